@@ -1,0 +1,192 @@
+//! What a computation may spend, what it did spend, and how it says so.
+//!
+//! Every long function of the core takes a [`Watch`], reports [`Progress`] to it and stops when it says
+//! so; every result carries [`Work`] (what was counted) and [`Achieved`] (what was reached).
+
+use std::ops::{AddAssign, ControlFlow};
+
+use serde::Serialize;
+
+/// How far one stage has come: `done` of `total` units of its own choosing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    pub stage: &'static str,
+    pub done: usize,
+    pub total: usize,
+}
+
+/// Called from inside core loops, possibly from several threads at once; `Break` asks them to stop.
+pub type Watch<'a> = &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync);
+
+/// A watch that never stops anything.
+#[must_use]
+pub fn unwatched(_: Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// The caller asked for a stop; nothing was produced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cancelled")]
+pub struct Cancelled;
+
+/// Reports to the watch and turns its `Break` into an error for `?`.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for a stop.
+pub fn report(
+    watch: Watch,
+    stage: &'static str,
+    done: usize,
+    total: usize,
+) -> Result<(), Cancelled> {
+    match watch(Progress { stage, done, total }) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(Cancelled),
+    }
+}
+
+/// Work counted by the core: tests and the speed-against-accuracy trade lean on these, not on a clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Work {
+    /// Stiffness matrices assembled.
+    pub assemblies: u64,
+    /// Sparse factorizations.
+    pub factorizations: u64,
+    /// Right-hand sides solved.
+    pub solves: u64,
+    /// Entries of kernel matrices evaluated.
+    pub kernel_evaluations: u64,
+    /// Regression models fitted (one a coordinate).
+    pub fits: u64,
+}
+
+impl AddAssign for Work {
+    fn add_assign(&mut self, other: Self) {
+        self.assemblies += other.assemblies;
+        self.factorizations += other.factorizations;
+        self.solves += other.solves;
+        self.kernel_evaluations += other.kernel_evaluations;
+        self.fits += other.fits;
+    }
+}
+
+/// Why a computation ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StopReason {
+    /// The tolerance asked for was reached.
+    Converged,
+    /// The effort allowed was spent first.
+    EffortSpent,
+    /// The data carry no more information (numerical rank reached).
+    Exhausted,
+}
+
+/// What was really reached, beside what was asked for.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Achieved {
+    /// In `unit`; absent where no estimate exists.
+    pub error_estimate: Option<f64>,
+    pub unit: &'static str,
+    pub effort: Work,
+    pub stop_reason: StopReason,
+    /// What a reader must know before trusting the number, in plain words.
+    pub notes: Vec<String>,
+}
+
+/// The three named trades; each only builds an explicit [`Budget`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Quality {
+    Draft,
+    #[default]
+    Standard,
+    Reference,
+}
+
+impl Quality {
+    pub const ALL: [Self; 3] = [Self::Draft, Self::Standard, Self::Reference];
+
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Draft => "draft",
+            Self::Standard => "standard",
+            Self::Reference => "reference",
+        }
+    }
+
+    /// The most each stage may spend. Counts in the project below these are kept.
+    #[must_use]
+    pub fn budget(self) -> Budget {
+        match self {
+            Self::Draft => Budget {
+                quality: self,
+                refinements: 0,
+                touches: 800,
+                test_touches: 300,
+                candidates: 60,
+                selection_touches: 400,
+                selection_candidates: 40,
+                folds: 3,
+                tuning_touches: 300,
+                svr_steps: 200_000,
+                svr_tolerance_mm: 0.05,
+            },
+            Self::Standard => Budget {
+                quality: self,
+                refinements: 0,
+                touches: usize::MAX,
+                test_touches: 800,
+                candidates: usize::MAX,
+                selection_touches: 800,
+                selection_candidates: 60,
+                folds: 5,
+                tuning_touches: 1000,
+                svr_steps: 1_000_000,
+                svr_tolerance_mm: 0.02,
+            },
+            Self::Reference => Budget {
+                quality: self,
+                refinements: 1,
+                touches: usize::MAX,
+                test_touches: 2000,
+                candidates: usize::MAX,
+                selection_touches: 1600,
+                selection_candidates: 120,
+                folds: 5,
+                tuning_touches: 1600,
+                svr_steps: 10_000_000,
+                svr_tolerance_mm: 0.005,
+            },
+        }
+    }
+}
+
+/// An explicit budget: the largest effort each stage may spend, and the tolerances it works to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Budget {
+    pub quality: Quality,
+    /// How often the part's mesh is split 1:4 before the model is built on it. The truth that accuracy
+    /// is quoted against always has one refinement more.
+    pub refinements: u32,
+    /// Most touches the model is asked for.
+    pub touches: usize,
+    /// Unseen touches that evaluation uses.
+    pub test_touches: usize,
+    /// Most candidates kept by the reduction.
+    pub candidates: usize,
+    /// Most touches that greedy SVR scores its candidates on.
+    pub selection_touches: usize,
+    /// Most candidates that greedy SVR scores.
+    pub selection_candidates: usize,
+    /// Folds of every cross-validation.
+    pub folds: usize,
+    /// Most touches that hyper-parameters are searched on.
+    pub tuning_touches: usize,
+    /// Most SMO steps of one fit.
+    pub svr_steps: usize,
+    /// Largest violation of the optimality conditions at which a fit counts as converged, in mm of
+    /// the target.
+    pub svr_tolerance_mm: f64,
+}

@@ -1,0 +1,555 @@
+//! A surface that has been checked: finite, indexed, welded, of one orientation, with its neighbourhoods.
+//!
+//! Positions are in metres. Everything after this layer may index without checking again.
+
+pub mod geodesic;
+pub mod locate;
+pub mod refine;
+pub mod sample;
+pub mod unroll;
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+
+use glam::DVec3;
+use serde::Serialize;
+
+/// Why a mesh was refused, with the place and the remedy.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    #[error("the mesh has no triangles: export it as a triangulated surface")]
+    Empty,
+    #[error(
+        "vertex {vertex} of the mesh is not a finite point: repair the mesh in the program that wrote it"
+    )]
+    NotFinite { vertex: usize },
+    #[error(
+        "triangle {triangle} refers to vertex {vertex}, but the mesh has {count} vertices: the file is damaged"
+    )]
+    BadIndex {
+        triangle: usize,
+        vertex: u64,
+        count: usize,
+    },
+    #[error(
+        "every triangle of the mesh has zero area: check the unit and the export of the mesh file"
+    )]
+    AllDegenerate,
+    #[error("the mesh has {count} separate bodies, so body {body} does not exist: choose 0 to {}", count - 1)]
+    NoSuchBody { body: usize, count: usize },
+    #[error(
+        "the mesh has {triangles} triangles, more than the {limit} this version handles: decimate it first"
+    )]
+    TooLarge { triangles: usize, limit: usize },
+}
+
+/// What was changed while a mesh was taken in; all zero for a clean one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RepairReport {
+    /// Vertices merged because their positions were equal to the bit.
+    pub welded_vertices: usize,
+    pub degenerate_triangles: usize,
+    pub duplicate_triangles: usize,
+    /// Triangles turned over so that neighbours agree on the outside.
+    pub flipped_triangles: usize,
+    /// Separate bodies found, of which one was kept.
+    pub bodies: usize,
+    /// Edges shared by more than two triangles: kept, the shell is joined there.
+    pub non_manifold_edges: usize,
+}
+
+/// An edge between two vertices (`a < b`) and the triangles on it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Edge {
+    pub a: u32,
+    pub b: u32,
+    pub triangles: Vec<u32>,
+}
+
+/// A validated triangle surface with its topology. Positions in metres; normals point outward as the
+/// triangles wind.
+#[derive(Clone, Debug)]
+pub struct TriMesh {
+    positions: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+    edges: Vec<Edge>,
+    /// Index into `edges` of the edge opposite each corner.
+    triangle_edges: Vec<[u32; 3]>,
+    vertex_triangles: Vec<Vec<u32>>,
+    vertex_normals: Vec<DVec3>,
+}
+
+const MAX_TRIANGLES: usize = 4_000_000;
+
+impl TriMesh {
+    /// Checks and takes in a raw surface: positions in metres, triangles by vertex index.
+    ///
+    /// Vertices equal to the bit are welded, triangles without area and repeated ones dropped,
+    /// orientation made consistent within the chosen body (`body` 0 is the one with the largest area).
+    ///
+    /// # Errors
+    /// [`MeshError`] for anything that cannot be a surface.
+    pub fn new(
+        positions: &[DVec3],
+        triangles: &[[u32; 3]],
+        body: usize,
+    ) -> Result<(Self, RepairReport), MeshError> {
+        check_raw(positions, triangles)?;
+        let mut report = RepairReport::default();
+        let (positions, triangles) = weld(positions, triangles, &mut report);
+        let triangles = drop_degenerate(&positions, triangles, &mut report)?;
+        let (positions, mut triangles) = keep_body(&positions, &triangles, body, &mut report)?;
+        orient(&mut triangles, &mut report);
+        let mesh = Self::from_checked(positions, triangles);
+        report.non_manifold_edges = mesh.edges.iter().filter(|e| e.triangles.len() > 2).count();
+        Ok((mesh, report))
+    }
+
+    /// Builds the neighbourhoods of a surface that is known to be sound.
+    pub(crate) fn from_checked(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+        let (edges, triangle_edges) = build_edges(&triangles);
+        let mut vertex_triangles = vec![Vec::new(); positions.len()];
+        for (t, tri) in triangles.iter().enumerate() {
+            for &v in tri {
+                vertex_triangles[v as usize].push(t as u32);
+            }
+        }
+        let vertex_normals = vertex_normals(&positions, &triangles);
+        Self {
+            positions,
+            triangles,
+            edges,
+            triangle_edges,
+            vertex_triangles,
+            vertex_normals,
+        }
+    }
+
+    #[must_use]
+    pub fn positions(&self) -> &[DVec3] {
+        &self.positions
+    }
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+    #[must_use]
+    pub fn edges(&self) -> &[Edge] {
+        &self.edges
+    }
+    #[must_use]
+    pub fn triangle_edges(&self) -> &[[u32; 3]] {
+        &self.triangle_edges
+    }
+    #[must_use]
+    pub fn vertex_triangles(&self) -> &[Vec<u32>] {
+        &self.vertex_triangles
+    }
+    /// Unit normals, averaged by corner angle.
+    #[must_use]
+    pub fn vertex_normals(&self) -> &[DVec3] {
+        &self.vertex_normals
+    }
+
+    /// The three corners of a triangle (m).
+    #[must_use]
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|v| self.positions[v as usize])
+    }
+
+    /// Unit normal of a facet.
+    #[must_use]
+    pub fn facet_normal(&self, triangle: u32) -> DVec3 {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
+    /// Area of a facet (m²).
+    #[must_use]
+    pub fn facet_area(&self, triangle: u32) -> f64 {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(c - a).length() / 2.0
+    }
+
+    /// Area of the whole surface (m²).
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        (0..self.triangles.len() as u32)
+            .map(|t| self.facet_area(t))
+            .sum()
+    }
+
+    /// Mean edge length (m): the element size that figures are quoted for.
+    #[must_use]
+    pub fn mean_edge(&self) -> f64 {
+        let sum: f64 = self
+            .edges
+            .iter()
+            .map(|e| self.positions[e.a as usize].distance(self.positions[e.b as usize]))
+            .sum();
+        sum / self.edges.len() as f64
+    }
+
+    /// Lower and upper corner of the axis-aligned box around the surface (m).
+    #[must_use]
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        self.positions.iter().fold(
+            (DVec3::INFINITY, DVec3::NEG_INFINITY),
+            |(lower, upper), &p| (lower.min(p), upper.max(p)),
+        )
+    }
+
+    /// Edges with a triangle on one side only: the free rims of the surface.
+    pub fn boundary_edges(&self) -> impl Iterator<Item = &Edge> {
+        self.edges.iter().filter(|e| e.triangles.len() == 1)
+    }
+
+    /// Vertices on a free rim.
+    #[must_use]
+    pub fn boundary_vertices(&self) -> Vec<bool> {
+        let mut boundary = vec![false; self.positions.len()];
+        for edge in self.boundary_edges() {
+            boundary[edge.a as usize] = true;
+            boundary[edge.b as usize] = true;
+        }
+        boundary
+    }
+
+    /// The position at barycentric coordinates of a triangle (m).
+    #[must_use]
+    pub fn point(&self, at: SurfacePoint) -> DVec3 {
+        let corners = self.corners(at.triangle);
+        (0..3).map(|i| corners[i] * at.barycentric[i]).sum()
+    }
+
+    /// The smoothed unit normal at a point, from the vertex normals.
+    #[must_use]
+    pub fn normal(&self, at: SurfacePoint) -> DVec3 {
+        let tri = self.triangles[at.triangle as usize];
+        let blend: DVec3 = (0..3)
+            .map(|i| self.vertex_normals[tri[i] as usize] * at.barycentric[i])
+            .sum();
+        blend
+            .try_normalize()
+            .unwrap_or_else(|| self.facet_normal(at.triangle))
+    }
+
+    /// Linear interpolation of a value given at the vertices.
+    #[must_use]
+    pub fn interpolate(&self, values: &[f64], at: SurfacePoint) -> f64 {
+        let tri = self.triangles[at.triangle as usize];
+        (0..3)
+            .map(|i| values[tri[i] as usize] * at.barycentric[i])
+            .sum()
+    }
+}
+
+/// A point of the surface: a triangle and the weights of its corners (they sum to one).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    pub triangle: u32,
+    pub barycentric: [f64; 3],
+}
+
+fn check_raw(positions: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), MeshError> {
+    if triangles.is_empty() {
+        return Err(MeshError::Empty);
+    }
+    if triangles.len() > MAX_TRIANGLES {
+        return Err(MeshError::TooLarge {
+            triangles: triangles.len(),
+            limit: MAX_TRIANGLES,
+        });
+    }
+    // Beyond this, squared lengths leave the range in which areas and stiffnesses mean anything.
+    if let Some(vertex) = positions
+        .iter()
+        .position(|p| !p.is_finite() || p.abs().max_element() > 1e9)
+    {
+        return Err(MeshError::NotFinite { vertex });
+    }
+    for (triangle, tri) in triangles.iter().enumerate() {
+        if let Some(&vertex) = tri.iter().find(|&&v| v as usize >= positions.len()) {
+            return Err(MeshError::BadIndex {
+                triangle,
+                vertex: u64::from(vertex),
+                count: positions.len(),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn weld(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    report: &mut RepairReport,
+) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let mut index: HashMap<[u64; 3], u32> = HashMap::with_capacity(positions.len());
+    let mut kept = Vec::with_capacity(positions.len());
+    let renumber: Vec<u32> = positions
+        .iter()
+        .map(|p| {
+            // Adding zero makes -0.0 and 0.0 one point.
+            let key = (*p + DVec3::ZERO).to_array().map(f64::to_bits);
+            *index.entry(key).or_insert_with(|| {
+                kept.push(*p);
+                (kept.len() - 1) as u32
+            })
+        })
+        .collect();
+    report.welded_vertices = positions.len() - kept.len();
+    let triangles = triangles
+        .iter()
+        .map(|t| t.map(|v| renumber[v as usize]))
+        .collect();
+    (kept, triangles)
+}
+
+fn drop_degenerate(
+    positions: &[DVec3],
+    triangles: Vec<[u32; 3]>,
+    report: &mut RepairReport,
+) -> Result<Vec<[u32; 3]>, MeshError> {
+    let mut seen = std::collections::HashSet::with_capacity(triangles.len());
+    let mut kept = Vec::with_capacity(triangles.len());
+    for tri in triangles {
+        let [a, b, c] = tri.map(|v| positions[v as usize]);
+        let longest = (b - a)
+            .length_squared()
+            .max((c - b).length_squared())
+            .max((a - c).length_squared());
+        // Relative, so that the test does not depend on the unit: a height below 1e-10 of the side.
+        if (b - a).cross(c - a).length() <= 1e-10 * longest {
+            report.degenerate_triangles += 1;
+            continue;
+        }
+        let mut key = tri;
+        key.sort_unstable();
+        if seen.insert(key) {
+            kept.push(tri);
+        } else {
+            report.duplicate_triangles += 1;
+        }
+    }
+    if kept.is_empty() {
+        return Err(MeshError::AllDegenerate);
+    }
+    Ok(kept)
+}
+
+/// Keeps one edge-connected body, by falling area, and only the vertices it uses.
+fn keep_body(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    body: usize,
+    report: &mut RepairReport,
+) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), MeshError> {
+    let labels = components(positions.len(), triangles);
+    let mut areas: BTreeMap<u32, f64> = BTreeMap::new();
+    for tri in triangles {
+        let [a, b, c] = tri.map(|v| positions[v as usize]);
+        *areas.entry(labels[tri[0] as usize]).or_default() += (b - a).cross(c - a).length();
+    }
+    let mut by_area: Vec<(u32, f64)> = areas.into_iter().collect();
+    by_area.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
+    report.bodies = by_area.len();
+    let &(label, _) = by_area.get(body).ok_or(MeshError::NoSuchBody {
+        body,
+        count: by_area.len(),
+    })?;
+    let mut used = vec![false; positions.len()];
+    let mut chosen: Vec<[u32; 3]> = Vec::new();
+    for tri in triangles.iter().filter(|t| labels[t[0] as usize] == label) {
+        tri.iter().for_each(|&v| used[v as usize] = true);
+        chosen.push(*tri);
+    }
+    // In their old order, so that a mesh that needs no repair keeps its numbers.
+    let mut renumber = vec![0; positions.len()];
+    let mut kept = Vec::new();
+    for v in (0..positions.len()).filter(|&v| used[v]) {
+        renumber[v] = kept.len() as u32;
+        kept.push(positions[v]);
+    }
+    for tri in &mut chosen {
+        *tri = tri.map(|v| renumber[v as usize]);
+    }
+    Ok((kept, chosen))
+}
+
+/// For each vertex the smallest vertex index it is connected to.
+pub(crate) fn components(vertices: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..vertices as u32).collect();
+    fn root(parent: &mut [u32], mut v: u32) -> u32 {
+        while parent[v as usize] != v {
+            parent[v as usize] = parent[parent[v as usize] as usize];
+            v = parent[v as usize];
+        }
+        v
+    }
+    for tri in triangles {
+        let first = root(&mut parent, tri[0]);
+        let low = tri[1..].iter().fold(first, |low, &v| {
+            let other = root(&mut parent, v);
+            let (low, high) = (low.min(other), low.max(other));
+            parent[high as usize] = low;
+            low
+        });
+        parent[first as usize] = low;
+    }
+    (0..vertices as u32).map(|v| root(&mut parent, v)).collect()
+}
+
+/// Turns triangles over until neighbours across every two-triangle edge agree, following the first
+/// triangle of the body; a closed body that ends up inside out is turned as a whole by the majority.
+fn orient(triangles: &mut [[u32; 3]], report: &mut RepairReport) {
+    let (edges, triangle_edges) = build_edges(triangles);
+    let runs = |tri: [u32; 3], a: u32, b: u32| (0..3).any(|i| tri[i] == a && tri[(i + 1) % 3] == b);
+    let mut visited = vec![false; triangles.len()];
+    let mut flipped = vec![false; triangles.len()];
+    for start in 0..triangles.len() {
+        if visited[start] {
+            continue;
+        }
+        visited[start] = true;
+        let mut members = vec![start];
+        let mut queue = VecDeque::from([start]);
+        while let Some(t) = queue.pop_front() {
+            for e in triangle_edges[t] {
+                let edge = &edges[e as usize];
+                if edge.triangles.len() != 2 {
+                    continue;
+                }
+                let other = edge.triangles[usize::from(edge.triangles[0] as usize == t)] as usize;
+                if visited[other] {
+                    continue;
+                }
+                visited[other] = true;
+                if runs(triangles[t], edge.a, edge.b) == runs(triangles[other], edge.a, edge.b) {
+                    triangles[other].swap(1, 2);
+                    flipped[other] = true;
+                }
+                members.push(other);
+                queue.push_back(other);
+            }
+        }
+        // The first triangle is as likely to be the wrong one: keep the side that most were on.
+        if 2 * members.iter().filter(|&&t| flipped[t]).count() > members.len() {
+            for &t in &members {
+                triangles[t].swap(1, 2);
+                flipped[t] = !flipped[t];
+            }
+        }
+    }
+    report.flipped_triangles = flipped.iter().filter(|&&f| f).count();
+}
+
+fn build_edges(triangles: &[[u32; 3]]) -> (Vec<Edge>, Vec<[u32; 3]>) {
+    let mut index: HashMap<(u32, u32), u32> = HashMap::with_capacity(triangles.len() * 3 / 2);
+    let mut edges: Vec<Edge> = Vec::with_capacity(triangles.len() * 3 / 2);
+    let triangle_edges = triangles
+        .iter()
+        .enumerate()
+        .map(|(t, tri)| {
+            std::array::from_fn(|corner| {
+                let (p, q) = (tri[(corner + 1) % 3], tri[(corner + 2) % 3]);
+                let (a, b) = (p.min(q), p.max(q));
+                let e = *index.entry((a, b)).or_insert_with(|| {
+                    edges.push(Edge {
+                        a,
+                        b,
+                        triangles: Vec::with_capacity(2),
+                    });
+                    (edges.len() - 1) as u32
+                });
+                edges[e as usize].triangles.push(t as u32);
+                e
+            })
+        })
+        .collect();
+    (edges, triangle_edges)
+}
+
+fn vertex_normals(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<DVec3> {
+    let mut normals = vec![DVec3::ZERO; positions.len()];
+    for tri in triangles {
+        let p = tri.map(|v| positions[v as usize]);
+        let normal = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
+        for i in 0..3 {
+            let (u, v) = (p[(i + 1) % 3] - p[i], p[(i + 2) % 3] - p[i]);
+            normals[tri[i] as usize] += normal * u.angle_between(v);
+        }
+    }
+    normals.iter().map(|n| n.normalize_or_zero()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square() -> (Vec<DVec3>, Vec<[u32; 3]>) {
+        let p = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        (
+            vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)],
+            vec![[0, 1, 2], [0, 2, 3]],
+        )
+    }
+
+    #[test]
+    fn a_clean_surface_needs_no_repair() {
+        let (p, t) = square();
+        let (mesh, report) = TriMesh::new(&p, &t, 0).unwrap();
+        assert_eq!(
+            report,
+            RepairReport {
+                bodies: 1,
+                ..Default::default()
+            }
+        );
+        assert!((mesh.area() - 1.0).abs() < 1e-15);
+        assert_eq!(mesh.boundary_edges().count(), 4);
+    }
+
+    #[test]
+    fn repairs_are_counted() {
+        let (mut p, mut t) = square();
+        p.push(p[2]); // a duplicate vertex …
+        t[1] = [0, 3, 4]; // … on a triangle that winds the other way
+        t.push([0, 0, 1]);
+        t.push([1, 2, 0]);
+        t.push([0, 1, 2]);
+        let (mesh, report) = TriMesh::new(&p, &t, 0).unwrap();
+        assert_eq!(
+            (report.welded_vertices, report.degenerate_triangles),
+            (1, 1)
+        );
+        assert_eq!(
+            (report.duplicate_triangles, report.flipped_triangles),
+            (2, 1)
+        );
+        assert!(mesh.facet_normal(0).dot(mesh.facet_normal(1)) > 0.99);
+    }
+
+    #[test]
+    fn what_is_no_surface_is_refused() {
+        let (p, t) = square();
+        assert_eq!(TriMesh::new(&p, &[], 0).unwrap_err(), MeshError::Empty);
+        let mut bad = p.clone();
+        bad[3].x = f64::NAN;
+        assert_eq!(
+            TriMesh::new(&bad, &t, 0).unwrap_err(),
+            MeshError::NotFinite { vertex: 3 }
+        );
+        assert!(matches!(
+            TriMesh::new(&p, &[[0, 1, 9]], 0).unwrap_err(),
+            MeshError::BadIndex { vertex: 9, .. }
+        ));
+        assert_eq!(
+            TriMesh::new(&[p[0]; 3], &[[0, 1, 2]], 0).unwrap_err(),
+            MeshError::AllDegenerate
+        );
+        assert!(matches!(
+            TriMesh::new(&p, &t, 1).unwrap_err(),
+            MeshError::NoSuchBody { count: 1, .. }
+        ));
+    }
+}

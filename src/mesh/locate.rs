@@ -1,0 +1,90 @@
+//! Finding places on a surface: the nearest point, and what a ray hits. The tree is parry's.
+
+use glam::DVec3;
+use parry3d_f64::query::{PointQueryWithLocation, Ray, details::local_ray_intersection_with_triangle};
+use parry3d_f64::shape::{CompositeShapeRef, Triangle, TriMesh as ParryMesh};
+
+use super::{SurfacePoint, TriMesh};
+
+/// A bounding-volume tree over one surface; as immutable as the surface it was built from.
+pub struct SurfaceIndex {
+    tree: ParryMesh,
+}
+
+impl SurfaceIndex {
+    /// # Panics
+    /// Never for a [`TriMesh`]: it has triangles and its indices were checked.
+    #[must_use]
+    pub fn new(mesh: &TriMesh) -> Self {
+        let tree = ParryMesh::new(mesh.positions().to_vec(), mesh.triangles().to_vec())
+            .expect("a validated mesh has triangles");
+        Self { tree }
+    }
+
+    /// The nearest point of the surface and how far it is (m).
+    #[must_use]
+    pub fn nearest(&self, point: DVec3) -> (SurfacePoint, f64) {
+        let (projection, (triangle, location)) =
+            self.tree.project_local_point_and_get_location(point, false);
+        let barycentric = location
+            .barycentric_coordinates()
+            .unwrap_or([1.0 / 3.0; 3]);
+        let at = SurfacePoint {
+            triangle,
+            barycentric,
+        };
+        (at, projection.point.distance(point))
+    }
+
+    /// The first point a ray meets and its distance in units of `direction`.
+    #[must_use]
+    pub fn ray(&self, origin: DVec3, direction: DVec3) -> Option<(SurfacePoint, f64)> {
+        let ray = Ray::new(origin, direction);
+        let (triangle, time) =
+            CompositeShapeRef(&self.tree).cast_local_ray(&ray, f64::MAX, false)?;
+        let Triangle { a, b, c } = self.tree.triangle(triangle);
+        let barycentric = local_ray_intersection_with_triangle(a, b, c, &ray)
+            .map_or([1.0 / 3.0; 3], |(_, weights)| weights.to_array());
+        let at = SurfacePoint {
+            triangle,
+            barycentric,
+        };
+        Some((at, time))
+    }
+
+    /// Triangles whose bounds come within `radius` of a point (m), in rising order.
+    #[must_use]
+    pub fn triangles_near(&self, point: DVec3, radius: f64) -> Vec<u32> {
+        let reach = DVec3::splat(radius);
+        let (lower, upper) = (point - reach, point + reach);
+        let near = self.tree.bvh().leaves(|node| {
+            let aabb = node.aabb();
+            aabb.mins.cmple(upper).all() && aabb.maxs.cmpge(lower).all()
+        });
+        let mut triangles: Vec<u32> = near.collect();
+        triangles.sort_unstable();
+        triangles
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_and_projections_land_where_they_should() {
+        let p = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let (mesh, _) = TriMesh::new(&p, &[[0, 1, 2]], 0).unwrap();
+        let index = SurfaceIndex::new(&mesh);
+        let (at, t) = index
+            .ray(DVec3::new(0.2, 0.3, 2.0), DVec3::NEG_Z)
+            .unwrap();
+        assert!((t - 2.0).abs() < 1e-12);
+        assert!(mesh.point(at).distance(DVec3::new(0.2, 0.3, 0.0)) < 1e-12);
+        let (at, d) = index.nearest(DVec3::new(-1.0, 0.5, 0.0));
+        assert!((d - 1.0).abs() < 1e-12);
+        assert!(mesh.point(at).distance(DVec3::new(0.0, 0.5, 0.0)) < 1e-12);
+        assert!(index.ray(DVec3::splat(2.0), DVec3::X).is_none());
+        assert_eq!(index.triangles_near(DVec3::new(1.2, 0.0, 0.0), 0.3), [0]);
+    }
+}

@@ -1,0 +1,154 @@
+//! A tube-like part laid flat: the angle about an axis becomes a length, the height stays.
+
+use glam::{DVec2, DVec3};
+
+use super::TriMesh;
+use super::locate::SurfaceIndex;
+use super::SurfacePoint;
+
+/// Cylinder coordinates about an axis of the part. `s` runs from 0 to the circumference at the mean
+/// radius, with the seam opposite to `zero`; lengths in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unrolling {
+    pub origin: DVec3,
+    pub axis: DVec3,
+    /// Direction of the middle of the unrolled strip, at right angles to the axis.
+    pub zero: DVec3,
+    /// Mean radius (m): what turns an angle into a length.
+    pub radius: f64,
+    /// Lowest and highest point along the axis, relative to `origin` (m).
+    pub height: (f64, f64),
+}
+
+/// The axis a project names for unrolling.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    X,
+    Y,
+    #[default]
+    Z,
+}
+
+impl Axis {
+    #[must_use]
+    pub fn direction(self) -> DVec3 {
+        match self {
+            Self::X => DVec3::X,
+            Self::Y => DVec3::Y,
+            Self::Z => DVec3::Z,
+        }
+    }
+
+    /// Where the middle of the strip points.
+    fn zero(self) -> DVec3 {
+        match self {
+            Self::X => DVec3::Y,
+            Self::Y => DVec3::Z,
+            Self::Z => DVec3::X,
+        }
+    }
+}
+
+impl Unrolling {
+    /// The axis runs through the centre of the circle that fits the vertices best (least squares,
+    /// Kåsa), so that an open arc is unrolled about its own centre.
+    #[must_use]
+    pub fn of(mesh: &TriMesh, axis: Axis) -> Self {
+        let (direction, zero) = (axis.direction(), axis.zero());
+        let side = direction.cross(zero);
+        let flat: Vec<DVec2> = mesh
+            .positions()
+            .iter()
+            .map(|p| DVec2::new(p.dot(zero), p.dot(side)))
+            .collect();
+        let (centre, radius) = fit_circle(&flat);
+        let along = mesh.positions().iter().map(|p| p.dot(direction));
+        let height = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| {
+            (l.min(z), h.max(z))
+        });
+        Self {
+            origin: zero * centre.x + side * centre.y,
+            axis: direction,
+            zero,
+            radius,
+            height,
+        }
+    }
+
+    /// (s, z) of a point (m).
+    #[must_use]
+    pub fn flat(&self, p: DVec3) -> DVec2 {
+        let r = p - self.origin;
+        let angle = r.dot(self.axis.cross(self.zero)).atan2(r.dot(self.zero));
+        DVec2::new(
+            (angle + std::f64::consts::PI) * self.radius,
+            r.dot(self.axis),
+        )
+    }
+
+    /// The full turn as a length (m).
+    #[must_use]
+    pub fn circumference(&self) -> f64 {
+        std::f64::consts::TAU * self.radius
+    }
+
+    /// The outermost surface point at (s, z), if the part has one there.
+    #[must_use]
+    pub fn lift(&self, index: &SurfaceIndex, flat: DVec2) -> Option<SurfacePoint> {
+        let angle = flat.x / self.radius - std::f64::consts::PI;
+        let outward =
+            self.zero * angle.cos() + self.axis.cross(self.zero) * angle.sin();
+        let far = 100.0 * (self.radius + self.height.1 - self.height.0);
+        let start = self.origin + self.axis * flat.y + outward * far;
+        let (at, distance) = index.ray(start, -outward)?;
+        // Beyond the axis the ray would come out on the other side of the limb.
+        (distance < far).then_some(at)
+    }
+
+    /// A regular lattice of about `spacing` (m) in (s, z), carried onto the part: whole numbers of
+    /// columns and rows, half a step from the ends, row by row.
+    #[must_use]
+    pub fn lattice(&self, index: &SurfaceIndex, spacing: f64) -> Vec<SurfacePoint> {
+        let (length, tall) = (self.circumference(), self.height.1 - self.height.0);
+        let columns = (length / spacing).round().max(1.0) as usize;
+        let rows = (tall / spacing).round().max(1.0) as usize;
+        let (ds, dz) = (length / columns as f64, tall / rows as f64);
+        (0..rows)
+            .flat_map(|j| {
+                (0..columns).filter_map(move |i| {
+                    let flat = DVec2::new(
+                        (i as f64 + 0.5) * ds,
+                        self.height.0 + (j as f64 + 0.5) * dz,
+                    );
+                    self.lift(index, flat)
+                })
+            })
+            .collect()
+    }
+}
+
+fn fit_circle(points: &[DVec2]) -> (DVec2, f64) {
+    let n = points.len() as f64;
+    let mean = points.iter().sum::<DVec2>() / n;
+    let (mut uu, mut uv, mut vv, mut ur, mut vr) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for p in points {
+        let d = *p - mean;
+        let r = d.length_squared();
+        uu += d.x * d.x;
+        uv += d.x * d.y;
+        vv += d.y * d.y;
+        ur += d.x * r;
+        vr += d.y * r;
+    }
+    let det = uu * vv - uv * uv;
+    // Points on a line (a flat part seen edge-on) have no circle: keep their middle.
+    let offset = if det > 1e-9 * (uu + vv).powi(2) {
+        DVec2::new(ur * vv - vr * uv, vr * uu - ur * uv) / (2.0 * det)
+    } else {
+        DVec2::ZERO
+    };
+    let centre = mean + offset;
+    let radius = points.iter().map(|p| p.distance(centre)).sum::<f64>() / n;
+    (centre, radius)
+}
