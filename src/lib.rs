@@ -4,6 +4,14 @@
 //! clock, no thread of its own, no global random state. SI units throughout (m, N, Pa, strain as a ratio).
 
 pub mod budget;
+pub mod dataset;
+pub mod design;
 pub mod elasticity;
+pub mod evaluation;
+pub mod feasible;
 pub mod limb;
 pub mod mesh;
+pub mod pca;
+pub mod placement;
+pub mod project;
+pub mod regression;

@@ -1,0 +1,405 @@
+//! What every site reports under every touch, and where the touches were.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::budget::{Cancelled, Watch, Work};
+use crate::elasticity::observe::{Face, Observer, SiteFrame};
+use crate::elasticity::{ShellModel, Touch};
+use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
+
+/// What a site reports.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Signal {
+    /// Total displacement of the inside point, a magnitude (m): the paper's X.
+    Displacement,
+    /// Displacement along the outward normal, signed (m).
+    NormalDisplacement,
+    /// Strain along the gauge on the inside face: what a real gauge measures.
+    #[default]
+    Strain,
+}
+
+impl Signal {
+    pub const ALL: [Self; 3] = [Self::Displacement, Self::NormalDisplacement, Self::Strain];
+
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement",
+            Self::NormalDisplacement => "normal-displacement",
+            Self::Strain => "strain",
+        }
+    }
+}
+
+/// Values by rows: one row a site, one column a touch.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SignalMatrix {
+    columns: usize,
+    values: Vec<f64>,
+}
+
+impl SignalMatrix {
+    /// `values` by rows; their number must be a multiple of `columns`.
+    #[must_use]
+    pub fn new(columns: usize, values: Vec<f64>) -> Self {
+        debug_assert!(columns == 0 || values.len().is_multiple_of(columns));
+        Self { columns, values }
+    }
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.values.len().checked_div(self.columns).unwrap_or(0)
+    }
+    #[must_use]
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+    #[must_use]
+    pub fn row(&self, row: usize) -> &[f64] {
+        &self.values[row * self.columns..][..self.columns]
+    }
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+    /// Some of the rows, in the order given.
+    #[must_use]
+    pub fn select_rows(&self, rows: &[usize]) -> Self {
+        let values = rows.iter().flat_map(|&r| self.row(r)).copied().collect();
+        Self::new(self.columns, values)
+    }
+    /// Some of the columns, in the order given.
+    #[must_use]
+    pub fn select_columns(&self, columns: &[usize]) -> Self {
+        let values = (0..self.rows())
+            .flat_map(|r| columns.iter().map(move |&c| self.row(r)[c]))
+            .collect();
+        Self::new(columns.len(), values)
+    }
+}
+
+/// A possible gauge position on the inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Site {
+    /// On the mid-surface (m).
+    pub position: DVec3,
+    /// Outward unit normal.
+    pub normal: DVec3,
+    /// Unit direction in the surface in which the strain is largest over the touches (rms).
+    pub direction: DVec3,
+    /// Rms over the touches of the strain along `direction`, inside face.
+    pub rms_strain: f64,
+    /// Largest principal strain over the touches (absolute), inside face: no direction reads more.
+    pub peak_strain: f64,
+}
+
+/// Signals of sites under touches.
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    pub signal: Signal,
+    pub sites: Vec<Site>,
+    pub touches: Vec<Touch>,
+    /// Sites × touches; m or strain.
+    pub x: SignalMatrix,
+    pub work: Work,
+}
+
+impl Dataset {
+    /// Touch positions in millimetres: the targets that inference learns.
+    #[must_use]
+    pub fn targets_mm(&self) -> Vec<[f64; 3]> {
+        self.touches
+            .iter()
+            .map(|t| (t.position * 1000.0).to_array())
+            .collect()
+    }
+}
+
+/// `count` touches spread over the surface, at least `margin` (m) from free edges: evenly for a model
+/// to learn from, uniformly at random for tests.
+#[must_use]
+pub fn spread_touches(
+    mesh: &TriMesh,
+    count: usize,
+    seed: u64,
+    margin: f64,
+    even: bool,
+    tip: (f64, f64),
+) -> Vec<Touch> {
+    let rims: Vec<u32> = (0..)
+        .zip(mesh.boundary_vertices())
+        .filter_map(|(v, rim)| rim.then_some(v))
+        .collect();
+    let edge = geodesic::from_vertices(mesh, &rims, 2.0 * margin + 4.0 * mesh.mean_edge());
+    let far = |v: f64| if v.is_finite() { v } else { 1e3 };
+    let edge: Vec<f64> = edge.into_iter().map(far).collect();
+    let inside = |at: SurfacePoint| rims.is_empty() || mesh.interpolate(&edge, at) >= margin;
+    let points = if even {
+        sample::even(mesh, count, seed, inside)
+    } else {
+        sample::random(mesh, count, seed, inside)
+    };
+    let (force, tip_radius) = tip;
+    points
+        .into_iter()
+        .map(|at| Touch {
+            position: mesh.point(at),
+            normal: mesh.normal(at),
+            force,
+            tip_radius,
+        })
+        .collect()
+}
+
+/// Simulates all touches and reads the signal at all sites. Gauge directions follow the strain over
+/// these very touches.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn simulate(
+    model: &ShellModel,
+    touches: Vec<Touch>,
+    points: &[SurfacePoint],
+    signal: Signal,
+    watch: Watch,
+) -> Result<Dataset, Cancelled> {
+    let observer = Observer::new(model, points, Face::Inside);
+    let normals: Vec<DVec3> = observer.frames().iter().map(|f| f.z_axis).collect();
+    let blocks = model.solve_touches(&touches, watch, |first, rows| {
+        let width = (touches.len() - first).min(rows_width(rows, model));
+        BlockSignals::read(&observer, &normals, signal, rows, width)
+    })?;
+    let mut moments = vec![Moments::default(); points.len()];
+    for block in &blocks {
+        for (sum, part) in moments.iter_mut().zip(&block.moments) {
+            sum.add(part);
+        }
+    }
+    let angles: Vec<f64> = moments.iter().map(Moments::dominant_angle).collect();
+    let sites = points
+        .iter()
+        .zip(observer.frames())
+        .zip(moments.iter().zip(&angles))
+        .map(|((&at, frame), (m, &angle))| m.site(model.mesh.point(at), *frame, angle, touches.len()))
+        .collect();
+    let x = gather(&blocks, signal, &angles, touches.len());
+    let mut work = model.work();
+    work.solves += touches.len() as u64;
+    Ok(Dataset {
+        signal,
+        sites,
+        touches,
+        x,
+        work,
+    })
+}
+
+/// Reads the signal of given sites, with their directions as they are, under given touches: what a
+/// finer model says of a design made on a coarser one.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn measure(
+    model: &ShellModel,
+    touches: &[Touch],
+    sites: &[Site],
+    signal: Signal,
+    watch: Watch,
+) -> Result<SignalMatrix, Cancelled> {
+    let points: Vec<SurfacePoint> = sites.iter().map(|s| model.index.nearest(s.position).0).collect();
+    let observer = Observer::new(model, &points, Face::Inside);
+    let angles: Vec<f64> = sites
+        .iter()
+        .zip(observer.frames())
+        .map(|(s, f)| s.direction.dot(f.y_axis).atan2(s.direction.dot(f.x_axis)))
+        .collect();
+    let normals: Vec<DVec3> = observer.frames().iter().map(|f| f.z_axis).collect();
+    let blocks = model.solve_touches(touches, watch, |first, rows| {
+        let width = (touches.len() - first).min(rows_width(rows, model));
+        BlockSignals::read(&observer, &normals, signal, rows, width)
+    })?;
+    Ok(gather(&blocks, signal, &angles, touches.len()))
+}
+
+fn rows_width(rows: &[f64], model: &ShellModel) -> usize {
+    rows.len() / (6 * model.mesh.positions().len())
+}
+
+/// One block of touches, read at all sites.
+struct BlockSignals {
+    width: usize,
+    /// One row a site for the displacement signals, three (xx, yy, 2xy) for strain.
+    values: Vec<f64>,
+    moments: Vec<Moments>,
+}
+
+impl BlockSignals {
+    fn read(
+        observer: &Observer,
+        normals: &[DVec3],
+        signal: Signal,
+        rows: &[f64],
+        width: usize,
+    ) -> Self {
+        let strain = observer.strain(rows);
+        let stride = strain.len() / (3 * normals.len()).max(1);
+        let moments = strain
+            .chunks_exact(3 * stride)
+            .map(|s| Moments::of(&s[..width], &s[stride..][..width], &s[2 * stride..][..width]))
+            .collect();
+        let values = match signal {
+            Signal::Strain => strain
+                .chunks_exact(stride)
+                .flat_map(|row| &row[..width])
+                .copied()
+                .collect(),
+            Signal::Displacement | Signal::NormalDisplacement => {
+                let u = observer.displacement(rows);
+                u.chunks_exact(3 * stride)
+                    .zip(normals)
+                    .flat_map(|(u, &n)| {
+                        (0..width).map(move |k| {
+                            let u = DVec3::new(u[k], u[stride + k], u[2 * stride + k]);
+                            if signal == Signal::Displacement {
+                                u.length()
+                            } else {
+                                u.dot(n)
+                            }
+                        })
+                    })
+                    .collect()
+            }
+        };
+        Self {
+            width,
+            values,
+            moments,
+        }
+    }
+}
+
+/// Puts the blocks side by side, strain along the given angles.
+fn gather(blocks: &[BlockSignals], signal: Signal, angles: &[f64], touches: usize) -> SignalMatrix {
+    let mut values = Vec::with_capacity(angles.len() * touches);
+    for (site, angle) in angles.iter().enumerate() {
+        let (c, s) = (angle.cos(), angle.sin());
+        for block in blocks {
+            let w = block.width;
+            if signal == Signal::Strain {
+                let rows = &block.values[3 * site * w..][..3 * w];
+                values.extend((0..w).map(|k| {
+                    rows[k] * c * c + rows[w + k] * s * s + rows[2 * w + k] * c * s
+                }));
+            } else {
+                values.extend_from_slice(&block.values[site * w..][..w]);
+            }
+        }
+    }
+    SignalMatrix::new(touches, values)
+}
+
+/// Second moments over the touches of the mean strain a, and b, c of a + b cos 2φ + c sin 2φ.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    aa: f64,
+    bb: f64,
+    cc: f64,
+    ab: f64,
+    ac: f64,
+    bc: f64,
+    peak: f64,
+}
+
+impl Moments {
+    fn of(xx: &[f64], yy: &[f64], xy: &[f64]) -> Self {
+        let mut m = Self::default();
+        for k in 0..xx.len() {
+            let (a, b, c) = ((xx[k] + yy[k]) / 2.0, (xx[k] - yy[k]) / 2.0, xy[k] / 2.0);
+            m.aa += a * a;
+            m.bb += b * b;
+            m.cc += c * c;
+            m.ab += a * b;
+            m.ac += a * c;
+            m.bc += b * c;
+            m.peak = m.peak.max(a.abs() + b.hypot(c));
+        }
+        m
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.aa += other.aa;
+        self.bb += other.bb;
+        self.cc += other.cc;
+        self.ab += other.ab;
+        self.ac += other.ac;
+        self.bc += other.bc;
+        self.peak = self.peak.max(other.peak);
+    }
+
+    /// Σ strain² along φ.
+    fn along(&self, angle: f64) -> f64 {
+        let (c, s) = ((2.0 * angle).cos(), (2.0 * angle).sin());
+        self.aa
+            + self.bb * c * c
+            + self.cc * s * s
+            + 2.0 * (self.ab * c + self.ac * s + self.bc * c * s)
+    }
+
+    /// The angle in [0, π) with the largest sum: a scan, then golden section. The smallest of equals.
+    fn dominant_angle(&self) -> f64 {
+        const SCAN: usize = 90;
+        let step = PI / SCAN as f64;
+        let mut best = 0;
+        for k in 1..SCAN {
+            if self.along(k as f64 * step) > self.along(best as f64 * step) * (1.0 + 1e-9) {
+                best = k;
+            }
+        }
+        let golden = (5f64.sqrt() - 1.0) / 2.0;
+        let (mut low, mut high) = ((best as f64 - 1.0) * step, (best as f64 + 1.0) * step);
+        for _ in 0..40 {
+            let (l, h) = (high - golden * (high - low), low + golden * (high - low));
+            if self.along(l) >= self.along(h) {
+                high = h;
+            } else {
+                low = l;
+            }
+        }
+        f64::midpoint(low, high).rem_euclid(PI)
+    }
+
+    fn site(&self, position: DVec3, frame: SiteFrame, angle: f64, touches: usize) -> Site {
+        Site {
+            position,
+            normal: frame.z_axis,
+            direction: frame.x_axis * angle.cos() + frame.y_axis * angle.sin(),
+            rms_strain: (self.along(angle) / touches.max(1) as f64).max(0.0).sqrt(),
+            peak_strain: self.peak,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_direction_follows_the_largest_strain() {
+        // Uniaxial strain along 30°, of either sign: the gauge must lie along it.
+        let angle = PI / 6.0;
+        let (c, s) = (angle.cos(), angle.sin());
+        let e = [1.0, -2.0, 0.5];
+        let component = |k: f64| e.map(|e| e * k);
+        let m = Moments::of(
+            &component(c * c),
+            &component(s * s),
+            &component(2.0 * c * s),
+        );
+        assert!((m.dominant_angle() - angle).abs() < 1e-6);
+        assert!((m.peak - 2.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,609 @@
+//! The whole road, stage by stage: simulate, filter, reduce, select, evaluate.
+//!
+//! Each stage is a pure function of the ones before it, so that a caller can keep what has not changed.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use serde::Serialize;
+
+use crate::budget::{Achieved, Budget, Cancelled, StopReason, Watch, Work};
+use crate::dataset::{self, Dataset, SignalMatrix};
+use crate::elasticity::load::Touch;
+use crate::elasticity::support::{held_freedoms, supported_vertices};
+use crate::elasticity::{ElasticError, ShellModel};
+use crate::evaluation::{self, Candidate, Evaluation, Region, Trial, subset};
+use crate::feasible::{FeasibleInput, Feasibility, feasible};
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::refine::refine;
+use crate::mesh::unroll::Unrolling;
+use crate::mesh::{SurfacePoint, TriMesh, sample};
+use crate::pca::Pca;
+use crate::placement::candidates::{Candidates, reduce};
+use crate::placement::greedy_svr::GreedySvr;
+use crate::placement::{PlacementError, Pool, Selection, Selector, SelectorKind, pca_qr};
+use crate::project::{BadValue, Lattice, Project};
+use crate::regression::tune::Effort;
+
+/// Why a stage ended without a result.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DesignError {
+    #[error(transparent)]
+    Value(#[from] BadValue),
+    #[error(transparent)]
+    Elastic(#[from] ElasticError),
+    #[error(transparent)]
+    Placement(#[from] PlacementError),
+    #[error("no touch lands on the part: lower touch.edge_margin_mm ({margin_mm} mm) or check the unit of the mesh (the part is {size_mm:.3} mm across)")]
+    NoTouches { margin_mm: f64, size_mm: f64 },
+    #[error("{count} sites at a spacing of {spacing_mm} mm are more than the {limit} this version handles: widen sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.0} mm across)")]
+    TooManySites {
+        count: usize,
+        limit: usize,
+        spacing_mm: f64,
+        size_mm: f64,
+    },
+    #[error("no site fits on the part: lower sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.3} mm across)")]
+    NoRoom { size_mm: f64 },
+    #[error("{needed_gb:.1} GB would be needed for {sites} sites × {touches} touches, more than the {limit_gb:.0} GB this version allows: lower touch.count or widen sites.spacing_mm")]
+    TooLarge {
+        needed_gb: f64,
+        limit_gb: f64,
+        sites: usize,
+        touches: usize,
+    },
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl DesignError {
+    /// Whether somebody asked for the stop.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        matches!(
+            self,
+            Self::Cancelled(_)
+                | Self::Elastic(ElasticError::Cancelled(_))
+                | Self::Placement(PlacementError::Cancelled(_))
+                | Self::Placement(PlacementError::Signals(crate::pca::PcaError::Cancelled(_)))
+        )
+    }
+}
+
+const MOST_SITES: usize = 50_000;
+const MOST_GB: f64 = 8.0;
+/// Seeds of the independent draws, apart from each other.
+const TEST_SEED: u64 = 0x7e57;
+const NOISE_SEED: u64 = 0x0153;
+
+/// What a design starts from.
+#[derive(Clone)]
+pub struct Inputs {
+    pub project: Project,
+    pub part: Arc<TriMesh>,
+    /// One value a vertex of the part; absent when nothing was painted.
+    pub painted: Option<Arc<Vec<bool>>>,
+}
+
+/// The elastic stage: the mesh that was computed on, the sites on it and the dataset.
+pub struct Simulated {
+    pub mesh: Arc<TriMesh>,
+    pub points: Vec<SurfacePoint>,
+    pub dataset: Dataset,
+    pub unknowns: usize,
+    pub smallest_pivot: f64,
+    pub achieved: Achieved,
+}
+
+/// Lays out sites and touches and simulates them.
+///
+/// # Errors
+/// [`DesignError`] for values out of range and for parts that cannot be computed.
+pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simulated, DesignError> {
+    let project = &inputs.project;
+    project.check()?;
+    let mesh = refined(&inputs.part, budget.refinements);
+    let held = held_freedoms(&mesh, &project.supports());
+    let points = lay_out_sites(&mesh, project)?;
+    let touches = lay_out_touches(&mesh, project, budget)?;
+    check_memory(points.len(), touches.len())?;
+    let model = ShellModel::new(&mesh, project.section(), &held, watch)?;
+    let (unknowns, smallest_pivot) = (model.unknowns(), model.smallest_pivot());
+    let signal = project.gauge.signal;
+    let dataset = dataset::simulate(&model, touches, &points, signal, watch)?;
+    let notes = if dataset.touches.len() < project.touch.count {
+        vec![format!(
+            "{} touches instead of the project's {}: the budget of this quality.",
+            dataset.touches.len(),
+            project.touch.count
+        )]
+    } else {
+        Vec::new()
+    };
+    drop(model);
+    Ok(Simulated {
+        achieved: Achieved {
+            error_estimate: None,
+            unit: "",
+            effort: dataset.work,
+            stop_reason: StopReason::Converged,
+            notes,
+        },
+        mesh,
+        points,
+        dataset,
+        unknowns,
+        smallest_pivot,
+    })
+}
+
+fn refined(part: &Arc<TriMesh>, times: u32) -> Arc<TriMesh> {
+    (0..times).fold(Arc::clone(part), |mesh, _| Arc::new(refine(&mesh)))
+}
+
+fn size_mm(mesh: &TriMesh) -> f64 {
+    let (lower, upper) = mesh.bounds();
+    (upper - lower).length() * 1000.0
+}
+
+/// The sites of a project on a mesh.
+///
+/// # Errors
+/// [`DesignError`] where there would be none or far too many.
+pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoint>, DesignError> {
+    let spacing = project.sites.spacing_mm * 1e-3;
+    let estimate = mesh.area() / (spacing * spacing);
+    if estimate > MOST_SITES as f64 {
+        return Err(DesignError::TooManySites {
+            count: estimate as usize,
+            limit: MOST_SITES,
+            spacing_mm: project.sites.spacing_mm,
+            size_mm: size_mm(mesh),
+        });
+    }
+    let points = match project.sites.lattice {
+        Lattice::Even => {
+            sample::even(mesh, estimate.round() as usize, project.budget.seed, |_| true)
+        }
+        Lattice::Unrolled => {
+            Unrolling::of(mesh, project.part.axis).lattice(&SurfaceIndex::new(mesh), spacing)
+        }
+    };
+    if points.is_empty() {
+        return Err(DesignError::NoRoom { size_mm: size_mm(mesh) });
+    }
+    Ok(points)
+}
+
+fn lay_out_touches(mesh: &TriMesh, project: &Project, budget: &Budget) -> Result<Vec<Touch>, DesignError> {
+    let count = project.touch.count.min(budget.touches);
+    touches_on(mesh, project, count, project.budget.seed, true)
+}
+
+fn touches_on(
+    mesh: &TriMesh,
+    project: &Project,
+    count: usize,
+    seed: u64,
+    even: bool,
+) -> Result<Vec<Touch>, DesignError> {
+    let margin = project.touch.edge_margin_mm * 1e-3;
+    let touches = dataset::spread_touches(mesh, count, seed, margin, even, project.tip());
+    if touches.is_empty() {
+        return Err(DesignError::NoTouches {
+            margin_mm: project.touch.edge_margin_mm,
+            size_mm: size_mm(mesh),
+        });
+    }
+    Ok(touches)
+}
+
+fn check_memory(sites: usize, touches: usize) -> Result<(), DesignError> {
+    // Three strain components a site and touch while they are gathered, and the signal itself.
+    let needed_gb = (sites * touches * 4 * size_of::<f64>()) as f64 / 1e9;
+    if needed_gb > MOST_GB {
+        return Err(DesignError::TooLarge {
+            needed_gb,
+            limit_gb: MOST_GB,
+            sites,
+            touches,
+        });
+    }
+    Ok(())
+}
+
+/// Filters the sites.
+#[must_use]
+pub fn filter(inputs: &Inputs, simulated: &Simulated) -> Feasibility {
+    let mesh = &simulated.mesh;
+    let held = held_freedoms(mesh, &inputs.project.supports());
+    let painted = inputs
+        .painted
+        .as_ref()
+        .map(|mask| painted_sites(&inputs.part, mask, &simulated.dataset));
+    feasible(
+        &FeasibleInput {
+            mesh,
+            index: &SurfaceIndex::new(mesh),
+            supported: &supported_vertices(&held),
+            points: &simulated.points,
+            sites: &simulated.dataset.sites,
+            painted: painted.as_deref(),
+        },
+        &inputs.project.feasible_rules(),
+    )
+}
+
+/// Whether each site lies where the mask (one value a vertex of the part) is mostly set.
+fn painted_sites(part: &TriMesh, mask: &[bool], dataset: &Dataset) -> Vec<bool> {
+    let index = SurfaceIndex::new(part);
+    let values: Vec<f64> = mask.iter().map(|&m| f64::from(u8::from(m))).collect();
+    dataset
+        .sites
+        .iter()
+        .map(|site| part.interpolate(&values, index.nearest(site.position).0) >= 0.5)
+        .collect()
+}
+
+/// The reduction stage: candidates among the feasible sites, and the components they came from.
+pub struct Reduced {
+    pub feasible: Vec<usize>,
+    /// Signals of the feasible sites.
+    pub x: SignalMatrix,
+    pub pca: Pca,
+    pub candidates: Candidates,
+    /// Candidates as numbered in the dataset, in the order of the pivots.
+    pub sites: Vec<usize>,
+}
+
+/// Reduces the feasible sites to candidates.
+///
+/// # Errors
+/// [`DesignError`] where nothing is feasible.
+pub fn reduce_sites(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    feasibility: &Feasibility,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Reduced, DesignError> {
+    let feasible = feasibility.sites();
+    let sensors = inputs.project.selection.sensors;
+    if feasible.is_empty() {
+        return Err(PlacementError::NoSites.into());
+    }
+    if sensors > feasible.len() {
+        return Err(PlacementError::TooFewSites {
+            wanted: sensors,
+            available: feasible.len(),
+        }
+        .into());
+    }
+    let x = simulated.dataset.x.select_rows(&feasible);
+    let pca = Pca::new(&x, watch).map_err(PlacementError::from)?;
+    let limit = budget.candidates.max(sensors);
+    let mut candidates = reduce(&x, &pca, inputs.project.reduction(), limit, watch)?;
+    if candidates.rows.len() < sensors {
+        // The variance asked for needs fewer sites than there are gauges to place.
+        candidates.rows = pca.pivots(sensors.min(pca.rank()));
+        candidates.notes.push(format!(
+            "Kept {} candidates, one a gauge: the variance asked for needs fewer.",
+            candidates.rows.len()
+        ));
+    }
+    let sites = candidates.rows.iter().map(|&r| feasible[r]).collect();
+    Ok(Reduced {
+        feasible,
+        x,
+        pca,
+        candidates,
+        sites,
+    })
+}
+
+/// Runs one selector.
+///
+/// # Errors
+/// [`DesignError`] where the pool does not allow it.
+pub fn select(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    kind: SelectorKind,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Selection, DesignError> {
+    let targets = simulated.dataset.targets_mm();
+    let sensors = inputs.project.selection.sensors;
+    match kind {
+        SelectorKind::PcaQr => {
+            let pool = Pool {
+                x: &reduced.x,
+                targets: &targets,
+                sites: &reduced.feasible,
+            };
+            Ok(pca_qr::from_components(&reduced.pca, &pool, sensors, watch)?)
+        }
+        SelectorKind::GreedySvr => {
+            let limit = budget.selection_candidates.max(sensors);
+            let sites = if reduced.sites.len() > limit {
+                let rows = reduced.pca.pivots(limit);
+                rows.iter().map(|&r| reduced.feasible[r]).collect()
+            } else {
+                reduced.sites.clone()
+            };
+            let touches = subset(targets.len(), budget.selection_touches);
+            let x = simulated.dataset.x.select_rows(&sites).select_columns(&touches);
+            let targets: Vec<[f64; 3]> = touches.iter().map(|&t| targets[t]).collect();
+            let pool = Pool {
+                x: &x,
+                targets: &targets,
+                sites: &sites,
+            };
+            let selector = GreedySvr {
+                hyper: inputs.project.hyper(),
+                folds: budget.folds,
+                seed: inputs.project.budget.seed,
+                effort: Effort {
+                    tolerance: budget.svr_tolerance_mm,
+                    max_steps: budget.svr_steps,
+                },
+            };
+            let mut selection = selector.select(&pool, sensors, watch)?;
+            selection.achieved.notes.push(format!(
+                "Scored on {} of {} touches and {} of {} candidates.",
+                touches.len(),
+                simulated.dataset.touches.len(),
+                sites.len(),
+                reduced.sites.len()
+            ));
+            Ok(selection)
+        }
+    }
+}
+
+/// The judge: a model of half the element size, with touches of its own.
+pub struct Truth {
+    pub touches: Vec<Touch>,
+    pub regions: Vec<Region>,
+    /// Element size of the truth (mm).
+    pub element_mm: f64,
+    pub work: Work,
+    /// Dataset sites that were measured, rising, and their signals.
+    pub sites: Vec<usize>,
+    pub x: SignalMatrix,
+}
+
+/// Measures sites on the truth: a mesh of half the element size, test touches drawn uniformly at random
+/// with a seed of their own, so that they lie off any node and are nobody's training touches.
+///
+/// # Errors
+/// [`DesignError`] as for [`simulate`].
+pub fn truth(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    sites: &[usize],
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Truth, DesignError> {
+    let project = &inputs.project;
+    let mesh = refine(&simulated.mesh);
+    let held = held_freedoms(&mesh, &project.supports());
+    let seed = project.budget.seed.wrapping_add(TEST_SEED);
+    let touches = touches_on(&mesh, project, budget.test_touches, seed, false)?;
+    let model = ShellModel::new(&mesh, project.section(), &held, watch)?;
+    let mut rows = sites.to_vec();
+    rows.sort_unstable();
+    rows.dedup();
+    let chosen: Vec<_> = rows.iter().map(|&s| simulated.dataset.sites[s]).collect();
+    let x = dataset::measure(&model, &touches, &chosen, project.gauge.signal, watch)?;
+    let mut work = model.work();
+    work.solves += touches.len() as u64;
+    Ok(Truth {
+        regions: regions(project, &touches),
+        element_mm: mesh.mean_edge() * 1000.0,
+        touches,
+        work,
+        sites: rows,
+        x,
+    })
+}
+
+fn regions(project: &Project, touches: &[Touch]) -> Vec<Region> {
+    project
+        .evaluation
+        .regions
+        .iter()
+        .map(|region| {
+            let [a, b] = region.box_mm.map(DVec3::from_array);
+            let (lower, upper) = (a.min(b), a.max(b));
+            let inside = |t: &Touch| {
+                let p = t.position * 1000.0;
+                p.cmpge(lower).all() && p.cmple(upper).all()
+            };
+            Region {
+                name: region.name.clone(),
+                contains: touches.iter().map(inside).collect(),
+            }
+        })
+        .collect()
+}
+
+/// Judges selections, with all candidates as the baseline, on the truth.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn evaluate(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    selections: &[Selection],
+    truth: &Truth,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Evaluation, Cancelled> {
+    let row_of = |site: &usize| truth.sites.binary_search(site).ok();
+    let mut sets = Vec::new();
+    for selection in selections {
+        for set in &selection.sets {
+            sets.push(Candidate {
+                selector: selection.selector.name().to_owned(),
+                rows: set.sites.iter().filter_map(row_of).collect(),
+            });
+        }
+    }
+    sets.push(Candidate {
+        selector: "all-candidates".to_owned(),
+        rows: reduced.sites.iter().filter_map(row_of).collect(),
+    });
+    let train = simulated.dataset.x.select_rows(&truth.sites);
+    let test_targets: Vec<[f64; 3]> = truth
+        .touches
+        .iter()
+        .map(|t| (t.position * 1000.0).to_array())
+        .collect();
+    evaluation::evaluate(
+        &Trial {
+            signal: simulated.dataset.signal,
+            train: &train,
+            train_targets: &simulated.dataset.targets_mm(),
+            test: &truth.x,
+            test_targets: &test_targets,
+            regions: &truth.regions,
+            noise: inputs.project.gauge.noise_microstrain * 1e-6,
+            seed: inputs.project.budget.seed.wrapping_add(NOISE_SEED),
+        },
+        &sets,
+        budget,
+        watch,
+    )
+}
+
+/// Every site that the evaluation of some selections looks at.
+#[must_use]
+pub fn sites_to_judge(reduced: &Reduced, selections: &[Selection]) -> Vec<usize> {
+    let chosen = selections.iter().flat_map(|s| &s.sets).flat_map(|s| &s.sites);
+    reduced.sites.iter().chain(chosen).copied().collect()
+}
+
+/// Everything a design produced.
+pub struct Design {
+    pub budget: Budget,
+    pub simulated: Simulated,
+    pub feasibility: Feasibility,
+    pub reduced: Reduced,
+    /// The project's selector first.
+    pub selections: Vec<Selection>,
+    pub truth: Truth,
+    pub evaluation: Evaluation,
+    pub seconds: Vec<StageTime>,
+}
+
+/// Wall and processor seconds of one stage.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StageTime {
+    pub stage: &'static str,
+    pub seconds: f64,
+}
+
+impl Design {
+    /// The chosen set: the project's selector at its number of gauges.
+    #[must_use]
+    pub fn chosen(&self) -> &[usize] {
+        self.selections
+            .first()
+            .and_then(|s| s.sets.last())
+            .map_or(&[], |set| &set.sites)
+    }
+
+    /// All counted work.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        let mut work = self.simulated.dataset.work;
+        for selection in &self.selections {
+            work += selection.achieved.effort;
+        }
+        work += self.truth.work;
+        work += self.evaluation.work;
+        work
+    }
+
+    /// What the reader of any figure must know.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = self.simulated.achieved.notes.clone();
+        notes.extend(self.reduced.candidates.notes.iter().cloned());
+        for selection in &self.selections {
+            let title = selection.selector.title();
+            notes.extend(selection.achieved.notes.iter().map(|n| format!("{title}: {n}")));
+        }
+        if self.evaluation.rows.iter().any(|r| !r.converged) {
+            notes.push("Some regressions stopped at the effort allowed before they met their tolerance.".into());
+        }
+        notes
+    }
+}
+
+/// Runs the whole road. `clock` gives seconds since any fixed moment: the core has no clock of its own.
+///
+/// # Errors
+/// [`DesignError`] from the stage that could not end.
+pub fn run(
+    inputs: &Inputs,
+    kinds: &[SelectorKind],
+    budget: &Budget,
+    clock: &dyn Fn() -> f64,
+    watch: Watch,
+) -> Result<Design, DesignError> {
+    let mut times = Stopwatch {
+        clock,
+        last: clock(),
+        stages: Vec::new(),
+    };
+    let simulated = simulate(inputs, budget, watch)?;
+    times.lap("simulate");
+    let feasibility = filter(inputs, &simulated);
+    times.lap("filter");
+    let reduced = reduce_sites(inputs, &simulated, &feasibility, budget, watch)?;
+    times.lap("reduce");
+    let mut selections = Vec::new();
+    for &kind in kinds {
+        selections.push(select(inputs, &simulated, &reduced, kind, budget, watch)?);
+        times.lap(match kind {
+            SelectorKind::GreedySvr => "select greedy-svr",
+            SelectorKind::PcaQr => "select pca-qr",
+        });
+    }
+    let judged = sites_to_judge(&reduced, &selections);
+    let truth = truth(inputs, &simulated, &judged, budget, watch)?;
+    times.lap("truth");
+    let evaluation = evaluate(inputs, &simulated, &reduced, &selections, &truth, budget, watch)?;
+    times.lap("evaluate");
+    Ok(Design {
+        budget: *budget,
+        simulated,
+        feasibility,
+        reduced,
+        selections,
+        truth,
+        evaluation,
+        seconds: times.stages,
+    })
+}
+
+struct Stopwatch<'a> {
+    clock: &'a dyn Fn() -> f64,
+    last: f64,
+    stages: Vec<StageTime>,
+}
+
+impl Stopwatch<'_> {
+    fn lap(&mut self, stage: &'static str) {
+        let now = (self.clock)();
+        self.stages.push(StageTime {
+            stage,
+            seconds: now - self.last,
+        });
+        self.last = now;
+    }
+}

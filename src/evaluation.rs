@@ -1,0 +1,253 @@
+//! How well a set of gauges finds a touch that nobody trained on.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::budget::{Budget, Cancelled, Watch, Work, report};
+use crate::dataset::{Signal, SignalMatrix};
+use crate::regression::tune::{self, CrossValidation, Effort, Grid, distances};
+use crate::regression::{Hyper, PositionModel};
+
+/// A named part of the touches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    pub name: String,
+    /// One value a test touch.
+    pub contains: Vec<bool>,
+}
+
+/// Training on one model, judging on another: nothing here has seen the test touches.
+pub struct Trial<'a> {
+    pub signal: Signal,
+    /// Signals of the sites of interest under the training touches (sites × touches).
+    pub train: &'a SignalMatrix,
+    pub train_targets: &'a [[f64; 3]],
+    /// The same sites under the test touches, from the finer model.
+    pub test: &'a SignalMatrix,
+    pub test_targets: &'a [[f64; 3]],
+    pub regions: &'a [Region],
+    /// Standard deviation of the noise added to training and test strain.
+    pub noise: f64,
+    pub seed: u64,
+}
+
+/// Errors of one set of sites in one region (mm).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EvaluationRow {
+    /// Selector's name, or "all-candidates" for the baseline.
+    pub selector: String,
+    pub sensors: usize,
+    pub region: String,
+    /// Mean Euclidean error.
+    pub error_mm: f64,
+    pub median_mm: f64,
+    pub p95_mm: f64,
+    pub touches: usize,
+    pub hyper: Hyper,
+    /// Whether the regression met its tolerance.
+    pub converged: bool,
+}
+
+/// Settings are searched for these set sizes and for no others; a size between two takes the settings
+/// of the smaller.
+const TUNED_SIZES: [usize; 6] = [1, 2, 3, 5, 8, 13];
+
+/// A set to judge: whose it is and which rows of the trial's matrices it has.
+pub struct Candidate {
+    pub selector: String,
+    pub rows: Vec<usize>,
+}
+
+/// The outcome: rows by set and region, and each set's errors touch by touch (mm).
+pub struct Evaluation {
+    pub rows: Vec<EvaluationRow>,
+    pub errors: Vec<Vec<f64>>,
+    pub work: Work,
+}
+
+/// Judges sets of sites, each with a regression tuned on the training touches.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn evaluate(
+    trial: &Trial,
+    sets: &[Candidate],
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Evaluation, Cancelled> {
+    let noisy = Noisy::new(trial);
+    let mut evaluation = Evaluation {
+        rows: Vec::new(),
+        errors: Vec::new(),
+        work: Work::default(),
+    };
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let hypers = tune_sets(&noisy, trial, sets, budget, watch, &mut evaluation.work)?;
+    let results: Result<Vec<_>, Cancelled> = sets
+        .par_iter()
+        .zip(&hypers)
+        .map(|(set, hyper)| {
+            let so_far = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            report(watch, "Evaluating", so_far, sets.len())?;
+            Ok(judge(&noisy, trial, set, hyper, budget))
+        })
+        .collect();
+    for (rows, errors, work) in results? {
+        evaluation.rows.extend(rows);
+        evaluation.errors.push(errors);
+        evaluation.work += work;
+    }
+    Ok(evaluation)
+}
+
+/// The trial's signals with noise, the same noise for a site in every set it is part of.
+struct Noisy {
+    train: SignalMatrix,
+    test: SignalMatrix,
+}
+
+impl Noisy {
+    fn new(trial: &Trial) -> Self {
+        let noise = if trial.signal == Signal::Strain { trial.noise } else { 0.0 };
+        Self {
+            train: add_noise(trial.train, noise, trial.seed.wrapping_add(1)),
+            test: add_noise(trial.test, noise, trial.seed.wrapping_add(2)),
+        }
+    }
+}
+
+/// Adds Gaussian noise of a standard deviation; every site has a stream of its own.
+#[must_use]
+pub fn add_noise(x: &SignalMatrix, deviation: f64, seed: u64) -> SignalMatrix {
+    if deviation == 0.0 {
+        return x.clone();
+    }
+    let values = (0..x.rows())
+        .flat_map(|row| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(row as u64);
+            x.row(row)
+                .iter()
+                .map(move |v| v + deviation * normal(&mut rng))
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    SignalMatrix::new(x.columns(), values)
+}
+
+/// Standard normal, by Box and Muller.
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
+}
+
+fn tune_sets(
+    noisy: &Noisy,
+    trial: &Trial,
+    sets: &[Candidate],
+    budget: &Budget,
+    watch: Watch,
+    work: &mut Work,
+) -> Result<Vec<Hyper>, Cancelled> {
+    let validation = CrossValidation {
+        folds: budget.folds.min(3),
+        seed: trial.seed,
+        effort: tuning_effort(budget),
+    };
+    let columns = subset(trial.train_targets.len(), budget.tuning_touches);
+    let targets: Vec<[f64; 3]> = columns.iter().map(|&c| trial.train_targets[c]).collect();
+    let mut hypers: Vec<Hyper> = Vec::with_capacity(sets.len());
+    let mut known: Vec<(String, usize, Hyper)> = Vec::new();
+    for set in sets {
+        let size = set.rows.len();
+        let tuned = TUNED_SIZES.iter().copied().filter(|&t| t <= size).max().unwrap_or(size);
+        let reuse = known.iter().find(|k| k.0 == set.selector && k.1 == tuned && size != tuned);
+        let hyper = if let Some((_, _, hyper)) = reuse {
+            Hyper {
+                gamma: hyper.gamma * tuned as f64 / size as f64,
+                ..*hyper
+            }
+        } else {
+            let x = noisy.train.select_rows(&set.rows).select_columns(&columns);
+            let (search, cost) = tune::search(&x, &targets, &Grid::default(), &validation, watch)?;
+            *work += cost;
+            known.push((set.selector.clone(), size, search.best()));
+            search.best()
+        };
+        hypers.push(hyper);
+    }
+    Ok(hypers)
+}
+
+/// A search needs the order of the settings, not their last digit.
+fn tuning_effort(budget: &Budget) -> Effort {
+    Effort {
+        tolerance: budget.svr_tolerance_mm.max(0.1),
+        max_steps: budget.svr_steps.min(50_000),
+    }
+}
+
+/// At most `most` indices of `count`, evenly spaced: the touches come in no order.
+#[must_use]
+pub fn subset(count: usize, most: usize) -> Vec<usize> {
+    let kept = count.min(most);
+    (0..kept).map(|k| k * count / kept).collect()
+}
+
+fn judge(
+    noisy: &Noisy,
+    trial: &Trial,
+    set: &Candidate,
+    hyper: &Hyper,
+    budget: &Budget,
+) -> (Vec<EvaluationRow>, Vec<f64>, Work) {
+    let effort = Effort {
+        tolerance: budget.svr_tolerance_mm,
+        max_steps: budget.svr_steps,
+    };
+    let train = noisy.train.select_rows(&set.rows);
+    let model = PositionModel::train(&train, trial.train_targets, hyper, effort);
+    let predicted = model.predict(&noisy.test.select_rows(&set.rows));
+    let errors = distances(&predicted, trial.test_targets);
+    let everywhere = Region {
+        name: "all touches".into(),
+        contains: vec![true; errors.len()],
+    };
+    let rows = std::iter::once(&everywhere)
+        .chain(trial.regions)
+        .map(|region| row(set, region, &errors, hyper, model.converged().0))
+        .collect();
+    (rows, errors, model.work)
+}
+
+fn row(
+    set: &Candidate,
+    region: &Region,
+    errors: &[f64],
+    hyper: &Hyper,
+    converged: bool,
+) -> EvaluationRow {
+    let mut inside: Vec<f64> = errors
+        .iter()
+        .zip(&region.contains)
+        .filter_map(|(&e, &inside)| inside.then_some(e))
+        .collect();
+    inside.sort_by(f64::total_cmp);
+    let quantile = |q: f64| {
+        let last = inside.len().saturating_sub(1);
+        inside.get((q * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
+    };
+    EvaluationRow {
+        selector: set.selector.clone(),
+        sensors: set.rows.len(),
+        region: region.name.clone(),
+        error_mm: inside.iter().sum::<f64>() / inside.len() as f64,
+        median_mm: quantile(0.5),
+        p95_mm: quantile(0.95),
+        touches: inside.len(),
+        hyper: *hyper,
+        converged,
+    }
+}

@@ -1,0 +1,229 @@
+//! Principal components of the signals, and the sites that carry them: PCA with pivoted QR.
+//!
+//! K. Manohar et al., "Data-driven sparse sensor placement for reconstruction" (2018), with the paper's
+//! Algorithm 2: for each number of sensors the QR runs on as many components.
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par, Side};
+
+use crate::budget::{Cancelled, Watch, report};
+use crate::dataset::SignalMatrix;
+use crate::regression::Standardizer;
+
+/// Eigenvalues below this share of the largest are rounding: the numerical rank ends there.
+const RANK: f64 = 1e-12;
+
+/// Why there are no components.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PcaError {
+    #[error("no site's signal varies over the touches: nothing can be told apart")]
+    Constant,
+    #[error("the eigenvalues of the signals did not converge: check the dataset for values that are not finite")]
+    NoConvergence,
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Principal components of standardized signals.
+pub struct Pca {
+    /// Sites × components, by falling variance.
+    modes: Mat<f64>,
+    /// Variance of each component, in units of one site's.
+    pub variances: Vec<f64>,
+    sites: usize,
+}
+
+impl Pca {
+    /// Components of signals (sites × touches), standardized here, up to the numerical rank.
+    ///
+    /// # Errors
+    /// [`PcaError`] for signals without variance.
+    pub fn new(x: &SignalMatrix, watch: Watch) -> Result<Self, PcaError> {
+        report(watch, "Principal components", 0, 2)?;
+        let z = Standardizer::of(x).apply(x);
+        let (sites, touches) = (z.rows(), z.columns());
+        let matrix = MatRef::from_row_major_slice(z.values(), sites, touches);
+        // The smaller of the two Gram matrices has the same spectrum.
+        let by_sites = sites <= touches;
+        let gram = if by_sites { product(matrix) } else { product(matrix.transpose()) };
+        report(watch, "Principal components", 1, 2)?;
+        let eigen = gram
+            .self_adjoint_eigen(Side::Lower)
+            .map_err(|_| PcaError::NoConvergence)?;
+        let n = gram.nrows();
+        let values: Vec<f64> = (0..n).rev().map(|k| eigen.S().column_vector()[k]).collect();
+        let largest = values.first().copied().unwrap_or(0.0);
+        if largest.is_nan() || largest <= 0.0 {
+            return Err(PcaError::Constant);
+        }
+        let rank = values.iter().take_while(|&&v| v > RANK * largest).count();
+        let vectors = Mat::from_fn(n, rank, |i, k| eigen.U()[(i, n - 1 - k)]);
+        let modes = if by_sites {
+            vectors
+        } else {
+            let mut modes = Mat::<f64>::zeros(sites, rank);
+            matmul(modes.as_mut(), Accum::Replace, matrix, vectors.as_ref(), 1.0, Par::Seq);
+            Mat::from_fn(sites, rank, |i, k| modes[(i, k)] / values[k].sqrt())
+        };
+        report(watch, "Principal components", 2, 2)?;
+        Ok(Self {
+            modes,
+            variances: values[..rank].iter().map(|v| v / touches as f64).collect(),
+            sites,
+        })
+    }
+
+    /// Components that carry more than rounding.
+    #[must_use]
+    pub fn rank(&self) -> usize {
+        self.variances.len()
+    }
+
+    /// The sites that column-pivoted QR picks for `count` sensors from as many components, in the order
+    /// of the pivots; fewer where the rank ends first. Ties go to the lower index.
+    #[must_use]
+    pub fn pivots(&self, count: usize) -> Vec<usize> {
+        let k = count.min(self.rank());
+        // Column i holds site i's weights in the first k components.
+        let mut columns: Vec<Vec<f64>> = (0..self.sites)
+            .map(|i| (0..k).map(|c| self.modes[(i, c)]).collect())
+            .collect();
+        let mut chosen = Vec::with_capacity(k);
+        for _ in 0..k {
+            let norms: Vec<f64> = columns.iter().map(|c| dot(c, c)).collect();
+            let Some(best) = largest(&norms, &chosen) else {
+                break;
+            };
+            let length = norms[best].sqrt();
+            let direction: Vec<f64> = columns[best].iter().map(|v| v / length).collect();
+            for column in &mut columns {
+                let share = dot(column, &direction);
+                for (v, d) in column.iter_mut().zip(&direction) {
+                    *v -= share * d;
+                }
+            }
+            chosen.push(best);
+        }
+        chosen
+    }
+}
+
+/// The index of the largest value not yet chosen; of those equal to rounding the lowest.
+fn largest(values: &[f64], chosen: &[usize]) -> Option<usize> {
+    let mut best: Option<usize> = None;
+    for i in (0..values.len()).filter(|i| !chosen.contains(i)) {
+        if best.is_none_or(|b| values[i] > values[b] * (1.0 + 1e-10)) {
+            best = Some(i);
+        }
+    }
+    best.filter(|&b| values[b] > 0.0)
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+fn product(a: MatRef<f64>) -> Mat<f64> {
+    let mut c = Mat::zeros(a.nrows(), a.nrows());
+    matmul(c.as_mut(), Accum::Replace, a, a.transpose(), 1.0, Par::Seq);
+    c
+}
+
+/// How much of the held-out variance of all sites the kept ones leave unexplained.
+pub struct Reconstruction {
+    train: Mat<f64>,
+    held_out: Mat<f64>,
+    total: f64,
+}
+
+impl Reconstruction {
+    /// From signals (sites × touches): columns `train` to learn the linear map on, `test` to judge it.
+    #[must_use]
+    pub fn new(x: &SignalMatrix, train: &[usize], test: &[usize]) -> Self {
+        let known = x.select_columns(train);
+        let standardizer = Standardizer::of(&known);
+        let known = standardizer.apply(&known);
+        let unseen = standardizer.apply(&x.select_columns(test));
+        let gram = |m: &SignalMatrix| {
+            product(MatRef::from_row_major_slice(m.values(), m.rows(), m.columns()))
+        };
+        let held_out = gram(&unseen);
+        let total = (0..held_out.nrows()).map(|i| held_out[(i, i)]).sum();
+        Self {
+            train: gram(&known),
+            held_out,
+            total,
+        }
+    }
+
+    /// ‖X - W X_S‖² / ‖X‖² on the held-out touches, W by least squares on the others (standardized).
+    /// Absent where the kept sites are linearly dependent to rounding.
+    #[must_use]
+    pub fn unexplained(&self, kept: &[usize]) -> Option<f64> {
+        let (k, n) = (kept.len(), self.train.nrows());
+        let inner = Mat::from_fn(k, k, |i, j| self.train[(kept[i], kept[j])]);
+        let cross = Mat::from_fn(k, n, |i, j| self.train[(kept[i], j)]);
+        use faer::linalg::solvers::Solve;
+        let weights = inner.llt(Side::Lower).ok()?.solve(&cross);
+        let held_cross = Mat::from_fn(k, n, |i, j| self.held_out[(kept[i], j)]);
+        let held_inner = Mat::from_fn(k, k, |i, j| self.held_out[(kept[i], kept[j])]);
+        let spread = &held_inner * &weights;
+        // tr(X Xᵀ) - 2 tr(Wᵀ X_S Xᵀ) + tr(Wᵀ X_S X_Sᵀ W)
+        let mut rest = self.total;
+        for j in 0..n {
+            for i in 0..k {
+                rest += weights[(i, j)] * (spread[(i, j)] - 2.0 * held_cross[(i, j)]);
+            }
+        }
+        Some((rest / self.total).max(0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+
+    /// Three independent patterns over eight sites.
+    fn signals(touches: usize) -> SignalMatrix {
+        let wave = |i: usize, t: usize| {
+            let t = t as f64;
+            let parts = [(0.7 * t).sin(), (1.3 * t + 1.0).sin(), (2.9 * t).cos()];
+            parts[i % 3] * (1.0 + i as f64) + if i >= 6 { parts[0] } else { 0.0 }
+        };
+        let values = (0..8).flat_map(|i| (0..touches).map(move |t| wave(i, t))).collect();
+        SignalMatrix::new(touches, values)
+    }
+
+    #[test]
+    fn both_gram_matrices_give_the_same_picks() {
+        let (wide, tall) = (signals(40), signals(5));
+        let pca = Pca::new(&wide, &unwatched).unwrap();
+        assert_eq!(pca.rank(), 3);
+        assert_eq!(pca.pivots(8).len(), 3, "picks end at the numerical rank");
+        assert!(Pca::new(&tall, &unwatched).unwrap().rank() <= 4);
+        let mut kinds: Vec<usize> = pca.pivots(3).iter().map(|i| i % 3).collect();
+        kinds.sort_unstable();
+        assert_eq!(kinds, [0, 1, 2]);
+    }
+
+    #[test]
+    fn enough_sites_explain_all() {
+        let x = signals(40);
+        let (train, test): (Vec<usize>, Vec<usize>) = (0..40).partition(|t| t % 4 != 0);
+        let judge = Reconstruction::new(&x, &train, &test);
+        let pca = Pca::new(&x, &unwatched).unwrap();
+        let curve: Vec<f64> = (1..=3)
+            .map(|k| judge.unexplained(&pca.pivots(k)).unwrap())
+            .collect();
+        assert!(curve[0] > 0.3 && curve[0] < 0.9, "{curve:?}");
+        assert!(curve[2] < 1e-12 && curve[1] > curve[2], "{curve:?}");
+        assert!(judge.unexplained(&[0, 3]).is_none_or(|u| u > 0.3));
+    }
+
+    #[test]
+    fn constant_signals_are_named() {
+        let flat = SignalMatrix::new(3, vec![1.0; 6]);
+        assert_eq!(Pca::new(&flat, &unwatched).err(), Some(PcaError::Constant));
+    }
+}

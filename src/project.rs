@@ -1,0 +1,498 @@
+//! A project: everything a design depends on, as plain data in the units of its file.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::budget::Quality;
+use crate::dataset::Signal;
+use crate::elasticity::{Freedoms, Material, Section, Support};
+use crate::feasible::FeasibleRules;
+use crate::limb::BoxMm;
+use crate::mesh::unroll::Axis;
+use crate::placement::SelectorKind;
+use crate::placement::candidates::Reduction;
+use crate::regression::Hyper;
+
+/// Version of the file format this program writes and the newest it reads.
+pub const FORMAT: u32 = 1;
+
+const MM: f64 = 1e-3;
+const MICRO: f64 = 1e-6;
+
+/// A value that cannot be used, by the key it stands under.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{key} must be {rule}, but is {value}")]
+pub struct BadValue {
+    pub key: String,
+    pub rule: &'static str,
+    pub value: String,
+}
+
+/// The whole project.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Project {
+    pub format: u32,
+    pub part: Part,
+    #[serde(default)]
+    pub material: MaterialKeys,
+    #[serde(default, rename = "support")]
+    pub supports: Vec<SupportKeys>,
+    #[serde(default)]
+    pub touch: TouchKeys,
+    #[serde(default)]
+    pub sites: SiteKeys,
+    #[serde(default)]
+    pub gauge: GaugeKeys,
+    #[serde(default)]
+    pub feasible: FeasibleKeys,
+    #[serde(default)]
+    pub candidates: CandidateKeys,
+    #[serde(default)]
+    pub selection: SelectionKeys,
+    #[serde(default)]
+    pub evaluation: EvaluationKeys,
+    #[serde(default)]
+    pub budget: BudgetKeys,
+}
+
+/// Unit of a mesh file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Unit {
+    #[serde(rename = "mm")]
+    Millimetre,
+    #[serde(rename = "cm")]
+    Centimetre,
+    #[serde(rename = "m")]
+    Metre,
+    #[serde(rename = "in")]
+    Inch,
+}
+
+impl Unit {
+    pub const ALL: [Self; 4] = [Self::Millimetre, Self::Centimetre, Self::Metre, Self::Inch];
+
+    #[must_use]
+    pub fn metres(self) -> f64 {
+        match self {
+            Self::Millimetre => 1e-3,
+            Self::Centimetre => 1e-2,
+            Self::Metre => 1.0,
+            Self::Inch => 0.0254,
+        }
+    }
+
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Millimetre => "mm",
+            Self::Centimetre => "cm",
+            Self::Metre => "m",
+            Self::Inch => "in",
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// Path of the mesh, relative to the project file.
+    pub mesh: String,
+    /// Unit of the mesh; glTF is in metres by its specification and needs none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Unit>,
+    #[serde(default)]
+    pub body: usize,
+    #[serde(default)]
+    pub model: PartModel,
+    #[serde(default = "defaults::thickness")]
+    pub thickness_mm: f64,
+    /// The axis the part is unrolled about.
+    #[serde(default)]
+    pub axis: Axis,
+}
+
+/// How the mesh is meant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PartModel {
+    /// The mesh is the mid-surface of a shell.
+    #[default]
+    Shell,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MaterialKeys {
+    pub youngs_modulus_gpa: f64,
+    pub poissons_ratio: f64,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SupportKind {
+    /// No displacement, no rotation.
+    #[default]
+    Clamped,
+    /// No displacement.
+    Pinned,
+    /// A mirror plane, normal to `normal`.
+    Symmetry,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupportKeys {
+    #[serde(default)]
+    pub kind: SupportKind,
+    pub box_mm: BoxMm,
+    #[serde(default)]
+    pub normal: Axis,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TouchKeys {
+    pub force_n: f64,
+    pub tip_radius_mm: f64,
+    pub count: usize,
+    pub edge_margin_mm: f64,
+}
+
+/// How sites are laid out on the inside.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Lattice {
+    /// Spread evenly over any surface.
+    #[default]
+    Even,
+    /// Rows and columns in the unrolled view.
+    Unrolled,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SiteKeys {
+    pub spacing_mm: f64,
+    pub lattice: Lattice,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GaugeKeys {
+    pub signal: Signal,
+    pub noise_microstrain: f64,
+    pub range_microstrain: f64,
+    pub least_signal_to_noise: f64,
+    pub grid_length_mm: f64,
+    pub grid_width_mm: f64,
+    pub flatness_mm: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FeasibleKeys {
+    pub support_clearance_mm: f64,
+    pub edge_neighbours: usize,
+    pub edge_radius_mm: f64,
+    /// Name of the painted mask (one value a vertex) in the arrays beside the project file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub painted: Option<String>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CandidateKeys {
+    pub unexplained: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub count: Option<usize>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SelectionKeys {
+    pub selector: SelectorKind,
+    pub sensors: usize,
+    /// Settings of greedy SVR's regression (targets in mm, features standardized).
+    pub c_mm: f64,
+    pub epsilon_mm: f64,
+    pub gamma: f64,
+    /// The chosen sites, written by a design.
+    #[serde(rename = "site", skip_serializing_if = "Vec::is_empty")]
+    pub sites: Vec<ChosenSite>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChosenSite {
+    pub position_mm: [f64; 3],
+    pub direction: [f64; 3],
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EvaluationKeys {
+    /// Regions that errors are quoted for, beside all touches.
+    #[serde(rename = "region", skip_serializing_if = "Vec::is_empty")]
+    pub regions: Vec<RegionKeys>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RegionKeys {
+    pub name: String,
+    pub box_mm: BoxMm,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BudgetKeys {
+    pub quality: Quality,
+    pub seed: u64,
+}
+
+mod defaults {
+    pub fn thickness() -> f64 {
+        1.5
+    }
+}
+
+impl Default for MaterialKeys {
+    fn default() -> Self {
+        Self {
+            youngs_modulus_gpa: 1.7,
+            poissons_ratio: 0.35,
+        }
+    }
+}
+impl Default for TouchKeys {
+    fn default() -> Self {
+        Self {
+            force_n: 10.0,
+            tip_radius_mm: 5.0,
+            count: 4000,
+            edge_margin_mm: 2.4,
+        }
+    }
+}
+impl Default for SiteKeys {
+    fn default() -> Self {
+        Self {
+            spacing_mm: 2.1,
+            lattice: Lattice::Even,
+        }
+    }
+}
+impl Default for GaugeKeys {
+    fn default() -> Self {
+        Self {
+            signal: Signal::Strain,
+            noise_microstrain: 1.0,
+            range_microstrain: 30_000.0,
+            least_signal_to_noise: 3.0,
+            grid_length_mm: 5.0,
+            grid_width_mm: 2.0,
+            flatness_mm: 0.3,
+        }
+    }
+}
+impl Default for FeasibleKeys {
+    fn default() -> Self {
+        Self {
+            support_clearance_mm: 8.0,
+            edge_neighbours: 20,
+            edge_radius_mm: 2.1,
+            painted: None,
+        }
+    }
+}
+impl Default for CandidateKeys {
+    fn default() -> Self {
+        Self {
+            unexplained: 0.01,
+            count: None,
+        }
+    }
+}
+impl Default for SelectionKeys {
+    fn default() -> Self {
+        let hyper = Hyper::default();
+        Self {
+            selector: SelectorKind::GreedySvr,
+            sensors: 10,
+            c_mm: hyper.c,
+            epsilon_mm: hyper.epsilon,
+            gamma: hyper.gamma,
+            sites: Vec::new(),
+        }
+    }
+}
+impl Default for BudgetKeys {
+    fn default() -> Self {
+        Self {
+            quality: Quality::Standard,
+            seed: 0,
+        }
+    }
+}
+
+impl Project {
+    /// A project around a mesh, everything else by default and nothing held yet.
+    #[must_use]
+    pub fn around(mesh: &str, unit: Option<Unit>) -> Self {
+        Self {
+            format: FORMAT,
+            part: Part {
+                mesh: mesh.to_owned(),
+                unit,
+                body: 0,
+                model: PartModel::Shell,
+                thickness_mm: defaults::thickness(),
+                axis: Axis::Z,
+            },
+            material: MaterialKeys::default(),
+            supports: Vec::new(),
+            touch: TouchKeys::default(),
+            sites: SiteKeys::default(),
+            gauge: GaugeKeys::default(),
+            feasible: FeasibleKeys::default(),
+            candidates: CandidateKeys::default(),
+            selection: SelectionKeys::default(),
+            evaluation: EvaluationKeys::default(),
+            budget: BudgetKeys::default(),
+        }
+    }
+
+    #[must_use]
+    pub fn section(&self) -> Section {
+        Section {
+            material: Material {
+                youngs_modulus: self.material.youngs_modulus_gpa * 1e9,
+                poissons_ratio: self.material.poissons_ratio,
+            },
+            thickness: self.part.thickness_mm * MM,
+        }
+    }
+
+    #[must_use]
+    pub fn supports(&self) -> Vec<Support> {
+        let axis = |a: Axis| [Axis::X, Axis::Y, Axis::Z].iter().position(|&b| a == b);
+        self.supports
+            .iter()
+            .map(|s| {
+                let [a, b] = s.box_mm.map(|p| DVec3::from_array(p) * MM);
+                Support {
+                    lower: a.min(b),
+                    upper: a.max(b),
+                    held: match s.kind {
+                        SupportKind::Clamped => Freedoms::ALL,
+                        SupportKind::Pinned => Freedoms::DISPLACEMENTS,
+                        SupportKind::Symmetry => Freedoms::symmetry(axis(s.normal).unwrap_or(2)),
+                    },
+                }
+            })
+            .collect()
+    }
+
+    #[must_use]
+    pub fn feasible_rules(&self) -> FeasibleRules {
+        FeasibleRules {
+            support_clearance: self.feasible.support_clearance_mm * MM,
+            edge_neighbours: self.feasible.edge_neighbours,
+            edge_radius: self.feasible.edge_radius_mm * MM,
+            grid_length: self.gauge.grid_length_mm * MM,
+            grid_width: self.gauge.grid_width_mm * MM,
+            flatness: self.gauge.flatness_mm * MM,
+            noise: self.gauge.noise_microstrain * MICRO,
+            least_signal_to_noise: self.gauge.least_signal_to_noise,
+            range: self.gauge.range_microstrain * MICRO,
+        }
+    }
+
+    #[must_use]
+    pub fn reduction(&self) -> Reduction {
+        self.candidates
+            .count
+            .map_or(Reduction::Unexplained(self.candidates.unexplained), Reduction::Count)
+    }
+
+    #[must_use]
+    pub fn hyper(&self) -> Hyper {
+        Hyper {
+            c: self.selection.c_mm,
+            epsilon: self.selection.epsilon_mm,
+            gamma: self.selection.gamma,
+        }
+    }
+
+    /// Force (N) and tip radius (m).
+    #[must_use]
+    pub fn tip(&self) -> (f64, f64) {
+        (self.touch.force_n, self.touch.tip_radius_mm * MM)
+    }
+
+    /// Checks every number against its range.
+    ///
+    /// # Errors
+    /// [`BadValue`] for the first that cannot be used.
+    pub fn check(&self) -> Result<(), BadValue> {
+        let above = [
+            ("part.thickness_mm", self.part.thickness_mm),
+            ("material.youngs_modulus_gpa", self.material.youngs_modulus_gpa),
+            ("touch.force_n", self.touch.force_n),
+            ("touch.tip_radius_mm", self.touch.tip_radius_mm),
+            ("sites.spacing_mm", self.sites.spacing_mm),
+            ("gauge.range_microstrain", self.gauge.range_microstrain),
+            ("gauge.grid_length_mm", self.gauge.grid_length_mm),
+            ("gauge.grid_width_mm", self.gauge.grid_width_mm),
+            ("selection.c_mm", self.selection.c_mm),
+            ("selection.gamma", self.selection.gamma),
+        ];
+        for (key, value) in above {
+            check(key, "a number above zero", value, value > 0.0)?;
+        }
+        let least_zero = [
+            ("touch.edge_margin_mm", self.touch.edge_margin_mm),
+            ("gauge.noise_microstrain", self.gauge.noise_microstrain),
+            ("gauge.least_signal_to_noise", self.gauge.least_signal_to_noise),
+            ("gauge.flatness_mm", self.gauge.flatness_mm),
+            ("feasible.support_clearance_mm", self.feasible.support_clearance_mm),
+            ("feasible.edge_radius_mm", self.feasible.edge_radius_mm),
+            ("selection.epsilon_mm", self.selection.epsilon_mm),
+        ];
+        for (key, value) in least_zero {
+            check(key, "zero or more", value, value >= 0.0)?;
+        }
+        let nu = self.material.poissons_ratio;
+        check("material.poissons_ratio", "above -1 and below 0.5", nu, nu > -1.0 && nu < 0.5)?;
+        let share = self.candidates.unexplained;
+        check("candidates.unexplained", "above 0 and below 1", share, share > 0.0 && share < 1.0)?;
+        for (key, count, least) in [
+            ("touch.count", self.touch.count, 3),
+            ("selection.sensors", self.selection.sensors, 1),
+            ("candidates.count", self.candidates.count.unwrap_or(1), 1),
+        ] {
+            let rule = if least == 3 { "at least 3" } else { "at least 1" };
+            check(key, rule, count as f64, count >= least)?;
+        }
+        let boxes = self.supports.iter().map(|s| ("support.box_mm", &s.box_mm));
+        let regions = self.evaluation.regions.iter().map(|r| ("evaluation.region.box_mm", &r.box_mm));
+        for (key, corners) in boxes.chain(regions) {
+            for value in corners.iter().flatten() {
+                check(key, "made of finite numbers", *value, true)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check(key: &str, rule: &'static str, value: f64, ok: bool) -> Result<(), BadValue> {
+    if ok && value.is_finite() {
+        return Ok(());
+    }
+    Err(BadValue {
+        key: key.to_owned(),
+        rule,
+        value: value.to_string(),
+    })
+}

@@ -1,0 +1,294 @@
+//! A model for the three coordinates, and the search for its settings by cross-validation.
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::features::{Standardizer, gaussian, squared_distances};
+use super::svr::{self, Fit, SvrParams};
+use crate::budget::{Cancelled, Watch, Work, report};
+use crate::dataset::SignalMatrix;
+
+/// Settings of the regression; targets are in millimetres, features standardized.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hyper {
+    /// Bound of the coefficients (mm).
+    pub c: f64,
+    /// Half-width of the tube without loss (mm).
+    pub epsilon: f64,
+    /// Of the Gaussian kernel exp(-γ d²).
+    pub gamma: f64,
+}
+
+impl Default for Hyper {
+    /// What a trial found good with ten gauges on the bundled limb.
+    fn default() -> Self {
+        Self {
+            c: 200.0,
+            epsilon: 0.1,
+            gamma: 0.1,
+        }
+    }
+}
+
+/// Effort of one fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Tolerance of the optimality conditions (mm).
+    pub tolerance: f64,
+    pub max_steps: usize,
+}
+
+impl Hyper {
+    #[must_use]
+    pub fn params(&self, effort: Effort) -> SvrParams {
+        SvrParams {
+            c: self.c,
+            epsilon: self.epsilon,
+            tolerance: effort.tolerance,
+            max_steps: effort.max_steps,
+        }
+    }
+}
+
+/// Three fits, one a coordinate, on one kernel.
+#[derive(Clone, Debug)]
+pub struct PositionModel {
+    standardizer: Standardizer,
+    training: SignalMatrix,
+    gamma: f64,
+    fits: [Fit; 3],
+    pub work: Work,
+}
+
+impl PositionModel {
+    /// Trains on signals (sites × touches) and touch positions (mm).
+    #[must_use]
+    pub fn train(x: &SignalMatrix, targets: &[[f64; 3]], hyper: &Hyper, effort: Effort) -> Self {
+        let standardizer = Standardizer::of(x);
+        let training = standardizer.apply(x);
+        let kernel = gaussian(&squared_distances(&training, &training), hyper.gamma);
+        let params = hyper.params(effort);
+        let fit = |axis: usize| {
+            let y: Vec<f64> = targets.iter().map(|t| t[axis]).collect();
+            svr::fit(&kernel, &y, &params, None)
+        };
+        let fits: Vec<Fit> = [0, 1, 2].into_par_iter().map(fit).collect();
+        let work = Work {
+            kernel_evaluations: kernel.len() as u64,
+            fits: 3,
+            ..Work::default()
+        };
+        Self {
+            standardizer,
+            training,
+            gamma: hyper.gamma,
+            fits: fits.try_into().unwrap_or_else(|_| unreachable!("three axes")),
+            work,
+        }
+    }
+
+    /// Predicted positions (mm) for new signals (sites × touches).
+    #[must_use]
+    pub fn predict(&self, x: &SignalMatrix) -> Vec<[f64; 3]> {
+        let features = self.standardizer.apply(x);
+        let kernel = gaussian(&squared_distances(&features, &self.training), self.gamma);
+        let axes = [0, 1, 2].map(|a| svr::predict(&self.fits[a], &kernel));
+        (0..x.columns()).map(|t| axes.each_ref().map(|a| a[t])).collect()
+    }
+
+    /// Whether every fit met its tolerance, and the largest violation left (mm).
+    #[must_use]
+    pub fn converged(&self) -> (bool, f64) {
+        let gap = self.fits.iter().map(|f| f.gap).fold(0.0, f64::max);
+        (self.fits.iter().all(|f| f.converged), gap)
+    }
+}
+
+/// Euclidean distances between predicted and true positions (mm).
+#[must_use]
+pub fn distances(predicted: &[[f64; 3]], truth: &[[f64; 3]]) -> Vec<f64> {
+    let distance = |(p, t): (&[f64; 3], &[f64; 3])| {
+        (0..3).map(|a| (p[a] - t[a]).powi(2)).sum::<f64>().sqrt()
+    };
+    predicted.iter().zip(truth).map(distance).collect()
+}
+
+/// Disjoint folds over `count` touches, shuffled by the seed.
+#[must_use]
+pub fn folds(count: usize, folds: usize, seed: u64) -> Vec<Vec<usize>> {
+    let mut order: Vec<usize> = (0..count).collect();
+    order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+    let k = folds.clamp(2, count.max(2));
+    (0..k)
+        .map(|f| order.iter().copied().skip(f).step_by(k).collect())
+        .collect()
+}
+
+/// The split of one fold, with what training on it needs of the whole kernel.
+pub struct Fold {
+    pub train: Vec<usize>,
+    pub test: Vec<usize>,
+}
+
+impl Fold {
+    #[must_use]
+    pub fn all(count: usize, number: usize, seed: u64) -> Vec<Self> {
+        let parts = folds(count, number, seed);
+        (0..parts.len())
+            .map(|f| Self {
+                train: (0..parts.len())
+                    .filter(|&g| g != f)
+                    .flat_map(|g| parts[g].iter().copied())
+                    .collect(),
+                test: parts[f].clone(),
+            })
+            .collect()
+    }
+
+    /// Sub-matrix of a symmetric kernel over all touches (`n` × `n`).
+    #[must_use]
+    pub fn block(kernel: &[f64], n: usize, rows: &[usize], columns: &[usize]) -> Vec<f64> {
+        rows.iter()
+            .flat_map(|&r| columns.iter().map(move |&c| kernel[r * n + c]))
+            .collect()
+    }
+
+    /// Mean Euclidean error (mm) on the fold's test touches of fits on its training touches, starting
+    /// from and leaving behind the coefficients in `warm`.
+    #[must_use]
+    pub fn error(
+        &self,
+        kernel: &[f64],
+        targets: &[[f64; 3]],
+        params: &SvrParams,
+        warm: &mut Option<[Vec<f64>; 3]>,
+    ) -> f64 {
+        let n = targets.len();
+        let inner = Self::block(kernel, n, &self.train, &self.train);
+        let outer = Self::block(kernel, n, &self.test, &self.train);
+        let fits = [0, 1, 2].map(|axis| {
+            let y: Vec<f64> = self.train.iter().map(|&t| targets[t][axis]).collect();
+            let start = warm.as_ref().map(|w| w[axis].as_slice());
+            svr::fit(&inner, &y, params, start)
+        });
+        let axes = fits.each_ref().map(|f| svr::predict(f, &outer));
+        let predicted: Vec<[f64; 3]> = (0..self.test.len())
+            .map(|t| axes.each_ref().map(|a| a[t]))
+            .collect();
+        let truth: Vec<[f64; 3]> = self.test.iter().map(|&t| targets[t]).collect();
+        *warm = Some(fits.map(|f| f.beta));
+        let d = distances(&predicted, &truth);
+        d.iter().sum::<f64>() / d.len().max(1) as f64
+    }
+}
+
+/// One point of a search: the settings and their cross-validated error (mm).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Trial {
+    pub hyper: Hyper,
+    pub error_mm: f64,
+}
+
+/// The outcome of a search: the best settings and every trial, in order.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Search {
+    pub trials: Vec<Trial>,
+}
+
+impl Search {
+    /// The settings with the smallest error; of equals the first, which is the smoothest.
+    #[must_use]
+    pub fn best(&self) -> Hyper {
+        self.trials
+            .iter()
+            .min_by(|a, b| a.error_mm.total_cmp(&b.error_mm))
+            .map_or_else(Hyper::default, |t| t.hyper)
+    }
+}
+
+/// The values a search looks at. γ is multiplied by 10 / sensors, because the squared distance between
+/// standardized signals grows with their number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    pub c: Vec<f64>,
+    pub epsilon: Vec<f64>,
+    pub gamma: Vec<f64>,
+}
+
+impl Default for Grid {
+    fn default() -> Self {
+        Self {
+            c: vec![20.0, 200.0, 2000.0],
+            epsilon: vec![0.1, 0.5],
+            gamma: vec![0.01, 0.03, 0.1, 0.3, 1.0],
+        }
+    }
+}
+
+/// What cross-validation spends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CrossValidation {
+    pub folds: usize,
+    pub seed: u64,
+    pub effort: Effort,
+}
+
+/// Grid search by k-fold cross-validation on signals (sites × touches) and positions (mm).
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn search(
+    x: &SignalMatrix,
+    targets: &[[f64; 3]],
+    grid: &Grid,
+    validation: &CrossValidation,
+    watch: Watch,
+) -> Result<(Search, Work), Cancelled> {
+    let z = Standardizer::of(x).apply(x);
+    let squared = squared_distances(&z, &z);
+    let folds = Fold::all(targets.len(), validation.folds, validation.seed);
+    let relative = 10.0 / x.rows().max(1) as f64;
+    let pairs: Vec<(f64, f64)> = grid
+        .gamma
+        .iter()
+        .flat_map(|&g| grid.epsilon.iter().map(move |&e| (g * relative, e)))
+        .collect();
+    let total = pairs.len();
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let columns: Result<Vec<Vec<Trial>>, Cancelled> = pairs
+        .par_iter()
+        .map(|&(gamma, epsilon)| {
+            let kernel = gaussian(&squared, gamma);
+            let mut warm: Vec<Option<[Vec<f64>; 3]>> = vec![None; folds.len()];
+            let trials = grid
+                .c
+                .iter()
+                .map(|&c| {
+                    let so_far = done.load(std::sync::atomic::Ordering::Relaxed);
+                    report(watch, "Tuning the regression", so_far, total)?;
+                    let hyper = Hyper { c, epsilon, gamma };
+                    let params = hyper.params(validation.effort);
+                    let sum: f64 = folds
+                        .iter()
+                        .zip(&mut warm)
+                        .map(|(fold, warm)| fold.error(&kernel, targets, &params, warm))
+                        .sum();
+                    let error_mm = sum / folds.len() as f64;
+                    Ok(Trial { hyper, error_mm })
+                })
+                .collect();
+            done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            trials
+        })
+        .collect();
+    let trials: Vec<Trial> = columns?.into_iter().flatten().collect();
+    let work = Work {
+        kernel_evaluations: (squared.len() * total) as u64,
+        fits: (3 * folds.len() * trials.len()) as u64,
+        ..Work::default()
+    };
+    Ok((Search { trials }, work))
+}
