@@ -130,8 +130,8 @@ impl Quality {
                 selection_candidates: 40,
                 folds: 3,
                 tuning_touches: 300,
-                svr_steps: 200_000,
-                svr_tolerance_mm: 0.05,
+                svr_steps: 100_000,
+                svr_tolerance_mm: 0.1,
             },
             Self::Standard => Budget {
                 quality: self,
@@ -143,8 +143,8 @@ impl Quality {
                 selection_candidates: 60,
                 folds: 5,
                 tuning_touches: 1000,
-                svr_steps: 1_000_000,
-                svr_tolerance_mm: 0.02,
+                svr_steps: 300_000,
+                svr_tolerance_mm: 0.1,
             },
             Self::Reference => Budget {
                 quality: self,
@@ -157,7 +157,7 @@ impl Quality {
                 folds: 5,
                 tuning_touches: 1600,
                 svr_steps: 10_000_000,
-                svr_tolerance_mm: 0.005,
+                svr_tolerance_mm: 0.02,
             },
         }
     }

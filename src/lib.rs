@@ -4,11 +4,13 @@
 //! clock, no thread of its own, no global random state. SI units throughout (m, N, Pa, strain as a ratio).
 
 pub mod budget;
+pub mod cli;
 pub mod dataset;
 pub mod design;
 pub mod elasticity;
 pub mod evaluation;
 pub mod feasible;
+pub mod io;
 pub mod limb;
 pub mod mesh;
 pub mod pca;

@@ -1,1 +1,33 @@
-fn main(){}
+//! Maps arguments to commands and errors to exit codes: 0 done, 1 failed with a message, 2 wrong usage.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use hapdef::cli::{self, Cli, Command};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let outcome = match &cli.command {
+        Some(Command::Design(args)) => cli::design::run(args),
+        Some(Command::Simulate(args)) => cli::simulate::run(args),
+        Some(Command::Limb(args)) => cli::limb::run(args),
+        None => open_studio(&cli),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("hapdef: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(feature = "studio")]
+fn open_studio(_cli: &Cli) -> anyhow::Result<()> {
+    anyhow::bail!("not yet")
+}
+
+#[cfg(not(feature = "studio"))]
+fn open_studio(_cli: &Cli) -> anyhow::Result<()> {
+    anyhow::bail!("this build has no window (feature \"studio\"). Run `hapdef design --out DIR`, or see `hapdef --help`")
+}

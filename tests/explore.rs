@@ -10,7 +10,7 @@ use hapdef::budget::*; use hapdef::limb::*; use hapdef::project::*; use hapdef::
     let inputs = Inputs{project:p, part: Arc::new(mesh), painted: None};
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
-    let b = q.budget();
+    let mut b = q.budget(); if let Ok(r)=std::env::var("R") { b.refinements = r.parse().unwrap(); }
     let d = run(&inputs, &hapdef::placement::SelectorKind::ALL, &b, &clock, &unwatched).unwrap();
     println!("sites {} feasible {} taken {:?}", d.simulated.dataset.sites.len(), d.reduced.feasible.len(), d.feasibility.taken());
     println!("candidates {} curve {:?}", d.reduced.sites.len(), d.reduced.candidates.curve);

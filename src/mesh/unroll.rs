@@ -106,22 +106,15 @@ impl Unrolling {
         (distance < far).then_some(at)
     }
 
-    /// A regular lattice of about `spacing` (m) in (s, z), carried onto the part: whole numbers of
-    /// columns and rows, half a step from the ends, row by row.
+    /// A square lattice of `spacing` (m) in (s, z), carried onto the part, row by row: it begins half a
+    /// step from the seam and from the lower end.
     #[must_use]
     pub fn lattice(&self, index: &SurfaceIndex, spacing: f64) -> Vec<SurfacePoint> {
-        let (length, tall) = (self.circumference(), self.height.1 - self.height.0);
-        let columns = (length / spacing).round().max(1.0) as usize;
-        let rows = (tall / spacing).round().max(1.0) as usize;
-        let (ds, dz) = (length / columns as f64, tall / rows as f64);
-        (0..rows)
-            .flat_map(|j| {
-                (0..columns).filter_map(move |i| {
-                    let flat = DVec2::new(
-                        (i as f64 + 0.5) * ds,
-                        self.height.0 + (j as f64 + 0.5) * dz,
-                    );
-                    self.lift(index, flat)
+        let steps = |length: f64| (0..(length / spacing + 0.5).floor() as usize).map(move |i| (i as f64 + 0.5) * spacing);
+        steps(self.height.1 - self.height.0)
+            .flat_map(|z| {
+                steps(self.circumference()).filter_map(move |s| {
+                    self.lift(index, DVec2::new(s, self.height.0 + z))
                 })
             })
             .collect()

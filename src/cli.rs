@@ -1,0 +1,180 @@
+//! The command line: everything the studio computes, without a display.
+
+pub mod design;
+pub mod limb;
+pub mod progress;
+pub mod simulate;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::Context;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::budget::Quality;
+use crate::dataset::Signal;
+use crate::design::Inputs;
+use crate::io::mesh_file::{ENDINGS, read_mesh};
+use crate::io::project_file::{self, LoadedProject};
+use crate::placement::SelectorKind;
+use crate::project::{Project, Unit};
+
+/// Decides where a handful of strain gauges go inside a flexible robot limb.
+///
+/// Without a command it opens the studio on the bundled limb, or on a project or mesh.
+#[derive(Parser, Debug)]
+#[command(name = "hapdef", version, args_conflicts_with_subcommands = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// Project (NAME.hapdef.toml) or mesh (glb, gltf, obj, stl) to open in the studio.
+    pub file: Option<PathBuf>,
+    /// Unit of a mesh file that does not say its own.
+    #[arg(long)]
+    pub unit: Option<UnitArg>,
+}
+
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// The whole road: simulate, filter, reduce, select, evaluate, report.
+    Design(design::DesignArgs),
+    /// The elastic model only: writes the dataset.
+    Simulate(simulate::SimulateArgs),
+    /// Writes the bundled limb, or another of its family.
+    Limb(limb::LimbArgs),
+}
+
+/// What every command understands.
+#[derive(Args, Debug, Clone, Default)]
+pub struct Common {
+    /// Project or mesh; the bundled limb when left out.
+    pub project: Option<PathBuf>,
+    /// How much to spend: draft, standard or reference.
+    #[arg(long)]
+    pub quality: Option<QualityArg>,
+    /// Seed of every random draw.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Worker threads; all cores when left out. The result does not depend on it.
+    #[arg(long)]
+    pub threads: Option<usize>,
+    /// What the sites report.
+    #[arg(long)]
+    pub signal: Option<SignalArg>,
+    /// Unit of a mesh file that does not say its own.
+    #[arg(long)]
+    pub unit: Option<UnitArg>,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+macro_rules! named {
+    ($name:ident, $target:ty, $($variant:ident => $value:expr),+) => {
+        #[derive(ValueEnum, Debug, Clone, Copy)]
+        pub enum $name { $($variant),+ }
+        impl From<$name> for $target {
+            fn from(value: $name) -> Self { match value { $($name::$variant => $value),+ } }
+        }
+    };
+}
+named!(QualityArg, Quality, Draft => Quality::Draft, Standard => Quality::Standard, Reference => Quality::Reference);
+named!(SignalArg, Signal, Displacement => Signal::Displacement, NormalDisplacement => Signal::NormalDisplacement, Strain => Signal::Strain);
+named!(SelectorArg, SelectorKind, GreedySvr => SelectorKind::GreedySvr, PcaQr => SelectorKind::PcaQr);
+named!(UnitArg, Unit, Mm => Unit::Millimetre, Cm => Unit::Centimetre, M => Unit::Metre, In => Unit::Inch);
+
+/// The bundled project and mesh, inside the program.
+pub const BUNDLED_PROJECT: &str = include_str!("../assets/limb.hapdef.toml");
+pub const BUNDLED_MESH: &[u8] = include_bytes!("../assets/limb.glb");
+
+/// The bundled limb as a loaded project.
+///
+/// # Errors
+/// None for the files this program was built with.
+pub fn bundled() -> anyhow::Result<LoadedProject> {
+    let project = project_file::parse(BUNDLED_PROJECT).map_err(|m| anyhow::anyhow!("bundled limb: {m}"))?;
+    let mesh = crate::io::mesh_file::parse_glb(BUNDLED_MESH).map_err(|m| anyhow::anyhow!("bundled limb: {m}"))?;
+    Ok(LoadedProject {
+        inputs: Inputs {
+            project,
+            part: Arc::new(mesh.mesh),
+            painted: None,
+        },
+        repairs: mesh.repairs,
+        path: PathBuf::from("limb.hapdef.toml"),
+        mesh_path: PathBuf::from("limb.glb"),
+    })
+}
+
+/// Opens a project or a mesh, by the file's ending.
+///
+/// # Errors
+/// A message naming the file and the remedy.
+pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    if name.ends_with(".toml") {
+        return Ok(project_file::load(path)?);
+    }
+    let loaded = read_mesh(path, unit, 0)?;
+    let file_name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    anyhow::ensure!(ENDINGS.iter().any(|e| name.ends_with(e)), "{}: open a project (.hapdef.toml) or a mesh", path.display());
+    Ok(LoadedProject {
+        inputs: Inputs {
+            project: Project::around(&file_name, unit),
+            part: Arc::new(loaded.mesh),
+            painted: None,
+        },
+        repairs: loaded.repairs,
+        path: path.with_extension("hapdef.toml"),
+        mesh_path: path.to_owned(),
+    })
+}
+
+impl Common {
+    /// The project the command works on, with the flags applied.
+    ///
+    /// # Errors
+    /// As [`open`].
+    pub fn load(&self) -> anyhow::Result<LoadedProject> {
+        let mut loaded = match &self.project {
+            Some(path) => open(path, self.unit.map(Into::into))?,
+            None => bundled()?,
+        };
+        let project = &mut loaded.inputs.project;
+        if let Some(quality) = self.quality {
+            project.budget.quality = quality.into();
+        }
+        if let Some(seed) = self.seed {
+            project.budget.seed = seed;
+        }
+        if let Some(signal) = self.signal {
+            project.gauge.signal = signal.into();
+        }
+        Ok(loaded)
+    }
+
+    /// Runs `work` on as many threads as were asked for.
+    ///
+    /// # Errors
+    /// What `work` reports, or that the threads could not be started.
+    pub fn in_pool<T: Send>(&self, work: impl FnOnce() -> anyhow::Result<T> + Send) -> anyhow::Result<T> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads.unwrap_or(0))
+            .build()
+            .context("the worker threads could not be started; try --threads 1")?;
+        pool.install(work)
+    }
+}
+
+/// Where the mesh of a loaded project can be found again: the bundled one is written beside the output.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn settle_mesh(loaded: &mut LoadedProject, folder: &Path, bundled: bool) -> anyhow::Result<()> {
+    if bundled {
+        std::fs::create_dir_all(folder).with_context(|| format!("{}: the folder cannot be created", folder.display()))?;
+        loaded.mesh_path = folder.join("limb.glb");
+        crate::io::atomic::write(&loaded.mesh_path, BUNDLED_MESH)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,101 @@
+//! `hapdef design`: the whole road.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::{Common, SelectorArg, progress::Bar, settle_mesh};
+use crate::design;
+use crate::io::artifacts::{self, Provenance};
+use crate::placement::SelectorKind;
+
+#[derive(Args, Debug, Clone)]
+pub struct DesignArgs {
+    #[command(flatten)]
+    pub common: Common,
+    /// Folder for report.html, sites.csv, design.json, dataset.npz and design.hapdef.toml.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Gauges to place.
+    #[arg(long)]
+    pub sensors: Option<usize>,
+    /// The selector whose sites are reported; both are evaluated.
+    #[arg(long)]
+    pub selector: Option<SelectorArg>,
+    /// Keep this many candidates instead of as many as the project's variance needs.
+    #[arg(long)]
+    pub candidates: Option<usize>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
+    let mut loaded = args.common.load()?;
+    let project = &mut loaded.inputs.project;
+    if let Some(sensors) = args.sensors {
+        project.selection.sensors = sensors;
+    }
+    if let Some(selector) = args.selector {
+        project.selection.selector = selector.into();
+    }
+    if args.candidates.is_some() {
+        project.candidates.count = args.candidates;
+    }
+    project.check()?;
+    let first = project.selection.selector;
+    let kinds: Vec<SelectorKind> = std::iter::once(first)
+        .chain(SelectorKind::ALL.into_iter().filter(|&k| k != first))
+        .collect();
+    let budget = project.budget.quality.budget();
+    let bar = Bar::default();
+    let start = Instant::now();
+    let inputs = loaded.inputs.clone();
+    let design = args.common.in_pool(|| {
+        let clock = || start.elapsed().as_secs_f64();
+        Ok(design::run(&inputs, &kinds, &budget, &clock, &|p| bar.show(p))?)
+    });
+    bar.finish();
+    let design = design?;
+    settle_mesh(&mut loaded, &args.out, args.common.project.is_none())?;
+    let provenance = Provenance {
+        mesh_path: &loaded.mesh_path,
+        version: env!("CARGO_PKG_VERSION"),
+    };
+    let files = artifacts::write_all(&args.out, &loaded.inputs, &design, &provenance)?;
+    if args.common.json {
+        println!("{}", artifacts::summary(&loaded.inputs, &design));
+        return Ok(());
+    }
+    print_summary(&design);
+    for file in files {
+        eprintln!("wrote {}", file.display());
+    }
+    Ok(())
+}
+
+fn print_summary(design: &design::Design) {
+    println!(
+        "{} inside sites, {} feasible, {} candidates, {} touches",
+        design.simulated.dataset.sites.len(),
+        design.reduced.feasible.len(),
+        design.reduced.sites.len(),
+        design.simulated.dataset.touches.len()
+    );
+    println!("gauge       x        y        z (mm)   direction");
+    for (k, &s) in design.chosen().iter().enumerate() {
+        let site = &design.simulated.dataset.sites[s];
+        let (p, d) = (site.position * 1000.0, site.direction);
+        println!("{:>5} {:8.2} {:8.2} {:8.2}   {:+.3} {:+.3} {:+.3}", k + 1, p.x, p.y, p.z, d.x, d.y, d.z);
+    }
+    for row in design.evaluation.rows.iter().filter(|r| [5, 10].contains(&r.sensors) || r.selector == "all-candidates") {
+        println!("{:>14}, {:>3} gauges, {:<26} {:7.2} mm mean {:7.2} mm median", row.selector, row.sensors, row.region, row.error_mm, row.median_mm);
+    }
+    for note in design.notes() {
+        println!("note: {note}");
+    }
+    let total: f64 = design.seconds.iter().map(|s| s.seconds).sum();
+    eprintln!("{total:.1} s");
+}

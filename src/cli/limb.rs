@@ -1,0 +1,170 @@
+//! `hapdef limb`: the generator of the bundled limb and its family.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Context;
+use clap::Args;
+use serde_json::json;
+
+use crate::design::Inputs;
+use crate::io::{atomic, glb, project_file};
+use crate::limb::{LimbSpec, LimbSupport};
+use crate::placement::SelectorKind;
+use crate::project::{Lattice, Project, RegionKeys, SupportKeys, SupportKind};
+
+/// Lengths in millimetres. Without options it writes the bundled limb.
+#[derive(Args, Debug, Clone)]
+pub struct LimbArgs {
+    /// Folder for limb.glb and limb.hapdef.toml.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Unrolled length around.
+    #[arg(long)]
+    pub circumference: Option<f64>,
+    /// Angle covered, in degrees; 360 is a closed tube.
+    #[arg(long)]
+    pub arc: Option<f64>,
+    #[arg(long)]
+    pub height: Option<f64>,
+    /// Radius at the top over radius at the bottom.
+    #[arg(long)]
+    pub taper: Option<f64>,
+    /// A regular grid of this many columns …
+    #[arg(long, requires = "hoops")]
+    pub columns: Option<usize>,
+    /// … and hoops, rims included.
+    #[arg(long, requires = "columns")]
+    pub hoops: Option<usize>,
+    /// Width of columns.
+    #[arg(long)]
+    pub column_width: Option<f64>,
+    /// Width of hoops in a regular grid.
+    #[arg(long, default_value_t = 10.0)]
+    pub hoop_width: f64,
+    /// Radius of the windows' corners.
+    #[arg(long)]
+    pub corner_radius: Option<f64>,
+    /// Clamp both rims all round, this deep, instead of the four bosses.
+    #[arg(long)]
+    pub clamp_rims: Option<f64>,
+    /// Largest side of an element.
+    #[arg(long)]
+    pub element: Option<f64>,
+    /// Thickness of the shell.
+    #[arg(long)]
+    pub thickness: Option<f64>,
+    /// Leave the project without chosen sites (they take a Draft design).
+    #[arg(long)]
+    pub no_sites: bool,
+    /// Print what was written as one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl LimbArgs {
+    fn spec(&self) -> LimbSpec {
+        let mut spec = LimbSpec::default();
+        let set = |value: &mut f64, arg: Option<f64>| {
+            if let Some(arg) = arg {
+                *value = arg;
+            }
+        };
+        set(&mut spec.circumference, self.circumference);
+        set(&mut spec.arc_degrees, self.arc);
+        set(&mut spec.height, self.height);
+        set(&mut spec.taper, self.taper);
+        set(&mut spec.column_width, self.column_width);
+        set(&mut spec.corner_radius, self.corner_radius);
+        set(&mut spec.element, self.element);
+        if let (Some(columns), Some(hoops)) = (self.columns, self.hoops) {
+            spec = spec.grid(columns, hoops, self.hoop_width);
+            // The bosses sit on two opposite columns of the new grid.
+            let centres = vec![spec.columns[0], spec.columns[columns / 2]];
+            spec.support = LimbSupport::Bosses {
+                centres,
+                half_width: spec.column_width / 2.0,
+                depth: 5.0,
+            };
+        }
+        if let Some(depth) = self.clamp_rims {
+            spec.support = LimbSupport::Rims { depth };
+        }
+        spec
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
+    anyhow::ensure!(args.columns != Some(0) && args.hoops.is_none_or(|h| h >= 2), "a limb has at least one column and two hoops");
+    let spec = args.spec();
+    let (mesh, boxes) = spec.build()?;
+    std::fs::create_dir_all(&args.out).with_context(|| format!("{}: the folder cannot be created", args.out.display()))?;
+    let mesh_path = args.out.join("limb.glb");
+    let bytes = glb::write_glb(&mesh)?;
+    atomic::write(&mesh_path, &bytes)?;
+    let mut project = project(&spec, &boxes);
+    if let Some(thickness) = args.thickness {
+        project.part.thickness_mm = thickness;
+    }
+    if !args.no_sites {
+        // On the mesh as it is in the file (single precision), like anyone who opens it.
+        let stored = crate::io::mesh_file::parse_glb(&bytes).map_err(anyhow::Error::msg)?.mesh;
+        project.selection.sites = choose_sites(&project, stored)?;
+    }
+    project_file::save(&args.out.join("limb.hapdef.toml"), &project, None)?;
+    let figures = json!({
+        "vertices": mesh.positions().len(),
+        "triangles": mesh.triangles().len(),
+        "mean_edge_mm": mesh.mean_edge() * 1000.0,
+        "radius_mm": spec.radius(),
+        "area_mm2": mesh.area() * 1e6,
+        "sites": project.selection.sites.len(),
+    });
+    if args.json {
+        println!("{figures}");
+    } else {
+        println!("{}: {figures}", args.out.display());
+    }
+    Ok(())
+}
+
+/// The project of a limb of the family.
+fn project(spec: &LimbSpec, boxes: &[[[f64; 3]; 2]]) -> Project {
+    let mut project = Project::around("limb.glb", None);
+    project.supports = boxes
+        .iter()
+        .map(|&box_mm| SupportKeys {
+            kind: SupportKind::Clamped,
+            box_mm,
+            normal: Default::default(),
+        })
+        .collect();
+    project.sites.lattice = Lattice::Unrolled;
+    let wide = (2.0 * spec.radius() * spec.taper.max(1.0)).ceil().max(80.0);
+    project.evaluation.regions = vec![RegionKeys {
+        name: "away from the boundaries".into(),
+        box_mm: [[-wide, -wide, 12.0], [wide, wide, spec.height - 12.0]],
+    }];
+    project
+}
+
+/// Ten sites by a Draft design on strain with greedy SVR.
+fn choose_sites(project: &Project, mesh: crate::mesh::TriMesh) -> anyhow::Result<Vec<crate::project::ChosenSite>> {
+    use crate::budget::{Quality, unwatched};
+    let inputs = Inputs {
+        project: project.clone(),
+        part: Arc::new(mesh),
+        painted: None,
+    };
+    let budget = Quality::Draft.budget();
+    let simulated = crate::design::simulate(&inputs, &budget, &unwatched)?;
+    let feasibility = crate::design::filter(&inputs, &simulated);
+    let reduced = crate::design::reduce_sites(&inputs, &simulated, &feasibility, &budget, &unwatched)?;
+    let selection = crate::design::select(&inputs, &simulated, &reduced, SelectorKind::GreedySvr, &budget, &unwatched)?;
+    let sites = selection.sets.last().map_or(&[][..], |s| &s.sites);
+    Ok(crate::io::artifacts::as_chosen(&simulated.dataset, sites))
+}

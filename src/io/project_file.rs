@@ -1,0 +1,323 @@
+//! Project files: readable, commented, versioned TOML, with arrays in NPZ beside them.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::mesh_file::{LoadedMesh, read_mesh};
+use super::npz::{NpzFile, read_mask};
+use super::{FileError, atomic};
+use crate::design::Inputs;
+use crate::mesh::RepairReport;
+use crate::project::{FORMAT, Project};
+
+/// Name of the painted mask among the arrays.
+const PAINTED: &str = "painted";
+
+/// A project with what it refers to.
+pub struct LoadedProject {
+    pub inputs: Inputs,
+    pub repairs: RepairReport,
+    /// Where the project file lies, and the mesh it names.
+    pub path: PathBuf,
+    pub mesh_path: PathBuf,
+}
+
+/// Reads a project, its mesh and its painted mask.
+///
+/// # Errors
+/// [`FileError`] naming the file, the place in it and the remedy.
+pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
+    let text = std::fs::read_to_string(path).map_err(|e| FileError::of(path, &e))?;
+    let project = parse(&text).map_err(|m| FileError::broken(path, m))?;
+    let mesh_path = path
+        .parent()
+        .unwrap_or(Path::new("."))
+        .join(&project.part.mesh);
+    let LoadedMesh { mesh, repairs } = read_mesh(&mesh_path, project.part.unit, project.part.body)?;
+    let painted = match &project.feasible.painted {
+        Some(name) => Some(read_painted(path, name, mesh.positions().len())?),
+        None => None,
+    };
+    Ok(LoadedProject {
+        inputs: Inputs {
+            project,
+            part: Arc::new(mesh),
+            painted: painted.map(Arc::new),
+        },
+        repairs,
+        path: path.to_owned(),
+        mesh_path,
+    })
+}
+
+fn read_painted(path: &Path, name: &str, vertices: usize) -> Result<Vec<bool>, FileError> {
+    let arrays = arrays_path(path);
+    let mask = read_mask(&arrays, name)?;
+    if mask.len() != vertices {
+        return Err(FileError::broken(
+            &arrays,
+            format!(
+                "the painted mask is for a mesh of {} vertices, but the part has {vertices}. Paint it again",
+                mask.len()
+            ),
+        ));
+    }
+    Ok(mask)
+}
+
+/// Where a project's arrays lie: `limb.hapdef.toml` has `limb.hapdef.npz`.
+#[must_use]
+pub fn arrays_path(project: &Path) -> PathBuf {
+    project.with_extension("npz")
+}
+
+/// Parses and checks a project's text.
+///
+/// # Errors
+/// A message in the user's terms, with the line where there is one.
+pub fn parse(text: &str) -> Result<Project, String> {
+    #[derive(serde::Deserialize)]
+    struct Versioned {
+        format: Option<i64>,
+    }
+    let readable = |e: toml::de::Error| format!("this is not a readable project file. {e}");
+    let version: Versioned = toml::from_str(text).map_err(readable)?;
+    match version.format {
+        Some(v) if v == i64::from(FORMAT) => {}
+        Some(v) if v > i64::from(FORMAT) => {
+            return Err(format!(
+                "the project is of format {v}, written by a newer version of HapDef; this one reads up to format {FORMAT}. Update HapDef"
+            ));
+        }
+        Some(v) => return Err(format!("format {v} has never existed. Set format = {FORMAT}")),
+        None => return Err(format!("the key \"format\" is missing. Add format = {FORMAT} as the first line")),
+    }
+    let project: Project = toml::from_str(text).map_err(readable)?;
+    project.check().map_err(|e| e.to_string())?;
+    Ok(project)
+}
+
+/// Saves a project atomically, one backup kept, its painted mask beside it. Paths in it are taken as
+/// they are: relative to the file.
+///
+/// # Errors
+/// [`FileError`] naming the file that could not be written; the old project is then untouched.
+pub fn save(path: &Path, project: &Project, painted: Option<&[bool]>) -> Result<(), FileError> {
+    let mut project = project.clone();
+    project.feasible.painted = painted.map(|_| PAINTED.to_owned());
+    if let Some(mask) = painted {
+        let arrays = arrays_path(path);
+        let mut file = NpzFile::default();
+        file.add(PAINTED, &[mask.len()], mask)
+            .map_err(|e| FileError::of(&arrays, &e))?;
+        file.save(&arrays)?;
+    }
+    atomic::write_with_backup(path, to_text(&project).as_bytes())
+}
+
+/// A path as a project at `project` should name it: relative where it can be.
+#[must_use]
+pub fn relative_to(project: &Path, target: &Path) -> String {
+    let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned());
+    let (from, to) = (absolute(project), absolute(target));
+    let folder = from.parent().unwrap_or(Path::new("/")).to_owned();
+    let common = folder
+        .components()
+        .zip(to.components())
+        .take_while(|(a, b)| a == b)
+        .count();
+    let up = folder.components().count() - common;
+    if common <= 1 {
+        return to.to_string_lossy().into_owned();
+    }
+    let mut relative = PathBuf::new();
+    (0..up).for_each(|_| relative.push(".."));
+    relative.extend(to.components().skip(common));
+    relative.to_string_lossy().replace('\\', "/")
+}
+
+/// The commented text of a project.
+#[must_use]
+pub fn to_text(project: &Project) -> String {
+    let mut t = Text::default();
+    t.line("# A HapDef project. Lengths in millimetres, forces in newtons; paths are relative to this file.");
+    t.key("format", project.format, "version of this file's format");
+    t.table("part");
+    let part = &project.part;
+    t.key("mesh", quoted(&part.mesh), "glTF/GLB, OBJ or STL");
+    t.maybe("unit", part.unit.map(|u| quoted(u.name())), "unit of the mesh file: \"mm\", \"cm\", \"m\" or \"in\"; glTF is in metres and needs none");
+    t.key("body", part.body, "which connected body, 0 being the largest");
+    t.key("model", quoted("shell"), "\"shell\": the mesh is the mid-surface");
+    t.key("thickness_mm", float(part.thickness_mm), "of the shell");
+    t.key("axis", serialized(&part.axis), "the axis the part is unrolled about: \"x\", \"y\" or \"z\"");
+    t.table("material");
+    t.key("youngs_modulus_gpa", float(project.material.youngs_modulus_gpa), "");
+    t.key("poissons_ratio", float(project.material.poissons_ratio), "above -1 and below 0.5");
+    for support in &project.supports {
+        t.list("support");
+        t.key("kind", serialized(&support.kind), "\"clamped\" (no displacement, no rotation), \"pinned\" (no displacement) or \"symmetry\"");
+        t.key("box_mm", corners(&support.box_mm), "every point of the part inside it is held");
+        t.key("normal", serialized(&support.normal), "of a symmetry plane; unused otherwise");
+    }
+    t.table("touch");
+    t.key("force_n", float(project.touch.force_n), "pressed along the inward normal");
+    t.key("tip_radius_mm", float(project.touch.tip_radius_mm), "the tip spreads the force as (1 - r²/a²)²");
+    t.key("count", project.touch.count, "touches simulated; lower qualities take fewer");
+    t.key("edge_margin_mm", float(project.touch.edge_margin_mm), "least distance of a touch from a free edge");
+    t.table("sites");
+    t.key("spacing_mm", float(project.sites.spacing_mm), "of the possible gauge positions on the inside");
+    t.key("lattice", serialized(&project.sites.lattice), "\"even\" (any surface) or \"unrolled\" (rows and columns about the axis)");
+    gauge(&mut t, project);
+    t.table("feasible");
+    t.key("support_clearance_mm", float(project.feasible.support_clearance_mm), "least distance over the surface from anything held");
+    t.key("edge_neighbours", project.feasible.edge_neighbours, "k of the centre-of-mass filter …");
+    t.key("edge_radius_mm", float(project.feasible.edge_radius_mm), "… and its radius");
+    t.maybe("painted", project.feasible.painted.as_deref().map(quoted), "painted region, an array in the NPZ file beside this one");
+    t.table("candidates");
+    t.key("unexplained", float(project.candidates.unexplained), "share of the held-out variance the candidates may leave unexplained");
+    t.maybe("count", project.candidates.count, "a fixed number of candidates instead");
+    selection(&mut t, project);
+    t.table("evaluation");
+    for region in &project.evaluation.regions {
+        t.list("evaluation.region");
+        t.key("name", quoted(&region.name), "errors are quoted for it, beside all touches");
+        t.key("box_mm", corners(&region.box_mm), "");
+    }
+    t.table("budget");
+    t.key("quality", quoted(project.budget.quality.name()), "\"draft\", \"standard\" or \"reference\"");
+    t.key("seed", project.budget.seed, "of every random draw");
+    t.0
+}
+
+fn gauge(t: &mut Text, project: &Project) {
+    let gauge = &project.gauge;
+    t.table("gauge");
+    t.key("signal", quoted(gauge.signal.name()), "\"strain\", \"displacement\" or \"normal-displacement\"");
+    t.key("noise_microstrain", float(gauge.noise_microstrain), "standard deviation of a reading");
+    t.key("range_microstrain", float(gauge.range_microstrain), "largest strain gauge and amplifier can take");
+    t.key("least_signal_to_noise", float(gauge.least_signal_to_noise), "rms strain over noise that a site must reach");
+    t.key("grid_length_mm", float(gauge.grid_length_mm), "of the measuring grid, along the gauge");
+    t.key("grid_width_mm", float(gauge.grid_width_mm), "across it");
+    t.key("flatness_mm", float(gauge.flatness_mm), "largest height of the surface over the gauge's plane");
+}
+
+fn selection(t: &mut Text, project: &Project) {
+    let selection = &project.selection;
+    t.table("selection");
+    t.key("selector", quoted(selection.selector.name()), "\"greedy-svr\" or \"pca-qr\"");
+    t.key("sensors", selection.sensors, "gauges to place");
+    t.key("c_mm", float(selection.c_mm), "C of greedy SVR's regression (targets in mm, features standardized)");
+    t.key("epsilon_mm", float(selection.epsilon_mm), "its ε");
+    t.key("gamma", float(selection.gamma), "its γ");
+    for site in &selection.sites {
+        t.list("selection.site");
+        t.key("position_mm", triple(&site.position_mm), "");
+        t.key("direction", triple(&site.direction), "");
+    }
+}
+
+#[derive(Default)]
+struct Text(String);
+
+impl Text {
+    fn line(&mut self, line: &str) {
+        self.0.push_str(line);
+        self.0.push('\n');
+    }
+    fn table(&mut self, name: &str) {
+        self.line(&format!("\n[{name}]"));
+    }
+    fn list(&mut self, name: &str) {
+        self.line(&format!("\n[[{name}]]"));
+    }
+    fn key(&mut self, key: &str, value: impl std::fmt::Display, comment: &str) {
+        let mut line = format!("{key} = {value}");
+        if !comment.is_empty() {
+            let _ = write!(line, "  # {comment}");
+        }
+        self.line(&line);
+    }
+    fn maybe(&mut self, key: &str, value: Option<impl std::fmt::Display>, comment: &str) {
+        match value {
+            Some(value) => self.key(key, value, comment),
+            None => self.line(&format!("# {key}: {comment}")),
+        }
+    }
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+/// A float with its point, in the shortest form that reads back the same.
+fn float(value: f64) -> String {
+    format!("{value:?}")
+}
+
+fn triple(values: &[f64; 3]) -> String {
+    format!("[{}]", values.map(float).join(", "))
+}
+
+fn corners(values: &[[f64; 3]; 2]) -> String {
+    format!("[{}]", values.each_ref().map(triple).join(", "))
+}
+
+/// An enum as its file name.
+fn serialized(value: &impl serde::Serialize) -> String {
+    toml::Value::try_from(value).map_or_else(|_| String::new(), |v| v.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::unroll::Axis;
+    use crate::project::{ChosenSite, RegionKeys, SupportKeys, SupportKind, Unit};
+
+    fn full() -> Project {
+        let mut p = Project::around("a \"part\".stl", Some(Unit::Inch));
+        p.supports.push(SupportKeys {
+            kind: SupportKind::Symmetry,
+            box_mm: [[0.0, 1e-3, -2.0], [1.0, 2.0, 3.0]],
+            normal: Axis::X,
+        });
+        p.candidates.count = Some(407);
+        p.feasible.painted = Some("painted".into());
+        p.selection.sites.push(ChosenSite {
+            position_mm: [0.1, 1.0 / 3.0, -7e-17],
+            direction: [0.0, 0.0, 1.0],
+        });
+        p.evaluation.regions.push(RegionKeys {
+            name: "middle".into(),
+            box_mm: [[-1.0; 3], [1.0; 3]],
+        });
+        p
+    }
+
+    #[test]
+    fn what_is_written_reads_back_the_same() {
+        for project in [Project::around("limb.glb", None), full()] {
+            let text = to_text(&project);
+            assert_eq!(parse(&text).as_ref(), Ok(&project), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_newer_or_foreign_file_is_refused_with_the_remedy() {
+        let text = to_text(&full()).replace("format = 1", "format = 2");
+        assert!(parse(&text).unwrap_err().contains("newer version"));
+        assert!(parse("[part]\n").unwrap_err().contains("format"));
+        let typo = to_text(&full()).replace("force_n", "force");
+        let message = parse(&typo).unwrap_err();
+        assert!(message.contains("force") && message.contains("line"), "{message}");
+        let negative = to_text(&full()).replace("force_n = 10.0", "force_n = -1.0");
+        assert!(parse(&negative).unwrap_err().contains("touch.force_n"));
+    }
+
+    #[test]
+    fn paths_are_kept_relative() {
+        let project = Path::new("/home/a/work/p.hapdef.toml");
+        assert_eq!(relative_to(project, Path::new("/home/a/work/limb.glb")), "limb.glb");
+        assert_eq!(relative_to(project, Path::new("/home/a/mesh/limb.glb")), "../mesh/limb.glb");
+    }
+}

@@ -1,0 +1,266 @@
+//! Pictures of the limb and plots, drawn as SVG text: a report needs no graphics adapter.
+
+use std::fmt::Write as _;
+
+use glam::{DMat3, DVec2, DVec3};
+
+use crate::mesh::TriMesh;
+use crate::mesh::unroll::Unrolling;
+
+/// A gauge to be drawn: its number, place (m) and direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Marker {
+    pub number: usize,
+    pub position: DVec3,
+    pub normal: DVec3,
+    pub direction: DVec3,
+}
+
+/// A side to look from: towards the viewer, and up.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    pub name: &'static str,
+    pub toward: DVec3,
+    pub up: DVec3,
+}
+
+/// The sides a report shows.
+#[must_use]
+pub fn standard_views(axis: DVec3, zero: DVec3) -> Vec<View> {
+    let side = axis.cross(zero);
+    [("front", zero), ("left", side), ("back", -zero), ("right", -side)]
+        .map(|(name, toward)| View {
+            name,
+            toward: (toward + axis * 0.25).normalize(),
+            up: axis,
+        })
+        .to_vec()
+}
+
+const ACCENT: &str = "#d55e00";
+
+/// The limb from one side: facets painted from the back, tinted by `tint` (0–1 a vertex), the gauges
+/// numbered. Gauges on the far side are drawn hollow.
+#[must_use]
+pub fn limb(mesh: &TriMesh, tint: &[f64], markers: &[Marker], view: &View, width: f64) -> String {
+    let right = view.up.cross(view.toward).normalize();
+    let frame = DMat3::from_cols(right, view.toward.cross(right), view.toward).transpose();
+    let seen: Vec<DVec3> = mesh.positions().iter().map(|&p| frame * p).collect();
+    let (lower, upper) = bounds(seen.iter().map(|p| p.truncate()));
+    let canvas = Canvas::new(lower, upper, width);
+    let mut svg = canvas.open(&format!("The limb from the {}", view.name));
+    let mut order: Vec<usize> = (0..mesh.triangles().len()).collect();
+    let depth = |t: usize| -> f64 { mesh.triangles()[t].iter().map(|&v| seen[v as usize].z).sum() };
+    order.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)).then(a.cmp(&b)));
+    for t in order {
+        let tri = mesh.triangles()[t];
+        let facing = mesh.facet_normal(t as u32).dot(view.toward);
+        let level = tri.iter().map(|&v| tint[v as usize]).sum::<f64>() / 3.0;
+        let points = tri.map(|v| canvas.place(seen[v as usize].truncate()));
+        let _ = write!(svg, "<path d=\"{}\" fill=\"{}\"/>", path(&points), shade(facing, level));
+    }
+    for marker in markers {
+        let at = canvas.place((frame * marker.position).truncate());
+        let tip = (frame * marker.direction).truncate();
+        let near = marker.normal.dot(view.toward) > 0.0;
+        draw_marker(&mut svg, at, DVec2::new(tip.x, -tip.y), marker.number, near);
+    }
+    svg.push_str("</g></svg>");
+    svg
+}
+
+/// The limb laid flat, s to the right and z up, in millimetres, with axes.
+#[must_use]
+pub fn unrolled(
+    mesh: &TriMesh,
+    unrolling: &Unrolling,
+    tint: &[f64],
+    markers: &[Marker],
+    width: f64,
+) -> String {
+    let around = unrolling.circumference();
+    let low = DVec2::new(0.0, unrolling.height.0);
+    let canvas = Canvas::new(low, DVec2::new(around, unrolling.height.1), width);
+    let mut svg = canvas.open("The limb unrolled, with numbered gauges");
+    for (t, tri) in mesh.triangles().iter().enumerate() {
+        let mut flat = tri.map(|v| unrolling.flat(mesh.positions()[v as usize]));
+        // A facet across the seam is drawn on the side of its first corner.
+        for k in 1..3 {
+            flat[k].x -= ((flat[k].x - flat[0].x) / around).round() * around;
+        }
+        let level = tri.iter().map(|&v| tint[v as usize]).sum::<f64>() / 3.0;
+        let points = flat.map(|p| canvas.place(p));
+        let _ = write!(svg, "<path d=\"{}\" fill=\"{}\"/>", path(&points), shade(0.85, level));
+        let _ = t;
+    }
+    for marker in markers {
+        let at = unrolling.flat(marker.position);
+        let ahead = unrolling.flat(marker.position + marker.direction * 1e-4);
+        let mut direction = ahead - at;
+        direction.x -= (direction.x / around).round() * around;
+        let direction = direction.normalize_or_zero();
+        draw_marker(&mut svg, canvas.place(at), DVec2::new(direction.x, -direction.y), marker.number, true);
+    }
+    svg.push_str("</g>");
+    let _ = write!(
+        svg,
+        "<text x=\"{:.0}\" y=\"{:.0}\">around, 0 – {:.0} mm →  ·  up, {:.0} mm ↑</text></svg>",
+        PAD,
+        canvas.height + 2.0 * PAD + 14.0,
+        around * 1000.0,
+        (unrolling.height.1 - unrolling.height.0) * 1000.0
+    );
+    svg
+}
+
+/// One line of a plot: name, colour-blind-safe colour and points.
+pub struct Series<'a> {
+    pub name: &'a str,
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Okabe and Ito's colours: told apart by everybody.
+pub const PALETTE: [&str; 5] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#666666"];
+
+/// A line plot with axes, ticks and a legend.
+#[must_use]
+pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series], width: f64) -> String {
+    let (height, left, bottom) = (0.55 * width, 58.0, 44.0);
+    let all = || series.iter().flat_map(|s| &s.points).filter(|p| p.0.is_finite() && p.1.is_finite());
+    let x_max = all().map(|p| p.0).fold(1.0, f64::max);
+    let x_min = all().map(|p| p.0).fold(x_max, f64::min);
+    let (y_step, y_top) = ticks(all().map(|p| p.1).fold(0.0, f64::max));
+    let px = |x: f64| left + (x - x_min) / (x_max - x_min).max(1e-12) * (width - left - 16.0);
+    let py = |y: f64| 30.0 + (1.0 - y / y_top) * (height - 30.0 - bottom);
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" role=\"img\" aria-label=\"{0}\" class=\"plot\"><title>{0}</title><text x=\"{left}\" y=\"16\" class=\"t\">{0}</text>",
+        escape(title)
+    );
+    let mut y = 0.0;
+    while y <= y_top * 1.0001 {
+        let _ = write!(
+            svg,
+            "<path d=\"M{left} {1:.1}H{2:.1}\" class=\"grid\"/><text x=\"{3:.1}\" y=\"{4:.1}\" text-anchor=\"end\">{0}</text>",
+            tidy(y), py(y), width - 16.0, left - 6.0, py(y) + 4.0
+        );
+        y += y_step;
+    }
+    let (x_step, _) = ticks(x_max - x_min);
+    let mut x = (x_min / x_step.max(1.0)).ceil() * x_step.max(1.0);
+    while x <= x_max * 1.0001 {
+        let _ = write!(svg, "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>", px(x), height - bottom + 16.0, tidy(x));
+        x += x_step.max(1.0);
+    }
+    let _ = write!(
+        svg,
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text><text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+        f64::midpoint(left, width), height - 8.0, escape(x_label), height / 2.0, escape(y_label)
+    );
+    for (k, line) in series.iter().enumerate() {
+        let colour = PALETTE[k % PALETTE.len()];
+        let mut d = String::new();
+        for (i, p) in line.points.iter().enumerate() {
+            let _ = write!(d, "{}{:.1} {:.1}", if i == 0 { 'M' } else { 'L' }, px(p.0), py(p.1));
+            let _ = write!(svg, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"{colour}\"/>", px(p.0), py(p.1));
+        }
+        let _ = write!(svg, "<path d=\"{d}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>");
+        let ly = 40.0 + 18.0 * k as f64;
+        let _ = write!(
+            svg,
+            "<path d=\"M{0:.1} {1:.1}h20\" stroke=\"{colour}\" stroke-width=\"2\"/><text x=\"{2:.1}\" y=\"{3:.1}\">{4}</text>",
+            width - 190.0, ly, width - 164.0, ly + 4.0, escape(line.name)
+        );
+    }
+    svg.push_str("</svg>");
+    svg
+}
+
+/// Text that is safe inside SVG and HTML.
+#[must_use]
+pub fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+const PAD: f64 = 14.0;
+
+struct Canvas {
+    lower: DVec2,
+    scale: f64,
+    width: f64,
+    height: f64,
+}
+
+impl Canvas {
+    fn new(lower: DVec2, upper: DVec2, width: f64) -> Self {
+        let size = (upper - lower).max(DVec2::splat(1e-9));
+        let scale = (width / size.x).min(1.4 * width / size.y);
+        Self {
+            lower,
+            scale,
+            width: size.x * scale,
+            height: size.y * scale,
+        }
+    }
+
+    fn open(&self, label: &str) -> String {
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.0} {:.0}\" role=\"img\" aria-label=\"{label}\" class=\"limb\"><title>{label}</title><g transform=\"translate({PAD} {PAD})\">",
+            self.width + 2.0 * PAD,
+            self.height + 2.0 * PAD + 20.0
+        )
+    }
+
+    fn place(&self, p: DVec2) -> DVec2 {
+        let q = (p - self.lower) * self.scale;
+        DVec2::new(q.x, self.height - q.y)
+    }
+}
+
+fn bounds(points: impl Iterator<Item = DVec2>) -> (DVec2, DVec2) {
+    points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, u), p| (l.min(p), u.max(p)))
+}
+
+fn path(points: &[DVec2; 3]) -> String {
+    let [a, b, c] = points;
+    format!("M{:.1} {:.1}L{:.1} {:.1} {:.1} {:.1}z", a.x, a.y, b.x, b.y, c.x, c.y)
+}
+
+/// Grey to blue-green by tint, darker when turned away, browner on the inside.
+fn shade(facing: f64, tint: f64) -> String {
+    let light = 0.45 + 0.55 * facing.abs();
+    let base = if facing > 0.0 { [222.0, 224.0, 228.0] } else { [176.0, 170.0, 160.0] };
+    let tinted = if facing > 0.0 { [126.0, 190.0, 178.0] } else { [96.0, 150.0, 140.0] };
+    let mix = |k: usize| (light * (base[k] + (tinted[k] - base[k]) * tint.clamp(0.0, 1.0))).round() as u8;
+    // A stroke of the same colour closes the hairlines between facets.
+    let colour = format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2));
+    format!("{colour}\" stroke=\"{colour}")
+}
+
+fn draw_marker(svg: &mut String, at: DVec2, direction: DVec2, number: usize, near: bool) {
+    let (a, b) = (at - direction * 13.0, at + direction * 13.0);
+    let (fill, ink, dash) = if near { (ACCENT, "#fff", "") } else { ("#fff", ACCENT, " stroke-dasharray=\"3 2\"") };
+    let _ = write!(
+        svg,
+        "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" stroke=\"{ACCENT}\" stroke-width=\"4\"{dash}/><circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"8\" fill=\"{fill}\" stroke=\"{ACCENT}\"/><text x=\"{:.1}\" y=\"{:.1}\" fill=\"{ink}\" text-anchor=\"middle\" class=\"n\">{number}</text>",
+        a.x, a.y, b.x, b.y, at.x, at.y, at.x, at.y + 3.6
+    );
+}
+
+/// A round step and a round top for values from zero.
+fn ticks(top: f64) -> (f64, f64) {
+    if !(top > 0.0 && top.is_finite()) {
+        return (1.0, 1.0);
+    }
+    let raw = top / 5.0;
+    let power = 10f64.powf(raw.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|&s| s >= raw).unwrap_or(raw);
+    (step, (top / step).ceil() * step)
+}
+
+fn tidy(value: f64) -> String {
+    let text = format!("{value:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
