@@ -489,7 +489,7 @@ pub fn sites_to_judge(reduced: &Reduced, selections: &[Selection]) -> Vec<usize>
 /// Everything a design produced.
 pub struct Design {
     pub budget: Budget,
-    pub simulated: Simulated,
+    pub simulated: Arc<Simulated>,
     pub feasibility: Feasibility,
     pub reduced: Reduced,
     /// The project's selector first.
@@ -499,7 +499,7 @@ pub struct Design {
     pub seconds: Vec<StageTime>,
 }
 
-/// Wall and processor seconds of one stage.
+/// Seconds by the clock of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageTime {
     pub stage: &'static str,
@@ -555,13 +555,27 @@ pub fn run(
     clock: &dyn Fn() -> f64,
     watch: Watch,
 ) -> Result<Design, DesignError> {
-    let mut times = Stopwatch {
-        clock,
-        last: clock(),
-        stages: Vec::new(),
-    };
-    let simulated = simulate(inputs, budget, watch)?;
+    let mut times = Stopwatch::new(clock);
+    let simulated = Arc::new(simulate(inputs, budget, watch)?);
     times.lap("simulate");
+    let mut design = run_from(inputs, simulated, kinds, budget, clock, watch)?;
+    design.seconds.splice(0..0, times.stages);
+    Ok(design)
+}
+
+/// Runs the road from a simulation that is there already.
+///
+/// # Errors
+/// [`DesignError`] from the stage that could not end.
+pub fn run_from(
+    inputs: &Inputs,
+    simulated: Arc<Simulated>,
+    kinds: &[SelectorKind],
+    budget: &Budget,
+    clock: &dyn Fn() -> f64,
+    watch: Watch,
+) -> Result<Design, DesignError> {
+    let mut times = Stopwatch::new(clock);
     let feasibility = filter(inputs, &simulated);
     times.lap("filter");
     let reduced = reduce_sites(inputs, &simulated, &feasibility, budget, watch)?;
@@ -597,7 +611,15 @@ struct Stopwatch<'a> {
     stages: Vec<StageTime>,
 }
 
-impl Stopwatch<'_> {
+impl<'a> Stopwatch<'a> {
+    fn new(clock: &'a dyn Fn() -> f64) -> Self {
+        Self {
+            clock,
+            last: clock(),
+            stages: Vec::new(),
+        }
+    }
+
     fn lap(&mut self, stage: &'static str) {
         let now = (self.clock)();
         self.stages.push(StageTime {

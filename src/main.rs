@@ -23,8 +23,8 @@ fn main() -> ExitCode {
 }
 
 #[cfg(feature = "studio")]
-fn open_studio(_cli: &Cli) -> anyhow::Result<()> {
-    anyhow::bail!("not yet")
+fn open_studio(cli: &Cli) -> anyhow::Result<()> {
+    hapdef::studio::run(cli.file.clone(), cli.unit.map(Into::into))
 }
 
 #[cfg(not(feature = "studio"))]

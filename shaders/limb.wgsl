@@ -1,0 +1,61 @@
+// The limb: lit from the eye and from above, coloured by its material, its feasible region or a field.
+
+struct Scene {
+    matrix: mat4x4f,
+    eye: vec4f,        // towards the eye, relative units
+    target_scale: vec4f, // xyz: target (m), w: 1 / distance
+    deform: vec4f,     // x: exaggeration, y: 1 when a field is shown, z: 1 when the region is shown
+};
+
+@group(0) @binding(0) var<uniform> scene: Scene;
+@group(0) @binding(1) var map: texture_2d<f32>;
+@group(0) @binding(2) var map_sampler: sampler;
+
+struct Vertex {
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) displacement: vec3f,
+    @location(3) value: f32,
+    @location(4) region: f32,
+};
+
+struct Fragment {
+    @builtin(position) clip: vec4f,
+    @location(0) world: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) value: f32,
+    @location(3) region: f32,
+};
+
+@vertex
+fn vs(v: Vertex) -> Fragment {
+    let p = v.position + v.displacement * scene.deform.x;
+    let local = (p - scene.target_scale.xyz) * scene.target_scale.w;
+    return Fragment(scene.matrix * vec4f(local, 1.0), local, v.normal, v.value, v.region);
+}
+
+@fragment
+fn fs(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    // The geometric normal follows the deformed shape; the smooth one keeps curved walls smooth.
+    let facet = normalize(cross(dpdx(f.world), dpdy(f.world)));
+    let to_eye = normalize(scene.eye.xyz - f.world);
+    var n = normalize(f.normal);
+    if (scene.deform.x > 0.0) { n = facet; }
+    if (dot(n, to_eye) < 0.0) { n = -n; }
+    let headlight = max(dot(n, to_eye), 0.0);
+    let sky = 0.5 + 0.5 * n.z;
+    let light = 0.34 + 0.50 * headlight + 0.16 * sky;
+
+    var base = select(vec3f(0.62, 0.59, 0.55), vec3f(0.86, 0.87, 0.89), front);
+    if (scene.deform.z > 0.5) {
+        let tint = select(vec3f(0.30, 0.55, 0.50), vec3f(0.42, 0.75, 0.68), front);
+        base = mix(base, tint, smoothstep(0.35, 0.65, f.region));
+    }
+    if (scene.deform.y > 0.5) {
+        let color = textureSampleLevel(map, map_sampler, vec2f(clamp(f.value, 0.0, 1.0), 0.5), 0.0).rgb;
+        base = select(color * 0.72, color, front);
+    }
+    let shine = select(0.0, 0.06 * pow(headlight, 40.0), front);
+    // Already encoded for the screen: the window blends in gamma space.
+    return vec4f(base * light + shine, 1.0);
+}

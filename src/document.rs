@@ -1,0 +1,279 @@
+//! The open project as the window edits it: plain data, with undo and redo.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::design::Inputs;
+use crate::io::project_file::LoadedProject;
+use crate::mesh::{RepairReport, SurfacePoint, TriMesh, geodesic};
+use crate::project::Project;
+
+/// What undo brings back. The mesh is not part of it: opening a file begins a new history.
+#[derive(Clone, PartialEq)]
+pub struct State {
+    pub project: Project,
+    pub painted: Option<Arc<Vec<bool>>>,
+}
+
+/// An open project.
+pub struct Document {
+    pub state: State,
+    pub part: Arc<TriMesh>,
+    pub repairs: RepairReport,
+    /// Where it was opened from or saved to; nothing for the bundled limb until it is saved.
+    pub path: Option<PathBuf>,
+    pub mesh_path: PathBuf,
+    saved: State,
+    /// The state at the last finished gesture.
+    settled: State,
+    past: Vec<State>,
+    future: Vec<State>,
+}
+
+/// Undo steps kept.
+const DEPTH: usize = 200;
+
+/// Whether a stroke adds to the painted region or takes from it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Brush {
+    Paint,
+    Erase,
+}
+
+impl Document {
+    #[must_use]
+    pub fn new(loaded: LoadedProject, path: Option<PathBuf>) -> Self {
+        let state = State {
+            project: loaded.inputs.project,
+            painted: loaded.inputs.painted,
+        };
+        Self {
+            part: loaded.inputs.part,
+            repairs: loaded.repairs,
+            path,
+            mesh_path: loaded.mesh_path,
+            saved: state.clone(),
+            settled: state.clone(),
+            state,
+            past: Vec::new(),
+            future: Vec::new(),
+        }
+    }
+
+    /// A snapshot for a job.
+    #[must_use]
+    pub fn inputs(&self) -> Inputs {
+        Inputs {
+            project: self.state.project.clone(),
+            part: Arc::clone(&self.part),
+            painted: self.state.painted.clone(),
+        }
+    }
+
+    /// Ends a gesture: what changed since the last one becomes one undo step.
+    pub fn settle(&mut self) {
+        if self.state == self.settled {
+            return;
+        }
+        self.past.push(std::mem::replace(&mut self.settled, self.state.clone()));
+        if self.past.len() > DEPTH {
+            self.past.remove(0);
+        }
+        self.future.clear();
+    }
+
+    pub fn undo(&mut self) {
+        self.settle();
+        if let Some(before) = self.past.pop() {
+            self.future.push(std::mem::replace(&mut self.state, before));
+            self.settled = self.state.clone();
+        }
+    }
+
+    pub fn redo(&mut self) {
+        self.settle();
+        if let Some(after) = self.future.pop() {
+            self.past.push(std::mem::replace(&mut self.state, after));
+            self.settled = self.state.clone();
+        }
+    }
+
+    #[must_use]
+    pub fn can_undo(&self) -> bool {
+        !self.past.is_empty() || self.state != self.settled
+    }
+
+    #[must_use]
+    pub fn can_redo(&self) -> bool {
+        !self.future.is_empty() && self.state == self.settled
+    }
+
+    #[must_use]
+    pub fn is_dirty(&self) -> bool {
+        self.state != self.saved
+    }
+
+    /// The state on disk is now this one.
+    pub fn mark_saved(&mut self, path: PathBuf) {
+        self.path = Some(path);
+        self.saved = self.state.clone();
+    }
+
+    /// Name for the title and the reports.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let path = self.path.as_ref().unwrap_or(&self.mesh_path);
+        path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// One dab of the brush: every vertex within `radius` (m) over the surface. The first dab of paint on
+    /// an unpainted part begins from nothing painted, the first erasing dab from everything.
+    pub fn dab(&mut self, brush: Brush, at: SurfacePoint, radius: f64) {
+        let reached = geodesic::from_point(&self.part, at, radius);
+        let vertices = self.part.positions().len();
+        let mask = self
+            .state
+            .painted
+            .get_or_insert_with(|| Arc::new(vec![brush == Brush::Erase; vertices]));
+        let mask = Arc::make_mut(mask);
+        for (m, d) in mask.iter_mut().zip(reached) {
+            if d <= radius {
+                *m = brush == Brush::Paint;
+            }
+        }
+    }
+
+    /// Everything may carry gauges again.
+    pub fn clear_paint(&mut self) {
+        self.state.painted = None;
+        self.settle();
+    }
+
+    /// What the simulation depends on, as a key.
+    #[must_use]
+    pub fn simulation_key(&self) -> String {
+        let p = &self.state.project;
+        format!(
+            "{:p} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+            Arc::as_ptr(&self.part),
+            p.part,
+            p.material,
+            p.supports,
+            p.touch,
+            p.sites,
+            p.gauge.signal,
+            p.budget
+        )
+    }
+
+    /// What the elastic model alone depends on.
+    #[must_use]
+    pub fn model_key(&self) -> String {
+        let p = &self.state.project;
+        format!("{:p} {:?} {:?} {:?}", Arc::as_ptr(&self.part), p.part, p.material, p.supports)
+    }
+
+    /// What the feasible region depends on.
+    #[must_use]
+    pub fn feasible_key(&self) -> String {
+        let p = &self.state.project;
+        let painted = self.state.painted.as_ref().map(|m| hash(m));
+        format!("{} {:?} {:?} {painted:?}", self.simulation_key(), p.gauge, p.feasible)
+    }
+
+    /// What the selection and its evaluation depend on.
+    #[must_use]
+    pub fn selection_key(&self) -> String {
+        let p = &self.state.project;
+        let s = &p.selection;
+        format!(
+            "{} {:?} {:?} {} {} {} {} {:?}",
+            self.feasible_key(),
+            p.candidates,
+            s.selector,
+            s.sensors,
+            s.c_mm,
+            s.epsilon_mm,
+            s.gamma,
+            p.evaluation
+        )
+    }
+}
+
+fn hash(mask: &[bool]) -> u64 {
+    use std::hash::{DefaultHasher, Hash, Hasher};
+    let mut hasher = DefaultHasher::new();
+    mask.hash(&mut hasher);
+    hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn document() -> Document {
+        Document::new(crate::cli::bundled().unwrap(), None)
+    }
+
+    fn at(document: &Document) -> SurfacePoint {
+        SurfacePoint {
+            triangle: (document.part.triangles().len() / 2) as u32,
+            barycentric: [1.0 / 3.0; 3],
+        }
+    }
+
+    #[test]
+    fn a_stroke_is_one_step_of_undo() {
+        let mut d = document();
+        let place = at(&d);
+        d.dab(Brush::Paint, place, 6e-3);
+        d.dab(Brush::Paint, place, 9e-3);
+        d.settle();
+        let painted = d.state.painted.as_ref().unwrap().iter().filter(|&&m| m).count();
+        assert!(painted > 10 && painted < 300, "{painted}");
+        d.dab(Brush::Erase, place, 4e-3);
+        d.settle();
+        d.undo();
+        assert_eq!(d.state.painted.as_ref().unwrap().iter().filter(|&&m| m).count(), painted);
+        d.undo();
+        assert!(d.state.painted.is_none() && !d.can_undo() && !d.is_dirty());
+        d.redo();
+        d.redo();
+        assert!(!d.can_redo() && d.is_dirty());
+    }
+
+    #[test]
+    fn a_new_change_ends_redo() {
+        let mut d = document();
+        d.state.project.touch.force_n = 12.0;
+        d.settle();
+        d.undo();
+        d.state.project.touch.force_n = 14.0;
+        d.settle();
+        assert!(!d.can_redo());
+        d.undo();
+        assert_eq!(d.state.project.touch.force_n, 10.0);
+    }
+
+    #[test]
+    fn only_what_depends_on_a_change_goes_stale() {
+        let mut d = document();
+        let keys = |d: &Document| [d.model_key(), d.simulation_key(), d.feasible_key(), d.selection_key()];
+        let before = keys(&d);
+        let changed = |d: &Document, expected: [bool; 4]| {
+            let now = keys(d);
+            let changed: Vec<bool> = now.iter().zip(&before).map(|(a, b)| a != b).collect();
+            assert_eq!(changed, expected);
+        };
+        d.state.project.selection.sensors = 5;
+        changed(&d, [false, false, false, true]);
+        d = document();
+        let before = keys(&d);
+        d.state.project.feasible.edge_radius_mm = 1.0;
+        let now = keys(&d);
+        assert_eq!(now[1], before[1]);
+        assert_ne!(now[2], before[2]);
+        d.state.project.part.thickness_mm = 2.0;
+        assert_ne!(keys(&d)[0], before[0]);
+    }
+}

@@ -1,0 +1,238 @@
+//! One list of commands feeds menus and keys, and is carried out in one place.
+
+use egui::{Context, Key, KeyboardShortcut, Modifiers};
+
+use super::Studio;
+use super::dialogs::Dialog;
+use super::viewport::Tool;
+use crate::render::camera::Preset;
+
+/// Everything that can be commanded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command {
+    Open,
+    Save,
+    SaveAs,
+    Export,
+    Quit,
+    Undo,
+    Redo,
+    ClearPaint,
+    Simulate,
+    Select,
+    Cancel,
+    Frame,
+    Look(Preset),
+    Tool(Tool),
+}
+
+impl Command {
+    /// As menus and accessibility name it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Open => "Open…",
+            Self::Save => "Save",
+            Self::SaveAs => "Save as…",
+            Self::Export => "Export report…",
+            Self::Quit => "Quit",
+            Self::Undo => "Undo",
+            Self::Redo => "Redo",
+            Self::ClearPaint => "Clear painted region",
+            Self::Simulate => "Simulate",
+            Self::Select => "Select gauges",
+            Self::Cancel => "Cancel job",
+            Self::Frame => "Frame the limb",
+            Self::Look(preset) => preset.name(),
+            Self::Tool(tool) => tool.name(),
+        }
+    }
+
+    #[must_use]
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::Open => "Open a project or a mesh",
+            Self::Save => "Save the project",
+            Self::SaveAs => "Save the project under another name",
+            Self::Export => "Write the placement report, the table of sites and the dataset into a folder",
+            Self::Quit => "Close the window",
+            Self::Undo => "Take back the last change",
+            Self::Redo => "Make the change again",
+            Self::ClearPaint => "Every site that passes the filters may carry a gauge again",
+            Self::Simulate => "Compute how the limb deforms under all touches",
+            Self::Select => "Filter, reduce, choose the gauges and judge them on unseen touches",
+            Self::Cancel => "Stop the running job",
+            Self::Frame => "Show the whole limb",
+            Self::Look(_) => "Look from this side",
+            Self::Tool(Tool::Touch) => "Click on the limb to press it there; drag to look around",
+            Self::Tool(Tool::Paint) => "Drag over the limb to paint where gauges may go",
+            Self::Tool(Tool::Erase) => "Drag over the limb to keep gauges away",
+        }
+    }
+
+    #[must_use]
+    pub fn shortcut(self) -> Option<KeyboardShortcut> {
+        const CTRL: Modifiers = Modifiers::COMMAND;
+        const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
+        let plain = |key| Some(KeyboardShortcut::new(Modifiers::NONE, key));
+        let ctrl = |key| Some(KeyboardShortcut::new(CTRL, key));
+        match self {
+            Self::Open => ctrl(Key::O),
+            Self::Save => ctrl(Key::S),
+            Self::SaveAs => Some(KeyboardShortcut::new(CTRL_SHIFT, Key::S)),
+            Self::Export => ctrl(Key::E),
+            Self::Quit => ctrl(Key::Q),
+            Self::Undo => ctrl(Key::Z),
+            Self::Redo => Some(KeyboardShortcut::new(CTRL_SHIFT, Key::Z)),
+            Self::Simulate => plain(Key::F5),
+            Self::Select => plain(Key::F6),
+            Self::Cancel => plain(Key::Escape),
+            Self::Frame => plain(Key::Home),
+            Self::Look(Preset::Front) => plain(Key::Num1),
+            Self::Look(Preset::Right) => plain(Key::Num3),
+            Self::Look(Preset::Top) => plain(Key::Num7),
+            Self::Tool(Tool::Touch) => plain(Key::T),
+            Self::Tool(Tool::Paint) => plain(Key::B),
+            Self::Tool(Tool::Erase) => plain(Key::X),
+            Self::Look(_) | Self::ClearPaint => None,
+        }
+    }
+
+    /// Every command, the most specific shortcut first where keys are shared.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let mut all = vec![
+            Self::SaveAs,
+            Self::Save,
+            Self::Open,
+            Self::Export,
+            Self::Quit,
+            Self::Redo,
+            Self::Undo,
+            Self::ClearPaint,
+            Self::Simulate,
+            Self::Select,
+            Self::Cancel,
+            Self::Frame,
+        ];
+        all.extend(Preset::ALL.map(Self::Look));
+        all.extend(Tool::ALL.map(Self::Tool));
+        all
+    }
+}
+
+impl Studio {
+    /// Whether a command can be given now.
+    #[must_use]
+    pub fn enabled(&self, command: Command) -> bool {
+        match command {
+            Command::Undo => self.document.can_undo(),
+            Command::Redo => self.document.can_redo(),
+            Command::ClearPaint => self.document.state.painted.is_some(),
+            Command::Simulate | Command::Select => !self.busy(),
+            Command::Cancel => self.busy(),
+            Command::Export => self.design.is_some() && !self.busy(),
+            _ => true,
+        }
+    }
+
+    /// Carries a command out.
+    pub fn execute(&mut self, ctx: &Context, command: Command) {
+        if !self.enabled(command) {
+            return;
+        }
+        match command {
+            Command::Open => self.dialog = Some(Dialog::open(&self.document)),
+            Command::Save => match self.document.path.clone() {
+                Some(path) => self.save_to(&path),
+                None => self.dialog = Some(Dialog::save_as(&self.document)),
+            },
+            Command::SaveAs => self.dialog = Some(Dialog::save_as(&self.document)),
+            Command::Export => self.dialog = Some(Dialog::export(&self.document)),
+            Command::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            Command::Undo => self.document.undo(),
+            Command::Redo => self.document.redo(),
+            Command::ClearPaint => self.document.clear_paint(),
+            Command::Simulate => self.simulate(ctx),
+            Command::Select => self.select(ctx),
+            Command::Cancel => self.cancel(),
+            Command::Frame => self.view.frame(&self.document),
+            Command::Look(preset) => self.view.camera.look_from(preset),
+            Command::Tool(tool) => self.view.tool = tool,
+        }
+    }
+
+    pub(super) fn shortcuts(&mut self, ctx: &Context) {
+        if self.dialog.is_some() || self.ask_quit {
+            return;
+        }
+        let typing = ctx.egui_wants_keyboard_input();
+        for command in Command::all() {
+            let Some(shortcut) = command.shortcut() else {
+                continue;
+            };
+            // Single keys belong to a text field while it has the focus.
+            let single = shortcut.modifiers == Modifiers::NONE;
+            if !(typing && single) && ctx.input_mut(|i| i.consume_shortcut(&shortcut)) {
+                self.execute(ctx, command);
+            }
+        }
+    }
+
+    /// A button or menu entry for a command.
+    pub(super) fn button(&mut self, ui: &mut egui::Ui, command: Command) {
+        let mut button = egui::Button::new(command.name());
+        if let Some(shortcut) = command.shortcut() {
+            button = button.shortcut_text(ui.ctx().format_shortcut(&shortcut));
+        }
+        let response = ui
+            .add_enabled(self.enabled(command), button)
+            .accessible_name(command.name())
+            .on_hover_text(command.tooltip());
+        if response.clicked() {
+            let ctx = ui.ctx().clone();
+            self.execute(&ctx, command);
+        }
+    }
+
+    pub(super) fn menu(&mut self, ui: &mut egui::Ui) {
+        egui::MenuBar::new().ui(ui, |ui| {
+            ui.menu_button("File", |ui| {
+                for command in [Command::Open, Command::Save, Command::SaveAs] {
+                    self.button(ui, command);
+                }
+                ui.separator();
+                self.button(ui, Command::Export);
+                ui.separator();
+                self.button(ui, Command::Quit);
+            });
+            ui.menu_button("Edit", |ui| {
+                for command in [Command::Undo, Command::Redo] {
+                    self.button(ui, command);
+                }
+                ui.separator();
+                for tool in Tool::ALL {
+                    self.button(ui, Command::Tool(tool));
+                }
+                self.button(ui, Command::ClearPaint);
+            });
+            ui.menu_button("View", |ui| {
+                self.button(ui, Command::Frame);
+                for preset in Preset::ALL {
+                    self.button(ui, Command::Look(preset));
+                }
+                ui.separator();
+                ui.horizontal(egui::widgets::global_theme_preference_buttons);
+            });
+            ui.menu_button("Run", |ui| {
+                for command in [Command::Simulate, Command::Select, Command::Cancel] {
+                    self.button(ui, command);
+                }
+            });
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let state = if self.document.is_dirty() { "not saved" } else { "saved" };
+                ui.weak(format!("{} · {state}", self.document.name()));
+            });
+        });
+    }
+}

@@ -1,0 +1,242 @@
+//! Opening, saving and exporting: a typed path always works; "Browse…" asks the desktop for a dialog.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, channel};
+
+use egui::Context;
+
+use super::Studio;
+use crate::cli;
+use crate::document::Document;
+use crate::io::mesh_file::ENDINGS;
+use crate::io::project_file;
+use crate::project::Unit;
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Purpose {
+    Open,
+    SaveAs,
+    Export,
+}
+
+/// A dialog that asks for a path.
+pub(super) struct Dialog {
+    purpose: Purpose,
+    path: String,
+    unit: Unit,
+    /// The desktop's own dialog, while it is open.
+    browsing: Option<Receiver<Option<PathBuf>>>,
+    focused: bool,
+}
+
+impl Dialog {
+    fn new(purpose: Purpose, path: String) -> Self {
+        Self {
+            purpose,
+            path,
+            unit: Unit::Millimetre,
+            browsing: None,
+            focused: false,
+        }
+    }
+
+    pub fn open(document: &Document) -> Self {
+        let folder = document.path.as_ref().and_then(|p| p.parent());
+        Self::new(Purpose::Open, folder.map(|f| format!("{}/", f.display())).unwrap_or_default())
+    }
+
+    pub fn save_as(document: &Document) -> Self {
+        let path = document.path.clone().unwrap_or_else(|| {
+            let stem = document.mesh_path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            document.mesh_path.with_file_name(format!("{stem}.hapdef.toml"))
+        });
+        Self::new(Purpose::SaveAs, path.display().to_string())
+    }
+
+    pub fn export(document: &Document) -> Self {
+        let folder = document.path.as_ref().and_then(|p| p.parent()).unwrap_or(Path::new(""));
+        Self::new(Purpose::Export, folder.join("report").display().to_string())
+    }
+
+    fn title(&self) -> &'static str {
+        match self.purpose {
+            Purpose::Open => "Open a project or mesh",
+            Purpose::SaveAs => "Save the project",
+            Purpose::Export => "Export the report",
+        }
+    }
+
+    fn verb(&self) -> &'static str {
+        match self.purpose {
+            Purpose::Open => "Open file",
+            Purpose::SaveAs => "Save file",
+            Purpose::Export => "Export",
+        }
+    }
+
+    fn hint(&self) -> &'static str {
+        match self.purpose {
+            Purpose::Open => "NAME.hapdef.toml, or a mesh: glb, gltf, obj, stl",
+            Purpose::SaveAs => "NAME.hapdef.toml",
+            Purpose::Export => "A folder for report.html, sites.csv, design.json, dataset.npz",
+        }
+    }
+
+    /// Whether the typed path is a mesh that does not say its unit.
+    fn needs_unit(&self) -> bool {
+        let lower = self.path.to_lowercase();
+        self.purpose == Purpose::Open && (lower.ends_with(".obj") || lower.ends_with(".stl"))
+    }
+
+    fn browse(&mut self, ctx: &Context) {
+        let (sender, receiver) = channel();
+        let dialog = rfd::FileDialog::new().set_title(self.title());
+        let purpose = self.purpose;
+        let ctx = ctx.clone();
+        // The desktop's dialog waits without an end: it must not hold up the window.
+        std::thread::spawn(move || {
+            let chosen = match purpose {
+                Purpose::Open => {
+                    let mut endings = vec!["toml"];
+                    endings.extend(ENDINGS);
+                    dialog.add_filter("Projects and meshes", &endings).pick_file()
+                }
+                Purpose::SaveAs => dialog.set_file_name("limb.hapdef.toml").save_file(),
+                Purpose::Export => dialog.pick_folder(),
+            };
+            let _ = sender.send(chosen);
+            ctx.request_repaint();
+        });
+        self.browsing = Some(receiver);
+    }
+}
+
+impl Studio {
+    pub(super) fn dialogs(&mut self, ctx: &Context) {
+        self.path_dialog(ctx);
+        self.quit_dialog(ctx);
+    }
+
+    fn path_dialog(&mut self, ctx: &Context) {
+        let Some(mut dialog) = self.dialog.take() else {
+            return;
+        };
+        if let Some(chosen) = dialog.browsing.as_ref().and_then(|r| r.try_recv().ok()) {
+            dialog.browsing = None;
+            if let Some(path) = chosen {
+                dialog.path = path.display().to_string();
+            }
+        }
+        let mut confirmed = false;
+        let mut closed = false;
+        let modal = egui::Modal::new(egui::Id::unique("path dialog")).show(ctx, |ui| {
+            ui.set_width(480.0);
+            ui.heading(dialog.title());
+            ui.add_space(4.0);
+            let hint = dialog.hint();
+            let field = egui::TextEdit::singleline(&mut dialog.path)
+                .hint_text(hint)
+                .desired_width(f32::INFINITY);
+            let field = ui.add(field).accessible_name("Path");
+            if !dialog.focused {
+                field.request_focus();
+                dialog.focused = true;
+            }
+            confirmed |= field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+            ui.weak(hint);
+            if dialog.needs_unit() {
+                ui.horizontal(|ui| {
+                    ui.label("Unit of the file");
+                    for unit in Unit::ALL {
+                        ui.selectable_value(&mut dialog.unit, unit, unit.name());
+                    }
+                });
+            }
+            ui.add_space(6.0);
+            ui.horizontal(|ui| {
+                let ready = !dialog.path.trim().is_empty();
+                confirmed |= ui.add_enabled(ready, egui::Button::new(dialog.verb())).clicked();
+                if ui.add_enabled(dialog.browsing.is_none(), egui::Button::new("Browse…")).clicked() {
+                    dialog.browse(ctx);
+                }
+                closed |= ui.button("Cancel").clicked();
+            });
+        });
+        closed |= modal.should_close();
+        if confirmed && !dialog.path.trim().is_empty() {
+            self.confirm(ctx, &dialog);
+        } else if !closed {
+            self.dialog = Some(dialog);
+        }
+    }
+
+    fn confirm(&mut self, ctx: &Context, dialog: &Dialog) {
+        let path = PathBuf::from(dialog.path.trim());
+        match dialog.purpose {
+            Purpose::Open => {
+                let unit = dialog.needs_unit().then_some(dialog.unit);
+                self.open_path(&path, unit);
+            }
+            Purpose::SaveAs => self.save_to(&path),
+            Purpose::Export => self.export(ctx, path),
+        }
+    }
+
+    /// Opens a project or mesh; on an error what is open stays open.
+    pub fn open_path(&mut self, path: &Path, unit: Option<Unit>) {
+        match cli::open(path, unit) {
+            Ok(loaded) => {
+                let is_project = path.to_string_lossy().ends_with(".toml");
+                self.replace(loaded, is_project.then(|| path.to_owned()));
+            }
+            Err(error) => self.complain(format!("{error:#}")),
+        }
+    }
+
+    pub(super) fn save_to(&mut self, path: &Path) {
+        self.document.settle();
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let saved = self.settled_mesh(&folder).and_then(|mesh| {
+            let mut project = self.document.state.project.clone();
+            project.part.mesh = project_file::relative_to(path, &mesh);
+            let painted = self.document.state.painted.as_ref().map(|m| m.as_slice());
+            project_file::save(path, &project, painted).map_err(|e| e.to_string())?;
+            Ok((project.part.mesh, mesh))
+        });
+        match saved {
+            Ok((name, mesh)) => {
+                self.document.state.project.part.mesh = name;
+                self.document.mesh_path = mesh;
+                self.document.settle();
+                self.document.mark_saved(path.to_owned());
+            }
+            Err(message) => self.complain(message),
+        }
+    }
+
+    fn quit_dialog(&mut self, ctx: &Context) {
+        if !self.ask_quit {
+            return;
+        }
+        let modal = egui::Modal::new(egui::Id::unique("quit dialog")).show(ctx, |ui| {
+            ui.heading("Save before closing?");
+            ui.label(format!("{} has changes that are not saved.", self.document.name()));
+            ui.horizontal(|ui| {
+                if ui.button("Save and keep open").clicked() {
+                    self.ask_quit = false;
+                    self.execute(ctx, super::Command::Save);
+                }
+                if ui.button("Close without saving").clicked() {
+                    self.quit = true;
+                    ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+                }
+                if ui.button("Go back").clicked() {
+                    self.ask_quit = false;
+                }
+            });
+        });
+        if modal.should_close() {
+            self.ask_quit = false;
+        }
+    }
+}

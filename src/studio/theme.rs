@@ -1,0 +1,34 @@
+//! Colours and spacing. The limb is the brightest thing on the screen; the controls stay quiet.
+
+use egui::{Color32, Context, Theme, ThemePreference, Visuals};
+
+/// Chosen gauges.
+pub const CHOSEN: Color32 = Color32::from_rgb(230, 110, 30);
+/// The applied touch.
+pub const TOUCHED: Color32 = Color32::from_rgb(70, 170, 255);
+pub const ERROR: Color32 = Color32::from_rgb(235, 110, 95);
+
+/// Behind the limb, by theme.
+#[must_use]
+pub fn backdrop(theme: Theme) -> Color32 {
+    match theme {
+        Theme::Dark => Color32::from_rgb(24, 27, 32),
+        Theme::Light => Color32::from_rgb(226, 230, 235),
+    }
+}
+
+pub fn apply(ctx: &Context) {
+    ctx.set_theme(ThemePreference::System);
+    let mut dark = Visuals::dark();
+    dark.panel_fill = Color32::from_rgb(32, 35, 41);
+    dark.window_fill = Color32::from_rgb(38, 42, 49);
+    dark.extreme_bg_color = Color32::from_rgb(22, 24, 29);
+    dark.widgets.noninteractive.fg_stroke.color = Color32::from_gray(196);
+    dark.widgets.inactive.weak_bg_fill = Color32::from_rgb(52, 57, 66);
+    dark.selection.bg_fill = Color32::from_rgb(38, 92, 140);
+    ctx.set_visuals_of(Theme::Dark, dark);
+    ctx.all_styles_mut(|style| {
+        style.spacing.item_spacing = egui::vec2(8.0, 6.0);
+        style.spacing.button_padding = egui::vec2(8.0, 4.0);
+    });
+}

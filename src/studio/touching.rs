@@ -1,0 +1,197 @@
+//! A click presses the limb: a worker keeps the factored model and solves the latest touch.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use glam::DVec3;
+
+use crate::budget::unwatched;
+use crate::document::Document;
+use crate::elasticity::observe::{Face, Observer};
+use crate::elasticity::support::held_freedoms;
+use crate::elasticity::{ElasticError, Section, ShellModel, Support, Touch};
+use crate::mesh::{SurfacePoint, TriMesh};
+
+/// What a touch did, at every vertex of the part.
+pub struct Touched {
+    pub touch: Touch,
+    /// m.
+    pub displacement: Vec<DVec3>,
+    /// Principal strain of the inside face that is larger in size, signed.
+    pub strain: Vec<f64>,
+    /// Largest displacement (m).
+    pub largest: f64,
+    key: String,
+}
+
+struct Request {
+    key: String,
+    part: Arc<TriMesh>,
+    section: Section,
+    supports: Vec<Support>,
+    touch: Touch,
+}
+
+type Reply = Result<Touched, String>;
+
+/// The touch that is shown, and the worker that computes it.
+#[derive(Default)]
+pub(super) struct Touching {
+    worker: Option<(Sender<Request>, Receiver<Reply>)>,
+    waiting: usize,
+    result: Option<Touched>,
+    /// Counts results, so that the view knows when to build its fields anew.
+    pub version: u64,
+}
+
+impl Touching {
+    /// Applies a touch of the project's force; the answer comes later.
+    pub fn apply(&mut self, ctx: &egui::Context, document: &Document, at: SurfacePoint) {
+        let project = &document.state.project;
+        let (force, tip_radius) = project.tip();
+        let request = Request {
+            key: document.model_key(),
+            part: Arc::clone(&document.part),
+            section: project.section(),
+            supports: project.supports(),
+            touch: Touch {
+                position: document.part.point(at),
+                normal: document.part.normal(at),
+                force,
+                tip_radius,
+            },
+        };
+        let (sender, _) = self.worker.get_or_insert_with(|| start_worker(ctx.clone()));
+        if sender.send(request).is_ok() {
+            self.waiting += 1;
+        }
+    }
+
+    pub fn result(&self) -> Option<&Touched> {
+        self.result.as_ref()
+    }
+
+    pub fn is_waiting(&self) -> bool {
+        self.waiting > 0
+    }
+
+    pub fn clear(&mut self) {
+        self.result = None;
+        self.version += 1;
+    }
+
+    /// Takes in answers; an error in the user's terms comes back.
+    pub fn collect(&mut self, document: &Document) -> Option<String> {
+        let mut error = None;
+        if let Some((_, replies)) = &self.worker {
+            while let Ok(reply) = replies.try_recv() {
+                self.waiting = 0;
+                match reply {
+                    Ok(touched) => {
+                        self.result = Some(touched);
+                        self.version += 1;
+                    }
+                    Err(message) => error = Some(message),
+                }
+            }
+        }
+        // What was computed for another part or support no longer shows this one.
+        if self.result.as_ref().is_some_and(|r| r.key != document.model_key()) {
+            self.clear();
+        }
+        error
+    }
+}
+
+fn start_worker(ctx: egui::Context) -> (Sender<Request>, Receiver<Reply>) {
+    let (requests, inbox) = channel::<Request>();
+    let (outbox, replies) = channel();
+    std::thread::spawn(move || {
+        let mut next = inbox.recv().ok();
+        while let Some(request) = next.take() {
+            let shared = std::panic::AssertUnwindSafe(|| serve(request, &inbox, &outbox, &ctx));
+            next = std::panic::catch_unwind(shared).unwrap_or_else(|_| {
+                let _ = outbox.send(Err("An internal error stopped this touch. Please report it".into()));
+                ctx.request_repaint();
+                inbox.recv().ok()
+            });
+        }
+    });
+    (requests, replies)
+}
+
+/// Answers requests on one model; returns the first that needs another.
+fn serve(
+    first: Request,
+    inbox: &Receiver<Request>,
+    outbox: &Sender<Reply>,
+    ctx: &egui::Context,
+) -> Option<Request> {
+    let answer = |reply: Reply| {
+        let _ = outbox.send(reply);
+        ctx.request_repaint();
+    };
+    let part = Arc::clone(&first.part);
+    let held = held_freedoms(&part, &first.supports);
+    let model = match ShellModel::new(&part, first.section, &held, &unwatched) {
+        Ok(model) => model,
+        Err(error) => {
+            answer(Err(explain(&error)));
+            return inbox.recv().ok();
+        }
+    };
+    let observer = Observer::new(&model, &every_vertex(&part), Face::Inside);
+    let key = first.key.clone();
+    let mut request = first;
+    loop {
+        // Only the latest touch matters.
+        while let Ok(newer) = inbox.try_recv() {
+            request = newer;
+        }
+        if request.key != key {
+            return Some(request);
+        }
+        answer(Ok(solve(&model, &observer, &request)));
+        request = inbox.recv().ok()?;
+    }
+}
+
+fn explain(error: &ElasticError) -> String {
+    format!("The touch could not be computed: {error}")
+}
+
+fn solve(model: &ShellModel, observer: &Observer, request: &Request) -> Touched {
+    let u = model.solve(&model.forces(&request.touch));
+    let displacement: Vec<DVec3> = u.chunks_exact(6).map(|f| DVec3::new(f[0], f[1], f[2])).collect();
+    let strain = observer
+        .strain_of(&u)
+        .into_iter()
+        .map(|[xx, yy, xy]| {
+            let (mean, radius) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy / 2.0));
+            mean + radius * if mean < 0.0 { -1.0 } else { 1.0 }
+        })
+        .collect();
+    Touched {
+        touch: request.touch,
+        largest: displacement.iter().map(|d| d.length()).fold(0.0, f64::max),
+        displacement,
+        strain,
+        key: request.key.clone(),
+    }
+}
+
+/// A surface point at each vertex, in order.
+fn every_vertex(mesh: &TriMesh) -> Vec<SurfacePoint> {
+    mesh.vertex_triangles()
+        .iter()
+        .enumerate()
+        .map(|(v, around)| {
+            let triangle = around.first().copied().unwrap_or(0);
+            let tri = mesh.triangles()[triangle as usize];
+            SurfacePoint {
+                triangle,
+                barycentric: std::array::from_fn(|k| f64::from(u8::from(tri[k] as usize == v))),
+            }
+        })
+        .collect()
+}
