@@ -36,11 +36,8 @@ fn vs(v: Vertex) -> Fragment {
 
 @fragment
 fn fs(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
-    // The geometric normal follows the deformed shape; the smooth one keeps curved walls smooth.
-    let facet = normalize(cross(dpdx(f.world), dpdy(f.world)));
     let to_eye = normalize(scene.eye.xyz - f.world);
     var n = normalize(f.normal);
-    if (scene.deform.x > 0.0) { n = facet; }
     if (dot(n, to_eye) < 0.0) { n = -n; }
     let headlight = max(dot(n, to_eye), 0.0);
     let sky = 0.5 + 0.5 * n.z;

@@ -135,7 +135,7 @@ impl Quality {
             },
             Self::Standard => Budget {
                 quality: self,
-                refinements: 0,
+                refinements: 1,
                 touches: usize::MAX,
                 test_touches: 800,
                 candidates: usize::MAX,
@@ -143,12 +143,12 @@ impl Quality {
                 selection_candidates: 60,
                 folds: 5,
                 tuning_touches: 1000,
-                svr_steps: 300_000,
+                svr_steps: 200_000,
                 svr_tolerance_mm: 0.1,
             },
             Self::Reference => Budget {
                 quality: self,
-                refinements: 1,
+                refinements: 2,
                 touches: usize::MAX,
                 test_touches: 2000,
                 candidates: usize::MAX,

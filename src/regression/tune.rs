@@ -28,7 +28,7 @@ impl Default for Hyper {
         Self {
             c: 200.0,
             epsilon: 0.1,
-            gamma: 0.1,
+            gamma: 0.3,
         }
     }
 }

@@ -158,7 +158,7 @@ impl Studio {
             Command::Cancel => self.cancel(),
             Command::Frame => self.view.frame(&self.document),
             Command::Look(preset) => self.view.camera.look_from(preset),
-            Command::Tool(tool) => self.view.tool = tool,
+            Command::Tool(tool) => self.view.take(tool),
         }
     }
 

@@ -117,6 +117,14 @@ impl Viewport {
         self.camera.distance = framed.distance;
     }
 
+    /// Takes a tool in hand; a brush shows what it paints.
+    pub fn take(&mut self, tool: Tool) {
+        self.tool = tool;
+        if tool != Tool::Touch {
+            self.field = Field::Region;
+        }
+    }
+
     #[must_use]
     pub fn is_stroking(&self) -> bool {
         self.last_dab.is_some()
@@ -163,7 +171,7 @@ impl Studio {
                     let chosen = self.view.tool == tool;
                     let button = ui.add(egui::Button::selectable(chosen, tool.name()));
                     if button.on_hover_text(Command::Tool(tool).tooltip()).clicked() {
-                        self.view.tool = tool;
+                        self.view.take(tool);
                     }
                 }
                 if self.view.tool != Tool::Touch {
@@ -373,10 +381,11 @@ impl Studio {
         (0..vertices).map(|v| if weight[v] > 0.0 { sum[v] / weight[v] } else { 0.0 }).collect()
     }
 
-    /// How much the deformation is exaggerated; nothing without a touch.
+    /// How much the deformation is exaggerated; nothing without a touch, nor while painting: the brush
+    /// works on the limb at rest.
     #[must_use]
     pub fn exaggeration(&self) -> Option<f64> {
-        let touched = self.touching.result()?;
+        let touched = self.touching.result().filter(|_| self.view.tool == Tool::Touch)?;
         let (lower, upper) = self.document.part.bounds();
         let wanted = SHOWN_DEFORMATION * (upper - lower).length() / touched.largest.max(f64::MIN_POSITIVE);
         let power = 10f64.powf(wanted.log10().floor());
@@ -413,7 +422,8 @@ impl Studio {
     }
 
     fn paint_touch(&self, painter: &egui::Painter) {
-        let Some(touched) = self.touching.result() else {
+        let shown = self.view.tool == Tool::Touch;
+        let Some(touched) = self.touching.result().filter(|_| shown) else {
             return;
         };
         let touch = touched.touch;
@@ -434,7 +444,7 @@ impl Studio {
             let direction = DVec3::from_array(site.direction);
             let (at, _) = self.view.index.nearest(position);
             let normal = self.document.part.normal(at);
-            let shift = self.touching.result().map_or(DVec3::ZERO, |t| {
+            let shift = self.touching.result().filter(|_| deformation > 0.0).map_or(DVec3::ZERO, |t| {
                 let tri = self.document.part.triangles()[at.triangle as usize];
                 (0..3).map(|k| t.displacement[tri[k] as usize] * at.barycentric[k]).sum::<DVec3>() * deformation
             });

@@ -1,4 +1,5 @@
 //! Published shell problems, each returning computed over reference on an n × n mesh.
+#![allow(dead_code, reason = "each test uses its own part of these")]
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -1,0 +1,306 @@
+//! What must hold whatever the numbers: rigid motion, rotation, renumbering, superposition, reciprocity,
+//! determinism, and each fast way against a naive one.
+
+mod bench;
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+use hapdef::budget::{Quality, unwatched};
+use hapdef::dataset::{Signal, SignalMatrix};
+use hapdef::design::{self, Inputs};
+use hapdef::elasticity::element::Facet;
+use hapdef::elasticity::observe::{Face, Observer};
+use hapdef::elasticity::support::held_freedoms;
+use hapdef::elasticity::{ShellModel, Touch};
+use hapdef::mesh::TriMesh;
+use hapdef::mesh::locate::SurfaceIndex;
+use hapdef::placement::greedy_svr::GreedySvr;
+use hapdef::placement::{Pool, Selector, SelectorKind};
+use hapdef::regression::tune::Effort;
+use hapdef::regression::{Hyper, PositionModel};
+
+fn bundled() -> Inputs {
+    hapdef::cli::bundled().unwrap().inputs
+}
+
+fn model(inputs: &Inputs) -> ShellModel<'_> {
+    let held = held_freedoms(&inputs.part, &inputs.project.supports());
+    ShellModel::new(&inputs.part, inputs.project.section(), &held, &unwatched).unwrap()
+}
+
+fn touch(inputs: &Inputs, toward: DVec3) -> Touch {
+    let index = SurfaceIndex::new(&inputs.part);
+    let (at, _) = index.nearest(toward);
+    Touch {
+        position: inputs.part.point(at),
+        normal: inputs.part.normal(at),
+        force: 10.0,
+        tip_radius: 5e-3,
+    }
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+#[test]
+fn rigid_motion_makes_no_force_and_no_strain() {
+    let section = bench::section(1.7e9, 0.35, 1.5e-3);
+    let corners = [
+        DVec3::new(0.01, 0.002, -0.003),
+        DVec3::new(0.013, 0.001, 0.0),
+        DVec3::new(0.011, 0.004, 0.001),
+    ];
+    let facet = Facet::new(corners, &section);
+    let k = facet.stiffness(&section);
+    let (shift, spin) = (DVec3::new(1.0, -2.0, 0.5), DVec3::new(30.0, -70.0, 55.0));
+    let motion = nalgebra::SVector::<f64, 18>::from_fn(|i, _| {
+        let p = corners[i / 6];
+        if i % 6 < 3 { (shift + spin.cross(p))[i % 6] } else { spin[i % 6 - 3] }
+    });
+    let scale = k.amax() * motion.amax();
+    assert!((k * motion).amax() < 1e-12 * scale);
+    assert!((k - k.transpose()).amax() < 1e-12 * k.amax());
+    for z in [-0.75e-3, 0.0, 0.75e-3] {
+        let strain = facet.strain([0.2, 0.5, 0.3], z);
+        assert!((strain * motion).amax() < 1e-12 * strain.amax() * motion.amax());
+    }
+}
+
+#[test]
+fn an_element_has_exactly_six_motions_without_energy() {
+    let section = bench::section(1.7e9, 0.35, 1.5e-3);
+    let corners = [DVec3::ZERO, DVec3::new(2e-3, 0.0, 1e-3), DVec3::new(0.5e-3, 1.7e-3, 0.0)];
+    let k = Facet::new(corners, &section).stiffness(&section);
+    let mut values: Vec<f64> = k.symmetric_eigenvalues().iter().copied().collect();
+    values.sort_by(f64::total_cmp);
+    assert!(values[5].abs() < 1e-9 * values[17] && values[6] > 0.0);
+    assert!(values[6] > 1e6 * values[5].abs(), "{values:?}");
+}
+
+#[test]
+fn a_turned_limb_deforms_the_same() {
+    let inputs = bundled();
+    let u = {
+        let m = model(&inputs);
+        m.solve(&m.forces(&touch(&inputs, DVec3::new(0.03, 0.01, 0.07))))
+    };
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.7, -1.1, 2.3);
+    let positions: Vec<DVec3> = inputs.part.positions().iter().map(|&p| turn * p).collect();
+    let turned = TriMesh::new(&positions, inputs.part.triangles(), 0).unwrap().0;
+    let held = held_freedoms(&inputs.part, &inputs.project.supports());
+    let m = ShellModel::new(&turned, inputs.project.section(), &held, &unwatched).unwrap();
+    let mut t = touch(&inputs, DVec3::new(0.03, 0.01, 0.07));
+    t.position = turn * t.position;
+    t.normal = turn * t.normal;
+    let v = m.solve(&m.forces(&t));
+    let back: Vec<f64> = v
+        .chunks_exact(3)
+        .flat_map(|d| (turn.inverse() * DVec3::from_slice(d)).to_array())
+        .collect();
+    let difference: Vec<f64> = u.iter().zip(&back).map(|(a, b)| a - b).collect();
+    assert!(norm(&difference) < 1e-8 * norm(&u), "{:e}", norm(&difference) / norm(&u));
+}
+
+#[test]
+fn touches_superpose_and_are_reciprocal_and_in_balance() {
+    let inputs = bundled();
+    let m = model(&inputs);
+    let [a, b] = [DVec3::new(0.03, 0.01, 0.07), DVec3::new(-0.03, 0.0, 0.03)].map(|p| m.forces(&touch(&inputs, p)));
+    let (ua, ub) = (m.solve(&a), m.solve(&b));
+    let both: Vec<(u32, DVec3)> = a.iter().chain(&b).copied().collect();
+    let sum: Vec<f64> = m.solve(&both).iter().zip(ua.iter().zip(&ub)).map(|(s, (x, y))| s - x - y).collect();
+    assert!(norm(&sum) < 1e-11 * norm(&ua));
+    let work = |f: &[(u32, DVec3)], u: &[f64]| -> f64 {
+        f.iter().map(|&(v, f)| f.dot(DVec3::from_slice(&u[6 * v as usize..]))).sum()
+    };
+    let (ab, ba) = (work(&a, &ub), work(&b, &ua));
+    assert!((ab - ba).abs() < 1e-10 * work(&a, &ua).abs(), "{ab} {ba}");
+    let check = m.check(&a, &ua);
+    assert!(check.reaction_error < 1e-8 && check.energy_error < 1e-8, "{check:?}");
+    assert!(m.residual(&a, &ua) < 1e-10);
+}
+
+#[test]
+fn blocks_give_the_bytes_of_single_touches() {
+    let inputs = bundled();
+    let m = model(&inputs);
+    let touches: Vec<Touch> = (0..70)
+        .map(|k| touch(&inputs, DVec3::new(0.03, 0.001 * f64::from(k) - 0.03, 0.06)))
+        .collect();
+    let firsts = m
+        .solve_touches(&touches, &unwatched, |first, rows| {
+            let width = rows.len() / (6 * inputs.part.positions().len());
+            (first, rows[6 * 1000 * width + 2], rows[6 * 1000 * width + width + 5])
+        })
+        .unwrap();
+    assert_eq!(firsts.len(), 2);
+    let single = m.solve(&m.forces(&touches[2]));
+    assert_eq!(firsts[0].1.to_bits(), single[6000].to_bits());
+    let single = m.solve(&m.forces(&touches[64 + 5]));
+    assert_eq!(firsts[1].2.to_bits(), single[6001].to_bits());
+}
+
+#[test]
+fn the_inside_face_is_the_outside_face_of_the_shell_turned_over() {
+    let inputs = bundled();
+    let flipped: Vec<[u32; 3]> = inputs.part.triangles().iter().map(|&[a, b, c]| [a, c, b]).collect();
+    let other = TriMesh::new(inputs.part.positions(), &flipped, 0).unwrap().0;
+    let held = held_freedoms(&inputs.part, &inputs.project.supports());
+    let section = inputs.project.section();
+    let m = ShellModel::new(&inputs.part, section, &held, &unwatched).unwrap();
+    let n = ShellModel::new(&other, section, &held, &unwatched).unwrap();
+    let u = m.solve(&m.forces(&touch(&inputs, DVec3::new(0.03, 0.01, 0.07))));
+    let place = DVec3::new(0.028, 0.012, 0.06);
+    let size = |m: &ShellModel, face| {
+        let at = m.index.nearest(place).0;
+        let [xx, yy, xy] = Observer::new(m, &[at], face).strain_of(&u)[0];
+        ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy / 2.0))
+    };
+    let (inside, outside) = (size(&m, Face::Inside), size(&n, Face::Outside));
+    assert!((inside.0 - outside.0).abs() < 1e-9 * inside.1 && (inside.1 - outside.1).abs() < 1e-9 * inside.1);
+    assert!((size(&m, Face::Outside).0 - inside.0).abs() > 0.1 * inside.1, "the faces differ under bending");
+}
+
+fn small(signal: Signal) -> (Inputs, hapdef::budget::Budget) {
+    let mut inputs = bundled();
+    inputs.project.gauge.signal = signal;
+    inputs.project.selection.sensors = 3;
+    let mut budget = Quality::Draft.budget();
+    budget.touches = 200;
+    budget.test_touches = 60;
+    budget.selection_touches = 120;
+    budget.selection_candidates = 10;
+    budget.candidates = 20;
+    budget.tuning_touches = 90;
+    (inputs, budget)
+}
+
+#[test]
+fn one_thread_or_many_give_the_same_bytes() {
+    let (inputs, budget) = small(Signal::Strain);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let design = pool
+            .install(|| design::run(&inputs, &SelectorKind::ALL, &budget, &|| 0.0, &unwatched))
+            .unwrap();
+        let bits: Vec<u64> = design.simulated.dataset.x.values().iter().map(|x| x.to_bits()).collect();
+        let errors: Vec<u64> = design.evaluation.rows.iter().map(|r| r.error_mm.to_bits()).collect();
+        (bits, design.selections.iter().map(|s| s.sets.clone()).collect::<Vec<_>>(), errors)
+    };
+    let one = run(1);
+    for threads in [2, 8] {
+        let many = run(threads);
+        assert!(one.0 == many.0, "dataset on {threads} threads");
+        assert_eq!(one.1, many.1);
+        assert_eq!(one.2, many.2);
+    }
+}
+
+#[test]
+fn the_work_is_counted_and_nothing_is_done_twice() {
+    let (inputs, budget) = small(Signal::Displacement);
+    let simulated = Arc::new(design::simulate(&inputs, &budget, &unwatched).unwrap());
+    let work = simulated.dataset.work;
+    assert_eq!((work.assemblies, work.factorizations, work.solves), (1, 1, 200));
+    let design = design::run_from(&inputs, simulated, &SelectorKind::ALL, &budget, &|| 0.0, &unwatched).unwrap();
+    let total = design.work();
+    // The truth is the only other model, and only the test touches are solved on it.
+    assert_eq!((total.assemblies, total.factorizations, total.solves), (2, 2, 260));
+}
+
+/// The greedy selector against a naive one that trains every set from nothing.
+#[test]
+fn greedy_svr_is_the_plain_algorithm() {
+    let touches = 60;
+    let targets: Vec<[f64; 3]> = (0..touches)
+        .map(|t| {
+            let a = f64::from(t) * 0.37;
+            [30.0 * a.cos(), 30.0 * a.sin(), f64::from(t)]
+        })
+        .collect();
+    let wave = |s: usize, p: &[f64; 3]| {
+        let s = s as f64;
+        (0.05 * p[0] * (s + 1.0)).sin() + (0.03 * p[1] * s).cos() + 0.01 * p[2] * (s * 0.7).sin()
+    };
+    let values = (0..8).flat_map(|s| targets.iter().map(move |p| wave(s, p))).collect();
+    let x = SignalMatrix::new(touches as usize, values);
+    let sites: Vec<usize> = (100..108).collect();
+    let hyper = Hyper {
+        c: 50.0,
+        epsilon: 0.2,
+        gamma: 0.3,
+    };
+    let effort = Effort {
+        tolerance: 1e-6,
+        max_steps: 1_000_000,
+    };
+    let selector = GreedySvr {
+        hyper,
+        folds: 3,
+        seed: 4,
+        effort,
+    };
+    let pool = Pool {
+        x: &x,
+        targets: &targets,
+        sites: &sites,
+    };
+    let selection = selector.select(&pool, 3, &unwatched).unwrap();
+    // The naive way: standardized over all touches as the selector does, folds as it draws them.
+    let z = hapdef::regression::Standardizer::of(&x).apply(&x);
+    let folds = hapdef::regression::tune::Fold::all(touches as usize, 3, 4);
+    let score = |rows: &[usize]| {
+        let sum: f64 = folds
+            .iter()
+            .map(|fold| {
+                let part = |columns: &[usize]| z.select_rows(rows).select_columns(columns);
+                let kernel = |a: &SignalMatrix, b: &SignalMatrix| {
+                    hapdef::regression::features::gaussian(&hapdef::regression::features::squared_distances(a, b), hyper.gamma)
+                };
+                let (train, test) = (part(&fold.train), part(&fold.test));
+                let inner = kernel(&train, &train);
+                let outer = kernel(&test, &train);
+                let axes = [0, 1, 2].map(|a| {
+                    let y: Vec<f64> = fold.train.iter().map(|&t| targets[t][a]).collect();
+                    let fit = hapdef::regression::svr::fit(&inner, &y, &hyper.params(effort), None);
+                    hapdef::regression::svr::predict(&fit, &outer)
+                });
+                let errors = fold.test.iter().enumerate().map(|(k, &t)| {
+                    (0..3).map(|a| (axes[a][k] - targets[t][a]).powi(2)).sum::<f64>().sqrt()
+                });
+                errors.sum::<f64>() / fold.test.len() as f64
+            })
+            .sum();
+        sum / folds.len() as f64
+    };
+    let mut chosen: Vec<usize> = Vec::new();
+    for set in &selection.sets {
+        let scores: Vec<(usize, f64)> = (0..8)
+            .filter(|s| !chosen.contains(s))
+            .map(|s| (s, score(&[&chosen[..], &[s]].concat())))
+            .collect();
+        let best = scores.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
+        let picked = set.sites[set.sites.len() - 1] - 100;
+        let own = scores.iter().find(|s| s.0 == picked).unwrap().1;
+        assert!(own <= best * 1.0001, "{picked}: {own} against {best}");
+        assert!((set.criterion / own - 1.0).abs() < 1e-4, "{} against {own}", set.criterion);
+        chosen.push(picked);
+    }
+}
+
+#[test]
+fn training_knows_nothing_of_the_test_touches() {
+    // The same training data give the same predictions whatever is asked, in whatever company.
+    let x = SignalMatrix::new(30, (0..60).map(|i| f64::from(i).sin()).collect());
+    let targets: Vec<[f64; 3]> = (0..30).map(|t| [f64::from(t), 1.0, -f64::from(t)]).collect();
+    let effort = Effort {
+        tolerance: 1e-6,
+        max_steps: 100_000,
+    };
+    let model = PositionModel::train(&x, &targets, &Hyper::default(), effort);
+    let asked = SignalMatrix::new(2, vec![0.1, 0.9, 0.2, -0.4]);
+    let alone = SignalMatrix::new(1, vec![0.1, 0.2]);
+    assert_eq!(model.predict(&asked)[0], model.predict(&alone)[0]);
+}

@@ -1,0 +1,263 @@
+//! The real window: driven by its accessible names, rendered by a real wgpu adapter.
+#![cfg(feature = "studio")]
+
+use std::time::{Duration, Instant};
+
+use eframe::egui_wgpu::wgpu;
+use egui::{Event, Modifiers, PointerButton, Pos2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use glam::DVec3;
+use hapdef::budget::Quality;
+use hapdef::cli;
+use hapdef::studio::{Field, Studio};
+use image::RgbaImage;
+
+/// Whether there is an adapter; in CI there must be one.
+fn adapter() -> bool {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    assert!(
+        !adapters.is_empty() || std::env::var_os("CI").is_none(),
+        "no graphics adapter: install mesa-vulkan-drivers"
+    );
+    if adapters.is_empty() {
+        eprintln!("SKIPPED: no graphics adapter. Install mesa-vulkan-drivers");
+    }
+    !adapters.is_empty()
+}
+
+struct Window {
+    harness: Harness<'static, Studio>,
+}
+
+impl Window {
+    fn open() -> Option<Self> {
+        if !adapter() {
+            return None;
+        }
+        let harness = Harness::builder()
+            .with_size([1440.0, 900.0])
+            .with_theme(egui::Theme::Dark)
+            .with_max_steps(120)
+            .with_step_dt(1.0 / 60.0)
+            .with_render_cursor(false)
+            .wgpu()
+            .build_eframe(|cc| {
+                let mut loaded = cli::bundled().unwrap();
+                loaded.inputs.project.budget.quality = Quality::Draft;
+                Studio::new(cc, loaded, None).unwrap()
+            });
+        Some(Self { harness })
+    }
+
+    fn press(&mut self, name: &str) {
+        self.harness.get_by_role_and_label(egui::Role::Button, name).click();
+        self.harness.run_ok();
+    }
+
+    fn wait(&mut self, what: &str, seconds: u64, done: impl Fn(&Studio) -> bool) {
+        let start = Instant::now();
+        while !done(self.harness.state()) {
+            assert!(start.elapsed().as_secs() < seconds, "timed out waiting for {what}: {:?}", self.harness.state().messages);
+            self.harness.step();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        self.harness.run_ok();
+    }
+
+    fn picture(&mut self) -> RgbaImage {
+        self.harness.render().unwrap()
+    }
+
+    /// Where a point of the limb (mm) is in the window.
+    fn place(&self, x: f64, y: f64, z: f64) -> Pos2 {
+        self.harness.state().view.place(DVec3::new(x, y, z) / 1000.0).unwrap()
+    }
+
+    fn click(&mut self, at: Pos2) {
+        self.drag(&[at]);
+    }
+
+    fn drag(&mut self, path: &[Pos2]) {
+        self.harness.hover_at(path[0]);
+        self.harness.step();
+        let button = |pos, pressed| Event::PointerButton {
+            pos,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        };
+        self.harness.event(button(path[0], true));
+        for &p in path {
+            self.harness.hover_at(p);
+        }
+        self.harness.event(button(path[path.len() - 1], false));
+        self.harness.run_ok();
+    }
+
+    fn painted(&self) -> Option<usize> {
+        let mask = self.harness.state().document.state.painted.as_ref()?;
+        Some(mask.iter().filter(|&&m| m).count())
+    }
+}
+
+/// Pixels of a rectangle of the view that are clearly not its backdrop.
+fn lit(picture: &RgbaImage, center: Pos2, radius: i64) -> usize {
+    let mut count = 0;
+    for dy in -radius..=radius {
+        for dx in -radius..=radius {
+            let p = picture.get_pixel((center.x as i64 + dx) as u32, (center.y as i64 + dy) as u32);
+            count += usize::from(p.0[..3].iter().map(|&c| u32::from(c)).sum::<u32>() > 240);
+        }
+    }
+    count
+}
+
+/// Mean (blue - red) of a square: sea-green of the region and blue of compression are above grey.
+fn blueness(picture: &RgbaImage, center: Pos2, radius: i64) -> f64 {
+    let mut sum = 0.0;
+    for dy in -radius..=radius {
+        for dx in -radius..=radius {
+            let p = picture.get_pixel((center.x as i64 + dx) as u32, (center.y as i64 + dy) as u32);
+            sum += f64::from(p.0[2]) - f64::from(p.0[0]);
+        }
+    }
+    sum / ((2 * radius + 1).pow(2) as f64)
+}
+
+#[test]
+fn the_limb_is_shown_and_bends_under_a_click() {
+    let Some(mut w) = Window::open() else { return };
+    w.press("Front");
+    // On the hoop at the front, between the columns.
+    let hoop = w.place(31.83, 0.0, 60.0);
+    let window = w.place(31.83, 0.0, 46.0);
+    let before = w.picture();
+    assert!(lit(&before, hoop, 6) > 150, "the hoop is drawn");
+    assert!(lit(&before, window, 6) < 60 || blueness(&before, window, 6).abs() < 40.0);
+    w.click(hoop);
+    w.wait("the touch", 60, |s| s.touched().is_some());
+    let touched = w.harness.state().touched().unwrap();
+    assert!(touched.touch.position.distance(DVec3::new(0.03183, 0.0, 0.060)) < 2e-3);
+    assert!((0.2e-3..3e-3).contains(&touched.largest), "{}", touched.largest);
+    assert_eq!(w.harness.state().view.field, Field::Strain);
+    let after = w.picture();
+    let changed = before
+        .pixels()
+        .zip(after.pixels())
+        .filter(|(a, b)| (0..3).any(|c| a.0[c].abs_diff(b.0[c]) > 30))
+        .count();
+    assert!(changed > 8000, "the strain field is drawn: {changed} pixels changed");
+}
+
+#[test]
+fn painting_erasing_undo_and_redo() {
+    let Some(mut w) = Window::open() else { return };
+    w.press("Front");
+    w.press("Paint");
+    let path: Vec<Pos2> = (0..8).map(|k| w.place(31.0, -7.0 + 2.0 * f64::from(k), 60.0)).collect();
+    w.drag(&path);
+    let painted = w.painted().expect("a stroke paints");
+    assert!(painted > 20 && painted < 600, "{painted}");
+    let picture = w.picture();
+    assert!(blueness(&picture, path[4], 4) > 15.0, "the region is tinted");
+    w.press("Erase");
+    w.click(path[4]);
+    assert!(w.painted().unwrap() < painted);
+    w.harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::Z);
+    w.harness.run_ok();
+    assert_eq!(w.painted(), Some(painted));
+    w.harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::Z);
+    w.harness.run_ok();
+    assert_eq!(w.painted(), None);
+    w.harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, egui::Key::Z);
+    w.harness.run_ok();
+    assert_eq!(w.painted(), Some(painted));
+}
+
+#[test]
+fn from_the_limb_to_the_report() {
+    let Some(mut w) = Window::open() else { return };
+    w.press("Simulate");
+    w.wait("the simulation", 120, |s| !s.busy());
+    assert!(w.harness.state().messages.is_empty(), "{:?}", w.harness.state().messages);
+    let sites = w.harness.state().simulation.as_ref().unwrap().simulated.dataset.sites.len();
+    assert_eq!(sites, 3039);
+    w.wait("the filters", 10, |s| s.feasibility.is_some());
+    w.harness.state_mut().document.state.project.selection.sensors = 5;
+    w.harness.run_ok();
+    w.press("Select gauges");
+    w.wait("the selection", 300, |s| !s.busy());
+    assert!(w.harness.state().messages.is_empty(), "{:?}", w.harness.state().messages);
+    let design = &w.harness.state().design.as_ref().unwrap().design;
+    assert_eq!(design.chosen().len(), 5);
+    assert!(design.evaluation.rows.iter().any(|r| r.selector == "pca-qr"));
+    let _ = w.picture();
+    // The error plot is there, by its name.
+    assert_eq!(w.harness.get_all_by_label_contains("Error against number of gauges").count(), 2);
+    let folder = tempfile::tempdir().unwrap();
+    w.press("Export report…");
+    let target = folder.path().join("report");
+    w.harness.get_by_label("Path").focus();
+    w.harness.run_ok();
+    w.harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
+    w.harness.get_by_label("Path").type_text(&target.display().to_string());
+    w.harness.run_ok();
+    w.press("Export");
+    w.wait("the export", 60, |s| !s.busy() && !s.messages.is_empty());
+    assert!(target.join("report.html").exists(), "{:?}", w.harness.state().messages);
+    assert!(hapdef::io::project_file::load(&target.join("design.hapdef.toml")).is_ok());
+}
+
+#[test]
+fn a_job_can_be_cancelled_and_bad_files_change_nothing() {
+    let Some(mut w) = Window::open() else { return };
+    w.harness.state_mut().document.state.project.budget.quality = Quality::Standard;
+    w.harness.run_ok();
+    w.press("Simulate");
+    w.wait("the job to report", 30, |s| s.busy());
+    w.press("Cancel job");
+    w.wait("the cancelled job", 60, |s| !s.busy());
+    assert!(w.harness.state().simulation.is_none());
+    assert!(w.harness.state().messages.iter().any(|m| m.text.contains("cancelled")));
+    let folder = tempfile::tempdir().unwrap();
+    let bad = folder.path().join("bad.glb");
+    std::fs::write(&bad, b"glTF nonsense").unwrap();
+    let before = w.harness.state().document.inputs();
+    w.harness.state_mut().open_path(&bad, None);
+    w.harness.run_ok();
+    let error = w.harness.state().messages.iter().find(|m| m.error).unwrap().text.clone();
+    assert!(error.contains("bad.glb"), "{error}");
+    assert_eq!(w.harness.state().document.state.project, before.project);
+    // A part that nothing holds says so, and the window lives on.
+    w.harness.state_mut().document.state.project.supports.clear();
+    w.harness.run_ok();
+    w.press("Simulate");
+    w.wait("the refusal", 60, |s| !s.busy() && s.messages.iter().any(|m| m.text.contains("support")));
+}
+
+#[test]
+fn a_saved_project_opens_again() {
+    let Some(mut w) = Window::open() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mine.hapdef.toml");
+    w.press("Front");
+    w.press("Paint");
+    let at = w.place(31.83, 0.0, 60.0);
+    w.click(at);
+    let painted = w.painted().unwrap();
+    w.harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::S);
+    w.harness.run_ok();
+    w.harness.get_by_label("Path").focus();
+    w.harness.run_ok();
+    w.harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
+    w.harness.get_by_label("Path").type_text(&path.display().to_string());
+    w.harness.run_ok();
+    w.press("Save file");
+    assert!(!w.harness.state().document.is_dirty(), "{:?}", w.harness.state().messages);
+    w.harness.state_mut().document.clear_paint();
+    w.harness.state_mut().open_path(&path, None);
+    w.harness.run_ok();
+    assert_eq!(w.painted(), Some(painted), "{:?}", w.harness.state().messages);
+}
