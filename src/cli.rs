@@ -92,8 +92,10 @@ pub const BUNDLED_MESH: &[u8] = include_bytes!("../assets/limb.glb");
 /// # Errors
 /// None for the files this program was built with.
 pub fn bundled() -> anyhow::Result<LoadedProject> {
-    let project = project_file::parse(BUNDLED_PROJECT).map_err(|m| anyhow::anyhow!("bundled limb: {m}"))?;
-    let mesh = crate::io::mesh_file::parse_glb(BUNDLED_MESH).map_err(|m| anyhow::anyhow!("bundled limb: {m}"))?;
+    let project =
+        project_file::parse(BUNDLED_PROJECT).map_err(|m| anyhow::anyhow!("bundled limb: {m}"))?;
+    let mesh = crate::io::mesh_file::parse_glb(BUNDLED_MESH)
+        .map_err(|m| anyhow::anyhow!("bundled limb: {m}"))?;
     Ok(LoadedProject {
         inputs: Inputs {
             project,
@@ -111,13 +113,25 @@ pub fn bundled() -> anyhow::Result<LoadedProject> {
 /// # Errors
 /// A message naming the file and the remedy.
 pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    let name = path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
     if name.ends_with(".toml") {
         return Ok(project_file::load(path)?);
     }
     let loaded = read_mesh(path, unit, 0)?;
-    let file_name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    anyhow::ensure!(ENDINGS.iter().any(|e| name.ends_with(e)), "{}: open a project (.hapdef.toml) or a mesh", path.display());
+    let file_name = path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    anyhow::ensure!(
+        ENDINGS.iter().any(|e| name.ends_with(e)),
+        "{}: open a project (.hapdef.toml) or a mesh",
+        path.display()
+    );
     Ok(LoadedProject {
         inputs: Inputs {
             project: Project::around(&file_name, unit),
@@ -157,7 +171,10 @@ impl Common {
     ///
     /// # Errors
     /// What `work` reports, or that the threads could not be started.
-    pub fn in_pool<T: Send>(&self, work: impl FnOnce() -> anyhow::Result<T> + Send) -> anyhow::Result<T> {
+    pub fn in_pool<T: Send>(
+        &self,
+        work: impl FnOnce() -> anyhow::Result<T> + Send,
+    ) -> anyhow::Result<T> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.unwrap_or(0))
             .build()
@@ -172,7 +189,8 @@ impl Common {
 /// When it cannot be written.
 pub fn settle_mesh(loaded: &mut LoadedProject, folder: &Path, bundled: bool) -> anyhow::Result<()> {
     if bundled {
-        std::fs::create_dir_all(folder).with_context(|| format!("{}: the folder cannot be created", folder.display()))?;
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("{}: the folder cannot be created", folder.display()))?;
         loaded.mesh_path = folder.join("limb.glb");
         crate::io::atomic::write(&loaded.mesh_path, BUNDLED_MESH)?;
     }

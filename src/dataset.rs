@@ -184,7 +184,9 @@ pub fn simulate(
         .iter()
         .zip(observer.frames())
         .zip(moments.iter().zip(&angles))
-        .map(|((&at, frame), (m, &angle))| m.site(model.mesh.point(at), *frame, angle, touches.len()))
+        .map(|((&at, frame), (m, &angle))| {
+            m.site(model.mesh.point(at), *frame, angle, touches.len())
+        })
         .collect();
     let x = gather(&blocks, signal, &angles, touches.len());
     let mut work = model.work();
@@ -210,7 +212,10 @@ pub fn measure(
     signal: Signal,
     watch: Watch,
 ) -> Result<SignalMatrix, Cancelled> {
-    let points: Vec<SurfacePoint> = sites.iter().map(|s| model.index.nearest(s.position).0).collect();
+    let points: Vec<SurfacePoint> = sites
+        .iter()
+        .map(|s| model.index.nearest(s.position).0)
+        .collect();
     let observer = Observer::new(model, &points, Face::Inside);
     let angles: Vec<f64> = sites
         .iter()
@@ -249,7 +254,13 @@ impl BlockSignals {
         let stride = strain.len() / (3 * normals.len()).max(1);
         let moments = strain
             .chunks_exact(3 * stride)
-            .map(|s| Moments::of(&s[..width], &s[stride..][..width], &s[2 * stride..][..width]))
+            .map(|s| {
+                Moments::of(
+                    &s[..width],
+                    &s[stride..][..width],
+                    &s[2 * stride..][..width],
+                )
+            })
             .collect();
         let values = match signal {
             Signal::Strain => strain
@@ -291,9 +302,9 @@ fn gather(blocks: &[BlockSignals], signal: Signal, angles: &[f64], touches: usiz
             let w = block.width;
             if signal == Signal::Strain {
                 let rows = &block.values[3 * site * w..][..3 * w];
-                values.extend((0..w).map(|k| {
-                    rows[k] * c * c + rows[w + k] * s * s + rows[2 * w + k] * c * s
-                }));
+                values.extend(
+                    (0..w).map(|k| rows[k] * c * c + rows[w + k] * s * s + rows[2 * w + k] * c * s),
+                );
             } else {
                 values.extend_from_slice(&block.values[site * w..][..w]);
             }

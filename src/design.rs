@@ -13,7 +13,7 @@ use crate::elasticity::load::Touch;
 use crate::elasticity::support::{held_freedoms, supported_vertices};
 use crate::elasticity::{ElasticError, ShellModel};
 use crate::evaluation::{self, Candidate, Evaluation, Region, Trial, subset};
-use crate::feasible::{FeasibleInput, Feasibility, feasible};
+use crate::feasible::{Feasibility, FeasibleInput, feasible};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::refine::refine;
 use crate::mesh::unroll::Unrolling;
@@ -34,18 +34,26 @@ pub enum DesignError {
     Elastic(#[from] ElasticError),
     #[error(transparent)]
     Placement(#[from] PlacementError),
-    #[error("no touch lands on the part: lower touch.edge_margin_mm ({margin_mm} mm) or check the unit of the mesh (the part is {size_mm:.3} mm across)")]
+    #[error(
+        "no touch lands on the part: lower touch.edge_margin_mm ({margin_mm} mm) or check the unit of the mesh (the part is {size_mm:.3} mm across)"
+    )]
     NoTouches { margin_mm: f64, size_mm: f64 },
-    #[error("{count} sites at a spacing of {spacing_mm} mm are more than the {limit} this version handles: widen sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.0} mm across)")]
+    #[error(
+        "{count} sites at a spacing of {spacing_mm} mm are more than the {limit} this version handles: widen sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.0} mm across)"
+    )]
     TooManySites {
         count: usize,
         limit: usize,
         spacing_mm: f64,
         size_mm: f64,
     },
-    #[error("no site fits on the part: lower sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.3} mm across)")]
+    #[error(
+        "no site fits on the part: lower sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.3} mm across)"
+    )]
     NoRoom { size_mm: f64 },
-    #[error("{needed_gb:.1} GB would be needed for {sites} sites × {touches} touches, more than the {limit_gb:.0} GB this version allows: lower touch.count or widen sites.spacing_mm")]
+    #[error(
+        "{needed_gb:.1} GB would be needed for {sites} sites × {touches} touches, more than the {limit_gb:.0} GB this version allows: lower touch.count or widen sites.spacing_mm"
+    )]
     TooLarge {
         needed_gb: f64,
         limit_gb: f64,
@@ -162,20 +170,26 @@ pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoi
         });
     }
     let points = match project.sites.lattice {
-        Lattice::Even => {
-            sample::even(mesh, estimate.round() as usize, project.budget.seed, |_| true)
-        }
+        Lattice::Even => sample::even(mesh, estimate.round() as usize, project.budget.seed, |_| {
+            true
+        }),
         Lattice::Unrolled => {
             Unrolling::of(mesh, project.part.axis).lattice(&SurfaceIndex::new(mesh), spacing)
         }
     };
     if points.is_empty() {
-        return Err(DesignError::NoRoom { size_mm: size_mm(mesh) });
+        return Err(DesignError::NoRoom {
+            size_mm: size_mm(mesh),
+        });
     }
     Ok(points)
 }
 
-fn lay_out_touches(mesh: &TriMesh, project: &Project, budget: &Budget) -> Result<Vec<Touch>, DesignError> {
+fn lay_out_touches(
+    mesh: &TriMesh,
+    project: &Project,
+    budget: &Budget,
+) -> Result<Vec<Touch>, DesignError> {
     let count = project.touch.count.min(budget.touches);
     touches_on(mesh, project, count, project.budget.seed, true)
 }
@@ -322,7 +336,12 @@ pub fn select(
                 targets: &targets,
                 sites: &reduced.feasible,
             };
-            Ok(pca_qr::from_components(&reduced.pca, &pool, sensors, watch)?)
+            Ok(pca_qr::from_components(
+                &reduced.pca,
+                &pool,
+                sensors,
+                watch,
+            )?)
         }
         SelectorKind::GreedySvr => {
             let limit = budget.selection_candidates.max(sensors);
@@ -333,7 +352,11 @@ pub fn select(
                 reduced.sites.clone()
             };
             let touches = subset(targets.len(), budget.selection_touches);
-            let x = simulated.dataset.x.select_rows(&sites).select_columns(&touches);
+            let x = simulated
+                .dataset
+                .x
+                .select_rows(&sites)
+                .select_columns(&touches);
             let targets: Vec<[f64; 3]> = touches.iter().map(|&t| targets[t]).collect();
             let pool = Pool {
                 x: &x,
@@ -482,7 +505,10 @@ pub fn evaluate(
 /// Every site that the evaluation of some selections looks at.
 #[must_use]
 pub fn sites_to_judge(reduced: &Reduced, selections: &[Selection]) -> Vec<usize> {
-    let chosen = selections.iter().flat_map(|s| &s.sets).flat_map(|s| &s.sites);
+    let chosen = selections
+        .iter()
+        .flat_map(|s| &s.sets)
+        .flat_map(|s| &s.sites);
     reduced.sites.iter().chain(chosen).copied().collect()
 }
 
@@ -535,10 +561,19 @@ impl Design {
         notes.extend(self.reduced.candidates.notes.iter().cloned());
         for selection in &self.selections {
             let title = selection.selector.title();
-            notes.extend(selection.achieved.notes.iter().map(|n| format!("{title}: {n}")));
+            notes.extend(
+                selection
+                    .achieved
+                    .notes
+                    .iter()
+                    .map(|n| format!("{title}: {n}")),
+            );
         }
         if self.evaluation.rows.iter().any(|r| !r.converged) {
-            notes.push("Some regressions stopped at the effort allowed before they met their tolerance.".into());
+            notes.push(
+                "Some regressions stopped at the effort allowed before they met their tolerance."
+                    .into(),
+            );
         }
         notes
     }
@@ -591,7 +626,15 @@ pub fn run_from(
     let judged = sites_to_judge(&reduced, &selections);
     let truth = truth(inputs, &simulated, &judged, budget, watch)?;
     times.lap("truth");
-    let evaluation = evaluate(inputs, &simulated, &reduced, &selections, &truth, budget, watch)?;
+    let evaluation = evaluate(
+        inputs,
+        &simulated,
+        &reduced,
+        &selections,
+        &truth,
+        budget,
+        watch,
+    )?;
     times.lap("evaluate");
     Ok(Design {
         budget: *budget,

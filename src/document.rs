@@ -75,7 +75,8 @@ impl Document {
         if self.state == self.settled {
             return;
         }
-        self.past.push(std::mem::replace(&mut self.settled, self.state.clone()));
+        self.past
+            .push(std::mem::replace(&mut self.settled, self.state.clone()));
         if self.past.len() > DEPTH {
             self.past.remove(0);
         }
@@ -123,7 +124,10 @@ impl Document {
     #[must_use]
     pub fn name(&self) -> String {
         let path = self.path.as_ref().unwrap_or(&self.mesh_path);
-        path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        path.file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
     }
 
     /// One dab of the brush: every vertex within `radius` (m) over the surface. The first dab of paint on
@@ -170,7 +174,13 @@ impl Document {
     #[must_use]
     pub fn model_key(&self) -> String {
         let p = &self.state.project;
-        format!("{:p} {:?} {:?} {:?}", Arc::as_ptr(&self.part), p.part, p.material, p.supports)
+        format!(
+            "{:p} {:?} {:?} {:?}",
+            Arc::as_ptr(&self.part),
+            p.part,
+            p.material,
+            p.supports
+        )
     }
 
     /// What the feasible region depends on.
@@ -178,7 +188,12 @@ impl Document {
     pub fn feasible_key(&self) -> String {
         let p = &self.state.project;
         let painted = self.state.painted.as_ref().map(|m| hash(m));
-        format!("{} {:?} {:?} {painted:?}", self.simulation_key(), p.gauge, p.feasible)
+        format!(
+            "{} {:?} {:?} {painted:?}",
+            self.simulation_key(),
+            p.gauge,
+            p.feasible
+        )
     }
 
     /// What the selection and its evaluation depend on.
@@ -229,12 +244,28 @@ mod tests {
         d.dab(Brush::Paint, place, 6e-3);
         d.dab(Brush::Paint, place, 9e-3);
         d.settle();
-        let painted = d.state.painted.as_ref().unwrap().iter().filter(|&&m| m).count();
+        let painted = d
+            .state
+            .painted
+            .as_ref()
+            .unwrap()
+            .iter()
+            .filter(|&&m| m)
+            .count();
         assert!(painted > 10 && painted < 300, "{painted}");
         d.dab(Brush::Erase, place, 4e-3);
         d.settle();
         d.undo();
-        assert_eq!(d.state.painted.as_ref().unwrap().iter().filter(|&&m| m).count(), painted);
+        assert_eq!(
+            d.state
+                .painted
+                .as_ref()
+                .unwrap()
+                .iter()
+                .filter(|&&m| m)
+                .count(),
+            painted
+        );
         d.undo();
         assert!(d.state.painted.is_none() && !d.can_undo() && !d.is_dirty());
         d.redo();
@@ -258,7 +289,14 @@ mod tests {
     #[test]
     fn only_what_depends_on_a_change_goes_stale() {
         let mut d = document();
-        let keys = |d: &Document| [d.model_key(), d.simulation_key(), d.feasible_key(), d.selection_key()];
+        let keys = |d: &Document| {
+            [
+                d.model_key(),
+                d.simulation_key(),
+                d.feasible_key(),
+                d.selection_key(),
+            ]
+        };
         let before = keys(&d);
         let changed = |d: &Document, expected: [bool; 4]| {
             let now = keys(d);

@@ -110,7 +110,11 @@ struct Noisy {
 
 impl Noisy {
     fn new(trial: &Trial) -> Self {
-        let noise = if trial.signal == Signal::Strain { trial.noise } else { 0.0 };
+        let noise = if trial.signal == Signal::Strain {
+            trial.noise
+        } else {
+            0.0
+        };
         Self {
             train: add_noise(trial.train, noise, trial.seed.wrapping_add(1)),
             test: add_noise(trial.test, noise, trial.seed.wrapping_add(2)),
@@ -162,8 +166,15 @@ fn tune_sets(
     let mut known: Vec<(String, usize, Hyper)> = Vec::new();
     for set in sets {
         let size = set.rows.len();
-        let tuned = TUNED_SIZES.iter().copied().filter(|&t| t <= size).max().unwrap_or(size);
-        let reuse = known.iter().find(|k| k.0 == set.selector && k.1 == tuned && size != tuned);
+        let tuned = TUNED_SIZES
+            .iter()
+            .copied()
+            .filter(|&t| t <= size)
+            .max()
+            .unwrap_or(size);
+        let reuse = known
+            .iter()
+            .find(|k| k.0 == set.selector && k.1 == tuned && size != tuned);
         let hyper = if let Some((_, _, hyper)) = reuse {
             Hyper {
                 gamma: hyper.gamma * tuned as f64 / size as f64,
@@ -237,7 +248,10 @@ fn row(
     inside.sort_by(f64::total_cmp);
     let quantile = |q: f64| {
         let last = inside.len().saturating_sub(1);
-        inside.get((q * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
+        inside
+            .get((q * last as f64).round() as usize)
+            .copied()
+            .unwrap_or(f64::NAN)
     };
     EvaluationRow {
         selector: set.selector.clone(),

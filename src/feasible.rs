@@ -78,7 +78,13 @@ impl Feasibility {
     pub fn taken(&self) -> Vec<(Filter, usize)> {
         use Filter::{Edge, Flatness, Footprint, Noise, Painted, Range, SupportClearance};
         [
-            SupportClearance, Edge, Footprint, Flatness, Noise, Range, Painted,
+            SupportClearance,
+            Edge,
+            Footprint,
+            Flatness,
+            Noise,
+            Range,
+            Painted,
         ]
         .map(|f| (f, self.verdicts.iter().filter(|&&v| v == Some(f)).count()))
         .to_vec()
@@ -110,7 +116,9 @@ pub fn feasible(input: &FeasibleInput, rules: &FeasibleRules) -> Feasibility {
                     input.mesh.interpolate(&clearance, input.points[i]) >= rules.support_clearance
                 }),
                 (Filter::Edge, &|| centred[i]),
-                (Filter::Footprint, &|| footprint(input.mesh, input.index, site, rules).on_part),
+                (Filter::Footprint, &|| {
+                    footprint(input.mesh, input.index, site, rules).on_part
+                }),
                 (Filter::Flatness, &|| {
                     footprint(input.mesh, input.index, site, rules).height <= rules.flatness
                 }),
@@ -192,8 +200,8 @@ fn footprint(
         .into_iter()
         .flat_map(|a| [-1.0, 0.0, 1.0].map(|b| (a, b)))
     {
-        let offset = site.direction * (a * rules.grid_length / 2.0)
-            + across * (b * rules.grid_width / 2.0);
+        let offset =
+            site.direction * (a * rules.grid_length / 2.0) + across * (b * rules.grid_width / 2.0);
         let target = site.position + offset;
         let (at, _) = index.nearest(target);
         let gap = mesh.point(at) - target;

@@ -33,9 +33,10 @@ impl FileError {
             std::io::ErrorKind::NotFound => Self::Missing {
                 path: path.to_owned(),
             },
-            std::io::ErrorKind::PermissionDenied => {
-                Self::broken(path, "permission denied. Check who may read and write there")
-            }
+            std::io::ErrorKind::PermissionDenied => Self::broken(
+                path,
+                "permission denied. Check who may read and write there",
+            ),
             _ => Self::broken(path, error),
         }
     }

@@ -93,7 +93,9 @@ impl<T: Send + 'static> Job<T> {
                 (reporter.wake)();
             });
         if let Err(error) = spawned {
-            let _ = failed_to_start.send(Outcome::Failed(format!("the job could not be started: {error}")));
+            let _ = failed_to_start.send(Outcome::Failed(format!(
+                "the job could not be started: {error}"
+            )));
         }
         Self {
             name: name.to_owned(),
@@ -131,9 +133,9 @@ impl<T: Send + 'static> Job<T> {
         match self.result.try_recv() {
             Ok(outcome) => Some(outcome),
             Err(TryRecvError::Empty) => None,
-            Err(TryRecvError::Disconnected) => {
-                Some(Outcome::Failed("the job ended without a result. Start it again".into()))
-            }
+            Err(TryRecvError::Disconnected) => Some(Outcome::Failed(
+                "the job ended without a result. Start it again".into(),
+            )),
         }
     }
 }
@@ -144,7 +146,9 @@ fn describe_panic(panic: &(dyn Any + Send)) -> String {
         .map(|s| (*s).to_owned())
         .or_else(|| panic.downcast_ref::<String>().cloned())
         .unwrap_or_else(|| "no message".into());
-    format!("an internal error stopped this job ({message}). Nothing else was lost; please report it")
+    format!(
+        "an internal error stopped this job ({message}). Nothing else was lost; please report it"
+    )
 }
 
 #[cfg(test)]
@@ -170,25 +174,35 @@ mod tests {
 
     #[test]
     fn a_job_reports_and_returns() {
-        let job = Job::start("count", String::new(), || (), |r| {
-            let _ = r.report(step(42));
-            Ok(7)
-        });
+        let job = Job::start(
+            "count",
+            String::new(),
+            || (),
+            |r| {
+                let _ = r.report(step(42));
+                Ok(7)
+            },
+        );
         assert!(matches!(wait(&job), Outcome::Done(7)));
         assert_eq!(job.progress(), Some(step(42)));
     }
 
     #[test]
     fn cancel_is_heard_at_the_next_report() {
-        let job = Job::<()>::start("spin", String::new(), || (), |r| {
-            for k in 0.. {
-                if r.report(step(k)).is_break() {
-                    return Err(Stop::Cancelled);
+        let job = Job::<()>::start(
+            "spin",
+            String::new(),
+            || (),
+            |r| {
+                for k in 0.. {
+                    if r.report(step(k)).is_break() {
+                        return Err(Stop::Cancelled);
+                    }
+                    std::thread::sleep(Duration::from_millis(1));
                 }
-                std::thread::sleep(Duration::from_millis(1));
-            }
-            Ok(())
-        });
+                Ok(())
+            },
+        );
         job.cancel();
         assert!(matches!(wait(&job), Outcome::Cancelled));
     }

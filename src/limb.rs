@@ -52,7 +52,9 @@ pub enum LimbError {
         rule: &'static str,
         value: f64,
     },
-    #[error("hoops must lie one above the other between 0 and the height, with windows between them")]
+    #[error(
+        "hoops must lie one above the other between 0 and the height, with windows between them"
+    )]
     Hoops,
     #[error("columns must lie apart from each other around the limb, with windows between them")]
     Columns,
@@ -125,13 +127,12 @@ impl LimbSpec {
         grid.round_corners(self.corner_radius);
         let positions: Vec<DVec3> = grid.nodes.iter().map(|&p| self.bend(p)).collect();
         // Building through the same checks as any file: a generator is no exception.
-        let (mesh, _) = TriMesh::new(&positions, &grid.triangles(), 0).map_err(|_| {
-            LimbError::Range {
+        let (mesh, _) =
+            TriMesh::new(&positions, &grid.triangles(), 0).map_err(|_| LimbError::Range {
                 what: "the element size",
                 rule: "above zero and small enough for the columns",
                 value: self.element,
-            }
-        })?;
+            })?;
         Ok((mesh, self.support_boxes()))
     }
 
@@ -144,9 +145,19 @@ impl LimbSpec {
             }
         };
         let positive = "above zero";
-        range("the circumference", positive, self.circumference, self.circumference > 0.0)?;
+        range(
+            "the circumference",
+            positive,
+            self.circumference,
+            self.circumference > 0.0,
+        )?;
         range("the height", positive, self.height, self.height > 0.0)?;
-        range("the taper", "between 0.2 and 5", self.taper, (0.2..=5.0).contains(&self.taper))?;
+        range(
+            "the taper",
+            "between 0.2 and 5",
+            self.taper,
+            (0.2..=5.0).contains(&self.taper),
+        )?;
         range(
             "the arc",
             "between 10 and 360 degrees",
@@ -160,8 +171,18 @@ impl LimbSpec {
             self.element,
             self.element >= smallest,
         )?;
-        range("the corner radius", "zero or more", self.corner_radius, self.corner_radius >= 0.0)?;
-        range("the column width", positive, self.column_width, self.column_width > 0.0)?;
+        range(
+            "the corner radius",
+            "zero or more",
+            self.corner_radius,
+            self.corner_radius >= 0.0,
+        )?;
+        range(
+            "the column width",
+            positive,
+            self.column_width,
+            self.column_width > 0.0,
+        )?;
         let stacked = self.hoops.windows(2).all(|w| w[0].1 < w[1].0);
         let proper = self.hoops.iter().all(|h| h.0 < h.1);
         let inside = self.hoops.first().is_some_and(|h| h.0 >= 0.0)
@@ -172,11 +193,17 @@ impl LimbSpec {
         let mut centres = self.columns.clone();
         centres.sort_by(f64::total_cmp);
         let apart = centres.windows(2).all(|w| w[1] - w[0] > self.column_width);
-        let within = centres.first().is_some_and(|c| c - self.column_width / 2.0 >= 0.0)
+        let within = centres
+            .first()
+            .is_some_and(|c| c - self.column_width / 2.0 >= 0.0)
             && centres
                 .last()
                 .is_some_and(|c| c + self.column_width / 2.0 <= self.circumference);
-        if apart && within { Ok(()) } else { Err(LimbError::Columns) }
+        if apart && within {
+            Ok(())
+        } else {
+            Err(LimbError::Columns)
+        }
     }
 
     /// (s, z) in mm to a point in metres.
@@ -220,9 +247,10 @@ impl LimbSpec {
                     let s = s0 + (s1 - s0) * f64::from(i) / f64::from(steps);
                     [z0, z1].map(|z| self.bend(DVec2::new(s, z)) * 1000.0)
                 });
-                let (low, high) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
-                    (l.min(p), h.max(p))
-                });
+                let (low, high) = corners
+                    .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
+                        (l.min(p), h.max(p))
+                    });
                 let round = |p: DVec3| p.to_array().map(|x| (x * 1000.0).round() / 1000.0);
                 [round(low - HAIR), round(high + HAIR)]
             })
@@ -307,7 +335,11 @@ impl Grid {
 
     fn is_material(&self, i: isize, j: isize) -> bool {
         let (columns, rows) = (self.columns() as isize, self.lines_z.len() as isize - 1);
-        let i = if self.closed { i.rem_euclid(columns) } else { i };
+        let i = if self.closed {
+            i.rem_euclid(columns)
+        } else {
+            i
+        };
         (0..columns).contains(&i)
             && (0..rows).contains(&j)
             && self.material[(j * columns + i) as usize]
@@ -387,14 +419,26 @@ impl Grid {
         moved[n] = true;
         for along_s in [true, false] {
             for step in 1.. {
-                let (a, b) = if along_s { (i as isize + di * step, j as isize) } else { (i as isize, j as isize + dj * step) };
+                let (a, b) = if along_s {
+                    (i as isize + di * step, j as isize)
+                } else {
+                    (i as isize, j as isize + dj * step)
+                };
                 let columns = self.columns() as isize;
-                let a = if self.closed { a.rem_euclid(columns) } else { a };
+                let a = if self.closed {
+                    a.rem_euclid(columns)
+                } else {
+                    a
+                };
                 if !(0..=columns).contains(&a) || !(0..self.lines_z.len() as isize).contains(&b) {
                     break;
                 }
                 let at = DVec2::new(self.lines_s[a as usize], self.lines_z[b as usize]);
-                let distance = if along_s { (at.x - corner.x).abs() } else { (at.y - corner.y).abs() };
+                let distance = if along_s {
+                    (at.x - corner.x).abs()
+                } else {
+                    (at.y - corner.y).abs()
+                };
                 if distance >= radius {
                     break;
                 }
@@ -407,8 +451,16 @@ impl Grid {
 
     /// Laplacian smoothing of nodes inside the material; feature lines and edges stay.
     fn smooth(&mut self, moved: &[bool]) {
-        let pinned_s: Vec<bool> = self.lines_s.iter().map(|s| near(&self.fixed_s, *s)).collect();
-        let pinned_z: Vec<bool> = self.lines_z.iter().map(|z| near(&self.fixed_z, *z)).collect();
+        let pinned_s: Vec<bool> = self
+            .lines_s
+            .iter()
+            .map(|s| near(&self.fixed_s, *s))
+            .collect();
+        let pinned_z: Vec<bool> = self
+            .lines_z
+            .iter()
+            .map(|z| near(&self.fixed_z, *z))
+            .collect();
         for _ in 0..20 {
             let before = self.nodes.clone();
             for j in 1..self.lines_z.len() - 1 {
@@ -445,7 +497,8 @@ impl Grid {
         let (width, columns) = (self.lines_s.len(), self.columns());
         for j in 0..self.lines_z.len() {
             let first = self.nodes[j * width];
-            self.nodes[j * width + columns] = first + DVec2::X * (self.lines_s[columns] - self.lines_s[0]);
+            self.nodes[j * width + columns] =
+                first + DVec2::X * (self.lines_s[columns] - self.lines_s[0]);
         }
     }
 }
@@ -489,7 +542,11 @@ mod tests {
         let (mesh, boxes) = LimbSpec::default().build().unwrap();
         assert_eq!(mesh.positions().len(), 2724);
         // 20 columns' and hoops' worth of the unrolled 200 × 120 mm: 13 360 mm², facets a little less.
-        assert!((mesh.area() * 1e6 - 13_360.0).abs() < 15.0, "{}", mesh.area() * 1e6);
+        assert!(
+            (mesh.area() * 1e6 - 13_360.0).abs() < 15.0,
+            "{}",
+            mesh.area() * 1e6
+        );
         assert_eq!(boxes.len(), 4);
         let finer = LimbSpec {
             element: 2.0,

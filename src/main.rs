@@ -29,5 +29,7 @@ fn open_studio(cli: &Cli) -> anyhow::Result<()> {
 
 #[cfg(not(feature = "studio"))]
 fn open_studio(_cli: &Cli) -> anyhow::Result<()> {
-    anyhow::bail!("this build has no window (feature \"studio\"). Run `hapdef design --out DIR`, or see `hapdef --help`")
+    anyhow::bail!(
+        "this build has no window (feature \"studio\"). Run `hapdef design --out DIR`, or see `hapdef --help`"
+    )
 }

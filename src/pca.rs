@@ -18,7 +18,9 @@ const RANK: f64 = 1e-12;
 pub enum PcaError {
     #[error("no site's signal varies over the touches: nothing can be told apart")]
     Constant,
-    #[error("the eigenvalues of the signals did not converge: check the dataset for values that are not finite")]
+    #[error(
+        "the eigenvalues of the signals did not converge: check the dataset for values that are not finite"
+    )]
     NoConvergence,
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -45,7 +47,11 @@ impl Pca {
         let matrix = MatRef::from_row_major_slice(z.values(), sites, touches);
         // The smaller of the two Gram matrices has the same spectrum.
         let by_sites = sites <= touches;
-        let gram = if by_sites { product(matrix) } else { product(matrix.transpose()) };
+        let gram = if by_sites {
+            product(matrix)
+        } else {
+            product(matrix.transpose())
+        };
         report(watch, "Principal components", 1, 2)?;
         let eigen = gram
             .self_adjoint_eigen(Side::Lower)
@@ -62,7 +68,14 @@ impl Pca {
             vectors
         } else {
             let mut modes = Mat::<f64>::zeros(sites, rank);
-            matmul(modes.as_mut(), Accum::Replace, matrix, vectors.as_ref(), 1.0, Par::Seq);
+            matmul(
+                modes.as_mut(),
+                Accum::Replace,
+                matrix,
+                vectors.as_ref(),
+                1.0,
+                Par::Seq,
+            );
             Mat::from_fn(sites, rank, |i, k| modes[(i, k)] / values[k].sqrt())
         };
         report(watch, "Principal components", 2, 2)?;
@@ -145,7 +158,11 @@ impl Reconstruction {
         let known = standardizer.apply(&known);
         let unseen = standardizer.apply(&x.select_columns(test));
         let gram = |m: &SignalMatrix| {
-            product(MatRef::from_row_major_slice(m.values(), m.rows(), m.columns()))
+            product(MatRef::from_row_major_slice(
+                m.values(),
+                m.rows(),
+                m.columns(),
+            ))
         };
         let held_out = gram(&unseen);
         let total = (0..held_out.nrows()).map(|i| held_out[(i, i)]).sum();
@@ -191,7 +208,9 @@ mod tests {
             let parts = [(0.7 * t).sin(), (1.3 * t + 1.0).sin(), (2.9 * t).cos()];
             parts[i % 3] * (1.0 + i as f64) + if i >= 6 { parts[0] } else { 0.0 }
         };
-        let values = (0..8).flat_map(|i| (0..touches).map(move |t| wave(i, t))).collect();
+        let values = (0..8)
+            .flat_map(|i| (0..touches).map(move |t| wave(i, t)))
+            .collect();
         SignalMatrix::new(touches, values)
     }
 

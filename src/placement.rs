@@ -11,7 +11,9 @@ use crate::dataset::SignalMatrix;
 use crate::pca::PcaError;
 
 /// The selectors a project can name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum SelectorKind {
     #[default]
@@ -82,9 +84,13 @@ impl Selection {
 /// Why nothing could be chosen.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlacementError {
-    #[error("no site is feasible: relax the filters that took the most sites, or paint a larger region")]
+    #[error(
+        "no site is feasible: relax the filters that took the most sites, or paint a larger region"
+    )]
     NoSites,
-    #[error("{wanted} gauges were asked for, but only {available} sites can be chosen from: ask for fewer gauges or relax the filters")]
+    #[error(
+        "{wanted} gauges were asked for, but only {available} sites can be chosen from: ask for fewer gauges or relax the filters"
+    )]
     TooFewSites { wanted: usize, available: usize },
     #[error("{touches} touches are too few to learn from: ask for at least {least}")]
     TooFewTouches { touches: usize, least: usize },
@@ -105,8 +111,12 @@ pub trait Selector: Sync {
     ///
     /// # Errors
     /// [`PlacementError`] where the pool does not allow it.
-    fn select(&self, pool: &Pool, sensors: usize, watch: Watch)
-    -> Result<Selection, PlacementError>;
+    fn select(
+        &self,
+        pool: &Pool,
+        sensors: usize,
+        watch: Watch,
+    ) -> Result<Selection, PlacementError>;
 }
 
 /// Refuses impossible counts, the same way for every selector.

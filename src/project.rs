@@ -411,9 +411,10 @@ impl Project {
 
     #[must_use]
     pub fn reduction(&self) -> Reduction {
-        self.candidates
-            .count
-            .map_or(Reduction::Unexplained(self.candidates.unexplained), Reduction::Count)
+        self.candidates.count.map_or(
+            Reduction::Unexplained(self.candidates.unexplained),
+            Reduction::Count,
+        )
     }
 
     #[must_use]
@@ -438,7 +439,10 @@ impl Project {
     pub fn check(&self) -> Result<(), BadValue> {
         let above = [
             ("part.thickness_mm", self.part.thickness_mm),
-            ("material.youngs_modulus_gpa", self.material.youngs_modulus_gpa),
+            (
+                "material.youngs_modulus_gpa",
+                self.material.youngs_modulus_gpa,
+            ),
             ("touch.force_n", self.touch.force_n),
             ("touch.tip_radius_mm", self.touch.tip_radius_mm),
             ("sites.spacing_mm", self.sites.spacing_mm),
@@ -454,9 +458,15 @@ impl Project {
         let least_zero = [
             ("touch.edge_margin_mm", self.touch.edge_margin_mm),
             ("gauge.noise_microstrain", self.gauge.noise_microstrain),
-            ("gauge.least_signal_to_noise", self.gauge.least_signal_to_noise),
+            (
+                "gauge.least_signal_to_noise",
+                self.gauge.least_signal_to_noise,
+            ),
             ("gauge.flatness_mm", self.gauge.flatness_mm),
-            ("feasible.support_clearance_mm", self.feasible.support_clearance_mm),
+            (
+                "feasible.support_clearance_mm",
+                self.feasible.support_clearance_mm,
+            ),
             ("feasible.edge_radius_mm", self.feasible.edge_radius_mm),
             ("selection.epsilon_mm", self.selection.epsilon_mm),
         ];
@@ -464,19 +474,37 @@ impl Project {
             check(key, "zero or more", value, value >= 0.0)?;
         }
         let nu = self.material.poissons_ratio;
-        check("material.poissons_ratio", "above -1 and below 0.5", nu, nu > -1.0 && nu < 0.5)?;
+        check(
+            "material.poissons_ratio",
+            "above -1 and below 0.5",
+            nu,
+            nu > -1.0 && nu < 0.5,
+        )?;
         let share = self.candidates.unexplained;
-        check("candidates.unexplained", "above 0 and below 1", share, share > 0.0 && share < 1.0)?;
+        check(
+            "candidates.unexplained",
+            "above 0 and below 1",
+            share,
+            share > 0.0 && share < 1.0,
+        )?;
         for (key, count, least) in [
             ("touch.count", self.touch.count, 3),
             ("selection.sensors", self.selection.sensors, 1),
             ("candidates.count", self.candidates.count.unwrap_or(1), 1),
         ] {
-            let rule = if least == 3 { "at least 3" } else { "at least 1" };
+            let rule = if least == 3 {
+                "at least 3"
+            } else {
+                "at least 1"
+            };
             check(key, rule, count as f64, count >= least)?;
         }
         let boxes = self.supports.iter().map(|s| ("support.box_mm", &s.box_mm));
-        let regions = self.evaluation.regions.iter().map(|r| ("evaluation.region.box_mm", &r.box_mm));
+        let regions = self
+            .evaluation
+            .regions
+            .iter()
+            .map(|r| ("evaluation.region.box_mm", &r.box_mm));
         for (key, corners) in boxes.chain(regions) {
             for value in corners.iter().flatten() {
                 check(key, "made of finite numbers", *value, true)?;

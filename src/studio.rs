@@ -82,7 +82,11 @@ impl Studio {
     ///
     /// # Errors
     /// When there is no graphics adapter.
-    pub fn new(cc: &eframe::CreationContext, loaded: LoadedProject, path: Option<PathBuf>) -> Result<Self, String> {
+    pub fn new(
+        cc: &eframe::CreationContext,
+        loaded: LoadedProject,
+        path: Option<PathBuf>,
+    ) -> Result<Self, String> {
         let Some(state) = &cc.wgpu_render_state else {
             return Err("no graphics adapter was found. Install a Vulkan driver (Debian: mesa-vulkan-drivers), or run `hapdef design --out DIR`, which needs none".into());
         };
@@ -157,7 +161,10 @@ impl Studio {
         self.start(ctx, "Simulate", self.document.simulation_key(), move |r| {
             let start = Instant::now();
             let simulated = design::simulate(&inputs, &budget, &|p| r.report(p)).map_err(stop)?;
-            Ok(Finished::Simulation(Arc::new(simulated), start.elapsed().as_secs_f64()))
+            Ok(Finished::Simulation(
+                Arc::new(simulated),
+                start.elapsed().as_secs_f64(),
+            ))
         });
     }
 
@@ -171,21 +178,31 @@ impl Studio {
             .as_ref()
             .filter(|s| s.key == self.document.simulation_key())
             .map(|s| Arc::clone(&s.simulated));
-        self.start(ctx, "Select gauges", self.document.selection_key(), move |r| {
-            let start = Instant::now();
-            let clock = || start.elapsed().as_secs_f64();
-            let watch = |p| r.report(p);
-            let first = inputs.project.selection.selector;
-            let kinds: Vec<SelectorKind> = std::iter::once(first)
-                .chain(SelectorKind::ALL.into_iter().filter(|&k| k != first))
-                .collect();
-            let design = match current {
-                Some(simulated) => design::run_from(&inputs, simulated, &kinds, &budget, &clock, &watch),
-                None => design::run(&inputs, &kinds, &budget, &clock, &watch),
-            };
-            let design = design.map_err(stop)?;
-            Ok(Finished::Design(Arc::new(design), start.elapsed().as_secs_f64()))
-        });
+        self.start(
+            ctx,
+            "Select gauges",
+            self.document.selection_key(),
+            move |r| {
+                let start = Instant::now();
+                let clock = || start.elapsed().as_secs_f64();
+                let watch = |p| r.report(p);
+                let first = inputs.project.selection.selector;
+                let kinds: Vec<SelectorKind> = std::iter::once(first)
+                    .chain(SelectorKind::ALL.into_iter().filter(|&k| k != first))
+                    .collect();
+                let design = match current {
+                    Some(simulated) => {
+                        design::run_from(&inputs, simulated, &kinds, &budget, &clock, &watch)
+                    }
+                    None => design::run(&inputs, &kinds, &budget, &clock, &watch),
+                };
+                let design = design.map_err(stop)?;
+                Ok(Finished::Design(
+                    Arc::new(design),
+                    start.elapsed().as_secs_f64(),
+                ))
+            },
+        );
     }
 
     /// Writes the report and what belongs to it into a folder.
@@ -255,12 +272,17 @@ impl Studio {
                         seconds,
                     });
                 } else {
-                    self.tell("The simulation was for settings that have changed since, and was dropped");
+                    self.tell(
+                        "The simulation was for settings that have changed since, and was dropped",
+                    );
                 }
             }
             Finished::Design(design, seconds) => self.take_design(design, key, seconds),
             Finished::Exported(folder) => {
-                self.tell(format!("The report is in {}", folder.join("report.html").display()));
+                self.tell(format!(
+                    "The report is in {}",
+                    folder.join("report.html").display()
+                ));
             }
         }
         ctx.request_repaint();
@@ -274,10 +296,14 @@ impl Studio {
         self.simulation = Some(SimulationResult {
             simulated: Arc::clone(&design.simulated),
             key: self.document.simulation_key(),
-            seconds: design.seconds.iter().find(|s| s.stage == "simulate").map_or_else(
-                || self.simulation.as_ref().map_or(0.0, |s| s.seconds),
-                |s| s.seconds,
-            ),
+            seconds: design
+                .seconds
+                .iter()
+                .find(|s| s.stage == "simulate")
+                .map_or_else(
+                    || self.simulation.as_ref().map_or(0.0, |s| s.seconds),
+                    |s| s.seconds,
+                ),
         });
         self.document.state.project.selection.sites =
             crate::io::artifacts::as_chosen(&design.simulated.dataset, design.chosen());
@@ -300,7 +326,11 @@ impl Studio {
             return;
         }
         let key = self.document.feasible_key();
-        if self.feasibility.as_ref().is_none_or(|(known, _)| *known != key) {
+        if self
+            .feasibility
+            .as_ref()
+            .is_none_or(|(known, _)| *known != key)
+        {
             let verdicts = design::filter(&self.document.inputs(), &simulation.simulated);
             self.feasibility = Some((key, Arc::new(verdicts)));
         }
@@ -316,7 +346,10 @@ impl Studio {
         self.feasibility = None;
         self.design = None;
         let repairs = self.document.repairs;
-        if repairs.degenerate_triangles + repairs.duplicate_triangles + repairs.flipped_triangles > 0 || repairs.bodies > 1 {
+        if repairs.degenerate_triangles + repairs.duplicate_triangles + repairs.flipped_triangles
+            > 0
+            || repairs.bodies > 1
+        {
             self.tell(format!(
                 "Taking the mesh in: {} bodies (the largest is shown), {} triangles without area and {} duplicates dropped, {} turned over",
                 repairs.bodies, repairs.degenerate_triangles, repairs.duplicate_triangles, repairs.flipped_triangles
@@ -325,7 +358,11 @@ impl Studio {
     }
 
     fn update_title(&mut self, ctx: &egui::Context) {
-        let dirty = if self.document.is_dirty() { " · not saved" } else { "" };
+        let dirty = if self.document.is_dirty() {
+            " · not saved"
+        } else {
+            ""
+        };
         let title = format!("{}{dirty} – HapDef Studio", self.document.name());
         if title != self.title {
             self.title.clone_from(&title);
@@ -364,10 +401,22 @@ impl eframe::App for Studio {
         self.collect(&ctx);
         self.shortcuts(&ctx);
         Panel::top("menu").show(ui, |ui| self.menu(ui));
-        Panel::bottom("messages").show_separator_line(false).show(ui, |ui| self.status(ui));
-        Panel::left("stages").default_size(216.0).size_range(180.0..=320.0).show(ui, |ui| self.stages(ui));
-        Panel::right("inspector").default_size(300.0).size_range(250.0..=460.0).show(ui, |ui| self.inspector(ui));
-        Panel::bottom("results").resizable(true).default_size(220.0).size_range(120.0..=520.0).show(ui, |ui| self.results(ui));
+        Panel::bottom("messages")
+            .show_separator_line(false)
+            .show(ui, |ui| self.status(ui));
+        Panel::left("stages")
+            .default_size(216.0)
+            .size_range(180.0..=320.0)
+            .show(ui, |ui| self.stages(ui));
+        Panel::right("inspector")
+            .default_size(300.0)
+            .size_range(250.0..=460.0)
+            .show(ui, |ui| self.inspector(ui));
+        Panel::bottom("results")
+            .resizable(true)
+            .default_size(220.0)
+            .size_range(120.0..=520.0)
+            .show(ui, |ui| self.results(ui));
         CentralPanel::no_frame().show(ui, |ui| self.viewport(ui));
         self.dialogs(&ctx);
         // A gesture has ended when nothing is held down any more.

@@ -37,7 +37,13 @@ fn patch(field: impl Fn(DVec3) -> [f64; 6]) -> (TriMesh, Section, f64, f64) {
         at(0.16, 0.08),
         at(0.08, 0.08),
     ];
-    let quads = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7]];
+    let quads = [
+        [0, 1, 5, 4],
+        [1, 2, 6, 5],
+        [2, 3, 7, 6],
+        [3, 0, 4, 7],
+        [4, 5, 6, 7],
+    ];
     let t: Vec<[u32; 3]> = quads
         .iter()
         .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
@@ -65,7 +71,12 @@ fn patch(field: impl Fn(DVec3) -> [f64; 6]) -> (TriMesh, Section, f64, f64) {
     let exact: Vec<f64> = mesh.positions().iter().flat_map(|&p| field(p)).collect();
     let rim = nalgebra::DVector::from_column_slice(&exact[..24]);
     let right = -k.view((24, 0), (24, 24)) * &rim;
-    let inner = k.view((24, 24), (24, 24)).into_owned().lu().solve(&right).unwrap();
+    let inner = k
+        .view((24, 24), (24, 24))
+        .into_owned()
+        .lu()
+        .solve(&right)
+        .unwrap();
     let scale = exact.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let error = (0..24)
         .map(|i| (inner[i] - exact[24 + i]).abs())
@@ -79,7 +90,14 @@ fn patch(field: impl Fn(DVec3) -> [f64; 6]) -> (TriMesh, Section, f64, f64) {
 fn membrane_patch_is_exact() {
     let (_, _, error, energy) = patch(|p| {
         let (x, y) = (p.x, p.y);
-        [1e-3 * (x + y / 2.0), 1e-3 * (y + x / 2.0), 0.0, 0.0, 0.0, 0.0]
+        [
+            1e-3 * (x + y / 2.0),
+            1e-3 * (y + x / 2.0),
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        ]
     });
     assert!(error < 1e-12, "{error}");
     // ½ ∫ ε:D:ε t dA with ε = 1e-3 (1, 1, 1) over 0.24 × 0.12 at t = 1e-3, by hand.
@@ -124,7 +142,11 @@ fn clamped_square_plate() {
 #[test]
 fn clamped_circular_plate() {
     for (n, known) in [(4, 1.003), (8, 1.001)] {
-        near(&format!("clamped circular plate, {n}"), ratio_disc(n), known);
+        near(
+            &format!("clamped circular plate, {n}"),
+            ratio_disc(n),
+            known,
+        );
     }
 }
 
@@ -148,7 +170,9 @@ fn cooks_membrane() {
 #[test]
 fn strain_on_the_faces_of_a_clamped_beam() {
     let (length, width, t, e) = (0.1, 0.01, 1e-3, 1e9);
-    let mesh = bench::grid(40, 4, bench::Cut::Rising, |u, v| DVec3::new(u * length, v * width, 0.0));
+    let mesh = bench::grid(40, 4, bench::Cut::Rising, |u, v| {
+        DVec3::new(u * length, v * width, 0.0)
+    });
     let section = Section {
         material: Material {
             youngs_modulus: e,
@@ -159,13 +183,25 @@ fn strain_on_the_faces_of_a_clamped_beam() {
     let held: Vec<Freedoms> = mesh
         .positions()
         .iter()
-        .map(|p| if p.x < 1e-9 { Freedoms::ALL } else { Freedoms::default() })
+        .map(|p| {
+            if p.x < 1e-9 {
+                Freedoms::ALL
+            } else {
+                Freedoms::default()
+            }
+        })
         .collect();
     let model = ShellModel::new(&mesh, section, &held, &unwatched).unwrap();
     let end: Vec<u32> = (0..mesh.positions().len() as u32)
         .filter(|&v| mesh.positions()[v as usize].x > length - 1e-9)
         .collect();
-    let share = |v: u32| if [0.0, width].contains(&mesh.positions()[v as usize].y) { 0.125 } else { 0.25 };
+    let share = |v: u32| {
+        if [0.0, width].contains(&mesh.positions()[v as usize].y) {
+            0.125
+        } else {
+            0.25
+        }
+    };
     let forces = end.iter().map(|&v| (v, DVec3::NEG_Z * share(v))).collect();
     let u = model.solve(&forces);
     let middle = model.index.nearest(DVec3::new(0.051, 0.0052, 0.0)).0;
@@ -184,5 +220,8 @@ fn strain_on_the_faces_of_a_clamped_beam() {
         );
     }
     let check = model.check(&forces, &u);
-    assert!(check.reaction_error < 1e-8 && check.energy_error < 1e-8, "{check:?}");
+    assert!(
+        check.reaction_error < 1e-8 && check.energy_error < 1e-8,
+        "{check:?}"
+    );
 }

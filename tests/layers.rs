@@ -27,7 +27,10 @@ const OUTER: [(&str, &[&str]); 6] = [
 ];
 
 fn level(module: &str) -> usize {
-    ORDER.iter().position(|l| l.contains(&module)).unwrap_or_else(|| panic!("{module} has no layer"))
+    ORDER
+        .iter()
+        .position(|l| l.contains(&module))
+        .unwrap_or_else(|| panic!("{module} has no layer"))
 }
 
 fn files(folder: &Path, into: &mut Vec<std::path::PathBuf>) {
@@ -49,7 +52,12 @@ fn dependencies_point_down() {
     let mut seen = 0;
     for path in all {
         let relative = path.strip_prefix(&root).unwrap();
-        let module = relative.iter().next().unwrap().to_string_lossy().replace(".rs", "");
+        let module = relative
+            .iter()
+            .next()
+            .unwrap()
+            .to_string_lossy()
+            .replace(".rs", "");
         if ["lib", "main"].contains(&module.as_str()) {
             continue;
         }
@@ -57,7 +65,10 @@ fn dependencies_point_down() {
         let text = std::fs::read_to_string(&path).unwrap();
         let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
         for used in code.split("crate::").skip(1) {
-            let used: String = used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+            let used: String = used
+                .chars()
+                .take_while(|c| c.is_alphanumeric() || *c == '_')
+                .collect();
             if used.is_empty() || used == module {
                 continue;
             }

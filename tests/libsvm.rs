@@ -43,12 +43,22 @@ fn objective_and_predictions_are_those_of_libsvm() {
             max_steps: 20_000_000,
         };
         let fit = svr::fit(&kernel, &p.y, &params, None);
-        assert!(fit.converged, "problem {k}: gap {:e} after {}", fit.gap, fit.steps);
+        assert!(
+            fit.converged,
+            "problem {k}: gap {:e} after {}",
+            fit.gap, fit.steps
+        );
         let relative = (fit.objective / p.objective - 1.0).abs();
-        assert!(relative < 1e-6, "problem {k}: objective off by {relative:e}");
+        assert!(
+            relative < 1e-6,
+            "problem {k}: objective off by {relative:e}"
+        );
         let rows = gaussian(&squared_distances(&unseen, &x), p.gamma);
         for (ours, theirs) in svr::predict(&fit, &rows).iter().zip(&p.predictions) {
-            assert!((ours - theirs).abs() < 1e-4 * p.size, "problem {k}: {ours} against {theirs}");
+            assert!(
+                (ours - theirs).abs() < 1e-4 * p.size,
+                "problem {k}: {ours} against {theirs}"
+            );
         }
     }
 }

@@ -57,7 +57,11 @@ fn rigid_motion_makes_no_force_and_no_strain() {
     let (shift, spin) = (DVec3::new(1.0, -2.0, 0.5), DVec3::new(30.0, -70.0, 55.0));
     let motion = nalgebra::SVector::<f64, 18>::from_fn(|i, _| {
         let p = corners[i / 6];
-        if i % 6 < 3 { (shift + spin.cross(p))[i % 6] } else { spin[i % 6 - 3] }
+        if i % 6 < 3 {
+            (shift + spin.cross(p))[i % 6]
+        } else {
+            spin[i % 6 - 3]
+        }
     });
     let scale = k.amax() * motion.amax();
     assert!((k * motion).amax() < 1e-12 * scale);
@@ -71,7 +75,11 @@ fn rigid_motion_makes_no_force_and_no_strain() {
 #[test]
 fn an_element_has_exactly_six_motions_without_energy() {
     let section = bench::section(1.7e9, 0.35, 1.5e-3);
-    let corners = [DVec3::ZERO, DVec3::new(2e-3, 0.0, 1e-3), DVec3::new(0.5e-3, 1.7e-3, 0.0)];
+    let corners = [
+        DVec3::ZERO,
+        DVec3::new(2e-3, 0.0, 1e-3),
+        DVec3::new(0.5e-3, 1.7e-3, 0.0),
+    ];
     let k = Facet::new(corners, &section).stiffness(&section);
     let mut values: Vec<f64> = k.symmetric_eigenvalues().iter().copied().collect();
     values.sort_by(f64::total_cmp);
@@ -88,7 +96,9 @@ fn a_turned_limb_deforms_the_same() {
     };
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.7, -1.1, 2.3);
     let positions: Vec<DVec3> = inputs.part.positions().iter().map(|&p| turn * p).collect();
-    let turned = TriMesh::new(&positions, inputs.part.triangles(), 0).unwrap().0;
+    let turned = TriMesh::new(&positions, inputs.part.triangles(), 0)
+        .unwrap()
+        .0;
     let held = held_freedoms(&inputs.part, &inputs.project.supports());
     let m = ShellModel::new(&turned, inputs.project.section(), &held, &unwatched).unwrap();
     let mut t = touch(&inputs, DVec3::new(0.03, 0.01, 0.07));
@@ -100,25 +110,40 @@ fn a_turned_limb_deforms_the_same() {
         .flat_map(|d| (turn.inverse() * DVec3::from_slice(d)).to_array())
         .collect();
     let difference: Vec<f64> = u.iter().zip(&back).map(|(a, b)| a - b).collect();
-    assert!(norm(&difference) < 1e-8 * norm(&u), "{:e}", norm(&difference) / norm(&u));
+    assert!(
+        norm(&difference) < 1e-8 * norm(&u),
+        "{:e}",
+        norm(&difference) / norm(&u)
+    );
 }
 
 #[test]
 fn touches_superpose_and_are_reciprocal_and_in_balance() {
     let inputs = bundled();
     let m = model(&inputs);
-    let [a, b] = [DVec3::new(0.03, 0.01, 0.07), DVec3::new(-0.03, 0.0, 0.03)].map(|p| m.forces(&touch(&inputs, p)));
+    let [a, b] = [DVec3::new(0.03, 0.01, 0.07), DVec3::new(-0.03, 0.0, 0.03)]
+        .map(|p| m.forces(&touch(&inputs, p)));
     let (ua, ub) = (m.solve(&a), m.solve(&b));
     let both: Vec<(u32, DVec3)> = a.iter().chain(&b).copied().collect();
-    let sum: Vec<f64> = m.solve(&both).iter().zip(ua.iter().zip(&ub)).map(|(s, (x, y))| s - x - y).collect();
+    let sum: Vec<f64> = m
+        .solve(&both)
+        .iter()
+        .zip(ua.iter().zip(&ub))
+        .map(|(s, (x, y))| s - x - y)
+        .collect();
     assert!(norm(&sum) < 1e-11 * norm(&ua));
     let work = |f: &[(u32, DVec3)], u: &[f64]| -> f64 {
-        f.iter().map(|&(v, f)| f.dot(DVec3::from_slice(&u[6 * v as usize..]))).sum()
+        f.iter()
+            .map(|&(v, f)| f.dot(DVec3::from_slice(&u[6 * v as usize..])))
+            .sum()
     };
     let (ab, ba) = (work(&a, &ub), work(&b, &ua));
     assert!((ab - ba).abs() < 1e-10 * work(&a, &ua).abs(), "{ab} {ba}");
     let check = m.check(&a, &ua);
-    assert!(check.reaction_error < 1e-8 && check.energy_error < 1e-8, "{check:?}");
+    assert!(
+        check.reaction_error < 1e-8 && check.energy_error < 1e-8,
+        "{check:?}"
+    );
     assert!(m.residual(&a, &ua) < 1e-10);
 }
 
@@ -132,7 +157,11 @@ fn blocks_give_the_bytes_of_single_touches() {
     let firsts = m
         .solve_touches(&touches, &unwatched, |first, rows| {
             let width = rows.len() / (6 * inputs.part.positions().len());
-            (first, rows[6 * 1000 * width + 2], rows[6 * 1000 * width + width + 5])
+            (
+                first,
+                rows[6 * 1000 * width + 2],
+                rows[6 * 1000 * width + width + 5],
+            )
         })
         .unwrap();
     assert_eq!(firsts.len(), 2);
@@ -145,8 +174,15 @@ fn blocks_give_the_bytes_of_single_touches() {
 #[test]
 fn the_inside_face_is_the_outside_face_of_the_shell_turned_over() {
     let inputs = bundled();
-    let flipped: Vec<[u32; 3]> = inputs.part.triangles().iter().map(|&[a, b, c]| [a, c, b]).collect();
-    let other = TriMesh::new(inputs.part.positions(), &flipped, 0).unwrap().0;
+    let flipped: Vec<[u32; 3]> = inputs
+        .part
+        .triangles()
+        .iter()
+        .map(|&[a, b, c]| [a, c, b])
+        .collect();
+    let other = TriMesh::new(inputs.part.positions(), &flipped, 0)
+        .unwrap()
+        .0;
     let held = held_freedoms(&inputs.part, &inputs.project.supports());
     let section = inputs.project.section();
     let m = ShellModel::new(&inputs.part, section, &held, &unwatched).unwrap();
@@ -159,8 +195,14 @@ fn the_inside_face_is_the_outside_face_of_the_shell_turned_over() {
         ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy / 2.0))
     };
     let (inside, outside) = (size(&m, Face::Inside), size(&n, Face::Outside));
-    assert!((inside.0 - outside.0).abs() < 1e-9 * inside.1 && (inside.1 - outside.1).abs() < 1e-9 * inside.1);
-    assert!((size(&m, Face::Outside).0 - inside.0).abs() > 0.1 * inside.1, "the faces differ under bending");
+    assert!(
+        (inside.0 - outside.0).abs() < 1e-9 * inside.1
+            && (inside.1 - outside.1).abs() < 1e-9 * inside.1
+    );
+    assert!(
+        (size(&m, Face::Outside).0 - inside.0).abs() > 0.1 * inside.1,
+        "the faces differ under bending"
+    );
 }
 
 fn small(signal: Signal) -> (Inputs, hapdef::budget::Budget) {
@@ -181,13 +223,36 @@ fn small(signal: Signal) -> (Inputs, hapdef::budget::Budget) {
 fn one_thread_or_many_give_the_same_bytes() {
     let (inputs, budget) = small(Signal::Strain);
     let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         let design = pool
             .install(|| design::run(&inputs, &SelectorKind::ALL, &budget, &|| 0.0, &unwatched))
             .unwrap();
-        let bits: Vec<u64> = design.simulated.dataset.x.values().iter().map(|x| x.to_bits()).collect();
-        let errors: Vec<u64> = design.evaluation.rows.iter().map(|r| r.error_mm.to_bits()).collect();
-        (bits, design.selections.iter().map(|s| s.sets.clone()).collect::<Vec<_>>(), errors)
+        let bits: Vec<u64> = design
+            .simulated
+            .dataset
+            .x
+            .values()
+            .iter()
+            .map(|x| x.to_bits())
+            .collect();
+        let errors: Vec<u64> = design
+            .evaluation
+            .rows
+            .iter()
+            .map(|r| r.error_mm.to_bits())
+            .collect();
+        (
+            bits,
+            design
+                .selections
+                .iter()
+                .map(|s| s.sets.clone())
+                .collect::<Vec<_>>(),
+            errors,
+        )
     };
     let one = run(1);
     for threads in [2, 8] {
@@ -203,11 +268,25 @@ fn the_work_is_counted_and_nothing_is_done_twice() {
     let (inputs, budget) = small(Signal::Displacement);
     let simulated = Arc::new(design::simulate(&inputs, &budget, &unwatched).unwrap());
     let work = simulated.dataset.work;
-    assert_eq!((work.assemblies, work.factorizations, work.solves), (1, 1, 200));
-    let design = design::run_from(&inputs, simulated, &SelectorKind::ALL, &budget, &|| 0.0, &unwatched).unwrap();
+    assert_eq!(
+        (work.assemblies, work.factorizations, work.solves),
+        (1, 1, 200)
+    );
+    let design = design::run_from(
+        &inputs,
+        simulated,
+        &SelectorKind::ALL,
+        &budget,
+        &|| 0.0,
+        &unwatched,
+    )
+    .unwrap();
     let total = design.work();
     // The truth is the only other model, and only the test touches are solved on it.
-    assert_eq!((total.assemblies, total.factorizations, total.solves), (2, 2, 260));
+    assert_eq!(
+        (total.assemblies, total.factorizations, total.solves),
+        (2, 2, 260)
+    );
 }
 
 /// The greedy selector against a naive one that trains every set from nothing.
@@ -224,7 +303,9 @@ fn greedy_svr_is_the_plain_algorithm() {
         let s = s as f64;
         (0.05 * p[0] * (s + 1.0)).sin() + (0.03 * p[1] * s).cos() + 0.01 * p[2] * (s * 0.7).sin()
     };
-    let values = (0..8).flat_map(|s| targets.iter().map(move |p| wave(s, p))).collect();
+    let values = (0..8)
+        .flat_map(|s| targets.iter().map(move |p| wave(s, p)))
+        .collect();
     let x = SignalMatrix::new(touches as usize, values);
     let sites: Vec<usize> = (100..108).collect();
     let hyper = Hyper {
@@ -257,7 +338,10 @@ fn greedy_svr_is_the_plain_algorithm() {
             .map(|fold| {
                 let part = |columns: &[usize]| z.select_rows(rows).select_columns(columns);
                 let kernel = |a: &SignalMatrix, b: &SignalMatrix| {
-                    hapdef::regression::features::gaussian(&hapdef::regression::features::squared_distances(a, b), hyper.gamma)
+                    hapdef::regression::features::gaussian(
+                        &hapdef::regression::features::squared_distances(a, b),
+                        hyper.gamma,
+                    )
                 };
                 let (train, test) = (part(&fold.train), part(&fold.test));
                 let inner = kernel(&train, &train);
@@ -268,7 +352,10 @@ fn greedy_svr_is_the_plain_algorithm() {
                     hapdef::regression::svr::predict(&fit, &outer)
                 });
                 let errors = fold.test.iter().enumerate().map(|(k, &t)| {
-                    (0..3).map(|a| (axes[a][k] - targets[t][a]).powi(2)).sum::<f64>().sqrt()
+                    (0..3)
+                        .map(|a| (axes[a][k] - targets[t][a]).powi(2))
+                        .sum::<f64>()
+                        .sqrt()
                 });
                 errors.sum::<f64>() / fold.test.len() as f64
             })
@@ -285,7 +372,11 @@ fn greedy_svr_is_the_plain_algorithm() {
         let picked = set.sites[set.sites.len() - 1] - 100;
         let own = scores.iter().find(|s| s.0 == picked).unwrap().1;
         assert!(own <= best * 1.0001, "{picked}: {own} against {best}");
-        assert!((set.criterion / own - 1.0).abs() < 1e-4, "{} against {own}", set.criterion);
+        assert!(
+            (set.criterion / own - 1.0).abs() < 1e-4,
+            "{} against {own}",
+            set.criterion
+        );
         chosen.push(picked);
     }
 }
@@ -294,7 +385,9 @@ fn greedy_svr_is_the_plain_algorithm() {
 fn training_knows_nothing_of_the_test_touches() {
     // The same training data give the same predictions whatever is asked, in whatever company.
     let x = SignalMatrix::new(30, (0..60).map(|i| f64::from(i).sin()).collect());
-    let targets: Vec<[f64; 3]> = (0..30).map(|t| [f64::from(t), 1.0, -f64::from(t)]).collect();
+    let targets: Vec<[f64; 3]> = (0..30)
+        .map(|t| [f64::from(t), 1.0, -f64::from(t)])
+        .collect();
     let effort = Effort {
         tolerance: 1e-6,
         max_steps: 100_000,

@@ -15,7 +15,8 @@ use image::RgbaImage;
 
 /// Whether there is an adapter; in CI there must be one.
 fn adapter() -> bool {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let instance =
+        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
     assert!(
         !adapters.is_empty() || std::env::var_os("CI").is_none(),
@@ -52,14 +53,20 @@ impl Window {
     }
 
     fn press(&mut self, name: &str) {
-        self.harness.get_by_role_and_label(egui::Role::Button, name).click();
+        self.harness
+            .get_by_role_and_label(egui::Role::Button, name)
+            .click();
         self.harness.run_ok();
     }
 
     fn wait(&mut self, what: &str, seconds: u64, done: impl Fn(&Studio) -> bool) {
         let start = Instant::now();
         while !done(self.harness.state()) {
-            assert!(start.elapsed().as_secs() < seconds, "timed out waiting for {what}: {:?}", self.harness.state().messages);
+            assert!(
+                start.elapsed().as_secs() < seconds,
+                "timed out waiting for {what}: {:?}",
+                self.harness.state().messages
+            );
             self.harness.step();
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -72,7 +79,11 @@ impl Window {
 
     /// Where a point of the limb (mm) is in the window.
     fn place(&self, x: f64, y: f64, z: f64) -> Pos2 {
-        self.harness.state().view.place(DVec3::new(x, y, z) / 1000.0).unwrap()
+        self.harness
+            .state()
+            .view
+            .place(DVec3::new(x, y, z) / 1000.0)
+            .unwrap()
     }
 
     fn click(&mut self, at: Pos2) {
@@ -139,8 +150,18 @@ fn the_limb_is_shown_and_bends_under_a_click() {
     w.click(hoop);
     w.wait("the touch", 60, |s| s.touched().is_some());
     let touched = w.harness.state().touched().unwrap();
-    assert!(touched.touch.position.distance(DVec3::new(0.03183, 0.0, 0.060)) < 2e-3);
-    assert!((0.2e-3..3e-3).contains(&touched.largest), "{}", touched.largest);
+    assert!(
+        touched
+            .touch
+            .position
+            .distance(DVec3::new(0.03183, 0.0, 0.060))
+            < 2e-3
+    );
+    assert!(
+        (0.2e-3..3e-3).contains(&touched.largest),
+        "{}",
+        touched.largest
+    );
     assert_eq!(w.harness.state().view.field, Field::Strain);
     let after = w.picture();
     let changed = before
@@ -148,7 +169,10 @@ fn the_limb_is_shown_and_bends_under_a_click() {
         .zip(after.pixels())
         .filter(|(a, b)| (0..3).any(|c| a.0[c].abs_diff(b.0[c]) > 30))
         .count();
-    assert!(changed > 8000, "the strain field is drawn: {changed} pixels changed");
+    assert!(
+        changed > 8000,
+        "the strain field is drawn: {changed} pixels changed"
+    );
 }
 
 #[test]
@@ -156,22 +180,30 @@ fn painting_erasing_undo_and_redo() {
     let Some(mut w) = Window::open() else { return };
     w.press("Front");
     w.press("Paint");
-    let path: Vec<Pos2> = (0..8).map(|k| w.place(31.0, -7.0 + 2.0 * f64::from(k), 60.0)).collect();
+    let path: Vec<Pos2> = (0..8)
+        .map(|k| w.place(31.0, -7.0 + 2.0 * f64::from(k), 60.0))
+        .collect();
     w.drag(&path);
     let painted = w.painted().expect("a stroke paints");
     assert!(painted > 20 && painted < 600, "{painted}");
     let picture = w.picture();
-    assert!(blueness(&picture, path[4], 4) > 15.0, "the region is tinted");
+    assert!(
+        blueness(&picture, path[4], 4) > 15.0,
+        "the region is tinted"
+    );
     w.press("Erase");
     w.click(path[4]);
     assert!(w.painted().unwrap() < painted);
-    w.harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::Z);
+    w.harness
+        .key_press_modifiers(Modifiers::COMMAND, egui::Key::Z);
     w.harness.run_ok();
     assert_eq!(w.painted(), Some(painted));
-    w.harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::Z);
+    w.harness
+        .key_press_modifiers(Modifiers::COMMAND, egui::Key::Z);
     w.harness.run_ok();
     assert_eq!(w.painted(), None);
-    w.harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, egui::Key::Z);
+    w.harness
+        .key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, egui::Key::Z);
     w.harness.run_ok();
     assert_eq!(w.painted(), Some(painted));
 }
@@ -181,32 +213,73 @@ fn from_the_limb_to_the_report() {
     let Some(mut w) = Window::open() else { return };
     w.press("Simulate");
     w.wait("the simulation", 120, |s| !s.busy());
-    assert!(w.harness.state().messages.is_empty(), "{:?}", w.harness.state().messages);
-    let sites = w.harness.state().simulation.as_ref().unwrap().simulated.dataset.sites.len();
+    assert!(
+        w.harness.state().messages.is_empty(),
+        "{:?}",
+        w.harness.state().messages
+    );
+    let sites = w
+        .harness
+        .state()
+        .simulation
+        .as_ref()
+        .unwrap()
+        .simulated
+        .dataset
+        .sites
+        .len();
     assert_eq!(sites, 3039);
     w.wait("the filters", 10, |s| s.feasibility.is_some());
-    w.harness.state_mut().document.state.project.selection.sensors = 5;
+    w.harness
+        .state_mut()
+        .document
+        .state
+        .project
+        .selection
+        .sensors = 5;
     w.harness.run_ok();
     w.press("Select gauges");
     w.wait("the selection", 300, |s| !s.busy());
-    assert!(w.harness.state().messages.is_empty(), "{:?}", w.harness.state().messages);
+    assert!(
+        w.harness.state().messages.is_empty(),
+        "{:?}",
+        w.harness.state().messages
+    );
     let design = &w.harness.state().design.as_ref().unwrap().design;
     assert_eq!(design.chosen().len(), 5);
-    assert!(design.evaluation.rows.iter().any(|r| r.selector == "pca-qr"));
+    assert!(
+        design
+            .evaluation
+            .rows
+            .iter()
+            .any(|r| r.selector == "pca-qr")
+    );
     let _ = w.picture();
     // The error plot is there, by its name.
-    assert_eq!(w.harness.get_all_by_label_contains("Error against number of gauges").count(), 2);
+    assert_eq!(
+        w.harness
+            .get_all_by_label_contains("Error against number of gauges")
+            .count(),
+        2
+    );
     let folder = tempfile::tempdir().unwrap();
     w.press("Export report…");
     let target = folder.path().join("report");
     w.harness.get_by_label("Path").focus();
     w.harness.run_ok();
-    w.harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
-    w.harness.get_by_label("Path").type_text(&target.display().to_string());
+    w.harness
+        .key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
+    w.harness
+        .get_by_label("Path")
+        .type_text(&target.display().to_string());
     w.harness.run_ok();
     w.press("Export");
     w.wait("the export", 60, |s| !s.busy() && !s.messages.is_empty());
-    assert!(target.join("report.html").exists(), "{:?}", w.harness.state().messages);
+    assert!(
+        target.join("report.html").exists(),
+        "{:?}",
+        w.harness.state().messages
+    );
     assert!(hapdef::io::project_file::load(&target.join("design.hapdef.toml")).is_ok());
 }
 
@@ -220,21 +293,43 @@ fn a_job_can_be_cancelled_and_bad_files_change_nothing() {
     w.press("Cancel job");
     w.wait("the cancelled job", 60, |s| !s.busy());
     assert!(w.harness.state().simulation.is_none());
-    assert!(w.harness.state().messages.iter().any(|m| m.text.contains("cancelled")));
+    assert!(
+        w.harness
+            .state()
+            .messages
+            .iter()
+            .any(|m| m.text.contains("cancelled"))
+    );
     let folder = tempfile::tempdir().unwrap();
     let bad = folder.path().join("bad.glb");
     std::fs::write(&bad, b"glTF nonsense").unwrap();
     let before = w.harness.state().document.inputs();
     w.harness.state_mut().open_path(&bad, None);
     w.harness.run_ok();
-    let error = w.harness.state().messages.iter().find(|m| m.error).unwrap().text.clone();
+    let error = w
+        .harness
+        .state()
+        .messages
+        .iter()
+        .find(|m| m.error)
+        .unwrap()
+        .text
+        .clone();
     assert!(error.contains("bad.glb"), "{error}");
     assert_eq!(w.harness.state().document.state.project, before.project);
     // A part that nothing holds says so, and the window lives on.
-    w.harness.state_mut().document.state.project.supports.clear();
+    w.harness
+        .state_mut()
+        .document
+        .state
+        .project
+        .supports
+        .clear();
     w.harness.run_ok();
     w.press("Simulate");
-    w.wait("the refusal", 60, |s| !s.busy() && s.messages.iter().any(|m| m.text.contains("support")));
+    w.wait("the refusal", 60, |s| {
+        !s.busy() && s.messages.iter().any(|m| m.text.contains("support"))
+    });
 }
 
 #[test]
@@ -247,17 +342,30 @@ fn a_saved_project_opens_again() {
     let at = w.place(31.83, 0.0, 60.0);
     w.click(at);
     let painted = w.painted().unwrap();
-    w.harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::S);
+    w.harness
+        .key_press_modifiers(Modifiers::COMMAND, egui::Key::S);
     w.harness.run_ok();
     w.harness.get_by_label("Path").focus();
     w.harness.run_ok();
-    w.harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
-    w.harness.get_by_label("Path").type_text(&path.display().to_string());
+    w.harness
+        .key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
+    w.harness
+        .get_by_label("Path")
+        .type_text(&path.display().to_string());
     w.harness.run_ok();
     w.press("Save file");
-    assert!(!w.harness.state().document.is_dirty(), "{:?}", w.harness.state().messages);
+    assert!(
+        !w.harness.state().document.is_dirty(),
+        "{:?}",
+        w.harness.state().messages
+    );
     w.harness.state_mut().document.clear_paint();
     w.harness.state_mut().open_path(&path, None);
     w.harness.run_ok();
-    assert_eq!(w.painted(), Some(painted), "{:?}", w.harness.state().messages);
+    assert_eq!(
+        w.painted(),
+        Some(painted),
+        "{:?}",
+        w.harness.state().messages
+    );
 }

@@ -55,7 +55,9 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
     let inputs = loaded.inputs.clone();
     let design = args.common.in_pool(|| {
         let clock = || start.elapsed().as_secs_f64();
-        Ok(design::run(&inputs, &kinds, &budget, &clock, &|p| bar.show(p))?)
+        Ok(design::run(&inputs, &kinds, &budget, &clock, &|p| {
+            bar.show(p)
+        })?)
     });
     bar.finish();
     let design = design?;
@@ -84,14 +86,34 @@ fn print_summary(design: &design::Design) {
         design.reduced.sites.len(),
         design.simulated.dataset.touches.len()
     );
+    for (filter, count) in design.feasibility.taken() {
+        println!("{count:>6} taken: {}", filter.label().to_lowercase());
+    }
     println!("gauge       x        y        z (mm)   direction");
     for (k, &s) in design.chosen().iter().enumerate() {
         let site = &design.simulated.dataset.sites[s];
         let (p, d) = (site.position * 1000.0, site.direction);
-        println!("{:>5} {:8.2} {:8.2} {:8.2}   {:+.3} {:+.3} {:+.3}", k + 1, p.x, p.y, p.z, d.x, d.y, d.z);
+        println!(
+            "{:>5} {:8.2} {:8.2} {:8.2}   {:+.3} {:+.3} {:+.3}",
+            k + 1,
+            p.x,
+            p.y,
+            p.z,
+            d.x,
+            d.y,
+            d.z
+        );
     }
-    for row in design.evaluation.rows.iter().filter(|r| [5, 10].contains(&r.sensors) || r.selector == "all-candidates") {
-        println!("{:>14}, {:>3} gauges, {:<26} {:7.2} mm mean {:7.2} mm median", row.selector, row.sensors, row.region, row.error_mm, row.median_mm);
+    for row in design
+        .evaluation
+        .rows
+        .iter()
+        .filter(|r| [5, 10].contains(&r.sensors) || r.selector == "all-candidates")
+    {
+        println!(
+            "{:>14}, {:>3} gauges, {:<26} {:7.2} mm mean {:7.2} mm median",
+            row.selector, row.sensors, row.region, row.error_mm, row.median_mm
+        );
     }
     for note in design.notes() {
         println!("note: {note}");

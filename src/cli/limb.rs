@@ -99,10 +99,14 @@ impl LimbArgs {
 /// # Errors
 /// A message in the user's terms.
 pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
-    anyhow::ensure!(args.columns != Some(0) && args.hoops.is_none_or(|h| h >= 2), "a limb has at least one column and two hoops");
+    anyhow::ensure!(
+        args.columns != Some(0) && args.hoops.is_none_or(|h| h >= 2),
+        "a limb has at least one column and two hoops"
+    );
     let spec = args.spec();
     let (mesh, boxes) = spec.build()?;
-    std::fs::create_dir_all(&args.out).with_context(|| format!("{}: the folder cannot be created", args.out.display()))?;
+    std::fs::create_dir_all(&args.out)
+        .with_context(|| format!("{}: the folder cannot be created", args.out.display()))?;
     let mesh_path = args.out.join("limb.glb");
     let bytes = glb::write_glb(&mesh)?;
     atomic::write(&mesh_path, &bytes)?;
@@ -112,7 +116,9 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
     }
     if !args.no_sites {
         // On the mesh as it is in the file (single precision), like anyone who opens it.
-        let stored = crate::io::mesh_file::parse_glb(&bytes).map_err(anyhow::Error::msg)?.mesh;
+        let stored = crate::io::mesh_file::parse_glb(&bytes)
+            .map_err(anyhow::Error::msg)?
+            .mesh;
         project.selection.sites = choose_sites(&project, stored)?;
     }
     project_file::save(&args.out.join("limb.hapdef.toml"), &project, None)?;
@@ -153,7 +159,10 @@ fn project(spec: &LimbSpec, boxes: &[[[f64; 3]; 2]]) -> Project {
 }
 
 /// Ten sites by a Draft design on strain with greedy SVR.
-fn choose_sites(project: &Project, mesh: crate::mesh::TriMesh) -> anyhow::Result<Vec<crate::project::ChosenSite>> {
+fn choose_sites(
+    project: &Project,
+    mesh: crate::mesh::TriMesh,
+) -> anyhow::Result<Vec<crate::project::ChosenSite>> {
     use crate::budget::{Quality, unwatched};
     let inputs = Inputs {
         project: project.clone(),
@@ -163,8 +172,16 @@ fn choose_sites(project: &Project, mesh: crate::mesh::TriMesh) -> anyhow::Result
     let budget = Quality::Draft.budget();
     let simulated = crate::design::simulate(&inputs, &budget, &unwatched)?;
     let feasibility = crate::design::filter(&inputs, &simulated);
-    let reduced = crate::design::reduce_sites(&inputs, &simulated, &feasibility, &budget, &unwatched)?;
-    let selection = crate::design::select(&inputs, &simulated, &reduced, SelectorKind::GreedySvr, &budget, &unwatched)?;
+    let reduced =
+        crate::design::reduce_sites(&inputs, &simulated, &feasibility, &budget, &unwatched)?;
+    let selection = crate::design::select(
+        &inputs,
+        &simulated,
+        &reduced,
+        SelectorKind::GreedySvr,
+        &budget,
+        &unwatched,
+    )?;
     let sites = selection.sets.last().map_or(&[][..], |s| &s.sites);
     Ok(crate::io::artifacts::as_chosen(&simulated.dataset, sites))
 }

@@ -22,7 +22,9 @@ impl Default for Bar {
             ProgressDrawTarget::hidden()
         };
         let bar = ProgressBar::with_draw_target(None, target);
-        if let Ok(style) = ProgressStyle::with_template("{msg:<28} {wide_bar} {percent:>3} %  {elapsed}") {
+        if let Ok(style) =
+            ProgressStyle::with_template("{msg:<28} {wide_bar} {percent:>3} %  {elapsed}")
+        {
             bar.set_style(style);
         }
         Self {

@@ -76,7 +76,9 @@ impl Facet {
             for j in 0..6 {
                 let block = local.fixed_view::<3, 3>(3 * i, 3 * j);
                 let turned = r * block * r.transpose();
-                global.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&turned);
+                global
+                    .fixed_view_mut::<3, 3>(3 * i, 3 * j)
+                    .copy_from(&turned);
             }
         }
         global

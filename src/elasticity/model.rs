@@ -15,11 +15,17 @@ use crate::mesh::locate::SurfaceIndex;
 /// Why a model cannot be built or solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ElasticError {
-    #[error("no triangle of the part is held by a support: move a support box onto the part (its points lie between {lower:.1} and {upper:.1} mm)")]
+    #[error(
+        "no triangle of the part is held by a support: move a support box onto the part (its points lie between {lower:.1} and {upper:.1} mm)"
+    )]
     NothingHeld { lower: DVec3, upper: DVec3 },
-    #[error("the part can still move as a rigid body: the supports hold it, but not in every direction. Clamp it, or add supports")]
+    #[error(
+        "the part can still move as a rigid body: the supports hold it, but not in every direction. Clamp it, or add supports"
+    )]
     Loose,
-    #[error("the shell is not held anywhere near vertex {vertex} at {place:.1} mm: join it to the rest or support it")]
+    #[error(
+        "the shell is not held anywhere near vertex {vertex} at {place:.1} mm: join it to the rest or support it"
+    )]
     NotHeld { vertex: usize, place: DVec3 },
     #[error("{what} must be {rule}, but is {value}")]
     Value {
@@ -128,7 +134,8 @@ impl<'a> ShellModel<'a> {
         let n = self.unknowns();
         let mut block = vec![0.0; n * BLOCK];
         self.fill(loads, &mut block[..n]);
-        self.factor.solve_block(&mut block, &mut self.factor.scratch());
+        self.factor
+            .solve_block(&mut block, &mut self.factor.scratch());
         self.expand(&block[..n])
     }
 
@@ -163,7 +170,8 @@ impl<'a> ShellModel<'a> {
                     for (touch, column) in chunk.iter().zip(scratch.block.chunks_exact_mut(n)) {
                         self.fill(&spread(&self.forces(touch)), column);
                     }
-                    self.factor.solve_block(&mut scratch.block, &mut scratch.memory);
+                    self.factor
+                        .solve_block(&mut scratch.block, &mut scratch.memory);
                     self.transpose(&scratch.block, &mut scratch.rows);
                     done.fetch_add(chunk.len(), std::sync::atomic::Ordering::Relaxed);
                     Ok(consume(b * BLOCK, &scratch.rows))
@@ -194,10 +202,14 @@ impl<'a> ShellModel<'a> {
         }
         let load: DVec3 = forces.iter().map(|f| f.1).sum();
         let twice_energy: f64 = internal.iter().zip(displacement).map(|(f, u)| f * u).sum();
-        let external: f64 = spread(forces).iter().map(|&(d, f)| displacement[d] * f).sum();
+        let external: f64 = spread(forces)
+            .iter()
+            .map(|&(d, f)| displacement[d] * f)
+            .sum();
         LoadCheck {
             reaction_error: (reaction + load).length() / load.length().max(f64::MIN_POSITIVE),
-            energy_error: (external - twice_energy).abs() / twice_energy.abs().max(f64::MIN_POSITIVE),
+            energy_error: (external - twice_energy).abs()
+                / twice_energy.abs().max(f64::MIN_POSITIVE),
         }
     }
 
@@ -213,7 +225,13 @@ impl<'a> ShellModel<'a> {
         let mut f = vec![0.0; self.unknowns()];
         self.fill(&spread(forces), &mut f);
         let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let r: Vec<f64> = self.stiffness.multiply(&u).iter().zip(&f).map(|(a, b)| a - b).collect();
+        let r: Vec<f64> = self
+            .stiffness
+            .multiply(&u)
+            .iter()
+            .zip(&f)
+            .map(|(a, b)| a - b)
+            .collect();
         norm(&r) / norm(&f)
     }
 
@@ -276,8 +294,18 @@ fn check_section(section: &Section) -> Result<(), ElasticError> {
     let e = material.youngs_modulus;
     let nu = material.poissons_ratio;
     range("Young's modulus in Pa", "above zero", e, e > 0.0)?;
-    range("Poisson's ratio", "above -1 and below 0.5", nu, nu > -1.0 && nu < 0.5)?;
-    range("the thickness in m", "above zero", thickness, thickness > 0.0)
+    range(
+        "Poisson's ratio",
+        "above -1 and below 0.5",
+        nu,
+        nu > -1.0 && nu < 0.5,
+    )?;
+    range(
+        "the thickness in m",
+        "above zero",
+        thickness,
+        thickness > 0.0,
+    )
 }
 
 /// Each connected piece must have its six rigid motions held.
@@ -355,7 +383,9 @@ fn number_unknowns(held: &[Freedoms]) -> Vec<u32> {
 /// The lower triangle's pattern from the mesh's edges: every vertex couples with itself and its
 /// neighbours.
 fn pattern(mesh: &TriMesh, unknowns: &[u32]) -> SymmetricMatrix {
-    let mut coupled: Vec<Vec<u32>> = (0..mesh.positions().len() as u32).map(|v| vec![v]).collect();
+    let mut coupled: Vec<Vec<u32>> = (0..mesh.positions().len() as u32)
+        .map(|v| vec![v])
+        .collect();
     for edge in mesh.edges() {
         coupled[edge.a as usize].push(edge.b);
         coupled[edge.b as usize].push(edge.a);

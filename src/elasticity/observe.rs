@@ -194,7 +194,11 @@ fn widen(displacement: &[f64]) -> Vec<f64> {
 /// Two directions across a normal: the first as near to "around z" as there is one.
 #[must_use]
 pub fn tangent_frame(normal: DVec3) -> SiteFrame {
-    let seed = if normal.z.abs() < 0.9 { DVec3::Z } else { DVec3::Y };
+    let seed = if normal.z.abs() < 0.9 {
+        DVec3::Z
+    } else {
+        DVec3::Y
+    };
     let first = seed.cross(normal).normalize();
     DMat3::from_cols(first, normal.cross(first), normal)
 }
@@ -241,7 +245,10 @@ impl CornerRows<'_> {
         let (frame, facets) = if smooth {
             (tangent_frame(normal), around.clone())
         } else {
-            (tangent_frame(self.mesh.facet_normal(triangle)), vec![triangle])
+            (
+                tangent_frame(self.mesh.facet_normal(triangle)),
+                vec![triangle],
+            )
         };
         self.push_average(vertex, frame, &facets);
         self.frames.push(frame);

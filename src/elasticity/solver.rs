@@ -18,7 +18,9 @@ pub const BLOCK: usize = 64;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FactorError {
     /// A pivot that is not positive, at this row.
-    NotPositive { row: usize },
+    NotPositive {
+        row: usize,
+    },
     OutOfMemory,
 }
 
@@ -76,7 +78,9 @@ pub struct Factor {
 impl Factor {
     pub fn new(matrix: &SymmetricMatrix) -> Result<Self, FactorError> {
         let n = matrix.dimension();
-        if let Some(row) = (0..n).find(|&c| matrix.diagonal(c) <= 0.0 || !matrix.diagonal(c).is_finite()) {
+        if let Some(row) =
+            (0..n).find(|&c| matrix.diagonal(c) <= 0.0 || !matrix.diagonal(c).is_finite())
+        {
             return Err(FactorError::NotPositive { row });
         }
         let scale: Vec<f64> = (0..n).map(|c| matrix.diagonal(c).sqrt().recip()).collect();
@@ -85,9 +89,13 @@ impl Factor {
             supernodal_flop_ratio_threshold: SupernodalThreshold::AUTO,
             ..Default::default()
         };
-        let symbolic =
-            factorize_symbolic_cholesky(scaled.symbolic(), Side::Lower, SymmetricOrdering::Amd, params)
-                .map_err(|_| FactorError::OutOfMemory)?;
+        let symbolic = factorize_symbolic_cholesky(
+            scaled.symbolic(),
+            Side::Lower,
+            SymmetricOrdering::Amd,
+            params,
+        )
+        .map_err(|_| FactorError::OutOfMemory)?;
         let mut values = vec![0.0; symbolic.len_val()];
         let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
         let mut memory = MemBuffer::try_new(scratch).map_err(|_| FactorError::OutOfMemory)?;
@@ -165,9 +173,7 @@ fn original_row(symbolic: &SymbolicCholesky<usize>, index: usize) -> usize {
         SymbolicCholeskyRaw::Supernodal(_) => index,
         SymbolicCholeskyRaw::Simplicial(_) => index.saturating_sub(1),
     };
-    symbolic
-        .perm()
-        .map_or(permuted, |p| p.arrays().0[permuted])
+    symbolic.perm().map_or(permuted, |p| p.arrays().0[permuted])
 }
 
 fn smallest_pivot(symbolic: &SymbolicCholesky<usize>, values: &[f64]) -> f64 {

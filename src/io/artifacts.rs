@@ -41,7 +41,15 @@ pub fn write_all(
     project_file::save(&project_path, &project, painted)?;
     let html = report::html(inputs, design, provenance);
     atomic::write(&at("report.html"), html.as_bytes())?;
-    Ok(["report.html", "sites.csv", "design.json", "dataset.npz", "design.hapdef.toml"].map(at).to_vec())
+    Ok([
+        "report.html",
+        "sites.csv",
+        "design.json",
+        "dataset.npz",
+        "design.hapdef.toml",
+    ]
+    .map(at)
+    .to_vec())
 }
 
 /// The project that reproduces the run, with the chosen sites in it.
@@ -135,10 +143,26 @@ pub fn save_dataset(path: &Path, dataset: &Dataset) -> Result<(), FileError> {
     let build = || -> std::io::Result<NpzFile> {
         let mut file = NpzFile::default();
         file.add("X", &[sites, touches], dataset.x.values())?;
-        file.add("p_m", &[touches, 3], &flat(dataset.touches.iter().map(|t| t.position).collect()))?;
-        file.add("n", &[touches, 3], &flat(dataset.touches.iter().map(|t| t.normal).collect()))?;
-        file.add("site_m", &[sites, 3], &flat(dataset.sites.iter().map(|s| s.position).collect()))?;
-        file.add("direction", &[sites, 3], &flat(dataset.sites.iter().map(|s| s.direction).collect()))?;
+        file.add(
+            "p_m",
+            &[touches, 3],
+            &flat(dataset.touches.iter().map(|t| t.position).collect()),
+        )?;
+        file.add(
+            "n",
+            &[touches, 3],
+            &flat(dataset.touches.iter().map(|t| t.normal).collect()),
+        )?;
+        file.add(
+            "site_m",
+            &[sites, 3],
+            &flat(dataset.sites.iter().map(|s| s.position).collect()),
+        )?;
+        file.add(
+            "direction",
+            &[sites, 3],
+            &flat(dataset.sites.iter().map(|s| s.direction).collect()),
+        )?;
         let forces: Vec<f64> = dataset.touches.iter().map(|t| t.force).collect();
         file.add("force_n", &[touches], &forces)?;
         file.add_text("signal", dataset.signal.name())?;
@@ -170,7 +194,12 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         .feasibility
         .taken()
         .into_iter()
-        .filter_map(|(filter, n)| Some((serde_json::to_value(filter).ok()?.as_str()?.to_owned(), n.into())))
+        .filter_map(|(filter, n)| {
+            Some((
+                serde_json::to_value(filter).ok()?.as_str()?.to_owned(),
+                n.into(),
+            ))
+        })
         .collect();
     let seconds: serde_json::Map<String, Value> = design
         .seconds

@@ -23,9 +23,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
         // Best effort: the error that matters is the one above.
         let _ = fs::remove_file(&aside);
         match e.kind() {
-            std::io::ErrorKind::NotFound => {
-                FileError::broken(path, "its folder does not exist. Create it or choose another")
-            }
+            std::io::ErrorKind::NotFound => FileError::broken(
+                path,
+                "its folder does not exist. Create it or choose another",
+            ),
             _ => FileError::of(path, &e),
         }
     })

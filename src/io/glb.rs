@@ -15,13 +15,22 @@ use crate::mesh::TriMesh;
 /// # Errors
 /// Only what serialization itself reports.
 pub fn write_glb(mesh: &TriMesh) -> Result<Vec<u8>, gltf::Error> {
-    let positions: Vec<[f32; 3]> = mesh.positions().iter().map(|p| p.as_vec3().to_array()).collect();
+    let positions: Vec<[f32; 3]> = mesh
+        .positions()
+        .iter()
+        .map(|p| p.as_vec3().to_array())
+        .collect();
     let indices: Vec<u32> = mesh.triangles().iter().flatten().copied().collect();
     let mut builder = Builder::new(positions.len() * 12 + indices.len() * 4);
     let fold = |pick: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
-        (0..3).map(|k| positions.iter().fold(start, |m, p| pick(m, p[k]))).collect()
+        (0..3)
+            .map(|k| positions.iter().fold(start, |m, p| pick(m, p[k])))
+            .collect()
     };
-    let bounds = Some((fold(f32::min, f32::INFINITY), fold(f32::max, f32::NEG_INFINITY)));
+    let bounds = Some((
+        fold(f32::min, f32::INFINITY),
+        fold(f32::max, f32::NEG_INFINITY),
+    ));
     let position_bytes = positions.iter().flatten().flat_map(|x| x.to_le_bytes());
     let at = builder.accessor(
         position_bytes,
@@ -137,7 +146,9 @@ impl Builder {
                 version: 2,
                 length: 0,
             },
-            json: Cow::Owned(json::serialize::to_vec(&self.root).map_err(gltf::Error::Deserialize)?),
+            json: Cow::Owned(
+                json::serialize::to_vec(&self.root).map_err(gltf::Error::Deserialize)?,
+            ),
             bin: Some(Cow::Owned(self.bytes)),
         };
         glb.to_vec()

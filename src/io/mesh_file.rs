@@ -41,7 +41,10 @@ pub fn read_mesh(path: &Path, unit: Option<Unit>, body: usize) -> Result<LoadedM
     }
     let bytes = std::fs::read(path).map_err(|e| FileError::of(path, &e))?;
     if bytes.is_empty() {
-        return Err(FileError::broken(path, "the file is empty. Export the mesh again"));
+        return Err(FileError::broken(
+            path,
+            "the file is empty. Export the mesh again",
+        ));
     }
     let scale = scale(path, &ending, unit)?;
     let parse = || match ending.as_str() {
@@ -91,26 +94,45 @@ fn read_stl(bytes: &[u8]) -> Result<Soup, String> {
         return Ok(binary_stl(bytes));
     }
     if !bytes.trim_ascii_start().starts_with(b"solid") {
-        return Err("the STL file is truncated: its length does not match the triangles it announces".into());
+        return Err(
+            "the STL file is truncated: its length does not match the triangles it announces"
+                .into(),
+        );
     }
     // The reader wants a name after the first word.
     let text = [b"solid stl".as_slice(), after_first_line(bytes)].join(&b'\n');
-    let mesh = stl_io::read_stl(&mut Cursor::new(text)).map_err(|e| format!("not a readable STL file ({e})"))?;
-    if !bytes.windows(8).any(|w| w.eq_ignore_ascii_case(b"endsolid")) {
+    let mesh = stl_io::read_stl(&mut Cursor::new(text))
+        .map_err(|e| format!("not a readable STL file ({e})"))?;
+    if !bytes
+        .windows(8)
+        .any(|w| w.eq_ignore_ascii_case(b"endsolid"))
+    {
         return Err("the STL file is truncated: it has no endsolid".into());
     }
-    let positions = mesh.vertices.iter().map(|v| Vec3::from_array(v.0).as_dvec3()).collect();
-    let triangles = mesh.faces.iter().map(|f| f.vertices.map(|v| v as u32)).collect();
+    let positions = mesh
+        .vertices
+        .iter()
+        .map(|v| Vec3::from_array(v.0).as_dvec3())
+        .collect();
+    let triangles = mesh
+        .faces
+        .iter()
+        .map(|f| f.vertices.map(|v| v as u32))
+        .collect();
     Ok((positions, triangles))
 }
 
 fn after_first_line(bytes: &[u8]) -> &[u8] {
-    let end = bytes.iter().position(|&b| b == b'\n').unwrap_or(bytes.len());
+    let end = bytes
+        .iter()
+        .position(|&b| b == b'\n')
+        .unwrap_or(bytes.len());
     bytes.get(end + 1..).unwrap_or_default()
 }
 
 fn binary_stl(bytes: &[u8]) -> Soup {
-    let float = |at: usize| f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+    let float =
+        |at: usize| f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
     let count = (bytes.len() - 84) / 50;
     let positions = (0..3 * count)
         .map(|i| {
@@ -118,7 +140,9 @@ fn binary_stl(bytes: &[u8]) -> Soup {
             Vec3::new(float(at), float(at + 4), float(at + 8)).as_dvec3()
         })
         .collect();
-    let triangles = (0..count as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let triangles = (0..count as u32)
+        .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+        .collect();
     (positions, triangles)
 }
 
@@ -174,7 +198,9 @@ fn read_gltf(bytes: &[u8], folder: Option<&Path>) -> Result<Soup, String> {
 }
 
 fn check_glb_length(bytes: &[u8]) -> Result<(), String> {
-    let announced = bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    let announced = bytes
+        .get(8..12)
+        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     if announced == Some(bytes.len()) {
         Ok(())
     } else {
@@ -230,7 +256,11 @@ fn read_primitive(
         return Err("a triangle of the glTF file refers to a vertex that is not there".into());
     }
     let base = soup.0.len() as u32;
-    soup.0.extend(positions.iter().map(|&p| world.transform_point3(Vec3::from_array(p).as_dvec3())));
+    soup.0.extend(
+        positions
+            .iter()
+            .map(|&p| world.transform_point3(Vec3::from_array(p).as_dvec3())),
+    );
     // A mirroring node turns the surface inside out.
     let turned = world.determinant() < 0.0;
     soup.1.extend(indices.chunks_exact(3).map(|t| {
@@ -280,7 +310,9 @@ mod tests {
         let bytes = super::super::glb::write_glb(&limb).unwrap();
         for cut in (0..bytes.len()).step_by(97) {
             let (_keep, path) = file("cut.glb", &bytes[..cut]);
-            let error = read_mesh(&path, None, 0).err().expect("a cut file is refused");
+            let error = read_mesh(&path, None, 0)
+                .err()
+                .expect("a cut file is refused");
             assert!(error.to_string().contains("cut.glb"), "{error}");
         }
     }
@@ -312,7 +344,13 @@ mod tests {
     #[test]
     fn what_is_not_finite_is_named() {
         let (_keep, path) = file("n.obj", b"v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
-        let error = read_mesh(&path, Some(Unit::Metre), 0).err().unwrap().to_string();
-        assert!(error.contains("n.obj") && (error.contains("finite") || error.contains("OBJ")), "{error}");
+        let error = read_mesh(&path, Some(Unit::Metre), 0)
+            .err()
+            .unwrap()
+            .to_string();
+        assert!(
+            error.contains("n.obj") && (error.contains("finite") || error.contains("OBJ")),
+            "{error}"
+        );
     }
 }

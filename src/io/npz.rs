@@ -99,7 +99,10 @@ impl NpzFile {
 pub fn read_mask(path: &Path, name: &str) -> Result<Vec<bool>, FileError> {
     let file = std::fs::File::open(path).map_err(|e| FileError::of(path, &e))?;
     let broken = |e: &dyn std::fmt::Display| {
-        FileError::broken(path, format!("the painted mask \"{name}\" cannot be read ({e}). Paint it again"))
+        FileError::broken(
+            path,
+            format!("the painted mask \"{name}\" cannot be read ({e}). Paint it again"),
+        )
     };
     let mut archive = ZipArchive::new(file).map_err(|e| broken(&e))?;
     let mut bytes = Vec::new();
@@ -120,7 +123,8 @@ mod tests {
     fn the_same_arrays_give_the_same_bytes_and_come_back() {
         let build = || {
             let mut file = NpzFile::default();
-            file.add("x", &[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
+            file.add("x", &[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+                .unwrap();
             file.add("mask", &[3], &[true, false, true]).unwrap();
             file.add_text("signal", "strain").unwrap();
             file.finish().unwrap()
@@ -130,6 +134,11 @@ mod tests {
         let path = folder.path().join("a.npz");
         std::fs::write(&path, build()).unwrap();
         assert_eq!(read_mask(&path, "mask").unwrap(), [true, false, true]);
-        assert!(read_mask(&path, "other").unwrap_err().to_string().contains("other"));
+        assert!(
+            read_mask(&path, "other")
+                .unwrap_err()
+                .to_string()
+                .contains("other")
+        );
     }
 }

@@ -90,8 +90,16 @@ pub fn parse(text: &str) -> Result<Project, String> {
                 "the project is of format {v}, written by a newer version of HapDef; this one reads up to format {FORMAT}. Update HapDef"
             ));
         }
-        Some(v) => return Err(format!("format {v} has never existed. Set format = {FORMAT}")),
-        None => return Err(format!("the key \"format\" is missing. Add format = {FORMAT} as the first line")),
+        Some(v) => {
+            return Err(format!(
+                "format {v} has never existed. Set format = {FORMAT}"
+            ));
+        }
+        None => {
+            return Err(format!(
+                "the key \"format\" is missing. Add format = {FORMAT} as the first line"
+            ));
+        }
     }
     let project: Project = toml::from_str(text).map_err(readable)?;
     project.check().map_err(|e| e.to_string())?;
@@ -146,46 +154,134 @@ pub fn to_text(project: &Project) -> String {
     t.table("part");
     let part = &project.part;
     t.key("mesh", quoted(&part.mesh), "glTF/GLB, OBJ or STL");
-    t.maybe("unit", part.unit.map(|u| quoted(u.name())), "unit of the mesh file: \"mm\", \"cm\", \"m\" or \"in\"; glTF is in metres and needs none");
-    t.key("body", part.body, "which connected body, 0 being the largest");
-    t.key("model", quoted("shell"), "\"shell\": the mesh is the mid-surface");
+    t.maybe(
+        "unit",
+        part.unit.map(|u| quoted(u.name())),
+        "unit of the mesh file: \"mm\", \"cm\", \"m\" or \"in\"; glTF is in metres and needs none",
+    );
+    t.key(
+        "body",
+        part.body,
+        "which connected body, 0 being the largest",
+    );
+    t.key(
+        "model",
+        quoted("shell"),
+        "\"shell\": the mesh is the mid-surface",
+    );
     t.key("thickness_mm", float(part.thickness_mm), "of the shell");
-    t.key("axis", serialized(&part.axis), "the axis the part is unrolled about: \"x\", \"y\" or \"z\"");
+    t.key(
+        "axis",
+        serialized(&part.axis),
+        "the axis the part is unrolled about: \"x\", \"y\" or \"z\"",
+    );
     t.table("material");
-    t.key("youngs_modulus_gpa", float(project.material.youngs_modulus_gpa), "");
-    t.key("poissons_ratio", float(project.material.poissons_ratio), "above -1 and below 0.5");
+    t.key(
+        "youngs_modulus_gpa",
+        float(project.material.youngs_modulus_gpa),
+        "",
+    );
+    t.key(
+        "poissons_ratio",
+        float(project.material.poissons_ratio),
+        "above -1 and below 0.5",
+    );
     for support in &project.supports {
         t.list("support");
         t.key("kind", serialized(&support.kind), "\"clamped\" (no displacement, no rotation), \"pinned\" (no displacement) or \"symmetry\"");
-        t.key("box_mm", corners(&support.box_mm), "every point of the part inside it is held");
-        t.key("normal", serialized(&support.normal), "of a symmetry plane; unused otherwise");
+        t.key(
+            "box_mm",
+            corners(&support.box_mm),
+            "every point of the part inside it is held",
+        );
+        t.key(
+            "normal",
+            serialized(&support.normal),
+            "of a symmetry plane; unused otherwise",
+        );
     }
     t.table("touch");
-    t.key("force_n", float(project.touch.force_n), "pressed along the inward normal");
-    t.key("tip_radius_mm", float(project.touch.tip_radius_mm), "the tip spreads the force as (1 - r²/a²)²");
-    t.key("count", project.touch.count, "touches simulated; lower qualities take fewer");
-    t.key("edge_margin_mm", float(project.touch.edge_margin_mm), "least distance of a touch from a free edge");
+    t.key(
+        "force_n",
+        float(project.touch.force_n),
+        "pressed along the inward normal",
+    );
+    t.key(
+        "tip_radius_mm",
+        float(project.touch.tip_radius_mm),
+        "the tip spreads the force as (1 - r²/a²)²",
+    );
+    t.key(
+        "count",
+        project.touch.count,
+        "touches simulated; lower qualities take fewer",
+    );
+    t.key(
+        "edge_margin_mm",
+        float(project.touch.edge_margin_mm),
+        "least distance of a touch from a free edge",
+    );
     t.table("sites");
-    t.key("spacing_mm", float(project.sites.spacing_mm), "of the possible gauge positions on the inside");
-    t.key("lattice", serialized(&project.sites.lattice), "\"even\" (any surface) or \"unrolled\" (rows and columns about the axis)");
+    t.key(
+        "spacing_mm",
+        float(project.sites.spacing_mm),
+        "of the possible gauge positions on the inside",
+    );
+    t.key(
+        "lattice",
+        serialized(&project.sites.lattice),
+        "\"even\" (any surface) or \"unrolled\" (rows and columns about the axis)",
+    );
     gauge(&mut t, project);
     t.table("feasible");
-    t.key("support_clearance_mm", float(project.feasible.support_clearance_mm), "least distance over the surface from anything held");
-    t.key("edge_neighbours", project.feasible.edge_neighbours, "k of the centre-of-mass filter …");
-    t.key("edge_radius_mm", float(project.feasible.edge_radius_mm), "… and its radius");
-    t.maybe("painted", project.feasible.painted.as_deref().map(quoted), "painted region, an array in the NPZ file beside this one");
+    t.key(
+        "support_clearance_mm",
+        float(project.feasible.support_clearance_mm),
+        "least distance over the surface from anything held",
+    );
+    t.key(
+        "edge_neighbours",
+        project.feasible.edge_neighbours,
+        "k of the centre-of-mass filter …",
+    );
+    t.key(
+        "edge_radius_mm",
+        float(project.feasible.edge_radius_mm),
+        "… and its radius",
+    );
+    t.maybe(
+        "painted",
+        project.feasible.painted.as_deref().map(quoted),
+        "painted region, an array in the NPZ file beside this one",
+    );
     t.table("candidates");
-    t.key("unexplained", float(project.candidates.unexplained), "share of the held-out variance the candidates may leave unexplained");
-    t.maybe("count", project.candidates.count, "a fixed number of candidates instead");
+    t.key(
+        "unexplained",
+        float(project.candidates.unexplained),
+        "share of the held-out variance the candidates may leave unexplained",
+    );
+    t.maybe(
+        "count",
+        project.candidates.count,
+        "a fixed number of candidates instead",
+    );
     selection(&mut t, project);
     t.table("evaluation");
     for region in &project.evaluation.regions {
         t.list("evaluation.region");
-        t.key("name", quoted(&region.name), "errors are quoted for it, beside all touches");
+        t.key(
+            "name",
+            quoted(&region.name),
+            "errors are quoted for it, beside all touches",
+        );
         t.key("box_mm", corners(&region.box_mm), "");
     }
     t.table("budget");
-    t.key("quality", quoted(project.budget.quality.name()), "\"draft\", \"standard\" or \"reference\"");
+    t.key(
+        "quality",
+        quoted(project.budget.quality.name()),
+        "\"draft\", \"standard\" or \"reference\"",
+    );
     t.key("seed", project.budget.seed, "of every random draw");
     t.0
 }
@@ -193,21 +289,53 @@ pub fn to_text(project: &Project) -> String {
 fn gauge(t: &mut Text, project: &Project) {
     let gauge = &project.gauge;
     t.table("gauge");
-    t.key("signal", quoted(gauge.signal.name()), "\"strain\", \"displacement\" or \"normal-displacement\"");
-    t.key("noise_microstrain", float(gauge.noise_microstrain), "standard deviation of a reading");
-    t.key("range_microstrain", float(gauge.range_microstrain), "largest strain gauge and amplifier can take");
-    t.key("least_signal_to_noise", float(gauge.least_signal_to_noise), "rms strain over noise that a site must reach");
-    t.key("grid_length_mm", float(gauge.grid_length_mm), "of the measuring grid, along the gauge");
+    t.key(
+        "signal",
+        quoted(gauge.signal.name()),
+        "\"strain\", \"displacement\" or \"normal-displacement\"",
+    );
+    t.key(
+        "noise_microstrain",
+        float(gauge.noise_microstrain),
+        "standard deviation of a reading",
+    );
+    t.key(
+        "range_microstrain",
+        float(gauge.range_microstrain),
+        "largest strain gauge and amplifier can take",
+    );
+    t.key(
+        "least_signal_to_noise",
+        float(gauge.least_signal_to_noise),
+        "rms strain over noise that a site must reach",
+    );
+    t.key(
+        "grid_length_mm",
+        float(gauge.grid_length_mm),
+        "of the measuring grid, along the gauge",
+    );
     t.key("grid_width_mm", float(gauge.grid_width_mm), "across it");
-    t.key("flatness_mm", float(gauge.flatness_mm), "largest height of the surface over the gauge's plane");
+    t.key(
+        "flatness_mm",
+        float(gauge.flatness_mm),
+        "largest height of the surface over the gauge's plane",
+    );
 }
 
 fn selection(t: &mut Text, project: &Project) {
     let selection = &project.selection;
     t.table("selection");
-    t.key("selector", quoted(selection.selector.name()), "\"greedy-svr\" or \"pca-qr\"");
+    t.key(
+        "selector",
+        quoted(selection.selector.name()),
+        "\"greedy-svr\" or \"pca-qr\"",
+    );
     t.key("sensors", selection.sensors, "gauges to place");
-    t.key("c_mm", float(selection.c_mm), "C of greedy SVR's regression (targets in mm, features standardized)");
+    t.key(
+        "c_mm",
+        float(selection.c_mm),
+        "C of greedy SVR's regression (targets in mm, features standardized)",
+    );
     t.key("epsilon_mm", float(selection.epsilon_mm), "its ε");
     t.key("gamma", float(selection.gamma), "its γ");
     for site in &selection.sites {
@@ -309,7 +437,10 @@ mod tests {
         assert!(parse("[part]\n").unwrap_err().contains("format"));
         let typo = to_text(&full()).replace("force_n", "force");
         let message = parse(&typo).unwrap_err();
-        assert!(message.contains("force") && message.contains("line"), "{message}");
+        assert!(
+            message.contains("force") && message.contains("line"),
+            "{message}"
+        );
         let negative = to_text(&full()).replace("force_n = 10.0", "force_n = -1.0");
         assert!(parse(&negative).unwrap_err().contains("touch.force_n"));
     }
@@ -317,7 +448,13 @@ mod tests {
     #[test]
     fn paths_are_kept_relative() {
         let project = Path::new("/home/a/work/p.hapdef.toml");
-        assert_eq!(relative_to(project, Path::new("/home/a/work/limb.glb")), "limb.glb");
-        assert_eq!(relative_to(project, Path::new("/home/a/mesh/limb.glb")), "../mesh/limb.glb");
+        assert_eq!(
+            relative_to(project, Path::new("/home/a/work/limb.glb")),
+            "limb.glb"
+        );
+        assert_eq!(
+            relative_to(project, Path::new("/home/a/mesh/limb.glb")),
+            "../mesh/limb.glb"
+        );
     }
 }

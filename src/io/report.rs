@@ -12,7 +12,7 @@ const STYLE: &str = "
 :root{color-scheme:light}body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1080px;margin:32px auto;padding:0 20px}
 h1{font-size:26px;margin:0 0 4px}h2{font-size:19px;margin:36px 0 10px;border-bottom:1px solid #d8dce3;padding-bottom:4px}
 p.lead{color:#4a5568;margin-top:0}table{border-collapse:collapse;font-variant-numeric:tabular-nums;width:100%}
-th,td{padding:5px 10px;text-align:right;border-bottom:1px solid #e7eaef}th{font-weight:600;color:#4a5568}th:first-child,td:first-child{text-align:left}
+th,td{padding:5px 10px;text-align:right;white-space:nowrap;border-bottom:1px solid #e7eaef}th{font-weight:600;color:#4a5568}th:first-child,td:first-child{text-align:left}
 .views{display:grid;grid-template-columns:repeat(auto-fit,minmax(220px,1fr));gap:14px}figure{margin:0}figcaption{text-align:center;color:#4a5568;font-size:13px}
 svg{width:100%;height:auto;display:block}svg text{font:12px system-ui,sans-serif;fill:#1d2430}svg text.n{font:bold 10px system-ui,sans-serif}svg text.t{font-weight:600}svg .grid{stroke:#e1e5ea;fill:none}
 svg.limb path{stroke-width:.4}.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:18px}
@@ -25,7 +25,11 @@ ul.notes{background:#fff7e6;border-left:4px solid #d9a441;padding:10px 28px;marg
 #[must_use]
 pub fn html(inputs: &Inputs, design: &Design, provenance: &Provenance) -> String {
     let mut page = String::new();
-    let name = provenance.mesh_path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = provenance
+        .mesh_path
+        .file_stem()
+        .map(|s| s.to_string_lossy().into_owned())
+        .unwrap_or_default();
     let _ = write!(
         page,
         "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\"><title>Gauge placement for {0}</title><style>{STYLE}</style></head><body><h1>Gauge placement for {0}</h1>",
@@ -48,12 +52,22 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
     let _ = write!(
         page,
         "<p class=\"lead\">{chosen} strain gauges, chosen by {} on {}, to find where a touch of {} N lands.</p><div class=\"numbers\">",
-        design.selections.first().map_or(selector.title(), |s| s.selector.title()),
+        design
+            .selections
+            .first()
+            .map_or(selector.title(), |s| s.selector.title()),
         dataset.signal.name(),
         inputs.project.touch.force_n
     );
-    for row in design.evaluation.rows.iter().filter(|r| r.sensors == chosen && Some(r.selector.as_str()) == design.selections.first().map(|s| s.selector.name())) {
-        number(page, &format!("{:.2} mm", row.error_mm), &format!("mean error, {}", row.region));
+    for row in design.evaluation.rows.iter().filter(|r| {
+        r.sensors == chosen
+            && Some(r.selector.as_str()) == design.selections.first().map(|s| s.selector.name())
+    }) {
+        number(
+            page,
+            &format!("{:.2} mm", row.error_mm),
+            &format!("mean error, {}", row.region),
+        );
         number(page, &format!("{:.2} mm", row.median_mm), "median");
     }
     number(page, &dataset.sites.len().to_string(), "inside sites");
@@ -71,7 +85,12 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
 }
 
 fn number(page: &mut String, value: &str, label: &str) {
-    let _ = write!(page, "<div><b>{}</b><span>{}</span></div>", escape(value), escape(label));
+    let _ = write!(
+        page,
+        "<div><b>{}</b><span>{}</span></div>",
+        escape(value),
+        escape(label)
+    );
 }
 
 /// The chosen gauges as markers.
@@ -92,14 +111,28 @@ pub fn markers(design: &Design) -> Vec<Marker> {
 /// Share of the sites around each vertex that are feasible: what tints the pictures.
 fn feasible_tint(design: &Design) -> Vec<f64> {
     let mesh = &design.simulated.mesh;
-    let (mut sum, mut count) = (vec![0.0; mesh.positions().len()], vec![0.0; mesh.positions().len()]);
-    for (at, verdict) in design.simulated.points.iter().zip(&design.feasibility.verdicts) {
-        for (k, v) in mesh.triangles()[at.triangle as usize].into_iter().enumerate() {
+    let (mut sum, mut count) = (
+        vec![0.0; mesh.positions().len()],
+        vec![0.0; mesh.positions().len()],
+    );
+    for (at, verdict) in design
+        .simulated
+        .points
+        .iter()
+        .zip(&design.feasibility.verdicts)
+    {
+        for (k, v) in mesh.triangles()[at.triangle as usize]
+            .into_iter()
+            .enumerate()
+        {
             sum[v as usize] += at.barycentric[k] * f64::from(u8::from(verdict.is_none()));
             count[v as usize] += at.barycentric[k];
         }
     }
-    sum.iter().zip(&count).map(|(s, &c)| if c > 0.0 { s / c } else { 0.0 }).collect()
+    sum.iter()
+        .zip(&count)
+        .map(|(s, &c)| if c > 0.0 { s / c } else { 0.0 })
+        .collect()
 }
 
 fn pictures(page: &mut String, inputs: &Inputs, design: &Design) {
@@ -138,12 +171,20 @@ fn sites(page: &mut String, inputs: &Inputs, design: &Design) {
         let site = &dataset.sites[s];
         let (p, d) = (site.position * 1000.0, site.direction);
         let (low, high) = range(dataset, s);
-        let ratio = signal_to_noise(inputs, site.rms_strain).map_or("–".into(), |r| format!("{r:.0}"));
+        let ratio =
+            signal_to_noise(inputs, site.rms_strain).map_or("–".into(), |r| format!("{r:.0}"));
         let decimals = if unit == "mm" { 3 } else { 0 };
         let _ = write!(
             page,
             "<tr><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{:+.3} {:+.3} {:+.3}</td><td>{low:.decimals$} – {high:.decimals$}</td><td>{:.0}</td><td>{ratio}</td></tr>",
-            k + 1, p.x, p.y, p.z, d.x, d.y, d.z, site.rms_strain * 1e6
+            k + 1,
+            p.x,
+            p.y,
+            p.z,
+            d.x,
+            d.y,
+            d.z,
+            site.rms_strain * 1e6
         );
     }
     page.push_str("</table>");
@@ -151,7 +192,12 @@ fn sites(page: &mut String, inputs: &Inputs, design: &Design) {
 
 fn plots(page: &mut String, design: &Design) {
     page.push_str("<h2>Error against number of gauges</h2><div class=\"plots\">");
-    let mut regions: Vec<&str> = design.evaluation.rows.iter().map(|r| r.region.as_str()).collect();
+    let mut regions: Vec<&str> = design
+        .evaluation
+        .rows
+        .iter()
+        .map(|r| r.region.as_str())
+        .collect();
     regions.dedup();
     let mut seen = Vec::new();
     for region in regions {
@@ -176,7 +222,12 @@ fn plots(page: &mut String, design: &Design) {
             520.0,
         ));
     }
-    let points = design.reduced.candidates.curve.iter().map(|p| (p.sites as f64, 100.0 * p.unexplained));
+    let points = design
+        .reduced
+        .candidates
+        .curve
+        .iter()
+        .map(|p| (p.sites as f64, 100.0 * p.unexplained));
     page.push_str(&svg::plot(
         "Variance of all feasible sites left unexplained",
         "sites kept",
@@ -203,7 +254,11 @@ pub fn curve(design: &Design, selector: SelectorKind, region: &str) -> Vec<(f64,
 }
 
 fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
-    let row = design.evaluation.rows.iter().find(|r| r.selector == "all-candidates" && r.region == region)?;
+    let row = design
+        .evaluation
+        .rows
+        .iter()
+        .find(|r| r.selector == "all-candidates" && r.region == region)?;
     let most = design.selections.iter().map(|s| s.sets.len()).max()? as f64;
     Some(Series {
         name: "All candidates",
@@ -224,7 +279,16 @@ fn errors(page: &mut String, design: &Design) {
         let _ = write!(
             page,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.3}</td></tr>",
-            escape(&r.selector), r.sensors, escape(&r.region), r.error_mm, r.median_mm, r.p95_mm, r.touches, r.hyper.c, r.hyper.epsilon, r.hyper.gamma
+            escape(&r.selector),
+            r.sensors,
+            escape(&r.region),
+            r.error_mm,
+            r.median_mm,
+            r.p95_mm,
+            r.touches,
+            r.hyper.c,
+            r.hyper.epsilon,
+            r.hyper.gamma
         );
     }
     page.push_str("</table>");
@@ -239,21 +303,80 @@ fn settings(page: &mut String, inputs: &Inputs, design: &Design, provenance: &Pr
     let p = &inputs.project;
     let work = design.work();
     let rows: Vec<(&str, String)> = vec![
-        ("Part", escape(&provenance.mesh_path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default())),
+        (
+            "Part",
+            escape(
+                &provenance
+                    .mesh_path
+                    .file_name()
+                    .map(|n| n.to_string_lossy().into_owned())
+                    .unwrap_or_default(),
+            ),
+        ),
         ("Thickness", format!("{} mm", p.part.thickness_mm)),
-        ("Material", format!("E {} GPa, ν {}", p.material.youngs_modulus_gpa, p.material.poissons_ratio)),
-        ("Touch", format!("{} N over a radius of {} mm", p.touch.force_n, p.touch.tip_radius_mm)),
-        ("Gauge noise and range", format!("{} and {} microstrain", p.gauge.noise_microstrain, p.gauge.range_microstrain)),
-        ("Gauge grid", format!("{} × {} mm", p.gauge.grid_length_mm, p.gauge.grid_width_mm)),
-        ("Quality and seed", format!("{}, {}", design.budget.quality.name(), p.budget.seed)),
-        ("Model", format!("{} vertices, {} unknowns, smallest scaled pivot {:.1e}", design.simulated.mesh.positions().len(), design.simulated.unknowns, design.simulated.smallest_pivot)),
-        ("Work", format!("{} assemblies, {} factorizations, {} solves, {} kernel entries, {} fits", work.assemblies, work.factorizations, work.solves, work.kernel_evaluations, work.fits)),
+        (
+            "Material",
+            format!(
+                "E {} GPa, ν {}",
+                p.material.youngs_modulus_gpa, p.material.poissons_ratio
+            ),
+        ),
+        (
+            "Touch",
+            format!(
+                "{} N over a radius of {} mm",
+                p.touch.force_n, p.touch.tip_radius_mm
+            ),
+        ),
+        (
+            "Gauge noise and range",
+            format!(
+                "{} and {} microstrain",
+                p.gauge.noise_microstrain, p.gauge.range_microstrain
+            ),
+        ),
+        (
+            "Gauge grid",
+            format!("{} × {} mm", p.gauge.grid_length_mm, p.gauge.grid_width_mm),
+        ),
+        (
+            "Quality and seed",
+            format!("{}, {}", design.budget.quality.name(), p.budget.seed),
+        ),
+        (
+            "Model",
+            format!(
+                "{} vertices, {} unknowns, smallest scaled pivot {:.1e}",
+                design.simulated.mesh.positions().len(),
+                design.simulated.unknowns,
+                design.simulated.smallest_pivot
+            ),
+        ),
+        (
+            "Work",
+            format!(
+                "{} assemblies, {} factorizations, {} solves, {} kernel entries, {} fits",
+                work.assemblies,
+                work.factorizations,
+                work.solves,
+                work.kernel_evaluations,
+                work.fits
+            ),
+        ),
     ];
     for (label, value) in rows {
         let _ = write!(page, "<tr><td>{label}</td><td>{value}</td></tr>");
     }
     for stage in &design.seconds {
-        let _ = write!(page, "<tr><td>Time, {}</td><td>{:.2} s</td></tr>", stage.stage, stage.seconds);
+        let _ = write!(
+            page,
+            "<tr><td>Time, {}</td><td>{:.2} s</td></tr>",
+            stage.stage, stage.seconds
+        );
     }
-    let _ = write!(page, "<tr><td>Version</td><td>HapDef {}</td></tr></table>", provenance.version);
+    let _ = write!(
+        page,
+        "<tr><td>Version</td><td>HapDef {}</td></tr></table>",
+        provenance.version
+    );
 }

@@ -28,13 +28,18 @@ pub struct View {
 #[must_use]
 pub fn standard_views(axis: DVec3, zero: DVec3) -> Vec<View> {
     let side = axis.cross(zero);
-    [("front", zero), ("left", side), ("back", -zero), ("right", -side)]
-        .map(|(name, toward)| View {
-            name,
-            toward: (toward + axis * 0.25).normalize(),
-            up: axis,
-        })
-        .to_vec()
+    [
+        ("front", zero),
+        ("left", side),
+        ("back", -zero),
+        ("right", -side),
+    ]
+    .map(|(name, toward)| View {
+        name,
+        toward: (toward + axis * 0.25).normalize(),
+        up: axis,
+    })
+    .to_vec()
 }
 
 const ACCENT: &str = "#d55e00";
@@ -50,14 +55,24 @@ pub fn limb(mesh: &TriMesh, tint: &[f64], markers: &[Marker], view: &View, width
     let canvas = Canvas::new(lower, upper, width);
     let mut svg = canvas.open(&format!("The limb from the {}", view.name));
     let mut order: Vec<usize> = (0..mesh.triangles().len()).collect();
-    let depth = |t: usize| -> f64 { mesh.triangles()[t].iter().map(|&v| seen[v as usize].z).sum() };
+    let depth = |t: usize| -> f64 {
+        mesh.triangles()[t]
+            .iter()
+            .map(|&v| seen[v as usize].z)
+            .sum()
+    };
     order.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)).then(a.cmp(&b)));
     for t in order {
         let tri = mesh.triangles()[t];
         let facing = mesh.facet_normal(t as u32).dot(view.toward);
         let level = tri.iter().map(|&v| tint[v as usize]).sum::<f64>() / 3.0;
         let points = tri.map(|v| canvas.place(seen[v as usize].truncate()));
-        let _ = write!(svg, "<path d=\"{}\" fill=\"{}\"/>", path(&points), shade(facing, level));
+        let _ = write!(
+            svg,
+            "<path d=\"{}\" fill=\"{}\"/>",
+            path(&points),
+            shade(facing, level)
+        );
     }
     for marker in markers {
         let at = canvas.place((frame * marker.position).truncate());
@@ -82,7 +97,7 @@ pub fn unrolled(
     let low = DVec2::new(0.0, unrolling.height.0);
     let canvas = Canvas::new(low, DVec2::new(around, unrolling.height.1), width);
     let mut svg = canvas.open("The limb unrolled, with numbered gauges");
-    for (t, tri) in mesh.triangles().iter().enumerate() {
+    for tri in mesh.triangles() {
         let mut flat = tri.map(|v| unrolling.flat(mesh.positions()[v as usize]));
         // A facet across the seam is drawn on the side of its first corner.
         for k in 1..3 {
@@ -90,8 +105,12 @@ pub fn unrolled(
         }
         let level = tri.iter().map(|&v| tint[v as usize]).sum::<f64>() / 3.0;
         let points = flat.map(|p| canvas.place(p));
-        let _ = write!(svg, "<path d=\"{}\" fill=\"{}\"/>", path(&points), shade(0.85, level));
-        let _ = t;
+        let _ = write!(
+            svg,
+            "<path d=\"{}\" fill=\"{}\"/>",
+            path(&points),
+            shade(0.85, level)
+        );
     }
     for marker in markers {
         let at = unrolling.flat(marker.position);
@@ -99,7 +118,13 @@ pub fn unrolled(
         let mut direction = ahead - at;
         direction.x -= (direction.x / around).round() * around;
         let direction = direction.normalize_or_zero();
-        draw_marker(&mut svg, canvas.place(at), DVec2::new(direction.x, -direction.y), marker.number, true);
+        draw_marker(
+            &mut svg,
+            canvas.place(at),
+            DVec2::new(direction.x, -direction.y),
+            marker.number,
+            true,
+        );
     }
     svg.push_str("</g>");
     let _ = write!(
@@ -126,7 +151,12 @@ pub const PALETTE: [&str; 5] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#66
 #[must_use]
 pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series], width: f64) -> String {
     let (height, left, bottom) = (0.55 * width, 58.0, 44.0);
-    let all = || series.iter().flat_map(|s| &s.points).filter(|p| p.0.is_finite() && p.1.is_finite());
+    let all = || {
+        series
+            .iter()
+            .flat_map(|s| &s.points)
+            .filter(|p| p.0.is_finite() && p.1.is_finite())
+    };
     let x_max = all().map(|p| p.0).fold(1.0, f64::max);
     let x_min = all().map(|p| p.0).fold(x_max, f64::min);
     let (y_step, y_top) = ticks(all().map(|p| p.1).fold(0.0, f64::max));
@@ -141,34 +171,66 @@ pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series], width:
         let _ = write!(
             svg,
             "<path d=\"M{left} {1:.1}H{2:.1}\" class=\"grid\"/><text x=\"{3:.1}\" y=\"{4:.1}\" text-anchor=\"end\">{0}</text>",
-            tidy(y), py(y), width - 16.0, left - 6.0, py(y) + 4.0
+            tidy(y),
+            py(y),
+            width - 16.0,
+            left - 6.0,
+            py(y) + 4.0
         );
         y += y_step;
     }
     let (x_step, _) = ticks(x_max - x_min);
     let mut x = (x_min / x_step.max(1.0)).ceil() * x_step.max(1.0);
     while x <= x_max * 1.0001 {
-        let _ = write!(svg, "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>", px(x), height - bottom + 16.0, tidy(x));
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+            px(x),
+            height - bottom + 16.0,
+            tidy(x)
+        );
         x += x_step.max(1.0);
     }
     let _ = write!(
         svg,
         "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text><text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
-        f64::midpoint(left, width), height - 8.0, escape(x_label), height / 2.0, escape(y_label)
+        f64::midpoint(left, width),
+        height - 8.0,
+        escape(x_label),
+        height / 2.0,
+        escape(y_label)
     );
     for (k, line) in series.iter().enumerate() {
         let colour = PALETTE[k % PALETTE.len()];
         let mut d = String::new();
         for (i, p) in line.points.iter().enumerate() {
-            let _ = write!(d, "{}{:.1} {:.1}", if i == 0 { 'M' } else { 'L' }, px(p.0), py(p.1));
-            let _ = write!(svg, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"{colour}\"/>", px(p.0), py(p.1));
+            let _ = write!(
+                d,
+                "{}{:.1} {:.1}",
+                if i == 0 { 'M' } else { 'L' },
+                px(p.0),
+                py(p.1)
+            );
+            let _ = write!(
+                svg,
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"{colour}\"/>",
+                px(p.0),
+                py(p.1)
+            );
         }
-        let _ = write!(svg, "<path d=\"{d}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>");
+        let _ = write!(
+            svg,
+            "<path d=\"{d}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>"
+        );
         let ly = 40.0 + 18.0 * k as f64;
         let _ = write!(
             svg,
             "<path d=\"M{0:.1} {1:.1}h20\" stroke=\"{colour}\" stroke-width=\"2\"/><text x=\"{2:.1}\" y=\"{3:.1}\">{4}</text>",
-            width - 190.0, ly, width - 164.0, ly + 4.0, escape(line.name)
+            width - 190.0,
+            ly,
+            width - 164.0,
+            ly + 4.0,
+            escape(line.name)
         );
     }
     svg.push_str("</svg>");
@@ -220,32 +282,57 @@ impl Canvas {
 }
 
 fn bounds(points: impl Iterator<Item = DVec2>) -> (DVec2, DVec2) {
-    points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, u), p| (l.min(p), u.max(p)))
+    points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, u), p| {
+        (l.min(p), u.max(p))
+    })
 }
 
 fn path(points: &[DVec2; 3]) -> String {
     let [a, b, c] = points;
-    format!("M{:.1} {:.1}L{:.1} {:.1} {:.1} {:.1}z", a.x, a.y, b.x, b.y, c.x, c.y)
+    format!(
+        "M{:.1} {:.1}L{:.1} {:.1} {:.1} {:.1}z",
+        a.x, a.y, b.x, b.y, c.x, c.y
+    )
 }
 
 /// Grey to blue-green by tint, darker when turned away, browner on the inside.
 fn shade(facing: f64, tint: f64) -> String {
     let light = 0.45 + 0.55 * facing.abs();
-    let base = if facing > 0.0 { [222.0, 224.0, 228.0] } else { [176.0, 170.0, 160.0] };
-    let tinted = if facing > 0.0 { [126.0, 190.0, 178.0] } else { [96.0, 150.0, 140.0] };
-    let mix = |k: usize| (light * (base[k] + (tinted[k] - base[k]) * tint.clamp(0.0, 1.0))).round() as u8;
+    let base = if facing > 0.0 {
+        [222.0, 224.0, 228.0]
+    } else {
+        [176.0, 170.0, 160.0]
+    };
+    let tinted = if facing > 0.0 {
+        [126.0, 190.0, 178.0]
+    } else {
+        [96.0, 150.0, 140.0]
+    };
+    let mix =
+        |k: usize| (light * (base[k] + (tinted[k] - base[k]) * tint.clamp(0.0, 1.0))).round() as u8;
     // A stroke of the same colour closes the hairlines between facets.
     let colour = format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2));
     format!("{colour}\" stroke=\"{colour}")
 }
 
 fn draw_marker(svg: &mut String, at: DVec2, direction: DVec2, number: usize, near: bool) {
-    let (a, b) = (at - direction * 13.0, at + direction * 13.0);
-    let (fill, ink, dash) = if near { (ACCENT, "#fff", "") } else { ("#fff", ACCENT, " stroke-dasharray=\"3 2\"") };
+    let (a, b) = (at - direction * 17.0, at + direction * 17.0);
+    let (fill, ink, dash) = if near {
+        (ACCENT, "#fff", "")
+    } else {
+        ("#fff", ACCENT, " stroke-dasharray=\"3 2\"")
+    };
     let _ = write!(
         svg,
-        "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" stroke=\"{ACCENT}\" stroke-width=\"4\"{dash}/><circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"8\" fill=\"{fill}\" stroke=\"{ACCENT}\"/><text x=\"{:.1}\" y=\"{:.1}\" fill=\"{ink}\" text-anchor=\"middle\" class=\"n\">{number}</text>",
-        a.x, a.y, b.x, b.y, at.x, at.y, at.x, at.y + 3.6
+        "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{ACCENT}\" stroke-width=\"4.5\"{dash}/><circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"8\" fill=\"{fill}\" stroke=\"{ACCENT}\"/><text x=\"{:.1}\" y=\"{:.1}\" style=\"fill:{ink}\" text-anchor=\"middle\" class=\"n\">{number}</text>",
+        a.x,
+        a.y,
+        b.x,
+        b.y,
+        at.x,
+        at.y,
+        at.x,
+        at.y + 3.6
     );
 }
 
@@ -256,7 +343,11 @@ fn ticks(top: f64) -> (f64, f64) {
     }
     let raw = top / 5.0;
     let power = 10f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|&s| s >= raw).unwrap_or(raw);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|m| m * power)
+        .into_iter()
+        .find(|&s| s >= raw)
+        .unwrap_or(raw);
     (step, (top / step).ceil() * step)
 }
 

@@ -1,8 +1,10 @@
 //! Finding places on a surface: the nearest point, and what a ray hits. The tree is parry's.
 
 use glam::DVec3;
-use parry3d_f64::query::{PointQueryWithLocation, Ray, details::local_ray_intersection_with_triangle};
-use parry3d_f64::shape::{CompositeShapeRef, Triangle, TriMesh as ParryMesh};
+use parry3d_f64::query::{
+    PointQueryWithLocation, Ray, details::local_ray_intersection_with_triangle,
+};
+use parry3d_f64::shape::{CompositeShapeRef, TriMesh as ParryMesh, Triangle};
 
 use super::{SurfacePoint, TriMesh};
 
@@ -26,9 +28,7 @@ impl SurfaceIndex {
     pub fn nearest(&self, point: DVec3) -> (SurfacePoint, f64) {
         let (projection, (triangle, location)) =
             self.tree.project_local_point_and_get_location(point, false);
-        let barycentric = location
-            .barycentric_coordinates()
-            .unwrap_or([1.0 / 3.0; 3]);
+        let barycentric = location.barycentric_coordinates().unwrap_or([1.0 / 3.0; 3]);
         let at = SurfacePoint {
             triangle,
             barycentric,
@@ -76,9 +76,7 @@ mod tests {
         let p = [DVec3::ZERO, DVec3::X, DVec3::Y];
         let (mesh, _) = TriMesh::new(&p, &[[0, 1, 2]], 0).unwrap();
         let index = SurfaceIndex::new(&mesh);
-        let (at, t) = index
-            .ray(DVec3::new(0.2, 0.3, 2.0), DVec3::NEG_Z)
-            .unwrap();
+        let (at, t) = index.ray(DVec3::new(0.2, 0.3, 2.0), DVec3::NEG_Z).unwrap();
         assert!((t - 2.0).abs() < 1e-12);
         assert!(mesh.point(at).distance(DVec3::new(0.2, 0.3, 0.0)) < 1e-12);
         let (at, d) = index.nearest(DVec3::new(-1.0, 0.5, 0.0));

@@ -83,12 +83,7 @@ mod tests {
 
     #[test]
     fn a_plane_and_a_crease_keep_their_shape() {
-        let p = [
-            DVec3::ZERO,
-            DVec3::X,
-            DVec3::Y,
-            DVec3::new(0.0, 0.0, 1.0),
-        ];
+        let p = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(0.0, 0.0, 1.0)];
         let (mesh, _) = TriMesh::new(&p, &[[0, 1, 2], [0, 3, 1]], 0).unwrap();
         let fine = refine(&mesh);
         assert!((fine.area() - mesh.area()).abs() < 1e-12);

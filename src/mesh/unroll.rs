@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
+use super::SurfacePoint;
 use super::TriMesh;
 use super::locate::SurfaceIndex;
-use super::SurfacePoint;
 
 /// Cylinder coordinates about an axis of the part. `s` runs from 0 to the circumference at the mean
 /// radius, with the seam opposite to `zero`; lengths in metres.
@@ -97,8 +97,7 @@ impl Unrolling {
     #[must_use]
     pub fn lift(&self, index: &SurfaceIndex, flat: DVec2) -> Option<SurfacePoint> {
         let angle = flat.x / self.radius - std::f64::consts::PI;
-        let outward =
-            self.zero * angle.cos() + self.axis.cross(self.zero) * angle.sin();
+        let outward = self.zero * angle.cos() + self.axis.cross(self.zero) * angle.sin();
         let far = 100.0 * (self.radius + self.height.1 - self.height.0);
         let start = self.origin + self.axis * flat.y + outward * far;
         let (at, distance) = index.ray(start, -outward)?;
@@ -110,12 +109,13 @@ impl Unrolling {
     /// step from the seam and from the lower end.
     #[must_use]
     pub fn lattice(&self, index: &SurfaceIndex, spacing: f64) -> Vec<SurfacePoint> {
-        let steps = |length: f64| (0..(length / spacing + 0.5).floor() as usize).map(move |i| (i as f64 + 0.5) * spacing);
+        let steps = |length: f64| {
+            (0..(length / spacing + 0.5).floor() as usize).map(move |i| (i as f64 + 0.5) * spacing)
+        };
         steps(self.height.1 - self.height.0)
             .flat_map(|z| {
-                steps(self.circumference()).filter_map(move |s| {
-                    self.lift(index, DVec2::new(s, self.height.0 + z))
-                })
+                steps(self.circumference())
+                    .filter_map(move |s| self.lift(index, DVec2::new(s, self.height.0 + z)))
             })
             .collect()
     }

@@ -62,12 +62,18 @@ pub fn reduce(
         points: Vec::new(),
     };
     // More sites than touches to learn the map from cannot be judged.
-    let most = pca.rank().min(limit).min(train.len().saturating_sub(1)).max(1);
+    let most = pca
+        .rank()
+        .min(limit)
+        .min(train.len().saturating_sub(1))
+        .max(1);
     let mut notes = Vec::new();
     let count = match reduction {
         Reduction::Count(count) => {
             if count > most {
-                notes.push(format!("{count} candidates were asked for; the signals and the budget allow {most}."));
+                notes.push(format!(
+                    "{count} candidates were asked for; the signals and the budget allow {most}."
+                ));
             }
             curve.sample(count.min(most));
             count.min(most)
@@ -103,7 +109,10 @@ struct Curve<'a> {
 
 impl Curve<'_> {
     fn at(&self, sites: usize) -> Option<f64> {
-        self.points.iter().find(|p| p.sites == sites).map(|p| p.unexplained)
+        self.points
+            .iter()
+            .find(|p| p.sites == sites)
+            .map(|p| p.unexplained)
     }
 
     /// The unexplained share with so many sites; linear dependence counts as no gain.
@@ -135,7 +144,11 @@ impl Curve<'_> {
                 let (mut low, mut high) = (below, count);
                 while high - low > 1 {
                     let middle = usize::midpoint(low, high);
-                    if self.evaluate(middle) <= target { high = middle } else { low = middle }
+                    if self.evaluate(middle) <= target {
+                        high = middle
+                    } else {
+                        low = middle
+                    }
                 }
                 return high;
             }

@@ -10,12 +10,12 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::{Pool, PlacementError, Selection, Selector, SelectorKind, SensorSet, check_pool};
+use super::{PlacementError, Pool, Selection, Selector, SelectorKind, SensorSet, check_pool};
 use crate::budget::{Achieved, Cancelled, StopReason, Watch, Work, report};
 use crate::dataset::SignalMatrix;
+use crate::regression::Hyper;
 use crate::regression::features::{Standardizer, gaussian, squared_distances};
 use crate::regression::tune::{Effort, Fold};
-use crate::regression::Hyper;
 
 /// Settings of the selector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,12 +119,18 @@ impl<'a> Search<'a> {
         for (k, old) in kernel.iter_mut().zip(&self.kernel) {
             *k *= old;
         }
-        self.kernel_evaluations.fetch_add(kernel.len() as u64, Ordering::Relaxed);
+        self.kernel_evaluations
+            .fetch_add(kernel.len() as u64, Ordering::Relaxed);
         kernel
     }
 
     /// Scores every site not chosen yet and returns the best with its criterion (mm).
-    fn best_addition(&self, step: usize, steps: usize, watch: Watch) -> Result<(usize, f64), PlacementError> {
+    fn best_addition(
+        &self,
+        step: usize,
+        steps: usize,
+        watch: Watch,
+    ) -> Result<(usize, f64), PlacementError> {
         let open: Vec<usize> = (0..self.pool.sites.len())
             .filter(|i| !self.chosen.contains(i) && !self.constant.contains(i))
             .collect();
@@ -140,7 +146,12 @@ impl<'a> Search<'a> {
             .par_iter()
             .map(|&candidate| {
                 let so_far = step * self.pool.sites.len() + done.fetch_add(1, Ordering::Relaxed);
-                report(watch, "Selecting by greedy SVR", so_far, steps * self.pool.sites.len())?;
+                report(
+                    watch,
+                    "Selecting by greedy SVR",
+                    so_far,
+                    steps * self.pool.sites.len(),
+                )?;
                 Ok(self.score(candidate, &bound))
             })
             .collect();
@@ -180,7 +191,8 @@ impl<'a> Search<'a> {
             // Only the coefficients are wanted: they are the next step's start.
             let _ = fold.error(&self.kernel, self.pool.targets, &params, warm);
         }
-        self.fits.fetch_add(3 * self.folds.len() as u64, Ordering::Relaxed);
+        self.fits
+            .fetch_add(3 * self.folds.len() as u64, Ordering::Relaxed);
         self.chosen.push(winner);
     }
 

@@ -1,6 +1,6 @@
 //! PCA with pivoted QR as a selector: exact, deterministic, without a seed.
 
-use super::{Pool, PlacementError, Selection, Selector, SelectorKind, SensorSet, check_pool};
+use super::{PlacementError, Pool, Selection, Selector, SelectorKind, SensorSet, check_pool};
 use crate::budget::{Achieved, StopReason, Watch, Work, report};
 use crate::pca::Pca;
 
@@ -60,7 +60,11 @@ pub fn from_components(
             error_estimate: None,
             unit: "",
             effort: Work::default(),
-            stop_reason: if short { StopReason::Exhausted } else { StopReason::Converged },
+            stop_reason: if short {
+                StopReason::Exhausted
+            } else {
+                StopReason::Converged
+            },
             notes: if short {
                 vec![format!(
                     "The signals carry only {reach} independent patterns, so there is no choice of {sensors} sites."

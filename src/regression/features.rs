@@ -24,7 +24,14 @@ impl Standardizer {
                 let variance = row.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
                 let size = row.iter().fold(0.0f64, |m, v| m.max(v.abs()));
                 let deviation = variance.sqrt();
-                (mean, if deviation > CONSTANT * size { deviation } else { 0.0 })
+                (
+                    mean,
+                    if deviation > CONSTANT * size {
+                        deviation
+                    } else {
+                        0.0
+                    },
+                )
             })
             .unzip();
         Self { mean, deviation }
@@ -36,7 +43,11 @@ impl Standardizer {
         let values = (0..x.rows())
             .flat_map(|r| {
                 let (mean, deviation) = (self.mean[r], self.deviation[r]);
-                let scale = if deviation > 0.0 { deviation.recip() } else { 0.0 };
+                let scale = if deviation > 0.0 {
+                    deviation.recip()
+                } else {
+                    0.0
+                };
                 x.row(r).iter().map(move |v| (v - mean) * scale)
             })
             .collect();

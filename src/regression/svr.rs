@@ -191,7 +191,12 @@ impl<'a> Solver<'a> {
         if lowest == f64::INFINITY {
             return (0.0, None);
         }
-        let Some(grow) = self.f.iter().zip(&self.up).position(|(f, u)| f + u <= lowest) else {
+        let Some(grow) = self
+            .f
+            .iter()
+            .zip(&self.up)
+            .position(|(f, u)| f + u <= lowest)
+        else {
             return (0.0, None);
         };
         let point = self.active[grow] as usize;
@@ -203,11 +208,21 @@ impl<'a> Solver<'a> {
             difference * difference / (own + diagonal - 2.0 * k).max(TINY)
         };
         if whole {
-            for (((g, f), d), (q, k)) in gains.iter_mut().zip(&self.f).zip(&self.down).zip(self.diagonal.iter().zip(row)) {
+            for (((g, f), d), (q, k)) in gains
+                .iter_mut()
+                .zip(&self.f)
+                .zip(&self.down)
+                .zip(self.diagonal.iter().zip(row))
+            {
                 *g = gain(*f, *d, *q, *k);
             }
         } else {
-            for (((g, f), d), &i) in gains.iter_mut().zip(&self.f).zip(&self.down).zip(&self.active) {
+            for (((g, f), d), &i) in gains
+                .iter_mut()
+                .zip(&self.f)
+                .zip(&self.down)
+                .zip(&self.active)
+            {
                 *g = gain(*f, *d, self.diagonal[i as usize], row[i as usize]);
             }
         }
@@ -227,7 +242,9 @@ impl<'a> Solver<'a> {
         let [i, j] = [pair.grow, pair.shrink].map(|k| self.active[k] as usize);
         let (ri, rj) = (self.row(i), self.row(j));
         let line = Line {
-            slope: self.f[pair.grow] + self.up[pair.grow] - self.f[pair.shrink] - self.down[pair.shrink],
+            slope: self.f[pair.grow] + self.up[pair.grow]
+                - self.f[pair.shrink]
+                - self.down[pair.shrink],
             curvature: (self.diagonal[i] + self.diagonal[j] - 2.0 * ri[j]).max(TINY),
             kinks: [-self.beta[i], self.beta[j]],
             jump: 2.0 * self.params.epsilon,

@@ -85,7 +85,9 @@ impl PositionModel {
             standardizer,
             training,
             gamma: hyper.gamma,
-            fits: fits.try_into().unwrap_or_else(|_| unreachable!("three axes")),
+            fits: fits
+                .try_into()
+                .unwrap_or_else(|_| unreachable!("three axes")),
             work,
         }
     }
@@ -96,7 +98,9 @@ impl PositionModel {
         let features = self.standardizer.apply(x);
         let kernel = gaussian(&squared_distances(&features, &self.training), self.gamma);
         let axes = [0, 1, 2].map(|a| svr::predict(&self.fits[a], &kernel));
-        (0..x.columns()).map(|t| axes.each_ref().map(|a| a[t])).collect()
+        (0..x.columns())
+            .map(|t| axes.each_ref().map(|a| a[t]))
+            .collect()
     }
 
     /// Whether every fit met its tolerance, and the largest violation left (mm).
@@ -110,9 +114,8 @@ impl PositionModel {
 /// Euclidean distances between predicted and true positions (mm).
 #[must_use]
 pub fn distances(predicted: &[[f64; 3]], truth: &[[f64; 3]]) -> Vec<f64> {
-    let distance = |(p, t): (&[f64; 3], &[f64; 3])| {
-        (0..3).map(|a| (p[a] - t[a]).powi(2)).sum::<f64>().sqrt()
-    };
+    let distance =
+        |(p, t): (&[f64; 3], &[f64; 3])| (0..3).map(|a| (p[a] - t[a]).powi(2)).sum::<f64>().sqrt();
     predicted.iter().zip(truth).map(distance).collect()
 }
 
@@ -203,11 +206,20 @@ impl Search {
     /// the smoothest model and the cheapest.
     #[must_use]
     pub fn best(&self) -> Hyper {
-        let smallest = self.trials.iter().map(|t| t.error_mm).fold(f64::INFINITY, f64::min);
+        let smallest = self
+            .trials
+            .iter()
+            .map(|t| t.error_mm)
+            .fold(f64::INFINITY, f64::min);
         self.trials
             .iter()
             .filter(|t| t.error_mm <= 1.01 * smallest)
-            .min_by(|a, b| a.hyper.c.total_cmp(&b.hyper.c).then(a.error_mm.total_cmp(&b.error_mm)))
+            .min_by(|a, b| {
+                a.hyper
+                    .c
+                    .total_cmp(&b.hyper.c)
+                    .then(a.error_mm.total_cmp(&b.error_mm))
+            })
             .map_or_else(Hyper::default, |t| t.hyper)
     }
 }
@@ -270,7 +282,12 @@ pub fn search(
         trials: columns?.into_iter().flatten().collect(),
     };
     let best = search.best();
-    let others: Vec<f64> = grid.epsilon.iter().copied().filter(|&e| e != middle).collect();
+    let others: Vec<f64> = grid
+        .epsilon
+        .iter()
+        .copied()
+        .filter(|&e| e != middle)
+        .collect();
     let more: Result<Vec<Vec<Trial>>, Cancelled> = others
         .par_iter()
         .map(|&e| bench.column(best.gamma, e, &[best.c]))

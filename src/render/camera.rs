@@ -136,7 +136,10 @@ impl Camera {
             return None;
         }
         let ndc = clip / clip.w;
-        Some((DVec2::new(f64::from(ndc.x) * 0.5 + 0.5, 0.5 - f64::from(ndc.y) * 0.5), ndc.z))
+        Some((
+            DVec2::new(f64::from(ndc.x) * 0.5 + 0.5, 0.5 - f64::from(ndc.y) * 0.5),
+            ndc.z,
+        ))
     }
 
     /// The ray through a place of the view (0–1 from the upper left): origin (m) and direction.

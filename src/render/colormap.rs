@@ -28,7 +28,9 @@ impl ColorMap {
     pub fn table(self) -> Vec<[u8; 4]> {
         (0..TABLE)
             .map(|k| {
-                let [r, g, b] = self.at(k as f64 / (TABLE - 1) as f64).map(|c| (c * 255.0).round() as u8);
+                let [r, g, b] = self
+                    .at(k as f64 / (TABLE - 1) as f64)
+                    .map(|c| (c * 255.0).round() as u8);
                 [r, g, b, 255]
             })
             .collect()

@@ -219,7 +219,8 @@ impl SceneGpu {
     }
 
     fn pass(&self, encoder: &mut wgpu::CommandEncoder, [r, g, b]: [f64; 3]) {
-        let (Some(targets), Some(mesh), Some((_, bind))) = (&self.targets, &self.mesh, &self.maps) else {
+        let (Some(targets), Some(mesh), Some((_, bind))) = (&self.targets, &self.mesh, &self.maps)
+        else {
             return;
         };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -275,9 +276,21 @@ impl MeshGpu {
             })
         };
         Self {
-            fixed: buffer("limb vertices", bytemuck::cast_slice(&fixed), wgpu::BufferUsages::VERTEX),
-            changing: buffer("limb fields", bytemuck::cast_slice(&frame.shown), wgpu::BufferUsages::VERTEX),
-            indices: buffer("limb triangles", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
+            fixed: buffer(
+                "limb vertices",
+                bytemuck::cast_slice(&fixed),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            changing: buffer(
+                "limb fields",
+                bytemuck::cast_slice(&frame.shown),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            indices: buffer(
+                "limb triangles",
+                bytemuck::cast_slice(&indices),
+                wgpu::BufferUsages::INDEX,
+            ),
             count: indices.len() as u32,
             mesh: Arc::clone(mesh),
             shown: Arc::clone(&frame.shown),
@@ -349,7 +362,11 @@ fn layout(device: &wgpu::Device, scene: bool) -> wgpu::BindGroupLayout {
         has_dynamic_offset: false,
         min_binding_size: None,
     };
-    let kinds = if scene { vec![uniforms, texture, sampler] } else { vec![texture, sampler] };
+    let kinds = if scene {
+        vec![uniforms, texture, sampler]
+    } else {
+        vec![texture, sampler]
+    };
     let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
         .zip(kinds)
         .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {

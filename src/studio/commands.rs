@@ -54,7 +54,9 @@ impl Command {
             Self::Open => "Open a project or a mesh",
             Self::Save => "Save the project",
             Self::SaveAs => "Save the project under another name",
-            Self::Export => "Write the placement report, the table of sites and the dataset into a folder",
+            Self::Export => {
+                "Write the placement report, the table of sites and the dataset into a folder"
+            }
             Self::Quit => "Close the window",
             Self::Undo => "Take back the last change",
             Self::Redo => "Make the change again",
@@ -230,7 +232,11 @@ impl Studio {
                 }
             });
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let state = if self.document.is_dirty() { "not saved" } else { "saved" };
+                let state = if self.document.is_dirty() {
+                    "not saved"
+                } else {
+                    "saved"
+                };
                 ui.weak(format!("{} · {state}", self.document.name()));
             });
         });

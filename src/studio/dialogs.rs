@@ -42,19 +42,35 @@ impl Dialog {
 
     pub fn open(document: &Document) -> Self {
         let folder = document.path.as_ref().and_then(|p| p.parent());
-        Self::new(Purpose::Open, folder.map(|f| format!("{}/", f.display())).unwrap_or_default())
+        Self::new(
+            Purpose::Open,
+            folder
+                .map(|f| format!("{}/", f.display()))
+                .unwrap_or_default(),
+        )
     }
 
     pub fn save_as(document: &Document) -> Self {
         let path = document.path.clone().unwrap_or_else(|| {
-            let stem = document.mesh_path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            document.mesh_path.with_file_name(format!("{stem}.hapdef.toml"))
+            let stem = document
+                .mesh_path
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            document
+                .mesh_path
+                .with_file_name(format!("{stem}.hapdef.toml"))
         });
         Self::new(Purpose::SaveAs, path.display().to_string())
     }
 
     pub fn export(document: &Document) -> Self {
-        let folder = document.path.as_ref().and_then(|p| p.parent()).unwrap_or(Path::new(""));
+        let folder = document
+            .path
+            .as_ref()
+            .and_then(|p| p.parent())
+            .unwrap_or(Path::new(""));
         Self::new(Purpose::Export, folder.join("report").display().to_string())
     }
 
@@ -99,7 +115,9 @@ impl Dialog {
                 Purpose::Open => {
                     let mut endings = vec!["toml"];
                     endings.extend(ENDINGS);
-                    dialog.add_filter("Projects and meshes", &endings).pick_file()
+                    dialog
+                        .add_filter("Projects and meshes", &endings)
+                        .pick_file()
                 }
                 Purpose::SaveAs => dialog.set_file_name("limb.hapdef.toml").save_file(),
                 Purpose::Export => dialog.pick_folder(),
@@ -155,8 +173,13 @@ impl Studio {
             ui.add_space(6.0);
             ui.horizontal(|ui| {
                 let ready = !dialog.path.trim().is_empty();
-                confirmed |= ui.add_enabled(ready, egui::Button::new(dialog.verb())).clicked();
-                if ui.add_enabled(dialog.browsing.is_none(), egui::Button::new("Browse…")).clicked() {
+                confirmed |= ui
+                    .add_enabled(ready, egui::Button::new(dialog.verb()))
+                    .clicked();
+                if ui
+                    .add_enabled(dialog.browsing.is_none(), egui::Button::new("Browse…"))
+                    .clicked()
+                {
                     dialog.browse(ctx);
                 }
                 closed |= ui.button("Cancel").clicked();
@@ -220,7 +243,10 @@ impl Studio {
         }
         let modal = egui::Modal::new(egui::Id::unique("quit dialog")).show(ctx, |ui| {
             ui.heading("Save before closing?");
-            ui.label(format!("{} has changes that are not saved.", self.document.name()));
+            ui.label(format!(
+                "{} has changes that are not saved.",
+                self.document.name()
+            ));
             ui.horizontal(|ui| {
                 if ui.button("Save and keep open").clicked() {
                     self.ask_quit = false;

@@ -15,42 +15,81 @@ impl Studio {
         let bounds = self.document.part.bounds();
         let bounds = [bounds.0, bounds.1].map(|p| (p * 1000.0).to_array());
         let project = &mut self.document.state.project;
-        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            ui.add_space(6.0);
-            quality(ui, project);
-            section(ui, "Part and material", true, |ui| part(ui, project));
-            section(ui, "Supports", false, |ui| supports(ui, project, bounds));
-            section(ui, "Touch", true, |ui| touch(ui, project));
-            section(ui, "Gauge", true, |ui| gauge(ui, project));
-            section(ui, "Feasible region and sites", false, |ui| feasible(ui, project));
-            section(ui, "Selection", true, |ui| selection(ui, project));
-        });
+        egui::ScrollArea::vertical()
+            .auto_shrink(false)
+            .show(ui, |ui| {
+                ui.add_space(6.0);
+                quality(ui, project);
+                section(ui, "Part and material", true, |ui| part(ui, project));
+                section(ui, "Supports", false, |ui| supports(ui, project, bounds));
+                section(ui, "Touch", true, |ui| touch(ui, project));
+                section(ui, "Gauge", true, |ui| gauge(ui, project));
+                section(ui, "Feasible region and sites", false, |ui| {
+                    feasible(ui, project)
+                });
+                section(ui, "Selection", true, |ui| selection(ui, project));
+            });
     }
 }
 
 fn section(ui: &mut Ui, title: &str, open: bool, content: impl FnOnce(&mut Ui)) {
-    CollapsingHeader::new(title).default_open(open).show(ui, |ui| {
-        Grid::new(title).num_columns(2).spacing([10.0, 5.0]).min_col_width(96.0).show(ui, content);
-    });
+    CollapsingHeader::new(title)
+        .default_open(open)
+        .show(ui, |ui| {
+            Grid::new(title)
+                .num_columns(2)
+                .spacing([10.0, 5.0])
+                .min_col_width(96.0)
+                .show(ui, content);
+        });
 }
 
 /// One row: a label and a number.
-fn number(ui: &mut Ui, label: &str, value: &mut f64, range: std::ops::RangeInclusive<f64>, speed: f64, suffix: &str, help: &str) {
+fn number(
+    ui: &mut Ui,
+    label: &str,
+    value: &mut f64,
+    range: std::ops::RangeInclusive<f64>,
+    speed: f64,
+    suffix: &str,
+    help: &str,
+) {
     let name = ui.label(label);
-    ui.add(DragValue::new(value).range(range).speed(speed).max_decimals(4).suffix(suffix))
+    ui.add(
+        DragValue::new(value)
+            .range(range)
+            .speed(speed)
+            .max_decimals(4)
+            .suffix(suffix),
+    )
+    .labelled_by(name.id)
+    .on_hover_text(help);
+    ui.end_row();
+}
+
+fn count(
+    ui: &mut Ui,
+    label: &str,
+    value: &mut usize,
+    range: std::ops::RangeInclusive<usize>,
+    help: &str,
+) {
+    let name = ui.label(label);
+    ui.add(DragValue::new(value).range(range).speed(1.0))
         .labelled_by(name.id)
         .on_hover_text(help);
     ui.end_row();
 }
 
-fn count(ui: &mut Ui, label: &str, value: &mut usize, range: std::ops::RangeInclusive<usize>, help: &str) {
-    let name = ui.label(label);
-    ui.add(DragValue::new(value).range(range).speed(1.0)).labelled_by(name.id).on_hover_text(help);
-    ui.end_row();
-}
-
 /// One row: a label and a choice.
-fn choice<T: PartialEq + Copy>(ui: &mut Ui, label: &str, value: &mut T, all: &[T], name: impl Fn(T) -> &'static str, help: &str) {
+fn choice<T: PartialEq + Copy>(
+    ui: &mut Ui,
+    label: &str,
+    value: &mut T,
+    all: &[T],
+    name: impl Fn(T) -> &'static str,
+    help: &str,
+) {
     ui.label(label);
     ComboBox::new(label, "")
         .selected_text(name(*value))
@@ -89,19 +128,61 @@ fn axis_name(axis: Axis) -> &'static str {
 const AXES: [Axis; 3] = [Axis::X, Axis::Y, Axis::Z];
 
 fn part(ui: &mut Ui, project: &mut Project) {
-    number(ui, "Thickness", &mut project.part.thickness_mm, 1e-4..=1e4, 0.01, " mm", "Of the shell; the mesh is its mid-surface");
-    number(ui, "Young's modulus", &mut project.material.youngs_modulus_gpa, 1e-6..=1e4, 0.01, " GPa", "Printed nylon: 1.7 GPa");
-    number(ui, "Poisson's ratio", &mut project.material.poissons_ratio, -0.99..=0.499, 0.005, "", "Printed nylon: 0.35");
-    choice(ui, "Axis", &mut project.part.axis, &AXES, axis_name, "The axis the part is unrolled about");
+    number(
+        ui,
+        "Thickness",
+        &mut project.part.thickness_mm,
+        1e-4..=1e4,
+        0.01,
+        " mm",
+        "Of the shell; the mesh is its mid-surface",
+    );
+    number(
+        ui,
+        "Young's modulus",
+        &mut project.material.youngs_modulus_gpa,
+        1e-6..=1e4,
+        0.01,
+        " GPa",
+        "Printed nylon: 1.7 GPa",
+    );
+    number(
+        ui,
+        "Poisson's ratio",
+        &mut project.material.poissons_ratio,
+        -0.99..=0.499,
+        0.005,
+        "",
+        "Printed nylon: 0.35",
+    );
+    choice(
+        ui,
+        "Axis",
+        &mut project.part.axis,
+        &AXES,
+        axis_name,
+        "The axis the part is unrolled about",
+    );
 }
 
 fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm) {
     let mut removed = None;
     for (k, support) in project.supports.iter_mut().enumerate() {
         let number = k + 1;
-        let kinds = [SupportKind::Clamped, SupportKind::Pinned, SupportKind::Symmetry];
+        let kinds = [
+            SupportKind::Clamped,
+            SupportKind::Pinned,
+            SupportKind::Symmetry,
+        ];
         let label = format!("Support {number}");
-        choice(ui, &label, &mut support.kind, &kinds, kind_name, "Clamped: no displacement, no rotation. Pinned: no displacement. Symmetry: a mirror plane");
+        choice(
+            ui,
+            &label,
+            &mut support.kind,
+            &kinds,
+            kind_name,
+            "Clamped: no displacement, no rotation. Pinned: no displacement. Symmetry: a mirror plane",
+        );
         for (end, corner) in ["from", "to"].into_iter().zip(&mut support.box_mm) {
             ui.label(format!("{end} (mm)"));
             ui.horizontal(|ui| {
@@ -113,7 +194,11 @@ fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm) {
             ui.end_row();
         }
         ui.label("");
-        if ui.button("Remove").accessible_name(format!("Remove support {number}")).clicked() {
+        if ui
+            .button("Remove")
+            .accessible_name(format!("Remove support {number}"))
+            .clicked()
+        {
             removed = Some(k);
         }
         ui.end_row();
@@ -121,7 +206,11 @@ fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm) {
     if let Some(k) = removed {
         project.supports.remove(k);
     }
-    if ui.button("Add support").on_hover_text("Everything inside a box is held").clicked() {
+    if ui
+        .button("Add support")
+        .on_hover_text("Everything inside a box is held")
+        .clicked()
+    {
         // A slice at the lower end: a start that holds something on any part.
         let [low, mut high] = bounds;
         high[2] = low[2] + 0.05 * (high[2] - low[2]);
@@ -144,21 +233,106 @@ fn kind_name(kind: SupportKind) -> &'static str {
 
 fn touch(ui: &mut Ui, project: &mut Project) {
     let touch = &mut project.touch;
-    number(ui, "Force", &mut touch.force_n, 1e-9..=1e9, 0.1, " N", "Pressed along the inward normal");
-    number(ui, "Tip radius", &mut touch.tip_radius_mm, 1e-3..=1e3, 0.1, " mm", "The tip spreads the force smoothly over this radius");
-    count(ui, "Touches", &mut touch.count, 3..=100_000, "Simulated touches; lower qualities take fewer");
-    number(ui, "Edge margin", &mut touch.edge_margin_mm, 0.0..=1e3, 0.1, " mm", "Least distance of a touch from a free edge");
+    number(
+        ui,
+        "Force",
+        &mut touch.force_n,
+        1e-9..=1e9,
+        0.1,
+        " N",
+        "Pressed along the inward normal",
+    );
+    number(
+        ui,
+        "Tip radius",
+        &mut touch.tip_radius_mm,
+        1e-3..=1e3,
+        0.1,
+        " mm",
+        "The tip spreads the force smoothly over this radius",
+    );
+    count(
+        ui,
+        "Touches",
+        &mut touch.count,
+        3..=100_000,
+        "Simulated touches; lower qualities take fewer",
+    );
+    number(
+        ui,
+        "Edge margin",
+        &mut touch.edge_margin_mm,
+        0.0..=1e3,
+        0.1,
+        " mm",
+        "Least distance of a touch from a free edge",
+    );
 }
 
 fn gauge(ui: &mut Ui, project: &mut Project) {
     let gauge = &mut project.gauge;
-    choice(ui, "Signal", &mut gauge.signal, &Signal::ALL, signal_name, "What a site reports: strain is what a gauge measures, displacement what the paper used");
-    number(ui, "Noise", &mut gauge.noise_microstrain, 0.0..=1e5, 0.1, " µε", "Standard deviation of a reading, in microstrain");
-    number(ui, "Range", &mut gauge.range_microstrain, 1.0..=1e6, 100.0, " µε", "Largest strain that gauge and amplifier can take, in microstrain");
-    number(ui, "Least signal to noise", &mut gauge.least_signal_to_noise, 0.0..=1e6, 0.1, "", "Rms strain over noise that a site must reach");
-    number(ui, "Grid length", &mut gauge.grid_length_mm, 0.01..=1e3, 0.1, " mm", "Of the measuring grid, along the gauge");
-    number(ui, "Grid width", &mut gauge.grid_width_mm, 0.01..=1e3, 0.1, " mm", "Across the gauge");
-    number(ui, "Flatness", &mut gauge.flatness_mm, 0.0..=1e3, 0.01, " mm", "Largest height of the surface over the gauge's plane");
+    choice(
+        ui,
+        "Signal",
+        &mut gauge.signal,
+        &Signal::ALL,
+        signal_name,
+        "What a site reports: strain is what a gauge measures, displacement what the paper used",
+    );
+    number(
+        ui,
+        "Noise",
+        &mut gauge.noise_microstrain,
+        0.0..=1e5,
+        0.1,
+        " µε",
+        "Standard deviation of a reading, in microstrain",
+    );
+    number(
+        ui,
+        "Range",
+        &mut gauge.range_microstrain,
+        1.0..=1e6,
+        100.0,
+        " µε",
+        "Largest strain that gauge and amplifier can take, in microstrain",
+    );
+    number(
+        ui,
+        "Least signal to noise",
+        &mut gauge.least_signal_to_noise,
+        0.0..=1e6,
+        0.1,
+        "",
+        "Rms strain over noise that a site must reach",
+    );
+    number(
+        ui,
+        "Grid length",
+        &mut gauge.grid_length_mm,
+        0.01..=1e3,
+        0.1,
+        " mm",
+        "Of the measuring grid, along the gauge",
+    );
+    number(
+        ui,
+        "Grid width",
+        &mut gauge.grid_width_mm,
+        0.01..=1e3,
+        0.1,
+        " mm",
+        "Across the gauge",
+    );
+    number(
+        ui,
+        "Flatness",
+        &mut gauge.flatness_mm,
+        0.0..=1e3,
+        0.01,
+        " mm",
+        "Largest height of the surface over the gauge's plane",
+    );
 }
 
 fn signal_name(signal: Signal) -> &'static str {
@@ -170,27 +344,115 @@ fn signal_name(signal: Signal) -> &'static str {
 }
 
 fn feasible(ui: &mut Ui, project: &mut Project) {
-    number(ui, "Support clearance", &mut project.feasible.support_clearance_mm, 0.0..=1e4, 0.1, " mm", "Least distance over the surface from anything held");
-    count(ui, "Edge neighbours", &mut project.feasible.edge_neighbours, 0..=200, "k of the centre-of-mass filter");
-    number(ui, "Edge radius", &mut project.feasible.edge_radius_mm, 0.0..=1e4, 0.05, " mm", "How far the centre of mass of the neighbours may lie from a site");
-    number(ui, "Site spacing", &mut project.sites.spacing_mm, 0.01..=1e4, 0.05, " mm", "Of the possible gauge positions on the inside");
+    number(
+        ui,
+        "Support clearance",
+        &mut project.feasible.support_clearance_mm,
+        0.0..=1e4,
+        0.1,
+        " mm",
+        "Least distance over the surface from anything held",
+    );
+    count(
+        ui,
+        "Edge neighbours",
+        &mut project.feasible.edge_neighbours,
+        0..=200,
+        "k of the centre-of-mass filter",
+    );
+    number(
+        ui,
+        "Edge radius",
+        &mut project.feasible.edge_radius_mm,
+        0.0..=1e4,
+        0.05,
+        " mm",
+        "How far the centre of mass of the neighbours may lie from a site",
+    );
+    number(
+        ui,
+        "Site spacing",
+        &mut project.sites.spacing_mm,
+        0.01..=1e4,
+        0.05,
+        " mm",
+        "Of the possible gauge positions on the inside",
+    );
     let name = |l| match l {
         Lattice::Even => "Even",
         Lattice::Unrolled => "Rows and columns",
     };
-    choice(ui, "Lattice", &mut project.sites.lattice, &[Lattice::Even, Lattice::Unrolled], name, "Even suits any surface; rows and columns suit tubes");
+    choice(
+        ui,
+        "Lattice",
+        &mut project.sites.lattice,
+        &[Lattice::Even, Lattice::Unrolled],
+        name,
+        "Even suits any surface; rows and columns suit tubes",
+    );
 }
 
 fn selection(ui: &mut Ui, project: &mut Project) {
-    choice(ui, "Selector", &mut project.selection.selector, &SelectorKind::ALL, SelectorKind::title, "Whose sites are shown and reported; both are evaluated");
-    count(ui, "Gauges", &mut project.selection.sensors, 1..=200, "How many gauges to place");
+    choice(
+        ui,
+        "Selector",
+        &mut project.selection.selector,
+        &SelectorKind::ALL,
+        SelectorKind::title,
+        "Whose sites are shown and reported; both are evaluated",
+    );
+    count(
+        ui,
+        "Gauges",
+        &mut project.selection.sensors,
+        1..=200,
+        "How many gauges to place",
+    );
     let mut percent = 100.0 * project.candidates.unexplained;
-    number(ui, "Unexplained", &mut percent, 0.01..=99.0, 0.05, " %", "Share of the held-out variance that the candidates may leave unexplained");
+    number(
+        ui,
+        "Unexplained",
+        &mut percent,
+        0.01..=99.0,
+        0.05,
+        " %",
+        "Share of the held-out variance that the candidates may leave unexplained",
+    );
     project.candidates.unexplained = percent / 100.0;
-    number(ui, "C", &mut project.selection.c_mm, 1e-3..=1e9, 1.0, " mm", "Of greedy SVR's regression: larger follows the touches more closely");
-    number(ui, "ε", &mut project.selection.epsilon_mm, 0.0..=1e3, 0.01, " mm", "Errors below this cost nothing");
-    number(ui, "γ", &mut project.selection.gamma, 1e-9..=1e6, 0.005, "", "Of the Gaussian kernel on standardized signals");
+    number(
+        ui,
+        "C",
+        &mut project.selection.c_mm,
+        1e-3..=1e9,
+        1.0,
+        " mm",
+        "Of greedy SVR's regression: larger follows the touches more closely",
+    );
+    number(
+        ui,
+        "ε",
+        &mut project.selection.epsilon_mm,
+        0.0..=1e3,
+        0.01,
+        " mm",
+        "Errors below this cost nothing",
+    );
+    number(
+        ui,
+        "γ",
+        &mut project.selection.gamma,
+        1e-9..=1e6,
+        0.005,
+        "",
+        "Of the Gaussian kernel on standardized signals",
+    );
     let mut seed = project.budget.seed as usize;
-    count(ui, "Seed", &mut seed, 0..=usize::MAX >> 12, "Of every random draw: the same seed gives the same design");
+    count(
+        ui,
+        "Seed",
+        &mut seed,
+        0..=usize::MAX >> 12,
+        "Of every random draw: the same seed gives the same design",
+    );
     project.budget.seed = seed as u64;
 }

@@ -44,7 +44,10 @@ impl Studio {
         });
         ui.separator();
         if self.design.is_none() && self.results != Tab::Sites {
-            empty(ui, "Nothing selected yet. Press “Select gauges” to choose the sites and judge them on unseen touches");
+            empty(
+                ui,
+                "Nothing selected yet. Press “Select gauges” to choose the sites and judge them on unseen touches",
+            );
             return;
         }
         match self.results {
@@ -68,7 +71,11 @@ impl Studio {
         let height = ui.available_height() - 4.0;
         ui.columns(regions.len().max(1), |columns| {
             for (ui, region) in columns.iter_mut().zip(&regions) {
-                let baseline = design.evaluation.rows.iter().find(|r| r.selector == "all-candidates" && r.region == *region);
+                let baseline = design
+                    .evaluation
+                    .rows
+                    .iter()
+                    .find(|r| r.selector == "all-candidates" && r.region == *region);
                 let plot = Plot::new(("error", region))
                     .height(height)
                     .legend(Legend::default().position(Corner::RightTop))
@@ -80,17 +87,30 @@ impl Studio {
                     .allow_zoom(false)
                     .show(ui, |plot| {
                         for (k, selection) in design.selections.iter().enumerate() {
-                            let points: Vec<[f64; 2]> = curve(design, selection.selector, region).into_iter().map(|(x, y)| [x, y]).collect();
+                            let points: Vec<[f64; 2]> = curve(design, selection.selector, region)
+                                .into_iter()
+                                .map(|(x, y)| [x, y])
+                                .collect();
                             let title = selection.selector.title();
-                            plot.line(Line::new(title, PlotPoints::from(points.clone())).color(COLOURS[k % 3]).width(2.0));
-                            plot.points(Points::new(title, points).color(COLOURS[k % 3]).radius(3.0));
+                            plot.line(
+                                Line::new(title, PlotPoints::from(points.clone()))
+                                    .color(COLOURS[k % 3])
+                                    .width(2.0),
+                            );
+                            plot.points(
+                                Points::new(title, points).color(COLOURS[k % 3]).radius(3.0),
+                            );
                         }
                         if let Some(row) = baseline {
-                            plot.hline(HLine::new(format!("all {} candidates", row.sensors), row.error_mm).color(egui::Color32::GRAY));
+                            plot.hline(
+                                HLine::new(format!("all {} candidates", row.sensors), row.error_mm)
+                                    .color(egui::Color32::GRAY),
+                            );
                         }
                     });
                 let label = format!("Error against number of gauges, {region}");
-                plot.response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, &label));
+                plot.response
+                    .widget_info(|| WidgetInfo::labeled(Role::Figure, true, &label));
             }
         });
     }
@@ -100,7 +120,11 @@ impl Studio {
             return;
         };
         let candidates = &result.design.reduced.candidates;
-        let points: Vec<[f64; 2]> = candidates.curve.iter().map(|p| [p.sites as f64, 100.0 * p.unexplained]).collect();
+        let points: Vec<[f64; 2]> = candidates
+            .curve
+            .iter()
+            .map(|p| [p.sites as f64, 100.0 * p.unexplained])
+            .collect();
         let plot = Plot::new("reduction")
             .height(ui.available_height() - 4.0)
             .legend(Legend::default().position(Corner::RightTop))
@@ -109,12 +133,22 @@ impl Studio {
             .include_y(0.0)
             .allow_scroll(false)
             .show(ui, |plot| {
-                plot.line(Line::new("PCA-QR", PlotPoints::from(points.clone())).color(COLOURS[0]).width(2.0));
+                plot.line(
+                    Line::new("PCA-QR", PlotPoints::from(points.clone()))
+                        .color(COLOURS[0])
+                        .width(2.0),
+                );
                 plot.points(Points::new("PCA-QR", points).color(COLOURS[0]).radius(3.0));
                 let target = 100.0 * result.inputs.project.candidates.unexplained;
                 plot.hline(HLine::new("asked for", target).color(egui::Color32::GRAY));
             });
-        plot.response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, "Unexplained variance against sites kept"));
+        plot.response.widget_info(|| {
+            WidgetInfo::labeled(
+                Role::Figure,
+                true,
+                "Unexplained variance against sites kept",
+            )
+        });
     }
 
     /// The project's sites; with a design also what they will report.
@@ -124,38 +158,48 @@ impl Studio {
             empty(ui, "No gauges chosen yet");
             return;
         }
-        let design = self.design.as_ref().filter(|d| d.design.chosen().len() == sites.len());
+        let design = self
+            .design
+            .as_ref()
+            .filter(|d| d.design.chosen().len() == sites.len());
         egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
-            egui::Grid::new("sites").num_columns(10).striped(true).spacing([18.0, 3.0]).show(ui, |ui| {
-                for title in ["Gauge", "x (mm)", "y (mm)", "z (mm)", "Direction"] {
-                    ui.strong(title);
-                }
-                if let Some(d) = design {
-                    let unit = signal_unit(d.design.simulated.dataset.signal);
-                    ui.strong(format!("Signal, from – to ({unit})"));
-                    ui.strong("Rms strain (µε)");
-                    ui.strong("Signal to noise");
-                }
-                ui.end_row();
-                for (k, site) in sites.iter().enumerate() {
-                    ui.monospace(format!("{:>3}", k + 1));
-                    for x in site.position_mm {
-                        ui.monospace(format!("{x:8.2}"));
+            egui::Grid::new("sites")
+                .num_columns(10)
+                .striped(true)
+                .spacing([18.0, 3.0])
+                .show(ui, |ui| {
+                    for title in ["Gauge", "x (mm)", "y (mm)", "z (mm)", "Direction"] {
+                        ui.strong(title);
                     }
-                    let [x, y, z] = site.direction;
-                    ui.monospace(format!("{x:+.3} {y:+.3} {z:+.3}"));
                     if let Some(d) = design {
-                        let dataset = &d.design.simulated.dataset;
-                        let index = d.design.chosen()[k];
-                        let (low, high) = range(dataset, index);
-                        let rms = dataset.sites[index].rms_strain;
-                        ui.monospace(format!("{low:9.3} – {high:9.3}"));
-                        ui.monospace(format!("{:7.0}", rms * 1e6));
-                        ui.monospace(signal_to_noise(&d.inputs, rms).map_or("–".into(), |r| format!("{r:7.0}")));
+                        let unit = signal_unit(d.design.simulated.dataset.signal);
+                        ui.strong(format!("Signal, from – to ({unit})"));
+                        ui.strong("Rms strain (µε)");
+                        ui.strong("Signal to noise");
                     }
                     ui.end_row();
-                }
-            });
+                    for (k, site) in sites.iter().enumerate() {
+                        ui.monospace(format!("{:>3}", k + 1));
+                        for x in site.position_mm {
+                            ui.monospace(format!("{x:8.2}"));
+                        }
+                        let [x, y, z] = site.direction;
+                        ui.monospace(format!("{x:+.3} {y:+.3} {z:+.3}"));
+                        if let Some(d) = design {
+                            let dataset = &d.design.simulated.dataset;
+                            let index = d.design.chosen()[k];
+                            let (low, high) = range(dataset, index);
+                            let rms = dataset.sites[index].rms_strain;
+                            ui.monospace(format!("{low:9.3} – {high:9.3}"));
+                            ui.monospace(format!("{:7.0}", rms * 1e6));
+                            ui.monospace(
+                                signal_to_noise(&d.inputs, rms)
+                                    .map_or("–".into(), |r| format!("{r:7.0}")),
+                            );
+                        }
+                        ui.end_row();
+                    }
+                });
         });
     }
 }

@@ -35,24 +35,34 @@ impl Standing {
 
 impl Studio {
     pub(super) fn stages(&mut self, ui: &mut Ui) {
-        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            ui.add_space(6.0);
-            self.part_stage(ui);
-            self.simulate_stage(ui);
-            self.feasible_stage(ui);
-            self.select_stage(ui);
-            self.report_stage(ui);
-        });
+        egui::ScrollArea::vertical()
+            .auto_shrink(false)
+            .show(ui, |ui| {
+                ui.add_space(6.0);
+                self.part_stage(ui);
+                self.simulate_stage(ui);
+                self.feasible_stage(ui);
+                self.select_stage(ui);
+                self.report_stage(ui);
+            });
     }
 
     fn part_stage(&mut self, ui: &mut Ui) {
         let part = &self.document.part;
         let lines = vec![
-            format!("{} vertices, {} triangles", part.positions().len(), part.triangles().len()),
+            format!(
+                "{} vertices, {} triangles",
+                part.positions().len(),
+                part.triangles().len()
+            ),
             format!("mean element {:.2} mm", part.mean_edge() * 1000.0),
             format!("{} supports", self.document.state.project.supports.len()),
         ];
-        let standing = if self.document.state.project.supports.is_empty() { Standing::Open } else { Standing::Current };
+        let standing = if self.document.state.project.supports.is_empty() {
+            Standing::Open
+        } else {
+            Standing::Current
+        };
         stage(ui, "Part and supports", standing, &lines);
     }
 
@@ -63,7 +73,11 @@ impl Studio {
         let lines = self.simulation.as_ref().map_or_else(Vec::new, |s| {
             let dataset = &s.simulated.dataset;
             vec![
-                format!("{} sites × {} touches", dataset.sites.len(), dataset.touches.len()),
+                format!(
+                    "{} sites × {} touches",
+                    dataset.sites.len(),
+                    dataset.touches.len()
+                ),
                 format!("{} unknowns, {:.1} s", s.simulated.unknowns, s.seconds),
             ]
         });
@@ -78,7 +92,9 @@ impl Studio {
         let lines = self.feasibility.as_ref().map_or_else(Vec::new, |(_, f)| {
             let mut lines = vec![format!("{} of {} sites", f.sites().len(), f.verdicts.len())];
             let taken = f.taken().into_iter().filter(|(_, n)| *n > 0);
-            lines.extend(taken.map(|(filter, n)| format!("− {n}  {}", filter.label().to_lowercase())));
+            lines.extend(
+                taken.map(|(filter, n)| format!("− {n}  {}", filter.label().to_lowercase())),
+            );
             lines
         });
         stage(ui, "Feasible region", standing, &lines);
@@ -108,7 +124,11 @@ impl Studio {
     }
 
     fn report_stage(&mut self, ui: &mut Ui) {
-        let standing = if self.design.is_some() { Standing::Current } else { Standing::Open };
+        let standing = if self.design.is_some() {
+            Standing::Current
+        } else {
+            Standing::Open
+        };
         stage(ui, "Report", standing, &[]);
         self.button(ui, Command::Export);
     }
@@ -117,18 +137,31 @@ impl Studio {
     pub(super) fn status(&mut self, ui: &mut Ui) {
         if let Some(job) = &self.job {
             let progress = job.progress();
-            let (stage, share) = progress.map_or(("Starting", 0.0), |p| (p.stage, p.done as f32 / p.total.max(1) as f32));
+            let (stage, share) = progress.map_or(("Starting", 0.0), |p| {
+                (p.stage, p.done as f32 / p.total.max(1) as f32)
+            });
             let elapsed = job.elapsed().as_secs();
             let mut cancel = false;
             ui.horizontal(|ui| {
-                let text = if job.is_cancelling() { "Cancelling …".to_owned() } else { format!("{stage}  {:.0} %  ·  {elapsed} s", 100.0 * share) };
-                ui.add(egui::ProgressBar::new(share).text(text).desired_width((ui.available_width() - 110.0).max(80.0)));
-                cancel = ui.add_enabled(!job.is_cancelling(), egui::Button::new("Cancel job")).clicked();
+                let text = if job.is_cancelling() {
+                    "Cancelling …".to_owned()
+                } else {
+                    format!("{stage}  {:.0} %  ·  {elapsed} s", 100.0 * share)
+                };
+                ui.add(
+                    egui::ProgressBar::new(share)
+                        .text(text)
+                        .desired_width((ui.available_width() - 110.0).max(80.0)),
+                );
+                cancel = ui
+                    .add_enabled(!job.is_cancelling(), egui::Button::new("Cancel job"))
+                    .clicked();
             });
             if cancel {
                 self.cancel();
             }
-            ui.ctx().request_repaint_after(std::time::Duration::from_millis(100));
+            ui.ctx()
+                .request_repaint_after(std::time::Duration::from_millis(100));
         }
         let mut read = None;
         for (k, message) in self.messages.iter().enumerate().rev().take(4) {
@@ -140,7 +173,11 @@ impl Studio {
                     }
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                         let text = RichText::new(&message.text);
-                        let text = if message.error { text.color(theme::ERROR) } else { text };
+                        let text = if message.error {
+                            text.color(theme::ERROR)
+                        } else {
+                            text
+                        };
                         ui.add(egui::Label::new(text).wrap());
                     });
                 });
@@ -169,7 +206,8 @@ fn stage(ui: &mut Ui, title: &str, standing: Standing, lines: &[String]) {
     ui.add_space(4.0);
     ui.horizontal(|ui| {
         let (mark, colour) = standing.mark();
-        ui.label(RichText::new(mark).color(colour).monospace()).on_hover_text(standing.word());
+        ui.label(RichText::new(mark).color(colour).monospace())
+            .on_hover_text(standing.word());
         ui.label(RichText::new(title).strong());
         if standing == Standing::Stale {
             ui.weak("stale");

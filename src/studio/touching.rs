@@ -96,7 +96,11 @@ impl Touching {
             }
         }
         // What was computed for another part or support no longer shows this one.
-        if self.result.as_ref().is_some_and(|r| r.key != document.model_key()) {
+        if self
+            .result
+            .as_ref()
+            .is_some_and(|r| r.key != document.model_key())
+        {
             self.clear();
         }
         error
@@ -111,7 +115,9 @@ fn start_worker(ctx: egui::Context) -> (Sender<Request>, Receiver<Reply>) {
         while let Some(request) = next.take() {
             let shared = std::panic::AssertUnwindSafe(|| serve(request, &inbox, &outbox, &ctx));
             next = std::panic::catch_unwind(shared).unwrap_or_else(|_| {
-                let _ = outbox.send(Err("An internal error stopped this touch. Please report it".into()));
+                let _ = outbox.send(Err(
+                    "An internal error stopped this touch. Please report it".into(),
+                ));
                 ctx.request_repaint();
                 inbox.recv().ok()
             });
@@ -162,7 +168,10 @@ fn explain(error: &ElasticError) -> String {
 
 fn solve(model: &ShellModel, observer: &Observer, request: &Request) -> Touched {
     let u = model.solve(&model.forces(&request.touch));
-    let displacement: Vec<DVec3> = u.chunks_exact(6).map(|f| DVec3::new(f[0], f[1], f[2])).collect();
+    let displacement: Vec<DVec3> = u
+        .chunks_exact(6)
+        .map(|f| DVec3::new(f[0], f[1], f[2]))
+        .collect();
     let strain = observer
         .strain_of(&u)
         .into_iter()

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use eframe::egui_wgpu;
-use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{
+    Align2, Color32, FontId, PointerButton, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2,
+    vec2,
+};
 use glam::{DVec2, DVec3};
 
 use super::{Command, Studio, theme};
@@ -47,7 +50,12 @@ pub enum Field {
 }
 
 impl Field {
-    pub const ALL: [Self; 4] = [Self::Region, Self::Strain, Self::Displacement, Self::SignalToNoise];
+    pub const ALL: [Self; 4] = [
+        Self::Region,
+        Self::Strain,
+        Self::Displacement,
+        Self::SignalToNoise,
+    ];
 
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -165,38 +173,64 @@ impl Studio {
     }
 
     fn toolbar(&mut self, ui: &mut Ui) {
-        egui::Frame::new().inner_margin(egui::Margin::symmetric(8, 5)).show(ui, |ui| {
-            ui.horizontal_wrapped(|ui| {
-                for tool in Tool::ALL {
-                    let chosen = self.view.tool == tool;
-                    let button = ui.add(egui::Button::selectable(chosen, tool.name()));
-                    if button.on_hover_text(Command::Tool(tool).tooltip()).clicked() {
-                        self.view.take(tool);
+        egui::Frame::new()
+            .inner_margin(egui::Margin::symmetric(8, 5))
+            .show(ui, |ui| {
+                ui.horizontal_wrapped(|ui| {
+                    for tool in Tool::ALL {
+                        let chosen = self.view.tool == tool;
+                        let button = ui.add(egui::Button::selectable(chosen, tool.name()));
+                        if button
+                            .on_hover_text(Command::Tool(tool).tooltip())
+                            .clicked()
+                        {
+                            self.view.take(tool);
+                        }
                     }
-                }
-                if self.view.tool != Tool::Touch {
-                    let mut mm = self.view.brush * 1000.0;
-                    ui.add(egui::DragValue::new(&mut mm).range(0.5..=500.0).speed(0.1).fixed_decimals(1).prefix("Radius ").suffix(" mm"))
+                    if self.view.tool != Tool::Touch {
+                        let mut mm = self.view.brush * 1000.0;
+                        ui.add(
+                            egui::DragValue::new(&mut mm)
+                                .range(0.5..=500.0)
+                                .speed(0.1)
+                                .fixed_decimals(1)
+                                .prefix("Radius ")
+                                .suffix(" mm"),
+                        )
                         .on_hover_text("Radius of the brush over the surface");
-                    self.view.brush = mm / 1000.0;
-                }
-                ui.separator();
-                egui::ComboBox::new("field", "").selected_text(self.view.field.name()).width(128.0).show_ui(ui, |ui| {
-                    for field in Field::ALL {
-                        ui.selectable_value(&mut self.view.field, field, field.name());
+                        self.view.brush = mm / 1000.0;
                     }
-                }).response.on_hover_text("What colours the limb").accessible_name("Field");
-                ui.separator();
-                for preset in Preset::ALL {
-                    if ui.button(preset.name()).on_hover_text(Command::Look(preset).tooltip()).clicked() {
-                        self.view.camera.look_from(preset);
+                    ui.separator();
+                    egui::ComboBox::new("field", "")
+                        .selected_text(self.view.field.name())
+                        .width(128.0)
+                        .show_ui(ui, |ui| {
+                            for field in Field::ALL {
+                                ui.selectable_value(&mut self.view.field, field, field.name());
+                            }
+                        })
+                        .response
+                        .on_hover_text("What colours the limb")
+                        .accessible_name("Field");
+                    ui.separator();
+                    for preset in Preset::ALL {
+                        if ui
+                            .button(preset.name())
+                            .on_hover_text(Command::Look(preset).tooltip())
+                            .clicked()
+                        {
+                            self.view.camera.look_from(preset);
+                        }
                     }
-                }
-                if ui.button("Frame").on_hover_text(Command::Frame.tooltip()).clicked() {
-                    self.view.frame(&self.document);
-                }
+                    if ui
+                        .button("Frame")
+                        .on_hover_text(Command::Frame.tooltip())
+                        .clicked()
+                    {
+                        self.view.frame(&self.document);
+                    }
+                });
             });
-        });
     }
 
     /// Orbit with the right button (or the left one beside the limb and with the touch tool), pan with
@@ -209,7 +243,9 @@ impl Studio {
         let turning = response.dragged_by(PointerButton::Secondary)
             || left && (self.view.tool == Tool::Touch || !self.view.is_stroking());
         if response.dragged_by(PointerButton::Middle) || turning && shift {
-            self.view.camera.pan(drag, f64::from(self.view.rect.height()));
+            self.view
+                .camera
+                .pan(drag, f64::from(self.view.rect.height()));
         } else if turning {
             self.view.camera.orbit(drag);
         }
@@ -291,14 +327,22 @@ impl Studio {
                 hasher.finish()
             }),
         );
-        if self.view.built.as_ref().is_some_and(|b| b.signature == signature) {
+        if self
+            .view
+            .built
+            .as_ref()
+            .is_some_and(|b| b.signature == signature)
+        {
             return;
         }
         let (values, legend) = self.field_values();
         let region = self.region_values();
         let shown = (0..self.document.part.positions().len())
             .map(|v| Shown {
-                displacement: self.touching.result().map_or([0.0; 3], |t| t.displacement[v].as_vec3().to_array()),
+                displacement: self
+                    .touching
+                    .result()
+                    .map_or([0.0; 3], |t| t.displacement[v].as_vec3().to_array()),
                 value: values.as_ref().map_or(0.0, |x| x[v] as f32),
                 region: region[v] as f32,
             })
@@ -318,23 +362,57 @@ impl Studio {
                 let micro: Vec<f64> = t.strain.iter().map(|e| e * 1e6).collect();
                 let top = robust_top(&micro);
                 let values = micro.iter().map(|e| 0.5 + 0.5 * e / top).collect();
-                (Some(values), Some(Legend { title: "strain (microstrain)", low: -top, high: top, map: ColorMap::BlueOrange }))
+                (
+                    Some(values),
+                    Some(Legend {
+                        title: "strain (microstrain)",
+                        low: -top,
+                        high: top,
+                        map: ColorMap::BlueOrange,
+                    }),
+                )
             }),
             Field::Displacement => self.touching.result().map_or((None, None), |t| {
                 let top = round_up(t.largest * 1000.0);
-                let values = t.displacement.iter().map(|d| d.length() * 1000.0 / top).collect();
-                (Some(values), Some(Legend { title: "displacement (mm)", low: 0.0, high: top, map: ColorMap::Viridis }))
+                let values = t
+                    .displacement
+                    .iter()
+                    .map(|d| d.length() * 1000.0 / top)
+                    .collect();
+                (
+                    Some(values),
+                    Some(Legend {
+                        title: "displacement (mm)",
+                        low: 0.0,
+                        high: top,
+                        map: ColorMap::Viridis,
+                    }),
+                )
             }),
             Field::SignalToNoise => {
                 let noise = self.document.state.project.gauge.noise_microstrain * 1e-6;
                 let Some(simulation) = self.simulation.as_ref().filter(|_| noise > 0.0) else {
                     return (None, None);
                 };
-                let rms: Vec<f64> = simulation.simulated.dataset.sites.iter().map(|s| s.rms_strain / noise).collect();
+                let rms: Vec<f64> = simulation
+                    .simulated
+                    .dataset
+                    .sites
+                    .iter()
+                    .map(|s| s.rms_strain / noise)
+                    .collect();
                 let ratio = self.from_sites(&rms);
                 let top = robust_top(&ratio);
                 let values = ratio.iter().map(|r| r / top).collect();
-                (Some(values), Some(Legend { title: "signal to noise (rms)", low: 0.0, high: top, map: ColorMap::Viridis }))
+                (
+                    Some(values),
+                    Some(Legend {
+                        title: "signal to noise (rms)",
+                        low: 0.0,
+                        high: top,
+                        map: ColorMap::Viridis,
+                    }),
+                )
             }
         }
     }
@@ -342,7 +420,11 @@ impl Studio {
     /// 1 where gauges may go: the filters' verdicts where they are known, else what was painted.
     fn region_values(&self) -> Vec<f64> {
         if let (Some((_, verdicts)), false) = (&self.feasibility, self.view.is_stroking()) {
-            let passed: Vec<f64> = verdicts.verdicts.iter().map(|v| f64::from(u8::from(v.is_none()))).collect();
+            let passed: Vec<f64> = verdicts
+                .verdicts
+                .iter()
+                .map(|v| f64::from(u8::from(v.is_none())))
+                .collect();
             return self.from_sites(&passed);
         }
         match &self.document.state.painted {
@@ -359,9 +441,15 @@ impl Studio {
         };
         // A refined model keeps the part's vertices as its first ones, but not its triangles.
         let mesh = &simulation.simulated.mesh;
-        let (mut sum, mut weight) = (vec![0.0; mesh.positions().len()], vec![0.0; mesh.positions().len()]);
+        let (mut sum, mut weight) = (
+            vec![0.0; mesh.positions().len()],
+            vec![0.0; mesh.positions().len()],
+        );
         for (at, value) in simulation.simulated.points.iter().zip(values) {
-            for (v, w) in mesh.triangles()[at.triangle as usize].into_iter().zip(at.barycentric) {
+            for (v, w) in mesh.triangles()[at.triangle as usize]
+                .into_iter()
+                .zip(at.barycentric)
+            {
                 sum[v as usize] += w * value;
                 weight[v as usize] += w;
             }
@@ -378,18 +466,33 @@ impl Studio {
                 }
             }
         }
-        (0..vertices).map(|v| if weight[v] > 0.0 { sum[v] / weight[v] } else { 0.0 }).collect()
+        (0..vertices)
+            .map(|v| {
+                if weight[v] > 0.0 {
+                    sum[v] / weight[v]
+                } else {
+                    0.0
+                }
+            })
+            .collect()
     }
 
     /// How much the deformation is exaggerated; nothing without a touch, nor while painting: the brush
     /// works on the limb at rest.
     #[must_use]
     pub fn exaggeration(&self) -> Option<f64> {
-        let touched = self.touching.result().filter(|_| self.view.tool == Tool::Touch)?;
+        let touched = self
+            .touching
+            .result()
+            .filter(|_| self.view.tool == Tool::Touch)?;
         let (lower, upper) = self.document.part.bounds();
-        let wanted = SHOWN_DEFORMATION * (upper - lower).length() / touched.largest.max(f64::MIN_POSITIVE);
+        let wanted =
+            SHOWN_DEFORMATION * (upper - lower).length() / touched.largest.max(f64::MIN_POSITIVE);
         let power = 10f64.powf(wanted.log10().floor());
-        [5.0, 2.0, 1.0].map(|m| m * power).into_iter().find(|s| *s <= wanted)
+        [5.0, 2.0, 1.0]
+            .map(|m| m * power)
+            .into_iter()
+            .find(|s| *s <= wanted)
     }
 
     fn paint_limb(&self, ui: &Ui, rect: Rect) {
@@ -406,7 +509,12 @@ impl Studio {
             matrix: camera.matrix(rect.aspect_ratio()).to_cols_array_2d(),
             eye: [eye.x, eye.y, eye.z, 0.0],
             target_scale: [target.x, target.y, target.z, (1.0 / camera.distance) as f32],
-            deform: [self.exaggeration().unwrap_or(0.0) as f32, flag(built.legend.is_some()), flag(region), 0.0],
+            deform: [
+                self.exaggeration().unwrap_or(0.0) as f32,
+                flag(built.legend.is_some()),
+                flag(region),
+                0.0,
+            ],
         };
         let pixels = rect.size() * ui.pixels_per_point();
         let back = theme::backdrop(ui.ctx().theme());
@@ -416,9 +524,13 @@ impl Studio {
             map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
             uniforms,
             background: [back.r(), back.g(), back.b()].map(|c| f64::from(c) / 255.0),
-            size: [pixels.x.round().max(1.0) as u32, pixels.y.round().max(1.0) as u32],
+            size: [
+                pixels.x.round().max(1.0) as u32,
+                pixels.y.round().max(1.0) as u32,
+            ],
         };
-        ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, frame));
+        ui.painter()
+            .add(egui_wgpu::Callback::new_paint_callback(rect, frame));
     }
 
     fn paint_touch(&self, painter: &egui::Painter) {
@@ -428,7 +540,10 @@ impl Studio {
         };
         let touch = touched.touch;
         let length = 0.16 * self.view.camera.distance;
-        let (Some(tip), Some(tail)) = (self.view.place(touch.position), self.view.place(touch.position + touch.normal * length)) else {
+        let (Some(tip), Some(tail)) = (
+            self.view.place(touch.position),
+            self.view.place(touch.position + touch.normal * length),
+        ) else {
             return;
         };
         painter.arrow(tail, tip - tail, Stroke::new(3.0, theme::TOUCHED));
@@ -444,10 +559,17 @@ impl Studio {
             let direction = DVec3::from_array(site.direction);
             let (at, _) = self.view.index.nearest(position);
             let normal = self.document.part.normal(at);
-            let shift = self.touching.result().filter(|_| deformation > 0.0).map_or(DVec3::ZERO, |t| {
-                let tri = self.document.part.triangles()[at.triangle as usize];
-                (0..3).map(|k| t.displacement[tri[k] as usize] * at.barycentric[k]).sum::<DVec3>() * deformation
-            });
+            let shift =
+                self.touching
+                    .result()
+                    .filter(|_| deformation > 0.0)
+                    .map_or(DVec3::ZERO, |t| {
+                        let tri = self.document.part.triangles()[at.triangle as usize];
+                        (0..3)
+                            .map(|k| t.displacement[tri[k] as usize] * at.barycentric[k])
+                            .sum::<DVec3>()
+                            * deformation
+                    });
             let centre = position + shift;
             let half = self.document.state.project.gauge.grid_length_mm * 0.5e-3;
             let ends = [-half, half].map(|h| self.view.place(centre + direction * h));
@@ -471,7 +593,11 @@ impl Studio {
                 self.view.place(centre + offset)
             })
             .collect();
-        let colour = if self.view.tool == Tool::Paint { Color32::WHITE } else { theme::ERROR };
+        let colour = if self.view.tool == Tool::Paint {
+            Color32::WHITE
+        } else {
+            theme::ERROR
+        };
         painter.line(ring, Stroke::new(1.5, colour));
     }
 
@@ -479,42 +605,88 @@ impl Studio {
         let mut bottom = rect.bottom() - 16.0;
         if let Some(scale) = self.exaggeration() {
             let text = format!("Deformation × {scale}");
-            label(painter, pos2(rect.right() - 16.0, bottom), Align2::RIGHT_BOTTOM, &text, Color32::WHITE);
+            label(
+                painter,
+                pos2(rect.right() - 16.0, bottom),
+                Align2::RIGHT_BOTTOM,
+                &text,
+                Color32::WHITE,
+            );
             bottom -= 26.0;
         }
         let Some(legend) = self.view.built.as_ref().and_then(|b| b.legend.clone()) else {
             return;
         };
-        let bar = Rect::from_min_max(pos2(rect.right() - 34.0, bottom - 210.0), pos2(rect.right() - 16.0, bottom));
+        let bar = Rect::from_min_max(
+            pos2(rect.right() - 34.0, bottom - 210.0),
+            pos2(rect.right() - 16.0, bottom),
+        );
         let board = Rect::from_min_max(bar.min - vec2(86.0, 30.0), bar.max + vec2(8.0, 8.0));
         painter.rect_filled(board, 6.0, Color32::from_black_alpha(150));
         let strips = 64;
         for k in 0..strips {
             let t = f64::from(k) / f64::from(strips);
-            let [r, g, b] = legend.map.at(t + 0.5 / f64::from(strips)).map(|c| (c * 255.0) as u8);
+            let [r, g, b] = legend
+                .map
+                .at(t + 0.5 / f64::from(strips))
+                .map(|c| (c * 255.0) as u8);
             let y = bar.bottom() - bar.height() * t as f32;
-            let strip = Rect::from_min_max(pos2(bar.left(), y - bar.height() / strips as f32 - 0.5), pos2(bar.right(), y));
+            let strip = Rect::from_min_max(
+                pos2(bar.left(), y - bar.height() / strips as f32 - 0.5),
+                pos2(bar.right(), y),
+            );
             painter.rect_filled(strip, 0.0, Color32::from_rgb(r, g, b));
         }
         for k in 0..=4 {
             let t = f64::from(k) / 4.0;
             let y = bar.bottom() - bar.height() * t as f32;
             let text = tidy(legend.low + (legend.high - legend.low) * t);
-            painter.text(pos2(bar.left() - 6.0, y), Align2::RIGHT_CENTER, text, FontId::proportional(11.5), Color32::WHITE);
+            painter.text(
+                pos2(bar.left() - 6.0, y),
+                Align2::RIGHT_CENTER,
+                text,
+                FontId::proportional(11.5),
+                Color32::WHITE,
+            );
         }
-        painter.text(board.right_top() + vec2(-8.0, 6.0), Align2::RIGHT_TOP, legend.title, FontId::proportional(11.5), Color32::WHITE);
+        painter.text(
+            board.right_top() + vec2(-8.0, 6.0),
+            Align2::RIGHT_TOP,
+            legend.title,
+            FontId::proportional(11.5),
+            Color32::WHITE,
+        );
     }
 
     fn paint_hint(&self, painter: &egui::Painter, rect: Rect) {
         let text = match self.view.tool {
             _ if self.touching.is_waiting() => "Computing the touch …",
-            Tool::Touch if matches!(self.view.field, Field::Strain | Field::Displacement) && self.touching.result().is_none() => "Click on the limb to press it and see this field",
-            Tool::Touch if self.view.field == Field::SignalToNoise && self.simulation.is_none() => "Press “Simulate” to see the signal at each site",
-            Tool::Touch => "Click: press the limb   ·   drag: look around   ·   Shift-drag: shift   ·   wheel: zoom",
-            Tool::Paint => "Drag over the limb: paint where gauges may go   ·   Ctrl: erase   ·   right-drag: look around",
-            Tool::Erase => "Drag over the limb: keep gauges away   ·   Ctrl: paint   ·   right-drag: look around",
+            Tool::Touch
+                if matches!(self.view.field, Field::Strain | Field::Displacement)
+                    && self.touching.result().is_none() =>
+            {
+                "Click on the limb to press it and see this field"
+            }
+            Tool::Touch if self.view.field == Field::SignalToNoise && self.simulation.is_none() => {
+                "Press “Simulate” to see the signal at each site"
+            }
+            Tool::Touch => {
+                "Click: press the limb   ·   drag: look around   ·   Shift-drag: shift   ·   wheel: zoom"
+            }
+            Tool::Paint => {
+                "Drag over the limb: paint where gauges may go   ·   Ctrl: erase   ·   right-drag: look around"
+            }
+            Tool::Erase => {
+                "Drag over the limb: keep gauges away   ·   Ctrl: paint   ·   right-drag: look around"
+            }
         };
-        label(painter, pos2(rect.left() + 14.0, rect.bottom() - 14.0), Align2::LEFT_BOTTOM, text, Color32::from_gray(215));
+        label(
+            painter,
+            pos2(rect.left() + 14.0, rect.bottom() - 14.0),
+            Align2::LEFT_BOTTOM,
+            text,
+            Color32::from_gray(215),
+        );
     }
 }
 
@@ -524,27 +696,49 @@ fn marker(painter: &egui::Painter, (a, b): (Pos2, Pos2), middle: Pos2, number: u
     let half = ((b - a).length() / 2.0).max(12.0);
     let alpha = if near { 1.0 } else { 0.55 };
     let colour = theme::CHOSEN.gamma_multiply(alpha);
-    painter.line_segment([middle - along * half, middle + along * half], Stroke::new(4.0, colour));
+    painter.line_segment(
+        [middle - along * half, middle + along * half],
+        Stroke::new(4.0, colour),
+    );
     if near {
         painter.circle_filled(middle, 9.0, colour);
     } else {
-        painter.circle(middle, 9.0, Color32::from_rgb(40, 44, 50), Stroke::new(1.5, colour));
+        painter.circle(
+            middle,
+            9.0,
+            Color32::from_rgb(40, 44, 50),
+            Stroke::new(1.5, colour),
+        );
     }
     let ink = if near { Color32::WHITE } else { colour };
-    painter.text(middle, Align2::CENTER_CENTER, number, FontId::proportional(11.0), ink);
+    painter.text(
+        middle,
+        Align2::CENTER_CENTER,
+        number,
+        FontId::proportional(11.0),
+        ink,
+    );
 }
 
 /// Text on a dark plate, readable over anything.
 fn label(painter: &egui::Painter, at: Pos2, align: Align2, text: &str, colour: Color32) {
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(12.5), colour);
     let rect = align.anchor_size(at, galley.size());
-    painter.rect_filled(rect.expand2(vec2(7.0, 4.0)), 5.0, Color32::from_black_alpha(150));
+    painter.rect_filled(
+        rect.expand2(vec2(7.0, 4.0)),
+        5.0,
+        Color32::from_black_alpha(150),
+    );
     painter.galley(rect.min, galley, colour);
 }
 
 /// A round number not below most of the values (99.5 % of them): single peaks do not wash the map out.
 fn robust_top(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).filter(|v| v.is_finite()).collect();
+    let mut sizes: Vec<f64> = values
+        .iter()
+        .map(|v| v.abs())
+        .filter(|v| v.is_finite())
+        .collect();
     sizes.sort_by(f64::total_cmp);
     let last = sizes.len().saturating_sub(1);
     round_up(sizes.get(last * 995 / 1000).copied().unwrap_or(1.0))
@@ -555,7 +749,11 @@ fn round_up(top: f64) -> f64 {
         return 1.0;
     }
     let power = 10f64.powf(top.log10().floor());
-    [1.0, 2.0, 4.0, 5.0, 8.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= top).unwrap_or(top)
+    [1.0, 2.0, 4.0, 5.0, 8.0, 10.0]
+        .map(|m| m * power)
+        .into_iter()
+        .find(|s| *s >= top)
+        .unwrap_or(top)
 }
 
 fn tidy(value: f64) -> String {

@@ -52,7 +52,11 @@ fn solve(
     held: impl Fn(DVec3) -> u8,
     forces: &[(u32, DVec3)],
 ) -> Vec<f64> {
-    let held: Vec<Freedoms> = mesh.positions().iter().map(|&p| Freedoms(held(p))).collect();
+    let held: Vec<Freedoms> = mesh
+        .positions()
+        .iter()
+        .map(|&p| Freedoms(held(p)))
+        .collect();
     let model = ShellModel::new(mesh, section, &held, &unwatched).unwrap();
     model.solve(&forces.to_vec())
 }
@@ -87,16 +91,26 @@ pub fn ratio_roof(n: usize) -> f64 {
             forces[v as usize] -= DVec3::Z * 90.0 * mesh.facet_area(t) / 3.0;
         }
     }
-    let forces: Vec<(u32, DVec3)> = forces.into_iter().enumerate().map(|(v, f)| (v as u32, f)).collect();
+    let forces: Vec<(u32, DVec3)> = forces
+        .into_iter()
+        .enumerate()
+        .map(|(v, f)| (v as u32, f))
+        .collect();
     // y = 0: the middle (mirror); y = half: rigid diaphragm, x and z held; x = 0: mirror.
     let u = solve(
         &mesh,
         section(4.32e8, 0.0, 0.25),
         |p| {
             let mut mask = 0;
-            if on(p.y, 0.0) { mask |= symmetry(1) }
-            if on(p.x, 0.0) { mask |= symmetry(0) }
-            if on(p.y, half) { mask |= Freedoms::of(&[0, 2]).0 }
+            if on(p.y, 0.0) {
+                mask |= symmetry(1)
+            }
+            if on(p.x, 0.0) {
+                mask |= symmetry(0)
+            }
+            if on(p.y, half) {
+                mask |= Freedoms::of(&[0, 2]).0
+            }
             mask
         },
         &forces,
@@ -118,10 +132,18 @@ pub fn ratio_cylinder(n: usize) -> f64 {
         section(3e6, 0.3, 3.0),
         |p| {
             let mut mask = 0;
-            if on(p.y, 0.0) { mask |= symmetry(1) }
-            if p.x.abs() < 1e-6 { mask |= symmetry(0) }
-            if p.z.abs() < 1e-6 { mask |= symmetry(2) }
-            if on(p.y, half) { mask |= Freedoms::of(&[0, 2]).0 }
+            if on(p.y, 0.0) {
+                mask |= symmetry(1)
+            }
+            if p.x.abs() < 1e-6 {
+                mask |= symmetry(0)
+            }
+            if p.z.abs() < 1e-6 {
+                mask |= symmetry(2)
+            }
+            if on(p.y, half) {
+                mask |= Freedoms::of(&[0, 2]).0
+            }
             mask
         },
         &[(top, DVec3::NEG_Z * 0.25)],
@@ -139,9 +161,15 @@ pub fn ratio_plate(n: usize) -> f64 {
         s,
         |p| {
             let mut mask = 0;
-            if on(p.x, 0.0) { mask |= symmetry(0) }
-            if on(p.y, 0.0) { mask |= symmetry(1) }
-            if on(p.x, 1.0) || on(p.y, 1.0) { mask |= 63 }
+            if on(p.x, 0.0) {
+                mask |= symmetry(0)
+            }
+            if on(p.y, 0.0) {
+                mask |= symmetry(1)
+            }
+            if on(p.x, 1.0) || on(p.y, 1.0) {
+                mask |= 63
+            }
             mask
         },
         &[(centre, DVec3::NEG_Z * 0.25)],
@@ -159,9 +187,15 @@ pub fn ratio_disc(n: usize) -> f64 {
         s,
         |p| {
             let mut mask = 0;
-            if on(p.x, 0.0) { mask |= symmetry(0) }
-            if on(p.y, 0.0) { mask |= symmetry(1) }
-            if p.length() > r * (1.0 - 1e-9) { mask |= 63 }
+            if on(p.x, 0.0) {
+                mask |= symmetry(0)
+            }
+            if on(p.y, 0.0) {
+                mask |= symmetry(1)
+            }
+            if p.length() > r * (1.0 - 1e-9) {
+                mask |= 63
+            }
             mask
         },
         &[(centre, DVec3::NEG_Z * 0.25)],
@@ -173,7 +207,11 @@ pub fn ratio_disc(n: usize) -> f64 {
 pub fn disc(n: usize, r: f64) -> TriMesh {
     let inner = 0.5 * r;
     let diagonal = 0.42 * r;
-    let corner = [DVec3::new(inner, 0.0, 0.0), DVec3::new(diagonal, diagonal, 0.0), DVec3::new(0.0, inner, 0.0)];
+    let corner = [
+        DVec3::new(inner, 0.0, 0.0),
+        DVec3::new(diagonal, diagonal, 0.0),
+        DVec3::new(0.0, inner, 0.0),
+    ];
     let core = |u: f64, v: f64| {
         corner[0] * (u * (1.0 - v)) + corner[1] * (u * v) + corner[2] * ((1.0 - u) * v)
     };
@@ -189,7 +227,11 @@ pub fn disc(n: usize, r: f64) -> TriMesh {
     block(&core);
     for half in 0..2 {
         block(&|u, v| {
-            let side = if half == 0 { core(1.0, v) } else { core(1.0 - v, 1.0) };
+            let side = if half == 0 {
+                core(1.0, v)
+            } else {
+                core(1.0 - v, 1.0)
+            };
             let a = (v + f64::from(half)) * PI / 4.0;
             side * (1.0 - u) + DVec3::new(a.cos(), a.sin(), 0.0) * (r * u)
         });
@@ -233,7 +275,13 @@ pub fn ratio_cook(n: usize) -> f64 {
     let u = solve(
         &mesh,
         section(1.0, 1.0 / 3.0, 1.0),
-        |p| if on(p.x, 0.0) { 63 } else { Freedoms::of(&[2, 3, 4]).0 },
+        |p| {
+            if on(p.x, 0.0) {
+                63
+            } else {
+                Freedoms::of(&[2, 3, 4]).0
+            }
+        },
         &forces,
     );
     let middle = vertex_at(&mesh, DVec3::new(48.0, 52.0, 0.0));
