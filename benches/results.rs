@@ -2,7 +2,6 @@
 //! Draft designs and prints without writing.
 
 #[path = "../tests/bench/mod.rs"]
-#[allow(dead_code, reason = "shared with the tests")]
 mod bench;
 
 use std::fmt::Write as _;

@@ -14,7 +14,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::budget::Quality;
 use crate::dataset::Signal;
 use crate::design::Inputs;
-use crate::io::mesh_file::{ENDINGS, read_mesh};
+use crate::io::mesh_file::read_mesh;
 use crate::io::project_file::{self, LoadedProject};
 use crate::placement::SelectorKind;
 use crate::project::{Project, Unit};
@@ -113,12 +113,7 @@ pub fn bundled() -> anyhow::Result<LoadedProject> {
 /// # Errors
 /// A message naming the file and the remedy.
 pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
-    let name = path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
-    if name.ends_with(".toml") {
+    if project_file::is_project(path) {
         return Ok(project_file::load(path)?);
     }
     let loaded = read_mesh(path, unit, 0)?;
@@ -127,11 +122,6 @@ pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
-    anyhow::ensure!(
-        ENDINGS.iter().any(|e| name.ends_with(e)),
-        "{}: open a project (.hapdef.toml) or a mesh",
-        path.display()
-    );
     Ok(LoadedProject {
         inputs: Inputs {
             project: Project::around(&file_name, unit),

@@ -329,7 +329,11 @@ impl Moments {
     fn of(xx: &[f64], yy: &[f64], xy: &[f64]) -> Self {
         let mut m = Self::default();
         for k in 0..xx.len() {
-            let (a, b, c) = ((xx[k] + yy[k]) / 2.0, (xx[k] - yy[k]) / 2.0, xy[k] / 2.0);
+            let (a, b, c) = (
+                f64::midpoint(xx[k], yy[k]),
+                (xx[k] - yy[k]) / 2.0,
+                xy[k] / 2.0,
+            );
             m.aa += a * a;
             m.bb += b * b;
             m.cc += c * c;

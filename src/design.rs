@@ -72,8 +72,10 @@ impl DesignError {
             self,
             Self::Cancelled(_)
                 | Self::Elastic(ElasticError::Cancelled(_))
-                | Self::Placement(PlacementError::Cancelled(_))
-                | Self::Placement(PlacementError::Signals(crate::pca::PcaError::Cancelled(_)))
+                | Self::Placement(
+                    PlacementError::Cancelled(_)
+                        | PlacementError::Signals(crate::pca::PcaError::Cancelled(_))
+                )
         )
     }
 }
@@ -112,10 +114,11 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     project.check()?;
     let mesh = refined(&inputs.part, budget.refinements);
     let held = held_freedoms(&mesh, &project.supports());
+    // First what cannot be computed at all: a part that nothing holds is the likeliest mistake.
+    let model = ShellModel::new(&mesh, project.section(), &held, watch)?;
     let points = lay_out_sites(&mesh, project)?;
     let touches = lay_out_touches(&mesh, project, budget)?;
     check_memory(points.len(), touches.len())?;
-    let model = ShellModel::new(&mesh, project.section(), &held, watch)?;
     let (unknowns, smallest_pivot) = (model.unknowns(), model.smallest_pivot());
     let signal = project.gauge.signal;
     let dataset = dataset::simulate(&model, touches, &points, signal, watch)?;

@@ -1,4 +1,4 @@
-//! HapDef: where a handful of strain gauges go inside a flexible robot limb.
+//! `HapDef`: where a handful of strain gauges go inside a flexible robot limb.
 //!
 //! The core (everything but `io`, `job`, `document`, `cli`, `render` and `studio`) is pure: no file, no
 //! clock, no thread of its own, no global random state. SI units throughout (m, N, Pa, strain as a ratio).

@@ -24,7 +24,7 @@ fn main() -> ExitCode {
 
 #[cfg(feature = "studio")]
 fn open_studio(cli: &Cli) -> anyhow::Result<()> {
-    hapdef::studio::run(cli.file.clone(), cli.unit.map(Into::into))
+    hapdef::studio::run(cli.file.as_deref(), cli.unit.map(Into::into))
 }
 
 #[cfg(not(feature = "studio"))]

@@ -360,7 +360,9 @@ fn keep_body(
     let mut used = vec![false; positions.len()];
     let mut chosen: Vec<[u32; 3]> = Vec::new();
     for tri in triangles.iter().filter(|t| labels[t[0] as usize] == label) {
-        tri.iter().for_each(|&v| used[v as usize] = true);
+        for &v in tri {
+            used[v as usize] = true;
+        }
         chosen.push(*tri);
     }
     // In their old order, so that a mesh that needs no repair keeps its numbers.
@@ -376,16 +378,18 @@ fn keep_body(
     Ok((kept, chosen))
 }
 
+/// The representative of a vertex in a union-find forest, with its path halved.
+fn root(parent: &mut [u32], mut v: u32) -> u32 {
+    while parent[v as usize] != v {
+        parent[v as usize] = parent[parent[v as usize] as usize];
+        v = parent[v as usize];
+    }
+    v
+}
+
 /// For each vertex the smallest vertex index it is connected to.
 pub(crate) fn components(vertices: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut parent: Vec<u32> = (0..vertices as u32).collect();
-    fn root(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
-    }
     for tri in triangles {
         let first = root(&mut parent, tri[0]);
         let low = tri[1..].iter().fold(first, |low, &v| {

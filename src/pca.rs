@@ -4,6 +4,7 @@
 //! Algorithm 2: for each number of sensors the QR runs on as many components.
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::solvers::Solve;
 use faer::{Accum, Mat, MatRef, Par, Side};
 
 use crate::budget::{Cancelled, Watch, report};
@@ -173,14 +174,13 @@ impl Reconstruction {
         }
     }
 
-    /// ‖X - W X_S‖² / ‖X‖² on the held-out touches, W by least squares on the others (standardized).
+    /// ‖X - W `X_S‖²` / ‖X‖² on the held-out touches, W by least squares on the others (standardized).
     /// Absent where the kept sites are linearly dependent to rounding.
     #[must_use]
     pub fn unexplained(&self, kept: &[usize]) -> Option<f64> {
         let (k, n) = (kept.len(), self.train.nrows());
         let inner = Mat::from_fn(k, k, |i, j| self.train[(kept[i], kept[j])]);
         let cross = Mat::from_fn(k, n, |i, j| self.train[(kept[i], j)]);
-        use faer::linalg::solvers::Solve;
         let weights = inner.llt(Side::Lower).ok()?.solve(&cross);
         let held_cross = Mat::from_fn(k, n, |i, j| self.held_out[(kept[i], j)]);
         let held_inner = Mat::from_fn(k, k, |i, j| self.held_out[(kept[i], kept[j])]);

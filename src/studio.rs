@@ -11,7 +11,7 @@ mod theme;
 mod touching;
 mod viewport;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -22,7 +22,7 @@ use crate::cli;
 use crate::design::{self, Design, DesignError, Simulated};
 use crate::document::Document;
 use crate::feasible::Feasibility;
-use crate::io::project_file::LoadedProject;
+use crate::io::project_file::{self, LoadedProject};
 use crate::job::{Job, Outcome, Reporter, Stop};
 use crate::placement::SelectorKind;
 
@@ -160,7 +160,8 @@ impl Studio {
         let budget = inputs.project.budget.quality.budget();
         self.start(ctx, "Simulate", self.document.simulation_key(), move |r| {
             let start = Instant::now();
-            let simulated = design::simulate(&inputs, &budget, &|p| r.report(p)).map_err(stop)?;
+            let simulated =
+                design::simulate(&inputs, &budget, &|p| r.report(p)).map_err(|e| stop(&e))?;
             Ok(Finished::Simulation(
                 Arc::new(simulated),
                 start.elapsed().as_secs_f64(),
@@ -196,7 +197,7 @@ impl Studio {
                     }
                     None => design::run(&inputs, &kinds, &budget, &clock, &watch),
                 };
-                let design = design.map_err(stop)?;
+                let design = design.map_err(|e| stop(&e))?;
                 Ok(Finished::Design(
                     Arc::new(design),
                     start.elapsed().as_secs_f64(),
@@ -386,7 +387,7 @@ impl Studio {
 }
 
 /// A stage's error as a job's end.
-fn stop(error: DesignError) -> Stop {
+fn stop(error: &DesignError) -> Stop {
     if error.is_cancelled() {
         Stop::Cancelled
     } else {
@@ -436,12 +437,12 @@ impl eframe::App for Studio {
 ///
 /// # Errors
 /// A message in the user's terms when no window can be opened.
-pub fn run(file: Option<PathBuf>, unit: Option<crate::project::Unit>) -> anyhow::Result<()> {
-    let (loaded, path) = match &file {
+pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::Result<()> {
+    let (loaded, path) = match file {
         Some(path) => {
             let loaded = cli::open(path, unit)?;
-            let is_project = path.to_string_lossy().ends_with(".toml");
-            (loaded, is_project.then(|| path.clone()))
+            let is_project = project_file::is_project(path);
+            (loaded, is_project.then(|| path.to_owned()))
         }
         None => (cli::bundled()?, None),
     };

@@ -1,6 +1,6 @@
 //! The shell element against patch tests, published benchmarks and closed forms.
 //!
-//! Sources: R. H. MacNeal and R. L. Harder, "A proposed standard set of problems to test finite element
+//! Sources: R. H. `MacNeal` and R. L. Harder, "A proposed standard set of problems to test finite element
 //! accuracy" (1985); T. Belytschko et al., "Stress projection for membrane and shear locking in shell
 //! finite elements" (1985), the obstacle course; S. Timoshenko and S. Woinowsky-Krieger, "Theory of
 //! Plates and Shells". Reached ratios at the same meshes with the same pair of elements are known;
@@ -24,7 +24,7 @@ fn near(name: &str, computed: f64, known: f64) {
     );
 }
 
-/// MacNeal and Harder's patch: exact displacements given on the rim; the inner nodes must follow.
+/// `MacNeal` and Harder's patch: exact displacements given on the rim; the inner nodes must follow.
 fn patch(field: impl Fn(DVec3) -> [f64; 6]) -> (TriMesh, Section, f64, f64) {
     let at = |x: f64, y: f64| DVec3::new(x, y, 0.0);
     let p = [

@@ -54,9 +54,10 @@ fn objective_and_predictions_are_those_of_libsvm() {
             "problem {k}: objective off by {relative:e}"
         );
         let rows = gaussian(&squared_distances(&unseen, &x), p.gamma);
+        // LIBSVM keeps its kernel in single precision: C times rounding shows in its predictions.
         for (ours, theirs) in svr::predict(&fit, &rows).iter().zip(&p.predictions) {
             assert!(
-                (ours - theirs).abs() < 1e-4 * p.size,
+                (ours - theirs).abs() < 3e-4 * p.size,
                 "problem {k}: {ours} against {theirs}"
             );
         }

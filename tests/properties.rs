@@ -192,7 +192,7 @@ fn the_inside_face_is_the_outside_face_of_the_shell_turned_over() {
     let size = |m: &ShellModel, face| {
         let at = m.index.nearest(place).0;
         let [xx, yy, xy] = Observer::new(m, &[at], face).strain_of(&u)[0];
-        ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy / 2.0))
+        (f64::midpoint(xx, yy), ((xx - yy) / 2.0).hypot(xy / 2.0))
     };
     let (inside, outside) = (size(&m, Face::Inside), size(&n, Face::Outside));
     assert!(

@@ -289,7 +289,7 @@ fn a_job_can_be_cancelled_and_bad_files_change_nothing() {
     w.harness.state_mut().document.state.project.budget.quality = Quality::Standard;
     w.harness.run_ok();
     w.press("Simulate");
-    w.wait("the job to report", 30, |s| s.busy());
+    w.wait("the job to report", 30, hapdef::studio::Studio::busy);
     w.press("Cancel job");
     w.wait("the cancelled job", 60, |s| !s.busy());
     assert!(w.harness.state().simulation.is_none());

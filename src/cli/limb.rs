@@ -10,6 +10,7 @@ use serde_json::json;
 use crate::design::Inputs;
 use crate::io::{atomic, glb, project_file};
 use crate::limb::{LimbSpec, LimbSupport};
+use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
 use crate::project::{Lattice, Project, RegionKeys, SupportKeys, SupportKind};
 
@@ -146,7 +147,7 @@ fn project(spec: &LimbSpec, boxes: &[[[f64; 3]; 2]]) -> Project {
         .map(|&box_mm| SupportKeys {
             kind: SupportKind::Clamped,
             box_mm,
-            normal: Default::default(),
+            normal: Axis::default(),
         })
         .collect();
     project.sites.lattice = Lattice::Unrolled;

@@ -37,11 +37,11 @@ impl Default for Bar {
 impl Bar {
     /// Shows one report; never asks for a stop.
     pub fn show(&self, progress: Progress) -> ControlFlow<()> {
-        if let Ok(mut stage) = self.stage.lock() {
-            if *stage != progress.stage {
-                *stage = progress.stage;
-                self.bar.set_message(progress.stage);
-            }
+        if let Ok(mut stage) = self.stage.lock()
+            && *stage != progress.stage
+        {
+            *stage = progress.stage;
+            self.bar.set_message(progress.stage);
         }
         self.bar.set_length(progress.total.max(1) as u64);
         self.bar.set_position(progress.done as u64);

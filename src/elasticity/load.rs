@@ -69,7 +69,7 @@ fn integrate(mesh: &TriMesh, t: u32, centre: DVec3, touch: &Touch, into: &mut Ve
         for k in 0..3 {
             let mut zeta = [0.0; 3];
             for i in 0..3 {
-                zeta[i] = (piece[k][i] + piece[(k + 1) % 3][i]) / 2.0;
+                zeta[i] = f64::midpoint(piece[k][i], piece[(k + 1) % 3][i]);
             }
             let p: DVec3 = (0..3).map(|i| corners[i] * zeta[i]).sum();
             let r2 = p.distance_squared(centre) / touch.tip_radius.powi(2);

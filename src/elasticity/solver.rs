@@ -1,7 +1,7 @@
 //! The sparse stiffness matrix: its pattern, its scaled factor, and solves in blocks.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltError;
+use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
@@ -9,7 +9,7 @@ use faer::sparse::linalg::cholesky::{
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Conj, MatMut, Par, Side};
+use faer::{Conj, MatMut, Par, Side, Spec};
 
 /// Right-hand sides solved together. Fixed, so that a load gives the same bytes in any company.
 pub const BLOCK: usize = 64;
@@ -97,17 +97,17 @@ impl Factor {
         )
         .map_err(|_| FactorError::OutOfMemory)?;
         let mut values = vec![0.0; symbolic.len_val()];
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
         let mut memory = MemBuffer::try_new(scratch).map_err(|_| FactorError::OutOfMemory)?;
         let outcome = symbolic
             .factorize_numeric_llt::<f64>(
                 &mut values,
                 scaled.as_ref(),
                 Side::Lower,
-                Default::default(),
+                LltRegularization::default(),
                 Par::Seq,
                 MemStack::new(&mut memory),
-                Default::default(),
+                Spec::default(),
             )
             .map(|_| ());
         if let Err(LltError::NonPositivePivot { index }) = outcome {

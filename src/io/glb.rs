@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf::json::buffer::{Target, View};
+use gltf::json::extras::Void;
 use gltf::json::validation::{Checked::Valid, USize64};
 use gltf::json::{self, Index, Root};
 
@@ -63,7 +64,7 @@ impl Builder {
             name: None,
             uri: None,
             extensions: None,
-            extras: Default::default(),
+            extras: Void::default(),
         });
         Self {
             root,
@@ -89,7 +90,7 @@ impl Builder {
             name: None,
             target: Some(Valid(target)),
             extensions: None,
-            extras: Default::default(),
+            extras: Void::default(),
         });
         let (min, max) = bounds.unzip();
         self.root.push(json::Accessor {
@@ -104,7 +105,7 @@ impl Builder {
             normalized: false,
             sparse: None,
             extensions: None,
-            extras: Default::default(),
+            extras: Void::default(),
         })
     }
 
@@ -118,7 +119,7 @@ impl Builder {
             name: None,
             weights: None,
             extensions: None,
-            extras: Default::default(),
+            extras: Void::default(),
             primitives: vec![json::mesh::Primitive {
                 attributes,
                 indices: Some(indices),
@@ -126,7 +127,7 @@ impl Builder {
                 mode: Valid(json::mesh::Mode::Triangles),
                 targets: None,
                 extensions: None,
-                extras: Default::default(),
+                extras: Void::default(),
             }],
         });
         let node = self.root.push(json::Node {
@@ -137,7 +138,7 @@ impl Builder {
             name: None,
             nodes: vec![node],
             extensions: None,
-            extras: Default::default(),
+            extras: Void::default(),
         });
         self.root.scene = Some(scene);
         let glb = gltf::Glb {

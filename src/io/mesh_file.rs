@@ -21,6 +21,18 @@ pub struct LoadedMesh {
 
 type Soup = (Vec<DVec3>, Vec<[u32; 3]>);
 
+/// Whether a mesh of this name does not say its unit.
+#[must_use]
+pub fn needs_unit(path: &Path) -> bool {
+    !ending(path).starts_with("gl")
+}
+
+fn ending(path: &Path) -> String {
+    path.extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default()
+}
+
 /// File endings that can be read.
 pub const ENDINGS: [&str; 4] = ["glb", "gltf", "obj", "stl"];
 
@@ -29,10 +41,7 @@ pub const ENDINGS: [&str; 4] = ["glb", "gltf", "obj", "stl"];
 /// # Errors
 /// [`FileError`] naming the file, what is wrong and what to do.
 pub fn read_mesh(path: &Path, unit: Option<Unit>, body: usize) -> Result<LoadedMesh, FileError> {
-    let ending = path
-        .extension()
-        .map(|e| e.to_string_lossy().to_lowercase())
-        .unwrap_or_default();
+    let ending = ending(path);
     if !ENDINGS.contains(&ending.as_str()) {
         return Err(FileError::broken(
             path,
@@ -46,7 +55,7 @@ pub fn read_mesh(path: &Path, unit: Option<Unit>, body: usize) -> Result<LoadedM
             "the file is empty. Export the mesh again",
         ));
     }
-    let scale = scale(path, &ending, unit)?;
+    let scale = scale(path, unit)?;
     let parse = || match ending.as_str() {
         "obj" => read_obj(&bytes),
         "stl" => read_stl(&bytes),
@@ -73,10 +82,10 @@ pub fn parse_glb(bytes: &[u8]) -> Result<LoadedMesh, String> {
     Ok(LoadedMesh { mesh, repairs })
 }
 
-fn scale(path: &Path, ending: &str, unit: Option<Unit>) -> Result<f64, FileError> {
+fn scale(path: &Path, unit: Option<Unit>) -> Result<f64, FileError> {
     match unit {
         Some(unit) => Ok(unit.metres()),
-        None if ending.starts_with("gl") => Ok(1.0),
+        None if !needs_unit(path) => Ok(1.0),
         None => Err(FileError::broken(
             path,
             "this format does not say its unit. Give it: --unit mm, cm, m or in (part.unit in a project)",

@@ -45,7 +45,7 @@ impl NpzFile {
         self.entry(name, &bytes)
     }
 
-    /// Adds a text, as a NumPy string without dimensions.
+    /// Adds a text, as a `NumPy` string without dimensions.
     ///
     /// # Errors
     /// What the writer reports.

@@ -66,6 +66,13 @@ fn read_painted(path: &Path, name: &str, vertices: usize) -> Result<Vec<bool>, F
     Ok(mask)
 }
 
+/// Whether a path names a project and not a mesh, by its ending.
+#[must_use]
+pub fn is_project(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+}
+
 /// Where a project's arrays lie: `limb.hapdef.toml` has `limb.hapdef.npz`.
 #[must_use]
 pub fn arrays_path(project: &Path) -> PathBuf {
@@ -151,6 +158,16 @@ pub fn to_text(project: &Project) -> String {
     let mut t = Text::default();
     t.line("# A HapDef project. Lengths in millimetres, forces in newtons; paths are relative to this file.");
     t.key("format", project.format, "version of this file's format");
+    part(&mut t, project);
+    touch(&mut t, project);
+    gauge(&mut t, project);
+    feasible(&mut t, project);
+    selection(&mut t, project);
+    evaluation(&mut t, project);
+    t.0
+}
+
+fn part(t: &mut Text, project: &Project) {
     t.table("part");
     let part = &project.part;
     t.key("mesh", quoted(&part.mesh), "glTF/GLB, OBJ or STL");
@@ -200,6 +217,9 @@ pub fn to_text(project: &Project) -> String {
             "of a symmetry plane; unused otherwise",
         );
     }
+}
+
+fn touch(t: &mut Text, project: &Project) {
     t.table("touch");
     t.key(
         "force_n",
@@ -232,7 +252,9 @@ pub fn to_text(project: &Project) -> String {
         serialized(&project.sites.lattice),
         "\"even\" (any surface) or \"unrolled\" (rows and columns about the axis)",
     );
-    gauge(&mut t, project);
+}
+
+fn feasible(t: &mut Text, project: &Project) {
     t.table("feasible");
     t.key(
         "support_clearance_mm",
@@ -265,7 +287,9 @@ pub fn to_text(project: &Project) -> String {
         project.candidates.count,
         "a fixed number of candidates instead",
     );
-    selection(&mut t, project);
+}
+
+fn evaluation(t: &mut Text, project: &Project) {
     t.table("evaluation");
     for region in &project.evaluation.regions {
         t.list("evaluation.region");
@@ -283,7 +307,6 @@ pub fn to_text(project: &Project) -> String {
         "\"draft\", \"standard\" or \"reference\"",
     );
     t.key("seed", project.budget.seed, "of every random draw");
-    t.0
 }
 
 fn gauge(t: &mut Text, project: &Project) {

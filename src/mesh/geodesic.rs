@@ -179,7 +179,7 @@ impl Unfolded {
         let crossing = self.x - self.y * gx / gy;
         (0.0..=self.c)
             .contains(&crossing)
-            .then(|| da + gx * self.x + gy * self.y)
+            .then_some(da + gx * self.x + gy * self.y)
     }
 }
 

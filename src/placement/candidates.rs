@@ -145,9 +145,9 @@ impl Curve<'_> {
                 while high - low > 1 {
                     let middle = usize::midpoint(low, high);
                     if self.evaluate(middle) <= target {
-                        high = middle
+                        high = middle;
                     } else {
-                        low = middle
+                        low = middle;
                     }
                 }
                 return high;

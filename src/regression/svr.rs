@@ -72,7 +72,7 @@ struct Solver<'a> {
     gains: Vec<f64>,
 }
 
-/// The pair to move, by place among the active points: β_grow grows, β_shrink shrinks.
+/// The pair to move, by place among the active points: `β_grow` grows, `β_shrink` shrinks.
 struct Pair {
     grow: usize,
     shrink: usize,

@@ -8,7 +8,7 @@ use egui::Context;
 use super::Studio;
 use crate::cli;
 use crate::document::Document;
-use crate::io::mesh_file::ENDINGS;
+use crate::io::mesh_file::{ENDINGS, needs_unit};
 use crate::io::project_file;
 use crate::project::Unit;
 
@@ -100,8 +100,11 @@ impl Dialog {
 
     /// Whether the typed path is a mesh that does not say its unit.
     fn needs_unit(&self) -> bool {
-        let lower = self.path.to_lowercase();
-        self.purpose == Purpose::Open && (lower.ends_with(".obj") || lower.ends_with(".stl"))
+        let path = Path::new(self.path.trim());
+        self.purpose == Purpose::Open
+            && path.extension().is_some()
+            && !project_file::is_project(path)
+            && needs_unit(path)
     }
 
     fn browse(&mut self, ctx: &Context) {
@@ -209,7 +212,7 @@ impl Studio {
     pub fn open_path(&mut self, path: &Path, unit: Option<Unit>) {
         match cli::open(path, unit) {
             Ok(loaded) => {
-                let is_project = path.to_string_lossy().ends_with(".toml");
+                let is_project = project_file::is_project(path);
                 self.replace(loaded, is_project.then(|| path.to_owned()));
             }
             Err(error) => self.complain(format!("{error:#}")),

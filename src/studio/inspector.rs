@@ -25,7 +25,7 @@ impl Studio {
                 section(ui, "Touch", true, |ui| touch(ui, project));
                 section(ui, "Gauge", true, |ui| gauge(ui, project));
                 section(ui, "Feasible region and sites", false, |ui| {
-                    feasible(ui, project)
+                    feasible(ui, project);
                 });
                 section(ui, "Selection", true, |ui| selection(ui, project));
             });

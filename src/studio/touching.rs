@@ -176,7 +176,7 @@ fn solve(model: &ShellModel, observer: &Observer, request: &Request) -> Touched 
         .strain_of(&u)
         .into_iter()
         .map(|[xx, yy, xy]| {
-            let (mean, radius) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy / 2.0));
+            let (mean, radius) = (f64::midpoint(xx, yy), ((xx - yy) / 2.0).hypot(xy / 2.0));
             mean + radius * if mean < 0.0 { -1.0 } else { 1.0 }
         })
         .collect();

@@ -401,7 +401,7 @@ impl Studio {
                     .iter()
                     .map(|s| s.rms_strain / noise)
                     .collect();
-                let ratio = self.from_sites(&rms);
+                let ratio = self.carried_from_sites(&rms);
                 let top = robust_top(&ratio);
                 let values = ratio.iter().map(|r| r / top).collect();
                 (
@@ -425,7 +425,7 @@ impl Studio {
                 .iter()
                 .map(|v| f64::from(u8::from(v.is_none())))
                 .collect();
-            return self.from_sites(&passed);
+            return self.carried_from_sites(&passed);
         }
         match &self.document.state.painted {
             Some(mask) => mask.iter().map(|&m| f64::from(u8::from(m))).collect(),
@@ -434,7 +434,7 @@ impl Studio {
     }
 
     /// Carries values of sites to the part's vertices, by the sites' places in their triangles.
-    fn from_sites(&self, values: &[f64]) -> Vec<f64> {
+    fn carried_from_sites(&self, values: &[f64]) -> Vec<f64> {
         let vertices = self.document.part.positions().len();
         let Some(simulation) = self.simulation.as_ref() else {
             return vec![0.0; vertices];

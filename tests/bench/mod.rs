@@ -103,13 +103,13 @@ pub fn ratio_roof(n: usize) -> f64 {
         |p| {
             let mut mask = 0;
             if on(p.y, 0.0) {
-                mask |= symmetry(1)
+                mask |= symmetry(1);
             }
             if on(p.x, 0.0) {
-                mask |= symmetry(0)
+                mask |= symmetry(0);
             }
             if on(p.y, half) {
-                mask |= Freedoms::of(&[0, 2]).0
+                mask |= Freedoms::of(&[0, 2]).0;
             }
             mask
         },
@@ -133,16 +133,16 @@ pub fn ratio_cylinder(n: usize) -> f64 {
         |p| {
             let mut mask = 0;
             if on(p.y, 0.0) {
-                mask |= symmetry(1)
+                mask |= symmetry(1);
             }
             if p.x.abs() < 1e-6 {
-                mask |= symmetry(0)
+                mask |= symmetry(0);
             }
             if p.z.abs() < 1e-6 {
-                mask |= symmetry(2)
+                mask |= symmetry(2);
             }
             if on(p.y, half) {
-                mask |= Freedoms::of(&[0, 2]).0
+                mask |= Freedoms::of(&[0, 2]).0;
             }
             mask
         },
@@ -162,13 +162,13 @@ pub fn ratio_plate(n: usize) -> f64 {
         |p| {
             let mut mask = 0;
             if on(p.x, 0.0) {
-                mask |= symmetry(0)
+                mask |= symmetry(0);
             }
             if on(p.y, 0.0) {
-                mask |= symmetry(1)
+                mask |= symmetry(1);
             }
             if on(p.x, 1.0) || on(p.y, 1.0) {
-                mask |= 63
+                mask |= 63;
             }
             mask
         },
@@ -188,13 +188,13 @@ pub fn ratio_disc(n: usize) -> f64 {
         |p| {
             let mut mask = 0;
             if on(p.x, 0.0) {
-                mask |= symmetry(0)
+                mask |= symmetry(0);
             }
             if on(p.y, 0.0) {
-                mask |= symmetry(1)
+                mask |= symmetry(1);
             }
             if p.length() > r * (1.0 - 1e-9) {
-                mask |= 63
+                mask |= 63;
             }
             mask
         },
