@@ -381,7 +381,12 @@ impl Studio {
     fn accept_drops(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|i| i.raw.dropped_files.first().map(|f| f.path().to_owned()));
         if let Some(path) = dropped {
-            self.open_path(&path, None);
+            let dialog = dialogs::Dialog::open_dropped(&path);
+            if dialog.needs_unit() || self.document.is_dirty() {
+                self.dialog = Some(dialog);
+            } else {
+                self.open_path(&path, None);
+            }
         }
     }
 }
@@ -415,7 +420,7 @@ impl eframe::App for Studio {
             .show(ui, |ui| self.inspector(ui));
         Panel::bottom("results")
             .resizable(true)
-            .default_size(220.0)
+            .default_size(260.0)
             .size_range(120.0..=520.0)
             .show(ui, |ui| self.results(ui));
         CentralPanel::no_frame().show(ui, |ui| self.viewport(ui));

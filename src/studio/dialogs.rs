@@ -40,6 +40,11 @@ impl Dialog {
         }
     }
 
+    /// For a file that was dropped on the window: its path is typed already.
+    pub fn open_dropped(path: &Path) -> Self {
+        Self::new(Purpose::Open, path.display().to_string())
+    }
+
     pub fn open(document: &Document) -> Self {
         let folder = document.path.as_ref().and_then(|p| p.parent());
         Self::new(
@@ -99,7 +104,7 @@ impl Dialog {
     }
 
     /// Whether the typed path is a mesh that does not say its unit.
-    fn needs_unit(&self) -> bool {
+    pub fn needs_unit(&self) -> bool {
         let path = Path::new(self.path.trim());
         self.purpose == Purpose::Open
             && path.extension().is_some()
@@ -173,11 +178,26 @@ impl Studio {
                     }
                 });
             }
+            let discards = dialog.purpose == Purpose::Open && self.document.is_dirty();
+            if discards {
+                let text = format!(
+                    "{} has changes that are not saved; opening another file discards them",
+                    self.document.name()
+                );
+                ui.colored_label(super::theme::ERROR, text);
+            }
             ui.add_space(6.0);
             ui.horizontal(|ui| {
                 let ready = !dialog.path.trim().is_empty();
                 confirmed |= ui
-                    .add_enabled(ready, egui::Button::new(dialog.verb()))
+                    .add_enabled(
+                        ready,
+                        egui::Button::new(if discards {
+                            "Discard and open"
+                        } else {
+                            dialog.verb()
+                        }),
+                    )
                     .clicked();
                 if ui
                     .add_enabled(dialog.browsing.is_none(), egui::Button::new("Browse…"))

@@ -1,6 +1,6 @@
 //! The lower side: error against number of gauges, the chosen sites, the reduction.
 
-use egui::{Role, Ui, WidgetInfo};
+use egui::{RichText, Role, Ui, WidgetInfo};
 use egui_plot::{Corner, HLine, Legend, Line, Plot, PlotPoints, Points};
 
 use super::Studio;
@@ -36,6 +36,8 @@ const COLOURS: [egui::Color32; 3] = [
 
 impl Studio {
     pub(super) fn results(&mut self, ui: &mut Ui) {
+        // A resizable panel that is not filled shrinks a little every frame.
+        ui.set_min_height(ui.available_height());
         ui.add_space(4.0);
         ui.horizontal(|ui| {
             for tab in Tab::ALL {
@@ -68,7 +70,7 @@ impl Studio {
                 regions.push(&row.region);
             }
         }
-        let height = ui.available_height() - 4.0;
+        let height = ui.available_height() - 26.0;
         ui.columns(regions.len().max(1), |columns| {
             for (ui, region) in columns.iter_mut().zip(&regions) {
                 let baseline = design
@@ -76,11 +78,13 @@ impl Studio {
                     .rows
                     .iter()
                     .find(|r| r.selector == "all-candidates" && r.region == *region);
+                ui.label(RichText::new(*region).strong());
                 let plot = Plot::new(("error", region))
                     .height(height)
                     .legend(Legend::default().position(Corner::RightTop))
                     .x_axis_label("gauges")
-                    .y_axis_label(format!("mean error, {region} (mm)"))
+                    .x_grid_spacer(egui_plot::uniform_grid_spacer(|_| [10.0, 5.0, 1.0]))
+                    .y_axis_label("mean error (mm)")
                     .include_y(0.0)
                     .allow_scroll(false)
                     .allow_drag(false)
@@ -190,7 +194,12 @@ impl Studio {
                             let index = d.design.chosen()[k];
                             let (low, high) = range(dataset, index);
                             let rms = dataset.sites[index].rms_strain;
-                            ui.monospace(format!("{low:9.3} – {high:9.3}"));
+                            let decimals = if signal_unit(dataset.signal) == "mm" {
+                                3
+                            } else {
+                                0
+                            };
+                            ui.monospace(format!("{low:8.decimals$} – {high:8.decimals$}"));
                             ui.monospace(format!("{:7.0}", rms * 1e6));
                             ui.monospace(
                                 signal_to_noise(&d.inputs, rms)

@@ -49,12 +49,15 @@ impl Studio {
 
     fn part_stage(&mut self, ui: &mut Ui) {
         let part = &self.document.part;
+        let (lower, upper) = part.bounds();
+        let size = (upper - lower) * 1000.0;
         let lines = vec![
             format!(
                 "{} vertices, {} triangles",
                 part.positions().len(),
                 part.triangles().len()
             ),
+            format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z),
             format!("mean element {:.2} mm", part.mean_edge() * 1000.0),
             format!("{} supports", self.document.state.project.supports.len()),
         ];
@@ -135,6 +138,8 @@ impl Studio {
 
     /// The bar at the bottom: the running job, and messages until they are read.
     pub(super) fn status(&mut self, ui: &mut Ui) {
+        // As tall with a job as without one: nothing above it jumps.
+        ui.set_min_height(ui.spacing().interact_size.y + 6.0);
         if let Some(job) = &self.job {
             let progress = job.progress();
             let (stage, share) = progress.map_or(("Starting", 0.0), |p| {
