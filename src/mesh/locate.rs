@@ -9,8 +9,13 @@ use parry3d_f64::shape::{CompositeShapeRef, TriMesh as ParryMesh, Triangle};
 use super::{SurfacePoint, TriMesh};
 
 /// A bounding-volume tree over one surface; as immutable as the surface it was built from.
+///
+/// The tree has its tolerances for things about one across, so the surface is kept in it at that size.
 pub struct SurfaceIndex {
     tree: ParryMesh,
+    centre: DVec3,
+    /// Metres to one unit of the tree.
+    size: f64,
 }
 
 impl SurfaceIndex {
@@ -18,14 +23,22 @@ impl SurfaceIndex {
     /// Never for a [`TriMesh`]: it has triangles and its indices were checked.
     #[must_use]
     pub fn new(mesh: &TriMesh) -> Self {
-        let tree = ParryMesh::new(mesh.positions().to_vec(), mesh.triangles().to_vec())
+        let (lower, upper) = mesh.bounds();
+        let (centre, size) = ((lower + upper) / 2.0, (upper - lower).max_element());
+        let scaled = mesh.positions().iter().map(|&p| (p - centre) / size);
+        let tree = ParryMesh::new(scaled.collect(), mesh.triangles().to_vec())
             .expect("a validated mesh has triangles");
-        Self { tree }
+        Self { tree, centre, size }
+    }
+
+    fn scaled(&self, point: DVec3) -> DVec3 {
+        (point - self.centre) / self.size
     }
 
     /// The nearest point of the surface and how far it is (m).
     #[must_use]
     pub fn nearest(&self, point: DVec3) -> (SurfacePoint, f64) {
+        let point = self.scaled(point);
         let (projection, (triangle, location)) =
             self.tree.project_local_point_and_get_location(point, false);
         let barycentric = location.barycentric_coordinates().unwrap_or([1.0 / 3.0; 3]);
@@ -33,13 +46,13 @@ impl SurfaceIndex {
             triangle,
             barycentric,
         };
-        (at, projection.point.distance(point))
+        (at, projection.point.distance(point) * self.size)
     }
 
     /// The first point a ray meets and its distance in units of `direction`.
     #[must_use]
     pub fn ray(&self, origin: DVec3, direction: DVec3) -> Option<(SurfacePoint, f64)> {
-        let ray = Ray::new(origin, direction);
+        let ray = Ray::new(self.scaled(origin), direction);
         let (triangle, time) =
             CompositeShapeRef(&self.tree).cast_local_ray(&ray, f64::MAX, false)?;
         let Triangle { a, b, c } = self.tree.triangle(triangle);
@@ -49,13 +62,13 @@ impl SurfaceIndex {
             triangle,
             barycentric,
         };
-        Some((at, time))
+        Some((at, time * self.size))
     }
 
     /// Triangles whose bounds come within `radius` of a point (m), in rising order.
     #[must_use]
     pub fn triangles_near(&self, point: DVec3, radius: f64) -> Vec<u32> {
-        let reach = DVec3::splat(radius);
+        let (point, reach) = (self.scaled(point), DVec3::splat(radius / self.size));
         let (lower, upper) = (point - reach, point + reach);
         let near = self.tree.bvh().leaves(|node| {
             let aabb = node.aabb();
