@@ -105,6 +105,7 @@ pub fn bundled() -> anyhow::Result<LoadedProject> {
         repairs: mesh.repairs,
         path: PathBuf::from("limb.hapdef.toml"),
         mesh_path: PathBuf::from("limb.glb"),
+        bundled: true,
     })
 }
 
@@ -131,6 +132,7 @@ pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
         repairs: loaded.repairs,
         path: path.with_extension("hapdef.toml"),
         mesh_path: path.to_owned(),
+        bundled: false,
     })
 }
 
@@ -144,6 +146,7 @@ impl Common {
             Some(path) => open(path, self.unit.map(Into::into))?,
             None => bundled()?,
         };
+        say_repairs(&loaded);
         let project = &mut loaded.inputs.project;
         if let Some(quality) = self.quality {
             project.budget.quality = quality.into();
@@ -173,16 +176,56 @@ impl Common {
     }
 }
 
-/// Where the mesh of a loaded project can be found again: the bundled one is written beside the output.
+/// What was changed or left out while the mesh was taken in, on stderr.
+fn say_repairs(loaded: &LoadedProject) {
+    let r = loaded.repairs;
+    let changed =
+        r.degenerate_triangles + r.duplicate_triangles + r.flipped_triangles + r.non_manifold_edges;
+    if changed > 0 || r.bodies > 1 {
+        eprintln!(
+            "{}: body {} of {}; {} triangles without area and {} duplicates dropped, {} turned over, {} edges join more than two triangles",
+            loaded.mesh_path.display(),
+            loaded.inputs.project.part.body,
+            r.bodies,
+            r.degenerate_triangles,
+            r.duplicate_triangles,
+            r.flipped_triangles,
+            r.non_manifold_edges
+        );
+    }
+}
+
+/// Makes the folder for results before anything is computed, and puts the bundled mesh into it where
+/// that is what was computed on.
 ///
 /// # Errors
-/// When it cannot be written.
-pub fn settle_mesh(loaded: &mut LoadedProject, folder: &Path, bundled: bool) -> anyhow::Result<()> {
-    if bundled {
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("{}: the folder cannot be created", folder.display()))?;
-        loaded.mesh_path = folder.join("limb.glb");
-        crate::io::atomic::write(&loaded.mesh_path, BUNDLED_MESH)?;
+/// When it cannot be written, or when another mesh of that name is there already.
+pub fn prepare_folder(loaded: &mut LoadedProject, folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| {
+        format!(
+            "{}: the folder cannot be created. Choose another",
+            folder.display()
+        )
+    })?;
+    if loaded.bundled {
+        loaded.mesh_path = write_bundled_mesh(folder)?;
     }
     Ok(())
+}
+
+/// Writes the bundled mesh into a folder, never over another one.
+///
+/// # Errors
+/// As [`prepare_folder`].
+pub fn write_bundled_mesh(folder: &Path) -> anyhow::Result<PathBuf> {
+    let path = folder.join("limb.glb");
+    match std::fs::read(&path) {
+        Ok(bytes) if bytes == BUNDLED_MESH => {}
+        Ok(_) => anyhow::bail!(
+            "{}: another mesh of this name is there already. Choose another folder",
+            path.display()
+        ),
+        Err(_) => crate::io::atomic::write(&path, BUNDLED_MESH)?,
+    }
+    Ok(path)
 }

@@ -80,6 +80,8 @@ impl DesignError {
     }
 }
 
+/// Below this neither folds nor held-out touches mean anything.
+const LEAST_TOUCHES: usize = 20;
 const MOST_SITES: usize = 50_000;
 const MOST_GB: f64 = 8.0;
 /// Seeds of the independent draws, apart from each other.
@@ -117,8 +119,8 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     // First what cannot be computed at all: a part that nothing holds is the likeliest mistake.
     let model = ShellModel::new(&mesh, project.section(), &held, watch)?;
     let points = lay_out_sites(&mesh, project)?;
+    check_memory(points.len(), project.touch.count.min(budget.touches))?;
     let touches = lay_out_touches(&mesh, project, budget)?;
-    check_memory(points.len(), touches.len())?;
     let (unknowns, smallest_pivot) = (model.unknowns(), model.smallest_pivot());
     let signal = project.gauge.signal;
     let dataset = dataset::simulate(&model, touches, &points, signal, watch)?;
@@ -216,8 +218,11 @@ fn touches_on(
 }
 
 fn check_memory(sites: usize, touches: usize) -> Result<(), DesignError> {
-    // Three strain components a site and touch while they are gathered, and the signal itself.
-    let needed_gb = (sites * touches * 4 * size_of::<f64>()) as f64 / 1e9;
+    // Three strain components a site and touch while they are gathered, and the signal itself; then the
+    // kernel of the evaluation and its distances, on every thread.
+    let dataset = 4 * sites * touches;
+    let kernels = 2 * touches * touches * rayon::current_num_threads();
+    let needed_gb = (dataset.max(kernels) * size_of::<f64>()) as f64 / 1e9;
     if needed_gb > MOST_GB {
         return Err(DesignError::TooLarge {
             needed_gb,
@@ -296,10 +301,18 @@ pub fn reduce_sites(
         }
         .into());
     }
+    let touches = simulated.dataset.touches.len();
+    if touches < LEAST_TOUCHES {
+        return Err(PlacementError::TooFewTouches {
+            touches,
+            least: LEAST_TOUCHES,
+        }
+        .into());
+    }
     let x = simulated.dataset.x.select_rows(&feasible);
     let pca = Pca::new(&x, watch).map_err(PlacementError::from)?;
     let limit = budget.candidates.max(sensors);
-    let mut candidates = reduce(&x, &pca, inputs.project.reduction(), limit, watch)?;
+    let mut candidates = reduce(&x, inputs.project.reduction(), limit, watch)?;
     if candidates.rows.len() < sensors {
         // The variance asked for needs fewer sites than there are gauges to place.
         candidates.rows = pca.pivots(sensors.min(pca.rank()));

@@ -23,6 +23,8 @@ pub struct Document {
     /// Where it was opened from or saved to; nothing for the bundled limb until it is saved.
     pub path: Option<PathBuf>,
     pub mesh_path: PathBuf,
+    /// The mesh is the one inside the program and lies in no file yet.
+    pub bundled: bool,
     saved: State,
     /// The state at the last finished gesture.
     settled: State,
@@ -52,6 +54,7 @@ impl Document {
             repairs: loaded.repairs,
             path,
             mesh_path: loaded.mesh_path,
+            bundled: loaded.bundled,
             saved: state.clone(),
             settled: state.clone(),
             state,
@@ -145,12 +148,27 @@ impl Document {
                 *m = brush == Brush::Paint;
             }
         }
+        // A brush finer than the mesh still leaves its mark.
+        let nearest = (0..3).max_by(|&a, &b| at.barycentric[a].total_cmp(&at.barycentric[b]));
+        if let Some(corner) = nearest {
+            let vertex = self.part.triangles()[at.triangle as usize][corner];
+            mask[vertex as usize] = brush == Brush::Paint;
+        }
     }
 
     /// Everything may carry gauges again.
     pub fn clear_paint(&mut self) {
         self.state.painted = None;
         self.settle();
+    }
+
+    /// The part without the path of its mesh: the mesh itself is known by its place in memory, and saving
+    /// under another name changes nothing that was computed.
+    fn part_key(&self) -> crate::project::Part {
+        crate::project::Part {
+            mesh: String::new(),
+            ..self.state.project.part.clone()
+        }
     }
 
     /// What the simulation depends on, as a key.
@@ -160,7 +178,7 @@ impl Document {
         format!(
             "{:p} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
             Arc::as_ptr(&self.part),
-            p.part,
+            self.part_key(),
             p.material,
             p.supports,
             p.touch,
@@ -177,7 +195,7 @@ impl Document {
         format!(
             "{:p} {:?} {:?} {:?}",
             Arc::as_ptr(&self.part),
-            p.part,
+            self.part_key(),
             p.material,
             p.supports
         )

@@ -228,6 +228,7 @@ fn judge(
     };
     let rows = std::iter::once(&everywhere)
         .chain(trial.regions)
+        .filter(|region| region.contains.contains(&true))
         .map(|region| row(set, region, &errors, hyper, model.converged().0))
         .collect();
     (rows, errors, model.work)

@@ -99,6 +99,7 @@ impl TriMesh {
         let triangles = drop_degenerate(&positions, triangles, &mut report)?;
         let (positions, mut triangles) = keep_body(&positions, &triangles, body, &mut report)?;
         orient(&mut triangles, &mut report);
+        turn_closed_outward(&positions, &mut triangles, &mut report);
         let mesh = Self::from_checked(positions, triangles);
         report.non_manifold_edges = mesh.edges.iter().filter(|e| e.triangles.len() > 2).count();
         Ok((mesh, report))
@@ -337,7 +338,7 @@ fn drop_degenerate(
     Ok(kept)
 }
 
-/// Keeps one edge-connected body, by falling area, and only the vertices it uses.
+/// Keeps one connected body (joined at least at a vertex), by falling area, and only the vertices it uses.
 fn keep_body(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
@@ -404,7 +405,7 @@ pub(crate) fn components(vertices: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
 }
 
 /// Turns triangles over until neighbours across every two-triangle edge agree, following the first
-/// triangle of the body; a closed body that ends up inside out is turned as a whole by the majority.
+/// triangle of the body, on the side that most were on.
 fn orient(triangles: &mut [[u32; 3]], report: &mut RepairReport) {
     let (edges, triangle_edges) = build_edges(triangles);
     let runs = |tri: [u32; 3], a: u32, b: u32| (0..3).any(|i| tri[i] == a && tri[(i + 1) % 3] == b);
@@ -445,6 +446,29 @@ fn orient(triangles: &mut [[u32; 3]], report: &mut RepairReport) {
         }
     }
     report.flipped_triangles = flipped.iter().filter(|&&f| f).count();
+}
+
+/// A closed body encloses a positive volume when its triangles face outward; an open one has no outside
+/// of its own and stays as its file says.
+fn turn_closed_outward(positions: &[DVec3], triangles: &mut [[u32; 3]], report: &mut RepairReport) {
+    let (edges, _) = build_edges(triangles);
+    if edges.iter().any(|e| e.triangles.len() != 2) {
+        return;
+    }
+    let origin = positions[0];
+    let volume: f64 = triangles
+        .iter()
+        .map(|tri| {
+            let [a, b, c] = tri.map(|v| positions[v as usize] - origin);
+            a.dot(b.cross(c))
+        })
+        .sum();
+    if volume < 0.0 {
+        for tri in triangles.iter_mut() {
+            tri.swap(1, 2);
+        }
+        report.flipped_triangles = triangles.len() - report.flipped_triangles;
+    }
 }
 
 fn build_edges(triangles: &[[u32; 3]]) -> (Vec<Edge>, Vec<[u32; 3]>) {
@@ -531,6 +555,19 @@ mod tests {
             (2, 1)
         );
         assert!(mesh.facet_normal(0).dot(mesh.facet_normal(1)) > 0.99);
+    }
+
+    #[test]
+    fn a_closed_body_faces_outward() {
+        let p = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let inward = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
+        let (mesh, report) = TriMesh::new(&p, &inward, 0).unwrap();
+        assert_eq!(report.flipped_triangles, 4);
+        let centre = DVec3::splat(0.25);
+        for t in 0..4 {
+            let middle = mesh.corners(t).iter().sum::<DVec3>() / 3.0;
+            assert!(mesh.facet_normal(t).dot(middle - centre) > 0.0);
+        }
     }
 
     #[test]

@@ -487,18 +487,37 @@ impl Project {
             share,
             share > 0.0 && share < 1.0,
         )?;
-        for (key, count, least) in [
-            ("touch.count", self.touch.count, 3),
-            ("selection.sensors", self.selection.sensors, 1),
-            ("candidates.count", self.candidates.count.unwrap_or(1), 1),
-        ] {
-            let rule = if least == 3 {
-                "at least 3"
-            } else {
-                "at least 1"
-            };
-            check(key, rule, count as f64, count >= least)?;
+        let counts = [
+            (
+                "touch.count",
+                self.touch.count,
+                "between 3 and 1000000",
+                3..=1_000_000,
+            ),
+            (
+                "selection.sensors",
+                self.selection.sensors,
+                "between 1 and 100000",
+                1..=100_000,
+            ),
+            (
+                "candidates.count",
+                self.candidates.count.unwrap_or(1),
+                "between 1 and 100000",
+                1..=100_000,
+            ),
+            (
+                "feasible.edge_neighbours",
+                self.feasible.edge_neighbours,
+                "between 0 and 1000",
+                0..=1000,
+            ),
+        ];
+        for (key, count, rule, range) in counts {
+            check(key, rule, count as f64, range.contains(&count))?;
         }
+        let c = self.selection.c_mm;
+        check("selection.c_mm", "above 0 and at most 1e12", c, c <= 1e12)?;
         let boxes = self.supports.iter().map(|s| ("support.box_mm", &s.box_mm));
         let regions = self
             .evaluation

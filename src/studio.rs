@@ -231,13 +231,11 @@ impl Studio {
 
     /// A path under which a saved project finds its mesh: the bundled limb is written beside it.
     pub(crate) fn settled_mesh(&self, folder: &std::path::Path) -> Result<PathBuf, String> {
-        if self.document.mesh_path.exists() || self.document.path.is_some() {
+        if !self.document.bundled {
             return Ok(self.document.mesh_path.clone());
         }
-        let target = folder.join("limb.glb");
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        crate::io::atomic::write(&target, cli::BUNDLED_MESH).map_err(|e| e.to_string())?;
-        Ok(target)
+        cli::write_bundled_mesh(folder).map_err(|e| format!("{e:#}"))
     }
 
     pub fn cancel(&mut self) {
@@ -260,7 +258,8 @@ impl Studio {
         if let Some(error) = self.touching.collect(&self.document) {
             self.complain(error);
         }
-        self.refresh_feasibility();
+        let dragging = ctx.input(|i| i.pointer.any_down()) || self.view.is_stroking();
+        self.refresh_feasibility(dragging);
     }
 
     fn finished(&mut self, ctx: &egui::Context, finished: Finished, key: String) {
@@ -319,11 +318,11 @@ impl Studio {
     }
 
     /// Filters anew when anything they depend on has changed and no stroke is under way.
-    fn refresh_feasibility(&mut self) {
+    fn refresh_feasibility(&mut self, dragging: bool) {
         let Some(simulation) = &self.simulation else {
             return;
         };
-        if simulation.key != self.document.simulation_key() || self.view.is_stroking() {
+        if simulation.key != self.document.simulation_key() || dragging {
             return;
         }
         let key = self.document.feasible_key();
@@ -352,8 +351,8 @@ impl Studio {
             || repairs.bodies > 1
         {
             self.tell(format!(
-                "Taking the mesh in: {} bodies (the largest is shown), {} triangles without area and {} duplicates dropped, {} turned over",
-                repairs.bodies, repairs.degenerate_triangles, repairs.duplicate_triangles, repairs.flipped_triangles
+                "Taking the mesh in: body {} of {} is shown, {} triangles without area and {} duplicates dropped, {} turned over",
+                self.document.state.project.part.body, repairs.bodies, repairs.degenerate_triangles, repairs.duplicate_triangles, repairs.flipped_triangles
             ));
         }
     }

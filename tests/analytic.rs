@@ -3,8 +3,8 @@
 //! Sources: R. H. `MacNeal` and R. L. Harder, "A proposed standard set of problems to test finite element
 //! accuracy" (1985); T. Belytschko et al., "Stress projection for membrane and shear locking in shell
 //! finite elements" (1985), the obstacle course; S. Timoshenko and S. Woinowsky-Krieger, "Theory of
-//! Plates and Shells". Reached ratios at the same meshes with the same pair of elements are known;
-//! each is asserted to 0.01.
+//! Plates and Shells". Ratios that the same pair of elements reaches on the same meshes are known; each
+//! must be at least as near to one, to 0.01.
 
 mod bench;
 

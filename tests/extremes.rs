@@ -87,7 +87,7 @@ fn the_ends_of_the_project_are_sound() {
         ("no noise", |p| p.gauge.noise_microstrain = 0.0),
         ("displacement", |p| p.gauge.signal = Signal::Displacement),
         ("normal displacement", |p| {
-            p.gauge.signal = Signal::NormalDisplacement
+            p.gauge.signal = Signal::NormalDisplacement;
         }),
         ("point tip", |p| p.touch.tip_radius_mm = 1e-6),
         ("tip larger than the limb", |p| p.touch.tip_radius_mm = 1e4),
@@ -100,12 +100,12 @@ fn the_ends_of_the_project_are_sound() {
             p.gauge.noise_microstrain = 0.0;
         }),
         ("nearly incompressible", |p| {
-            p.material.poissons_ratio = 0.499
+            p.material.poissons_ratio = 0.499;
         }),
         ("auxetic", |p| p.material.poissons_ratio = -0.9),
         ("no edge filter", |p| p.feasible.edge_neighbours = 0),
         ("all are neighbours", |p| {
-            p.feasible.edge_neighbours = 100_000;
+            p.feasible.edge_neighbours = 1000;
             p.feasible.edge_radius_mm = 1e3;
         }),
         ("even lattice", |p| p.sites.lattice = Lattice::Even),
@@ -216,12 +216,39 @@ fn one_triangle_and_a_sliver() {
 }
 
 #[test]
+fn a_part_held_all_over_and_too_few_touches_are_refused() {
+    let mut inputs = limb();
+    inputs.project.supports[0].box_mm = [[-1e3; 3], [1e3; 3]];
+    let error = run(&inputs).err().unwrap().to_string();
+    assert!(error.contains("every point of the part is held"), "{error}");
+    for count in [3, 7, 19] {
+        let mut inputs = limb();
+        inputs.project.touch.count = count;
+        let error = run(&inputs).err().unwrap().to_string();
+        assert!(error.contains("too few to learn from"), "{error}");
+    }
+    let mut inputs = limb();
+    inputs.project.touch.count = 1_000_000;
+    let budget = Budget {
+        touches: usize::MAX,
+        ..budget()
+    };
+    let error = design::simulate(&inputs, &budget, &unwatched)
+        .err()
+        .unwrap();
+    assert!(matches!(error, DesignError::TooLarge { .. }), "{error}");
+}
+
+#[test]
 fn values_outside_their_range_are_named() {
-    let cases: [(fn(&mut Project), &str); 6] = [
+    type Change = fn(&mut Project);
+    let cases: [(Change, &str); 8] = [
         (|p| p.material.poissons_ratio = 0.5, "poissons_ratio"),
         (|p| p.part.thickness_mm = 0.0, "thickness_mm"),
         (|p| p.touch.count = 2, "touch.count"),
         (|p| p.selection.gamma = f64::INFINITY, "gamma"),
+        (|p| p.touch.count = usize::MAX, "touch.count"),
+        (|p| p.feasible.edge_neighbours = 100_000, "edge_neighbours"),
         (|p| p.candidates.unexplained = 1.0, "unexplained"),
         (|p| p.supports[0].box_mm[0][1] = f64::NAN, "box_mm"),
     ];

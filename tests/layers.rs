@@ -22,7 +22,7 @@ const OUTER: [(&str, &[&str]); 6] = [
     ("job", &[]),
     ("render", &[]),
     ("document", &["io"]),
-    ("cli", &["io", "studio"]),
+    ("cli", &["io"]),
     ("studio", &["io", "job", "document", "render", "cli"]),
 ];
 

@@ -252,6 +252,7 @@ fn one_thread_or_many_give_the_same_bytes() {
                 .map(|s| s.sets.clone())
                 .collect::<Vec<_>>(),
             errors,
+            design.work(),
         )
     };
     let one = run(1);
@@ -260,6 +261,7 @@ fn one_thread_or_many_give_the_same_bytes() {
         assert!(one.0 == many.0, "dataset on {threads} threads");
         assert_eq!(one.1, many.1);
         assert_eq!(one.2, many.2);
+        assert_eq!(one.3, many.3);
     }
 }
 

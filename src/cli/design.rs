@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::{Common, SelectorArg, progress::Bar, settle_mesh};
+use super::{Common, SelectorArg, prepare_folder, progress::Bar};
 use crate::design;
 use crate::io::artifacts::{self, Provenance};
 use crate::placement::SelectorKind;
@@ -45,6 +45,9 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
         project.candidates.count = args.candidates;
     }
     project.check()?;
+    let existed = args.out.exists();
+    prepare_folder(&mut loaded, &args.out)?;
+    let project = &loaded.inputs.project;
     let first = project.selection.selector;
     let kinds: Vec<SelectorKind> = std::iter::once(first)
         .chain(SelectorKind::ALL.into_iter().filter(|&k| k != first))
@@ -60,8 +63,11 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
         })?)
     });
     bar.finish();
+    if design.is_err() && !existed {
+        // Made to find out early that it can be; a refused design leaves nothing behind.
+        let _ = std::fs::remove_dir_all(&args.out);
+    }
     let design = design?;
-    settle_mesh(&mut loaded, &args.out, args.common.project.is_none())?;
     let provenance = Provenance {
         mesh_path: &loaded.mesh_path,
         version: env!("CARGO_PKG_VERSION"),

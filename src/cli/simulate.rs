@@ -29,6 +29,13 @@ pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
         "{}: datasets are written as .npz",
         args.out.display()
     );
+    if let Some(folder) = args.out.parent().filter(|f| !f.as_os_str().is_empty()) {
+        anyhow::ensure!(
+            folder.is_dir(),
+            "{}: there is no such folder. Create it first",
+            folder.display()
+        );
+    }
     let budget = loaded.inputs.project.budget.quality.budget();
     let bar = Bar::default();
     let result = args

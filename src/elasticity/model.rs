@@ -33,6 +33,10 @@ pub enum ElasticError {
         rule: &'static str,
         value: f64,
     },
+    #[error(
+        "every point of the part is held, so nothing can deform: make the support boxes smaller"
+    )]
+    AllHeld,
     #[error("the model does not fit into memory: use a coarser mesh")]
     OutOfMemory,
     #[error(transparent)]
@@ -316,6 +320,9 @@ fn check_held(mesh: &TriMesh, held: &[Freedoms]) -> Result<(), ElasticError> {
             lower: lower * 1000.0,
             upper: upper * 1000.0,
         });
+    }
+    if held.iter().all(|h| *h == Freedoms::ALL) {
+        return Err(ElasticError::AllHeld);
     }
     let labels = crate::mesh::components(mesh.positions().len(), mesh.triangles());
     let mut roots: Vec<u32> = labels.clone();

@@ -21,6 +21,8 @@ pub struct LoadedProject {
     /// Where the project file lies, and the mesh it names.
     pub path: PathBuf,
     pub mesh_path: PathBuf,
+    /// The limb inside the program: its mesh lies in no file yet.
+    pub bundled: bool,
 }
 
 /// Reads a project, its mesh and its painted mask.
@@ -48,6 +50,7 @@ pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
         repairs,
         path: path.to_owned(),
         mesh_path,
+        bundled: false,
     })
 }
 
@@ -71,6 +74,17 @@ fn read_painted(path: &Path, name: &str, vertices: usize) -> Result<Vec<bool>, F
 pub fn is_project(path: &Path) -> bool {
     path.extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+}
+
+/// The path with the ending that projects have, added where it is missing.
+#[must_use]
+pub fn with_ending(path: &Path) -> PathBuf {
+    if is_project(path) {
+        return path.to_owned();
+    }
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".hapdef.toml");
+    path.with_file_name(name)
 }
 
 /// Where a project's arrays lie: `limb.hapdef.toml` has `limb.hapdef.npz`.
@@ -117,7 +131,8 @@ pub fn parse(text: &str) -> Result<Project, String> {
 /// they are: relative to the file.
 ///
 /// # Errors
-/// [`FileError`] naming the file that could not be written; the old project is then untouched.
+/// [`FileError`] naming the file that could not be written; what was there before is whole, in its place
+/// or as its `.bak`.
 pub fn save(path: &Path, project: &Project, painted: Option<&[bool]>) -> Result<(), FileError> {
     let mut project = project.clone();
     project.feasible.painted = painted.map(|_| PAINTED.to_owned());
@@ -126,7 +141,8 @@ pub fn save(path: &Path, project: &Project, painted: Option<&[bool]>) -> Result<
         let mut file = NpzFile::default();
         file.add(PAINTED, &[mask.len()], mask)
             .map_err(|e| FileError::of(&arrays, &e))?;
-        file.save(&arrays)?;
+        let bytes = file.finish().map_err(|e| FileError::of(&arrays, &e))?;
+        atomic::write_with_backup(&arrays, &bytes)?;
     }
     atomic::write_with_backup(path, to_text(&project).as_bytes())
 }

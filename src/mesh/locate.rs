@@ -23,11 +23,26 @@ impl SurfaceIndex {
     /// Never for a [`TriMesh`]: it has triangles and its indices were checked.
     #[must_use]
     pub fn new(mesh: &TriMesh) -> Self {
-        let (lower, upper) = mesh.bounds();
+        Self::of(mesh.positions().to_vec(), mesh.triangles())
+    }
+
+    /// Over the triangles of a validated mesh whose vertices have moved.
+    ///
+    /// # Panics
+    /// When there are no triangles or they refer to missing vertices.
+    #[must_use]
+    pub fn of(mut positions: Vec<DVec3>, triangles: &[[u32; 3]]) -> Self {
+        let (lower, upper) = positions
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), &p| {
+                (l.min(p), u.max(p))
+            });
         let (centre, size) = ((lower + upper) / 2.0, (upper - lower).max_element());
-        let scaled = mesh.positions().iter().map(|&p| (p - centre) / size);
-        let tree = ParryMesh::new(scaled.collect(), mesh.triangles().to_vec())
-            .expect("a validated mesh has triangles");
+        for p in &mut positions {
+            *p = (*p - centre) / size;
+        }
+        let tree =
+            ParryMesh::new(positions, triangles.to_vec()).expect("a validated mesh has triangles");
         Self { tree, centre, size }
     }
 

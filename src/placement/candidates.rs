@@ -36,14 +36,13 @@ pub struct Candidates {
 /// Every how manyth touch is held out.
 const HELD_OUT: usize = 7;
 
-/// Reduces signals (sites × touches). A seventh of the touches is held out of the linear map that the
-/// unexplained share is measured with.
+/// Reduces signals (sites × touches). A seventh of the touches is held out: neither the components nor the
+/// linear map that the unexplained share is measured with have seen them.
 ///
 /// # Errors
 /// [`PlacementError`] where there is nothing to reduce.
 pub fn reduce(
     x: &SignalMatrix,
-    pca: &Pca,
     reduction: Reduction,
     limit: usize,
     watch: Watch,
@@ -54,6 +53,8 @@ pub fn reduce(
     let (test, train): (Vec<usize>, Vec<usize>) =
         (0..x.columns()).partition(|t| t % HELD_OUT == HELD_OUT / 2);
     report(watch, "Reducing to candidates", 0, 2)?;
+    // Neither the picks nor the map have seen the touches they are judged on.
+    let pca = &Pca::new(&x.select_columns(&train), watch)?;
     let judge = Reconstruction::new(x, &train, &test);
     report(watch, "Reducing to candidates", 1, 2)?;
     let mut curve = Curve {

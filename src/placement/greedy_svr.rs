@@ -29,6 +29,9 @@ pub struct GreedySvr {
 /// Two candidates whose criteria differ by less than this share are tied; the lower site wins.
 pub const TIE: f64 = 1e-9;
 
+/// Candidates scored against the same bound.
+const BATCH: usize = 16;
+
 impl Selector for GreedySvr {
     fn kind(&self) -> SelectorKind {
         SelectorKind::GreedySvr
@@ -70,7 +73,11 @@ impl Selector for GreedySvr {
                 error_estimate: sets.last().map(|s| s.criterion),
                 unit: "mm",
                 effort: search.work(),
-                stop_reason: StopReason::Converged,
+                stop_reason: if search.converged {
+                    StopReason::Converged
+                } else {
+                    StopReason::EffortSpent
+                },
                 notes: search.notes(),
             },
             sets,
@@ -89,6 +96,8 @@ struct Search<'a> {
     kernel: Vec<f64>,
     /// Coefficients of the chosen set, a fold: where the next step starts from.
     warm: Vec<Option<[Vec<f64>; 3]>>,
+    /// Whether every winner's fits met their tolerance.
+    converged: bool,
     fits: AtomicU64,
     kernel_evaluations: AtomicU64,
 }
@@ -107,6 +116,7 @@ impl<'a> Search<'a> {
             folds,
             chosen: Vec::new(),
             kernel: vec![1.0; n * n],
+            converged: true,
             fits: AtomicU64::new(0),
             kernel_evaluations: AtomicU64::new(0),
         }
@@ -140,22 +150,24 @@ impl<'a> Search<'a> {
                 available: step,
             });
         }
-        let bound = AtomicU64::new(f64::INFINITY.to_bits());
         let done = AtomicUsize::new(0);
-        let scores: Result<Vec<f64>, Cancelled> = open
-            .par_iter()
-            .map(|&candidate| {
-                let so_far = step * self.pool.sites.len() + done.fetch_add(1, Ordering::Relaxed);
-                report(
-                    watch,
-                    "Selecting by greedy SVR",
-                    so_far,
-                    steps * self.pool.sites.len(),
-                )?;
-                Ok(self.score(candidate, &bound))
-            })
-            .collect();
-        let scores = scores?;
+        let mut bound = f64::INFINITY;
+        let mut scores = Vec::with_capacity(open.len());
+        // The bound moves between batches of fixed size only, so that the work counted does not depend
+        // on which thread was first.
+        for batch in open.chunks(BATCH) {
+            let batch: Result<Vec<f64>, Cancelled> = batch
+                .par_iter()
+                .map(|&candidate| {
+                    let total = self.pool.sites.len();
+                    let so_far = step * total + done.fetch_add(1, Ordering::Relaxed);
+                    report(watch, "Selecting by greedy SVR", so_far, steps * total)?;
+                    Ok(self.score(candidate, bound))
+                })
+                .collect();
+            scores.extend(batch?);
+            bound = scores.iter().copied().fold(f64::INFINITY, f64::min);
+        }
         let smallest = scores.iter().copied().fold(f64::INFINITY, f64::min);
         let winner = scores
             .iter()
@@ -165,22 +177,21 @@ impl<'a> Search<'a> {
     }
 
     /// Mean error over the folds, or infinity once it cannot win any more.
-    fn score(&self, candidate: usize, bound: &AtomicU64) -> f64 {
+    fn score(&self, candidate: usize, bound: f64) -> f64 {
         let kernel = self.extended_kernel(candidate);
         let params = self.settings.hyper.params(self.settings.effort);
         let count = self.folds.len() as f64;
         let mut sum = 0.0;
         for (fold, warm) in self.folds.iter().zip(&self.warm) {
             let mut start = warm.clone();
-            sum += fold.error(&kernel, self.pool.targets, &params, &mut start);
+            let error = fold.error(&kernel, self.pool.targets, &params, &mut start);
+            sum += error.mm;
             self.fits.fetch_add(3, Ordering::Relaxed);
-            // A tie must survive, whichever candidate's thread came first.
-            if sum / count > f64::from_bits(bound.load(Ordering::Relaxed)) * (1.0 + 2.0 * TIE) {
+            // A tie must survive.
+            if sum / count > bound * (1.0 + 2.0 * TIE) {
                 return f64::INFINITY;
             }
         }
-        // Bits of non-negative floats order as the floats do.
-        bound.fetch_min((sum / count).to_bits(), Ordering::Relaxed);
         sum / count
     }
 
@@ -188,8 +199,9 @@ impl<'a> Search<'a> {
         self.kernel = self.extended_kernel(winner);
         let params = self.settings.hyper.params(self.settings.effort);
         for (fold, warm) in self.folds.iter().zip(&mut self.warm) {
-            // Only the coefficients are wanted: they are the next step's start.
-            let _ = fold.error(&self.kernel, self.pool.targets, &params, warm);
+            // For its coefficients, the next step's start, and to know whether the winner's fits ended.
+            let error = fold.error(&self.kernel, self.pool.targets, &params, warm);
+            self.converged &= error.converged;
         }
         self.fits
             .fetch_add(3 * self.folds.len() as u64, Ordering::Relaxed);

@@ -130,6 +130,14 @@ pub fn folds(count: usize, folds: usize, seed: u64) -> Vec<Vec<usize>> {
         .collect()
 }
 
+/// Mean Euclidean error on one fold's test touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoldError {
+    pub mm: f64,
+    /// Whether all its fits met their tolerance.
+    pub converged: bool,
+}
+
 /// The split of one fold, with what training on it needs of the whole kernel.
 pub struct Fold {
     pub train: Vec<usize>,
@@ -168,7 +176,7 @@ impl Fold {
         targets: &[[f64; 3]],
         params: &SvrParams,
         warm: &mut Option<[Vec<f64>; 3]>,
-    ) -> f64 {
+    ) -> FoldError {
         let n = targets.len();
         let inner = Self::block(kernel, n, &self.train, &self.train);
         let outer = Self::block(kernel, n, &self.test, &self.train);
@@ -182,9 +190,13 @@ impl Fold {
             .map(|t| axes.each_ref().map(|a| a[t]))
             .collect();
         let truth: Vec<[f64; 3]> = self.test.iter().map(|&t| targets[t]).collect();
+        let converged = fits.iter().all(|f| f.converged);
         *warm = Some(fits.map(|f| f.beta));
         let d = distances(&predicted, &truth);
-        d.iter().sum::<f64>() / d.len().max(1) as f64
+        FoldError {
+            mm: d.iter().sum::<f64>() / d.len().max(1) as f64,
+            converged,
+        }
     }
 }
 
@@ -324,7 +336,7 @@ impl Bench<'_> {
                 .folds
                 .iter()
                 .zip(&mut warm)
-                .map(|(fold, warm)| fold.error(&kernel, self.targets, &params, warm))
+                .map(|(fold, warm)| fold.error(&kernel, self.targets, &params, warm).mm)
                 .sum();
             let error_mm = sum / self.folds.len() as f64;
             trials.push(Trial { hyper, error_mm });

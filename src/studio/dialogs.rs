@@ -240,6 +240,7 @@ impl Studio {
     }
 
     pub(super) fn save_to(&mut self, path: &Path) {
+        let path = &project_file::with_ending(path);
         self.document.settle();
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let saved = self.settled_mesh(&folder).and_then(|mesh| {
@@ -253,6 +254,7 @@ impl Studio {
             Ok((name, mesh)) => {
                 self.document.state.project.part.mesh = name;
                 self.document.mesh_path = mesh;
+                self.document.bundled = false;
                 self.document.settle();
                 self.document.mark_saved(path.to_owned());
             }

@@ -58,6 +58,7 @@ fn number(
     ui.add(
         DragValue::new(value)
             .range(range)
+            .clamp_existing_to_range(false)
             .speed(speed)
             .max_decimals(4)
             .suffix(suffix),
@@ -75,9 +76,14 @@ fn count(
     help: &str,
 ) {
     let name = ui.label(label);
-    ui.add(DragValue::new(value).range(range).speed(1.0))
-        .labelled_by(name.id)
-        .on_hover_text(help);
+    ui.add(
+        DragValue::new(value)
+            .range(range)
+            .clamp_existing_to_range(false)
+            .speed(1.0),
+    )
+    .labelled_by(name.id)
+    .on_hover_text(help);
     ui.end_row();
 }
 
@@ -418,7 +424,10 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         " %",
         "Share of the held-out variance that the candidates may leave unexplained",
     );
-    project.candidates.unexplained = percent / 100.0;
+    // Not every frame: a hundredfold and back is not always the same number.
+    if (percent - 100.0 * project.candidates.unexplained).abs() > 0.0 {
+        project.candidates.unexplained = percent / 100.0;
+    }
     number(
         ui,
         "C",
@@ -447,6 +456,7 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         "Of the Gaussian kernel on standardized signals",
     );
     let mut seed = project.budget.seed as usize;
+    let before = seed;
     count(
         ui,
         "Seed",
@@ -454,5 +464,7 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         0..=usize::MAX >> 12,
         "Of every random draw: the same seed gives the same design",
     );
-    project.budget.seed = seed as u64;
+    if seed != before {
+        project.budget.seed = seed as u64;
+    }
 }

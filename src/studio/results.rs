@@ -4,7 +4,7 @@ use egui::{RichText, Role, Ui, WidgetInfo};
 use egui_plot::{Corner, HLine, Legend, Line, Plot, PlotPoints, Points};
 
 use super::Studio;
-use crate::io::artifacts::{range, signal_to_noise, signal_unit};
+use crate::io::artifacts::{as_chosen, range, signal_to_noise, signal_unit};
 use crate::io::report::curve;
 
 /// What is shown below the view.
@@ -42,6 +42,13 @@ impl Studio {
         ui.horizontal(|ui| {
             for tab in Tab::ALL {
                 ui.selectable_value(&mut self.results, tab, tab.name());
+            }
+            let stale = self
+                .design
+                .as_ref()
+                .is_some_and(|d| d.key != self.document.selection_key());
+            if stale && self.results != Tab::Sites {
+                ui.colored_label(super::theme::STALE, "of settings that have changed since");
             }
         });
         ui.separator();
@@ -162,10 +169,11 @@ impl Studio {
             empty(ui, "No gauges chosen yet");
             return;
         }
+        // Only where the table shows the very sites that the design chose.
         let design = self
             .design
             .as_ref()
-            .filter(|d| d.design.chosen().len() == sites.len());
+            .filter(|d| as_chosen(&d.design.simulated.dataset, d.design.chosen()) == *sites);
         egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
             egui::Grid::new("sites")
                 .num_columns(10)

@@ -17,7 +17,7 @@ impl Standing {
     fn mark(self) -> (&'static str, egui::Color32) {
         match self {
             Self::Current => ("✔", egui::Color32::from_rgb(110, 190, 130)),
-            Self::Stale => ("~", egui::Color32::from_rgb(225, 180, 80)),
+            Self::Stale => ("~", theme::STALE),
             Self::Running => ("…", theme::TOUCHED),
             Self::Open => ("○", egui::Color32::from_gray(130)),
         }
@@ -119,6 +119,7 @@ impl Studio {
                 rows.filter(|r| r.sensors == chosen && Some(r.selector.as_str()) == first)
                     .map(|r| format!("{:.2} mm, {}", r.error_mm, r.region)),
             );
+            lines.extend(d.design.notes());
             lines
         });
         stage(ui, "Select and evaluate", standing, &lines);
@@ -127,11 +128,8 @@ impl Studio {
     }
 
     fn report_stage(&mut self, ui: &mut Ui) {
-        let standing = if self.design.is_some() {
-            Standing::Current
-        } else {
-            Standing::Open
-        };
+        let key = self.document.selection_key();
+        let standing = standing(self.design.as_ref().map(|d| d.key == key), false);
         stage(ui, "Report", standing, &[]);
         self.button(ui, Command::Export);
     }

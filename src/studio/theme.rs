@@ -6,6 +6,8 @@ use egui::{Color32, Context, Theme, ThemePreference, Visuals};
 pub const CHOSEN: Color32 = Color32::from_rgb(230, 110, 30);
 /// The applied touch.
 pub const TOUCHED: Color32 = Color32::from_rgb(70, 170, 255);
+/// Results of settings that have changed since.
+pub const STALE: Color32 = Color32::from_rgb(225, 180, 80);
 pub const ERROR: Color32 = Color32::from_rgb(235, 110, 95);
 
 /// Behind the limb, by theme.

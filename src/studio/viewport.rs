@@ -128,6 +128,7 @@ impl Viewport {
     /// Takes a tool in hand; a brush shows what it paints.
     pub fn take(&mut self, tool: Tool) {
         self.tool = tool;
+        self.last_dab = None;
         if tool != Tool::Touch {
             self.field = Field::Region;
         }
@@ -147,10 +148,14 @@ impl Viewport {
 
     /// The point of the limb under a place of the window.
     fn pick(&self, at: Pos2) -> Option<SurfacePoint> {
+        self.pick_on(&self.index, at)
+    }
+
+    fn pick_on(&self, index: &SurfaceIndex, at: Pos2) -> Option<SurfacePoint> {
         let u = (at - self.rect.min) / self.rect.size();
         let place = DVec2::new(f64::from(u.x), f64::from(u.y));
         let (origin, direction) = self.camera.ray(place, self.rect.aspect_ratio());
-        self.index.ray(origin, direction).map(|hit| hit.0)
+        index.ray(origin, direction).map(|hit| hit.0)
     }
 }
 
@@ -287,7 +292,7 @@ impl Studio {
     }
 
     fn press(&mut self, ui: &Ui, at: Option<Pos2>) {
-        match at.and_then(|at| self.view.pick(at)) {
+        match at.and_then(|at| self.pick_shown(at)) {
             Some(place) => {
                 self.touching.apply(ui.ctx(), &self.document, place);
                 if !matches!(self.view.field, Field::Strain | Field::Displacement) {
@@ -296,6 +301,20 @@ impl Studio {
             }
             None => self.touching.clear(),
         }
+    }
+
+    /// The point of the limb under a place of the window, on the shape that is shown there.
+    fn pick_shown(&self, at: Pos2) -> Option<SurfacePoint> {
+        let (Some(scale), Some(touched)) = (self.exaggeration(), self.touching.result()) else {
+            return self.view.pick(at);
+        };
+        let part = &self.document.part;
+        let moved = part.positions().iter().zip(&touched.displacement);
+        let index = SurfaceIndex::of(
+            moved.map(|(p, u)| *p + *u * scale).collect(),
+            part.triangles(),
+        );
+        self.view.pick_on(&index, at)
     }
 
     /// Dabs along the way from the last pointer sample, so that a fast stroke has no gaps.
@@ -318,7 +337,10 @@ impl Studio {
             "{:?} {} {:?} {:?} {:?}",
             self.view.field,
             self.touching.version,
-            self.feasibility.as_ref().map(|f| Arc::as_ptr(&f.1)),
+            self.feasibility
+                .as_ref()
+                .filter(|f| !self.view.is_stroking() && f.0 == self.document.feasible_key())
+                .map(|f| Arc::as_ptr(&f.1)),
             self.simulation.as_ref().map(|s| Arc::as_ptr(&s.simulated)),
             self.document.state.painted.as_ref().map(|m| {
                 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -419,7 +441,11 @@ impl Studio {
 
     /// 1 where gauges may go: the filters' verdicts where they are known, else what was painted.
     fn region_values(&self) -> Vec<f64> {
-        if let (Some((_, verdicts)), false) = (&self.feasibility, self.view.is_stroking()) {
+        let current = self
+            .feasibility
+            .as_ref()
+            .filter(|f| !self.view.is_stroking() && f.0 == self.document.feasible_key());
+        if let Some((_, verdicts)) = current {
             let passed: Vec<f64> = verdicts
                 .verdicts
                 .iter()
@@ -484,7 +510,7 @@ impl Studio {
         let touched = self
             .touching
             .result()
-            .filter(|_| self.view.tool == Tool::Touch)?;
+            .filter(|t| self.view.tool == Tool::Touch && t.largest > 0.0)?;
         let (lower, upper) = self.document.part.bounds();
         let wanted =
             SHOWN_DEFORMATION * (upper - lower).length() / touched.largest.max(f64::MIN_POSITIVE);
