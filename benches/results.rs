@@ -294,12 +294,22 @@ fn errors(text: &mut String, designs: &[(Quality, Signal, Design)]) {
                         format!("{:.2} / {:.2}", r.error_mm, r.median_mm)
                     })
             };
-            let aim = match (quality, signal, sensors) {
-                (Quality::Standard, Signal::Displacement, 5) => "6 (paper < 10)",
-                (Quality::Standard, Signal::Displacement, 10) => "3 (paper 2.5)",
-                (Quality::Draft, _, 10) => "12",
-                _ => "",
+            let aim: Option<(f64, &str)> = match (quality, signal, sensors) {
+                (Quality::Standard, Signal::Displacement, 5) => Some((6.0, ", paper < 10")),
+                (Quality::Standard, Signal::Displacement, 10) => Some((3.0, ", paper 2.5")),
+                (Quality::Draft, _, 10) => Some((12.0, "")),
+                _ => None,
             };
+            let reached = rows
+                .iter()
+                .find(|r| {
+                    r.selector == selector && r.sensors == sensors && r.region == "all touches"
+                })
+                .map_or(f64::NAN, |r| r.error_mm);
+            let aim = aim.map_or(String::new(), |(aim, paper)| {
+                let verdict = if reached <= aim { "met" } else { "missed" };
+                format!("{aim}{paper}: {verdict}")
+            });
             let _ = writeln!(
                 text,
                 "| {} | {} | {selector} | {sensors} | {} | {} | {aim} |",

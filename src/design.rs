@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::budget::{Achieved, Budget, Cancelled, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset, SignalMatrix};
 use crate::elasticity::load::Touch;
+use crate::elasticity::model::LoadCheck;
 use crate::elasticity::support::{held_freedoms, supported_vertices};
 use crate::elasticity::{ElasticError, ShellModel};
 use crate::evaluation::{self, Candidate, Evaluation, Region, Trial, subset};
@@ -104,6 +105,8 @@ pub struct Simulated {
     pub dataset: Dataset,
     pub unknowns: usize,
     pub smallest_pivot: f64,
+    /// Balance of forces and energy under the first touch.
+    pub balance: LoadCheck,
     pub achieved: Achieved,
 }
 
@@ -124,7 +127,8 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     let (unknowns, smallest_pivot) = (model.unknowns(), model.smallest_pivot());
     let signal = project.gauge.signal;
     let dataset = dataset::simulate(&model, touches, &points, signal, watch)?;
-    let notes = if dataset.touches.len() < project.touch.count {
+    let balance = check_balance(&model, &dataset.touches[0]);
+    let mut notes = if dataset.touches.len() < project.touch.count {
         vec![format!(
             "{} touches instead of the project's {}: the budget of this quality.",
             dataset.touches.len(),
@@ -133,6 +137,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     } else {
         Vec::new()
     };
+    notes.extend(distrust(&balance, smallest_pivot));
     drop(model);
     Ok(Simulated {
         achieved: Achieved {
@@ -147,7 +152,33 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         dataset,
         unknowns,
         smallest_pivot,
+        balance,
     })
+}
+
+fn check_balance(model: &ShellModel, touch: &Touch) -> LoadCheck {
+    let forces = model.forces(touch);
+    model.check(&forces, &model.solve(&forces))
+}
+
+/// What makes the solution untrustworthy, in plain words.
+fn distrust(balance: &LoadCheck, smallest_pivot: f64) -> Vec<String> {
+    /// Beyond these, fewer than about five digits of a displacement can be right.
+    const BALANCE: f64 = 1e-5;
+    const PIVOT: f64 = 1e-11;
+    let mut notes = Vec::new();
+    let worst = balance.reaction_error.max(balance.energy_error);
+    if worst.is_nan() || worst > BALANCE {
+        notes.push(format!(
+            "The solution is out of balance by {worst:.0e} of the load: do not trust it. Check thickness, unit and supports."
+        ));
+    }
+    if smallest_pivot < PIVOT {
+        notes.push(format!(
+            "The model is nearly singular (smallest scaled pivot {smallest_pivot:.0e}): the shell is very thin for its elements or barely held."
+        ));
+    }
+    notes
 }
 
 fn refined(part: &Arc<TriMesh>, times: u32) -> Arc<TriMesh> {

@@ -4,7 +4,9 @@
 
 mod commands;
 mod dialogs;
+mod fields;
 mod inspector;
+mod overlay;
 mod results;
 mod stages;
 mod theme;
@@ -27,7 +29,8 @@ use crate::job::{Job, Outcome, Reporter, Stop};
 use crate::placement::SelectorKind;
 
 pub use commands::Command;
-pub use viewport::{Field, Tool};
+pub use fields::Field;
+pub use viewport::Tool;
 
 /// Something to tell the user that stays until it is read.
 #[derive(Clone, Debug, PartialEq)]

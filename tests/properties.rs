@@ -145,6 +145,10 @@ fn touches_superpose_and_are_reciprocal_and_in_balance() {
         "{check:?}"
     );
     assert!(m.residual(&a, &ua) < 1e-10);
+    // A touch that lies half on a boss goes into the support directly.
+    let boss = m.forces(&touch(&inputs, DVec3::new(0.0187, 0.0257, 0.005)));
+    let check = m.check(&boss, &m.solve(&boss));
+    assert!(check.reaction_error < 1e-8, "{check:?}");
 }
 
 #[test]

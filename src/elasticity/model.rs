@@ -197,8 +197,13 @@ impl<'a> ShellModel<'a> {
                 internal[freedoms[i]] += f[i];
             }
         }
-        // Held freedoms carry the reactions: there the internal force is not balanced by the load.
+        // Held freedoms carry the reactions: the internal force less what presses there directly.
         let mut reaction = DVec3::ZERO;
+        for (freedom, force) in spread(forces) {
+            if self.unknowns[freedom] == HELD {
+                reaction[freedom % 6] -= force;
+            }
+        }
         for (freedom, force) in internal.iter().enumerate() {
             if self.unknowns[freedom] == HELD && freedom % 6 < 3 {
                 reaction[freedom % 6] += force;

@@ -230,6 +230,8 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
             "element_mm": design.simulated.mesh.mean_edge() * 1000.0,
             "truth_element_mm": design.truth.element_mm,
             "smallest_pivot": design.simulated.smallest_pivot,
+            "reaction_error": design.simulated.balance.reaction_error,
+            "energy_error": design.simulated.balance.energy_error,
         },
         "budget": design.budget,
         "seconds": seconds,
