@@ -1,6 +1,7 @@
 //! The window: an engineer chooses where gauges go, by eye and by number.
 //!
-//! This layer only shows and asks; everything computed runs in jobs on snapshots of the document.
+//! This layer only shows and asks. What takes long runs in jobs on snapshots of the document; opening a
+//! file and applying the filters still run here, between gestures.
 
 mod commands;
 mod dialogs;

@@ -1,6 +1,7 @@
 //! The real window: driven by its accessible names, rendered by a real wgpu adapter.
 #![cfg(feature = "studio")]
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use eframe::egui_wgpu::wgpu;
@@ -56,6 +57,18 @@ impl Window {
         self.harness
             .get_by_role_and_label(egui::Role::Button, name)
             .click();
+        self.harness.run_ok();
+    }
+
+    /// Replaces the path in the open dialog.
+    fn type_path(&mut self, path: &Path) {
+        self.harness.get_by_label("Path").focus();
+        self.harness.run_ok();
+        self.harness
+            .key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
+        self.harness
+            .get_by_label("Path")
+            .type_text(&path.display().to_string());
         self.harness.run_ok();
     }
 
@@ -293,14 +306,7 @@ fn from_the_limb_to_the_report() {
     let folder = tempfile::tempdir().unwrap();
     w.press("Export report…");
     let target = folder.path().join("report");
-    w.harness.get_by_label("Path").focus();
-    w.harness.run_ok();
-    w.harness
-        .key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
-    w.harness
-        .get_by_label("Path")
-        .type_text(&target.display().to_string());
-    w.harness.run_ok();
+    w.type_path(&target);
     w.press("Export");
     w.wait("the export", 60, |s| !s.busy() && !s.messages.is_empty());
     assert!(
@@ -380,14 +386,7 @@ fn results_survive_saving_and_undo_is_not_mistaken_for_them() {
     w.harness
         .key_press_modifiers(Modifiers::COMMAND, egui::Key::S);
     w.harness.run_ok();
-    w.harness.get_by_label("Path").focus();
-    w.harness.run_ok();
-    w.harness
-        .key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
-    w.harness
-        .get_by_label("Path")
-        .type_text(&path.display().to_string());
-    w.harness.run_ok();
+    w.type_path(&path);
     w.press("Save file");
     assert!(
         w.harness
@@ -416,14 +415,7 @@ fn a_saved_project_opens_again() {
     w.harness
         .key_press_modifiers(Modifiers::COMMAND, egui::Key::S);
     w.harness.run_ok();
-    w.harness.get_by_label("Path").focus();
-    w.harness.run_ok();
-    w.harness
-        .key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
-    w.harness
-        .get_by_label("Path")
-        .type_text(&path.display().to_string());
-    w.harness.run_ok();
+    w.type_path(&path);
     w.press("Save file");
     assert!(
         !w.harness.state().document.is_dirty(),
