@@ -121,7 +121,14 @@ impl Quality {
         match self {
             Self::Draft => Budget {
                 quality: self,
-                refinements: 0,
+                elements: Elements {
+                    vertices: 2400,
+                    most_vertices: 6000,
+                    effort: 2_400_000,
+                    displacement_percent: 5.0,
+                    strain_percent: 10.0,
+                    passes: 1,
+                },
                 touches: 800,
                 test_touches: 300,
                 candidates: 60,
@@ -134,7 +141,14 @@ impl Quality {
             },
             Self::Standard => Budget {
                 quality: self,
-                refinements: 1,
+                elements: Elements {
+                    vertices: 3000,
+                    most_vertices: 24_000,
+                    effort: 14_000_000,
+                    displacement_percent: 2.0,
+                    strain_percent: 5.0,
+                    passes: 2,
+                },
                 touches: usize::MAX,
                 test_touches: 800,
                 candidates: usize::MAX,
@@ -147,7 +161,14 @@ impl Quality {
             },
             Self::Reference => Budget {
                 quality: self,
-                refinements: 2,
+                elements: Elements {
+                    vertices: 10_000,
+                    most_vertices: 80_000,
+                    effort: 60_000_000,
+                    displacement_percent: 1.0,
+                    strain_percent: 2.0,
+                    passes: 3,
+                },
                 touches: usize::MAX,
                 test_touches: 2000,
                 candidates: usize::MAX,
@@ -162,13 +183,37 @@ impl Quality {
     }
 }
 
+/// How fine an elastic model is to be and what it may cost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Elements {
+    /// Vertices to begin with, and the most whatever the number of loads.
+    pub vertices: usize,
+    pub most_vertices: usize,
+    /// The most vertices × loads.
+    pub effort: usize,
+    /// Estimated errors at which no more are added (%): rms over the loads of the displacement under the
+    /// load, and of the strain beyond two tip radii over the load's largest.
+    pub displacement_percent: f64,
+    pub strain_percent: f64,
+    /// How often elements are laid anew by the error of the last ones.
+    pub passes: usize,
+}
+
+impl Elements {
+    /// The most vertices for this many loads.
+    #[must_use]
+    pub fn most_for(&self, loads: usize) -> usize {
+        (self.effort / loads.max(1)).clamp(self.vertices, self.most_vertices)
+    }
+}
+
 /// An explicit budget: the largest effort each stage may spend, and the tolerances it works to.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Budget {
     pub quality: Quality,
-    /// How often the part's mesh is split 1:4 before the model is built on it. The truth that accuracy
-    /// is quoted against always has one refinement more.
-    pub refinements: u32,
+    /// Size of the elastic model. The truth that accuracy is quoted against always has elements of half
+    /// its size.
+    pub elements: Elements,
     /// Most touches the model is asked for.
     pub touches: usize,
     /// Unseen touches that evaluation uses.

@@ -16,8 +16,9 @@ use crate::dataset::Signal;
 use crate::design::Inputs;
 use crate::io::mesh_file::read_mesh;
 use crate::io::project_file::{self, LoadedProject};
+use crate::mesh::repair::Repair;
 use crate::placement::SelectorKind;
-use crate::project::{Project, Unit};
+use crate::project::{Masks, Project, Unit};
 
 /// Decides where a handful of strain gauges go inside a flexible robot limb.
 ///
@@ -27,7 +28,7 @@ use crate::project::{Project, Unit};
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// Project (NAME.hapdef.toml) or mesh (glb, gltf, obj, stl) to open in the studio.
+    /// Project (NAME.hapdef.toml) or mesh (glb, gltf, obj, ply, stl) to open in the studio.
     pub file: Option<PathBuf>,
     /// Unit of a mesh file that does not say its own.
     #[arg(long)]
@@ -101,6 +102,7 @@ pub fn bundled() -> anyhow::Result<LoadedProject> {
             project,
             part: Arc::new(mesh.mesh),
             painted: None,
+            masks: Masks::new(),
         },
         repairs: mesh.repairs,
         path: PathBuf::from("limb.hapdef.toml"),
@@ -117,7 +119,7 @@ pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
     if project_file::is_project(path) {
         return Ok(project_file::load(path)?);
     }
-    let loaded = read_mesh(path, unit, 0)?;
+    let loaded = read_mesh(path, unit, 0, Repair::default())?;
     let file_name = path
         .file_name()
         .unwrap_or_default()
@@ -128,6 +130,7 @@ pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
             project: Project::around(&file_name, unit),
             part: Arc::new(loaded.mesh),
             painted: None,
+            masks: loaded.groups,
         },
         repairs: loaded.repairs,
         path: path.with_extension("hapdef.toml"),

@@ -3,10 +3,12 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::budget::{Cancelled, Watch, Work};
-use crate::elasticity::observe::{Face, Observer, SiteFrame};
+use crate::elasticity::observe::{Face, Observer, SiteFrame, along};
+use crate::elasticity::respond::{Reading, respond};
 use crate::elasticity::{ShellModel, Touch};
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 
@@ -168,34 +170,47 @@ pub fn simulate(
     watch: Watch,
 ) -> Result<Dataset, Cancelled> {
     let observer = Observer::new(model, points, Face::Inside);
-    let normals: Vec<DVec3> = observer.frames().iter().map(|f| f.z_axis).collect();
-    let blocks = model.solve_touches(&touches, watch, |first, rows| {
-        let width = (touches.len() - first).min(rows_width(rows, model));
-        BlockSignals::read(&observer, &normals, signal, rows, width)
-    })?;
-    let mut moments = vec![Moments::default(); points.len()];
-    for block in &blocks {
-        for (sum, part) in moments.iter_mut().zip(&block.moments) {
-            sum.add(part);
-        }
-    }
-    let angles: Vec<f64> = moments.iter().map(Moments::dominant_angle).collect();
-    let sites = points
-        .iter()
-        .zip(observer.frames())
-        .zip(moments.iter().zip(&angles))
-        .map(|((&at, frame), (m, &angle))| {
-            m.site(model.mesh.point(at), *frame, angle, touches.len())
-        })
+    let reading = match signal {
+        Signal::Strain => Reading::Strain,
+        Signal::Displacement | Signal::NormalDisplacement => Reading::StrainAndDisplacement,
+    };
+    let responses = respond(model, &touches, &observer, reading, watch)?;
+    let count = touches.len();
+    let mut values = vec![0.0; points.len() * count];
+    let sites = values
+        .par_chunks_mut(count)
+        .enumerate()
+        .map_init(
+            || vec![vec![0.0; count]; 3],
+            |rows, (i, into)| {
+                for (k, row) in rows.iter_mut().enumerate() {
+                    responses.row_into(3 * i + k, row);
+                }
+                let moments = Moments::of(&rows[0], &rows[1], &rows[2]);
+                let angle = moments.dominant_angle();
+                let frame = observer.frames()[i];
+                if signal == Signal::Strain {
+                    let w = along(angle);
+                    for (t, x) in into.iter_mut().enumerate() {
+                        *x = w[0] * rows[0][t] + w[1] * rows[1][t] + w[2] * rows[2][t];
+                    }
+                } else {
+                    for (k, row) in rows.iter_mut().enumerate() {
+                        responses.row_into(3 * (points.len() + i) + k, row);
+                    }
+                    read_displacement(signal, frame.z_axis, rows, into);
+                }
+                moments.site(model.mesh.point(points[i]), frame, angle, count)
+            },
+        )
         .collect();
-    let x = gather(&blocks, signal, &angles, touches.len());
     let mut work = model.work();
-    work.solves += touches.len() as u64;
+    work.solves += responses.solves as u64;
     Ok(Dataset {
         signal,
         sites,
         touches,
-        x,
+        x: SignalMatrix::new(count, values),
         work,
     })
 }
@@ -222,95 +237,36 @@ pub fn measure(
         .zip(observer.frames())
         .map(|(s, f)| s.direction.dot(f.y_axis).atan2(s.direction.dot(f.x_axis)))
         .collect();
-    let normals: Vec<DVec3> = observer.frames().iter().map(|f| f.z_axis).collect();
-    let blocks = model.solve_touches(touches, watch, |first, rows| {
-        let width = (touches.len() - first).min(rows_width(rows, model));
-        BlockSignals::read(&observer, &normals, signal, rows, width)
-    })?;
-    Ok(gather(&blocks, signal, &angles, touches.len()))
+    let reading = match signal {
+        Signal::Strain => Reading::Gauge(&angles),
+        Signal::Displacement | Signal::NormalDisplacement => Reading::Displacement,
+    };
+    let responses = respond(model, touches, &observer, reading, watch)?;
+    let mut values = vec![0.0; sites.len() * touches.len()];
+    let mut rows = vec![vec![0.0; touches.len()]; 3];
+    for (i, into) in values.chunks_exact_mut(touches.len()).enumerate() {
+        if signal == Signal::Strain {
+            responses.row_into(i, into);
+            continue;
+        }
+        for (k, row) in rows.iter_mut().enumerate() {
+            responses.row_into(3 * i + k, row);
+        }
+        read_displacement(signal, observer.frames()[i].z_axis, &rows, into);
+    }
+    Ok(SignalMatrix::new(touches.len(), values))
 }
 
-fn rows_width(rows: &[f64], model: &ShellModel) -> usize {
-    rows.len() / (6 * model.mesh.positions().len())
-}
-
-/// One block of touches, read at all sites.
-struct BlockSignals {
-    width: usize,
-    /// One row a site for the displacement signals, three (xx, yy, 2xy) for strain.
-    values: Vec<f64>,
-    moments: Vec<Moments>,
-}
-
-impl BlockSignals {
-    fn read(
-        observer: &Observer,
-        normals: &[DVec3],
-        signal: Signal,
-        rows: &[f64],
-        width: usize,
-    ) -> Self {
-        let strain = observer.strain(rows);
-        let stride = strain.len() / (3 * normals.len()).max(1);
-        let moments = strain
-            .chunks_exact(3 * stride)
-            .map(|s| {
-                Moments::of(
-                    &s[..width],
-                    &s[stride..][..width],
-                    &s[2 * stride..][..width],
-                )
-            })
-            .collect();
-        let values = match signal {
-            Signal::Strain => strain
-                .chunks_exact(stride)
-                .flat_map(|row| &row[..width])
-                .copied()
-                .collect(),
-            Signal::Displacement | Signal::NormalDisplacement => {
-                let u = observer.displacement(rows);
-                u.chunks_exact(3 * stride)
-                    .zip(normals)
-                    .flat_map(|(u, &n)| {
-                        (0..width).map(move |k| {
-                            let u = DVec3::new(u[k], u[stride + k], u[2 * stride + k]);
-                            if signal == Signal::Displacement {
-                                u.length()
-                            } else {
-                                u.dot(n)
-                            }
-                        })
-                    })
-                    .collect()
-            }
+/// The displacement signal from its three components by rows.
+fn read_displacement(signal: Signal, normal: DVec3, rows: &[Vec<f64>], into: &mut [f64]) {
+    for (t, x) in into.iter_mut().enumerate() {
+        let u = DVec3::new(rows[0][t], rows[1][t], rows[2][t]);
+        *x = if signal == Signal::Displacement {
+            u.length()
+        } else {
+            u.dot(normal)
         };
-        Self {
-            width,
-            values,
-            moments,
-        }
     }
-}
-
-/// Puts the blocks side by side, strain along the given angles.
-fn gather(blocks: &[BlockSignals], signal: Signal, angles: &[f64], touches: usize) -> SignalMatrix {
-    let mut values = Vec::with_capacity(angles.len() * touches);
-    for (site, angle) in angles.iter().enumerate() {
-        let (c, s) = (angle.cos(), angle.sin());
-        for block in blocks {
-            let w = block.width;
-            if signal == Signal::Strain {
-                let rows = &block.values[3 * site * w..][..3 * w];
-                values.extend(
-                    (0..w).map(|k| rows[k] * c * c + rows[w + k] * s * s + rows[2 * w + k] * c * s),
-                );
-            } else {
-                values.extend_from_slice(&block.values[site * w..][..w]);
-            }
-        }
-    }
-    SignalMatrix::new(touches, values)
 }
 
 /// Second moments over the touches of the mean strain a, and b, c of a + b cos 2φ + c sin 2φ.
@@ -343,16 +299,6 @@ impl Moments {
             m.peak = m.peak.max(a.abs() + b.hypot(c));
         }
         m
-    }
-
-    fn add(&mut self, other: &Self) {
-        self.aa += other.aa;
-        self.bb += other.bb;
-        self.cc += other.cc;
-        self.ab += other.ab;
-        self.ac += other.ac;
-        self.bc += other.bc;
-        self.peak = self.peak.max(other.peak);
     }
 
     /// Σ strain² along φ.

@@ -10,20 +10,23 @@ use serde::Serialize;
 use crate::budget::{Achieved, Budget, Cancelled, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset, SignalMatrix};
 use crate::elasticity::load::Touch;
-use crate::elasticity::model::LoadCheck;
-use crate::elasticity::support::{held_freedoms, supported_vertices};
-use crate::elasticity::{ElasticError, ShellModel};
+use crate::elasticity::estimate::Discretization;
+use crate::elasticity::grade::{Graded, Ground};
+use crate::elasticity::linearity::Linearity;
+use crate::elasticity::model::{check_held, check_section};
+use crate::elasticity::support::supported_vertices;
+use crate::elasticity::{ElasticError, Freedoms, ShellModel};
 use crate::evaluation::{self, Candidate, Evaluation, Region, Trial, subset};
 use crate::feasible::{Feasibility, FeasibleInput, feasible};
 use crate::mesh::locate::SurfaceIndex;
-use crate::mesh::refine::refine;
+use crate::mesh::remesh::Remeshed;
 use crate::mesh::unroll::Unrolling;
 use crate::mesh::{SurfacePoint, TriMesh, sample};
 use crate::pca::Pca;
 use crate::placement::candidates::{Candidates, reduce};
 use crate::placement::greedy_svr::GreedySvr;
 use crate::placement::{PlacementError, Pool, Selection, Selector, SelectorKind, pca_qr};
-use crate::project::{BadValue, Lattice, Project};
+use crate::project::{BadValue, Elements, Lattice, Masks, Project};
 use crate::regression::tune::Effort;
 
 /// Why a stage ended without a result.
@@ -48,6 +51,23 @@ pub enum DesignError {
         spacing_mm: f64,
         size_mm: f64,
     },
+    #[error(
+        "{what} {number} lies {distance_mm:.0} mm from the part, which is {size_mm:.0} mm across: check the unit of the mesh and of the points (mm)"
+    )]
+    OffThePart {
+        what: &'static str,
+        number: usize,
+        distance_mm: f64,
+        size_mm: f64,
+    },
+    #[error(
+        "the direction of site {number} points out of the surface: a gauge lies in it, give dx, dy, dz along it"
+    )]
+    AcrossTheWall { number: usize },
+    #[error(
+        "the part is {size_mm:.3} mm across and its wall {thickness_mm:.3} mm thick: this is no shell. Check the unit of the mesh and part.thickness_mm"
+    )]
+    ThickerThanWide { size_mm: f64, thickness_mm: f64 },
     #[error(
         "no site fits on the part: lower sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.3} mm across)"
     )]
@@ -85,6 +105,8 @@ impl DesignError {
 const LEAST_TOUCHES: usize = 20;
 const MOST_SITES: usize = 50_000;
 const MOST_GB: f64 = 8.0;
+/// Vertices of the mesh that sites and touches are laid out on: the same for every quality.
+pub const LAYOUT: usize = 3500;
 /// Seeds of the independent draws, apart from each other.
 const TEST_SEED: u64 = 0x7e57;
 const NOISE_SEED: u64 = 0x0153;
@@ -96,18 +118,37 @@ pub struct Inputs {
     pub part: Arc<TriMesh>,
     /// One value a vertex of the part; absent when nothing was painted.
     pub painted: Option<Arc<Vec<bool>>>,
+    /// Masks of the part's vertices that supports may name.
+    pub masks: Masks,
 }
 
 /// The elastic stage: the mesh that was computed on, the sites on it and the dataset.
 pub struct Simulated {
     pub mesh: Arc<TriMesh>,
+    /// What it was laid on, and where.
+    ground: Ground,
+    laid: Remeshed,
+    /// What is held at its vertices.
+    pub held: Vec<Freedoms>,
+    /// Where the vertices of the part that is shown lie on it.
+    pub carried: Vec<SurfacePoint>,
+    pub discretization: Discretization,
     pub points: Vec<SurfacePoint>,
     pub dataset: Dataset,
     pub unknowns: usize,
-    pub smallest_pivot: f64,
-    /// Balance of forces and energy under the first touch.
-    pub balance: LoadCheck,
+    pub linearity: Linearity,
+    pub checks: Checks,
     pub achieved: Achieved,
+}
+
+impl Simulated {
+    /// The model, built anew: it is large and nobody keeps it.
+    ///
+    /// # Errors
+    /// [`DesignError`] as when it was built first.
+    pub fn model(&self) -> Result<ShellModel, DesignError> {
+        Ok(self.ground.model(&self.laid, &crate::budget::unwatched)?)
+    }
 }
 
 /// Lays out sites and touches and simulates them.
@@ -117,17 +158,34 @@ pub struct Simulated {
 pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simulated, DesignError> {
     let project = &inputs.project;
     project.check()?;
-    let mesh = refined(&inputs.part, budget.refinements);
-    let held = held_freedoms(&mesh, &project.supports());
+    let ground = ground(inputs)?;
+    let layout = layout(inputs, &ground);
     // First what cannot be computed at all: a part that nothing holds is the likeliest mistake.
-    let model = ShellModel::new(&mesh, project.section(), &held, watch)?;
-    let points = lay_out_sites(&mesh, project)?;
-    check_memory(points.len(), project.touch.count.min(budget.touches))?;
-    let touches = lay_out_touches(&mesh, project, budget)?;
-    let (unknowns, smallest_pivot) = (model.unknowns(), model.smallest_pivot());
+    check_section(&project.section())?;
+    check_held(&ground.held.mesh, &ground.held.held)?;
+    let sites = lay_out_sites(&layout, project)?;
+    check_memory(sites.len(), project.touch.count.min(budget.touches))?;
+    let touches = lay_out_touches(&layout, project, budget)?;
+    let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
+    let graded = ground.grade(&touches, &places, &budget.elements, watch)?;
+    let checks = Checks::of(&graded);
+    let Graded {
+        laid,
+        held,
+        model,
+        estimate,
+        linearity,
+        models,
+        solves,
+        ..
+    } = graded;
+    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
+    let unknowns = model.unknowns();
     let signal = project.gauge.signal;
-    let dataset = dataset::simulate(&model, touches, &points, signal, watch)?;
-    let balance = check_balance(&model, &dataset.touches[0]);
+    let mut dataset = dataset::simulate(&model, touches, &points, signal, watch)?;
+    dataset.work.assemblies += models - 1;
+    dataset.work.factorizations += models - 1;
+    dataset.work.solves += solves;
     let mut notes = if dataset.touches.len() < project.touch.count {
         vec![format!(
             "{} touches instead of the project's {}: the budget of this quality.",
@@ -137,52 +195,165 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     } else {
         Vec::new()
     };
-    notes.extend(distrust(&balance, smallest_pivot));
+    notes.extend(checks.distrust());
+    notes.extend(cautions(&estimate, &linearity, &budget.elements));
+    notes.extend(ground.cautions(project.tip().1));
+    let carried = carry(&model, &inputs.part);
     drop(model);
     Ok(Simulated {
         achieved: Achieved {
-            error_estimate: None,
-            unit: "",
+            error_estimate: Some(estimate.strain_percent),
+            unit: "% of a load's largest strain",
             effort: dataset.work,
-            stop_reason: StopReason::Converged,
+            stop_reason: if estimate.meets(&budget.elements) {
+                StopReason::Converged
+            } else {
+                StopReason::EffortSpent
+            },
             notes,
         },
-        mesh,
+        mesh: Arc::clone(&laid.mesh),
+        ground,
+        laid,
+        held,
+        carried,
+        discretization: estimate,
         points,
         dataset,
         unknowns,
-        smallest_pivot,
-        balance,
+        linearity,
+        checks,
     })
 }
 
-fn check_balance(model: &ShellModel, touch: &Touch) -> LoadCheck {
-    let forces = model.forces(touch);
-    model.check(&forces, &model.solve(&forces))
+/// What the solution was checked for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Checks {
+    /// Worst over the sample of the loads: |sum of reactions + load| over the load, and
+    /// |½ u·f - strain energy| over the energy.
+    pub reaction_error: f64,
+    pub energy_error: f64,
+    /// Of the stiffness scaled to a unit diagonal; one over it bounds the condition from below.
+    pub smallest_pivot: f64,
+    /// Connected pieces of the model, each of them held against all six rigid motions.
+    pub pieces_held: usize,
 }
 
-/// What makes the solution untrustworthy, in plain words.
-fn distrust(balance: &LoadCheck, smallest_pivot: f64) -> Vec<String> {
-    /// Beyond these, fewer than about five digits of a displacement can be right.
-    const BALANCE: f64 = 1e-5;
-    const PIVOT: f64 = 1e-11;
+impl Checks {
+    #[must_use]
+    pub fn of(graded: &Graded) -> Self {
+        Self {
+            reaction_error: graded.balance.reaction_error,
+            energy_error: graded.balance.energy_error,
+            smallest_pivot: graded.model.smallest_pivot(),
+            pieces_held: graded.model.pieces(),
+        }
+    }
+
+    /// What makes the solution untrustworthy, in plain words.
+    #[must_use]
+    pub fn distrust(&self) -> Vec<String> {
+        /// Beyond these, fewer than about five digits of a displacement can be right.
+        const BALANCE: f64 = 1e-5;
+        const PIVOT: f64 = 1e-11;
+        let mut notes = Vec::new();
+        let worst = self.reaction_error.max(self.energy_error);
+        if worst.is_nan() || worst > BALANCE {
+            notes.push(format!(
+                "The solution is out of balance by {worst:.0e} of the load: do not trust it. Check thickness, unit and supports."
+            ));
+        }
+        if self.smallest_pivot < PIVOT {
+            notes.push(format!(
+                "The model is nearly singular (smallest scaled pivot {:.0e}): the shell is very thin for its elements or barely held.",
+                self.smallest_pivot
+            ));
+        }
+        notes
+    }
+}
+
+/// What the estimates of the model's own error ask to be said.
+#[must_use]
+pub fn cautions(
+    discretization: &Discretization,
+    linearity: &Linearity,
+    aim: &crate::budget::Elements,
+) -> Vec<String> {
+    /// Beyond this change a linear answer is the wrong kind of answer (%).
+    const NONLINEAR: f64 = 10.0;
     let mut notes = Vec::new();
-    let worst = balance.reaction_error.max(balance.energy_error);
-    if worst.is_nan() || worst > BALANCE {
+    if !discretization.meets(aim) {
         notes.push(format!(
-            "The solution is out of balance by {worst:.0e} of the load: do not trust it. Check thickness, unit and supports."
+            "The mesh is coarser than this quality asks for: about {:.1} % error in displacement (asked: {:.0} %) and {:.1} % in strain (asked: {:.0} %). Choose a higher quality.",
+            discretization.displacement_percent,
+            aim.displacement_percent,
+            discretization.strain_percent,
+            aim.strain_percent
         ));
     }
-    if smallest_pivot < PIVOT {
+    if linearity.beyond > 0 {
         notes.push(format!(
-            "The model is nearly singular (smallest scaled pivot {smallest_pivot:.0e}): the shell is very thin for its elements or barely held."
+            "At {:.1} N the shell may snap or fold under {} of {} touches: the linear answer says nothing there. Lower the force.",
+            linearity.force_n, linearity.beyond, linearity.loads
+        ));
+    }
+    if linearity.largest_percent.abs() > NONLINEAR {
+        notes.push(format!(
+            "At {:.1} N large displacements would change the answer by up to {:.0} % (half of the touches: less than {:.0} %): the model is linear.",
+            linearity.force_n,
+            linearity.largest_percent.abs(),
+            linearity.median_percent
         ));
     }
     notes
 }
 
-fn refined(part: &Arc<TriMesh>, times: u32) -> Arc<TriMesh> {
-    (0..times).fold(Arc::clone(part), |mesh, _| Arc::new(refine(&mesh)))
+/// The part with its supports, ready to have elements laid on it.
+///
+/// # Errors
+/// [`DesignError`] for supports without a region.
+pub fn ground(inputs: &Inputs) -> Result<Ground, DesignError> {
+    let project = &inputs.project;
+    if project.part.thickness_mm > size_mm(&inputs.part) {
+        return Err(DesignError::ThickerThanWide {
+            size_mm: size_mm(&inputs.part),
+            thickness_mm: project.part.thickness_mm,
+        });
+    }
+    let supports = project.supports(&inputs.masks)?;
+    let as_given = project.part.elements == Elements::AsGiven;
+    Ok(Ground::new(
+        &inputs.part,
+        project.section(),
+        &supports,
+        as_given,
+    ))
+}
+
+/// The mesh that sites and touches are laid out on, the same for every quality: the part, or where its
+/// triangles are too thin to measure distances on, even ones on its surface.
+fn layout(inputs: &Inputs, ground: &Ground) -> Arc<TriMesh> {
+    /// Height over length of a triangle, and the share of the area that may be thinner.
+    const THIN: f64 = 0.1;
+    const SHARE: f64 = 0.02;
+    let part = &inputs.part;
+    let thin: f64 = (0..part.triangles().len() as u32)
+        .filter(|&t| part.thinness(t) < THIN)
+        .map(|t| part.facet_area(t))
+        .sum();
+    if thin < SHARE * part.area() {
+        Arc::clone(part)
+    } else {
+        ground.even(LAYOUT).mesh
+    }
+}
+
+/// Where the vertices of the part that is shown lie on the mesh that was computed on.
+#[must_use]
+pub fn carry(model: &ShellModel, part: &TriMesh) -> Vec<SurfacePoint> {
+    let nearest = |&p: &DVec3| model.index.nearest(p).0;
+    part.positions().iter().map(nearest).collect()
 }
 
 fn size_mm(mesh: &TriMesh) -> f64 {
@@ -249,17 +420,25 @@ fn touches_on(
 }
 
 fn check_memory(sites: usize, touches: usize) -> Result<(), DesignError> {
-    // Three strain components a site and touch while they are gathered, and the signal itself; then the
-    // kernel of the evaluation and its distances, on every thread.
-    let dataset = 4 * sites * touches;
+    // The signal itself beside three strain components a site and touch; then the kernel of the
+    // evaluation and its distances, on every thread.
     let kernels = 2 * touches * touches * rayon::current_num_threads();
-    let needed_gb = (dataset.max(kernels) * size_of::<f64>()) as f64 / 1e9;
+    check_room(4 * sites, touches)?;
+    check_room(kernels.div_ceil(touches.max(1)), touches)
+}
+
+/// Refuses a dense result of `rows` × `columns` that cannot be held, before it is allocated.
+///
+/// # Errors
+/// [`DesignError::TooLarge`].
+pub fn check_room(rows: usize, columns: usize) -> Result<(), DesignError> {
+    let needed_gb = rows as f64 * columns as f64 * size_of::<f64>() as f64 / 1e9;
     if needed_gb > MOST_GB {
         return Err(DesignError::TooLarge {
             needed_gb,
             limit_gb: MOST_GB,
-            sites,
-            touches,
+            sites: rows / 4,
+            touches: columns,
         });
     }
     Ok(())
@@ -269,7 +448,6 @@ fn check_memory(sites: usize, touches: usize) -> Result<(), DesignError> {
 #[must_use]
 pub fn filter(inputs: &Inputs, simulated: &Simulated) -> Feasibility {
     let mesh = &simulated.mesh;
-    let held = held_freedoms(mesh, &inputs.project.supports());
     let painted = inputs
         .painted
         .as_ref()
@@ -278,7 +456,7 @@ pub fn filter(inputs: &Inputs, simulated: &Simulated) -> Feasibility {
         &FeasibleInput {
             mesh,
             index: &SurfaceIndex::new(mesh),
-            supported: &supported_vertices(&held),
+            supported: &supported_vertices(&simulated.held),
             points: &simulated.points,
             sites: &simulated.dataset.sites,
             painted: painted.as_deref(),
@@ -457,11 +635,11 @@ pub fn truth(
     watch: Watch,
 ) -> Result<Truth, DesignError> {
     let project = &inputs.project;
-    let mesh = refine(&simulated.mesh);
-    let held = held_freedoms(&mesh, &project.supports());
+    let laid = simulated.ground.halved(&simulated.laid);
+    let mesh = &laid.mesh;
     let seed = project.budget.seed.wrapping_add(TEST_SEED);
-    let touches = touches_on(&mesh, project, budget.test_touches, seed, false)?;
-    let model = ShellModel::new(&mesh, project.section(), &held, watch)?;
+    let touches = touches_on(mesh, project, budget.test_touches, seed, false)?;
+    let model = simulated.ground.model(&laid, watch)?;
     let mut rows = sites.to_vec();
     rows.sort_unstable();
     rows.dedup();

@@ -6,13 +6,15 @@ use std::sync::Arc;
 use crate::design::Inputs;
 use crate::io::project_file::LoadedProject;
 use crate::mesh::{RepairReport, SurfacePoint, TriMesh, geodesic};
-use crate::project::Project;
+use crate::project::{Masks, Project};
 
 /// What undo brings back. The mesh is not part of it: opening a file begins a new history.
 #[derive(Clone, PartialEq)]
 pub struct State {
     pub project: Project,
     pub painted: Option<Arc<Vec<bool>>>,
+    /// Masks of the part's vertices that supports may name.
+    pub masks: Masks,
 }
 
 /// An open project.
@@ -48,6 +50,7 @@ impl Document {
         let state = State {
             project: loaded.inputs.project,
             painted: loaded.inputs.painted,
+            masks: loaded.inputs.masks,
         };
         Self {
             part: loaded.inputs.part,
@@ -70,6 +73,7 @@ impl Document {
             project: self.state.project.clone(),
             part: Arc::clone(&self.part),
             painted: self.state.painted.clone(),
+            masks: self.state.masks.clone(),
         }
     }
 

@@ -6,14 +6,21 @@
 
 pub mod bending;
 pub mod element;
+pub mod estimate;
+pub mod grade;
+pub mod linearity;
 pub mod load;
 pub mod membrane;
 pub mod model;
 pub mod observe;
+mod recover;
+pub mod respond;
+mod rows;
+pub mod scope;
 mod solver;
 pub mod support;
 
-pub use load::Touch;
+pub use load::{NodalForces, Touch};
 pub use model::{ElasticError, ShellModel};
 pub use support::{Freedoms, Support};
 

@@ -5,9 +5,11 @@ pub mod atomic;
 pub mod glb;
 pub mod mesh_file;
 pub mod npz;
+pub mod points;
 pub mod project_file;
 pub mod report;
 pub mod svg;
+pub mod vtu;
 
 use std::path::PathBuf;
 

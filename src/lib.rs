@@ -11,6 +11,7 @@ pub mod document;
 pub mod elasticity;
 pub mod evaluation;
 pub mod feasible;
+pub mod given;
 pub mod io;
 pub mod job;
 pub mod limb;

@@ -2,16 +2,22 @@
 //!
 //! Positions are in metres. Everything after this layer may index without checking again.
 
+pub mod cut;
 pub mod geodesic;
 pub mod locate;
 pub mod refine;
+pub mod remesh;
+pub mod repair;
 pub mod sample;
+pub mod surface;
 pub mod unroll;
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
 use glam::DVec3;
 use serde::Serialize;
+
+use repair::Repair;
 
 /// Why a mesh was refused, with the place and the remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -47,6 +53,8 @@ pub enum MeshError {
 pub struct RepairReport {
     /// Vertices merged because their positions were equal to the bit.
     pub welded_vertices: usize,
+    /// Vertices merged because they were nearer than the tolerance asked for.
+    pub joined_vertices: usize,
     pub degenerate_triangles: usize,
     pub duplicate_triangles: usize,
     /// Triangles turned over so that neighbours agree on the outside.
@@ -55,6 +63,12 @@ pub struct RepairReport {
     pub bodies: usize,
     /// Edges shared by more than two triangles: kept, the shell is joined there.
     pub non_manifold_edges: usize,
+    /// Edges with a triangle on one side only: free rims.
+    pub boundary_edges: usize,
+    /// Holes that were filled because that was asked for.
+    pub filled_holes: usize,
+    /// Triangles thinner than a hundredth of their length: kept, a new mesh is laid for computing.
+    pub slivers: usize,
 }
 
 /// An edge between two vertices (`a < b`) and the triangles on it.
@@ -93,15 +107,42 @@ impl TriMesh {
         triangles: &[[u32; 3]],
         body: usize,
     ) -> Result<(Self, RepairReport), MeshError> {
+        Self::repaired(positions, triangles, body, &Repair::default())
+    }
+
+    /// As [`Self::new`], with the repairs that are asked for.
+    ///
+    /// # Errors
+    /// [`MeshError`] for anything that cannot be a surface.
+    pub fn repaired(
+        positions: &[DVec3],
+        triangles: &[[u32; 3]],
+        body: usize,
+        repair: &Repair,
+    ) -> Result<(Self, RepairReport), MeshError> {
         check_raw(positions, triangles)?;
         let mut report = RepairReport::default();
-        let (positions, triangles) = weld(positions, triangles, &mut report);
+        let (mut positions, mut triangles) = weld(positions, triangles, &mut report);
+        if repair.weld > 0.0 {
+            let (renumber, kept) = repair::join_near(&positions, repair.weld);
+            report.joined_vertices = positions.len() - kept.len();
+            positions = kept;
+            triangles = triangles
+                .iter()
+                .map(|t| t.map(|v| renumber[v as usize]))
+                .collect();
+        }
         let triangles = drop_degenerate(&positions, triangles, &mut report)?;
-        let (positions, mut triangles) = keep_body(&positions, &triangles, body, &mut report)?;
+        let (mut positions, mut triangles) = keep_body(&positions, &triangles, body, &mut report)?;
         orient(&mut triangles, &mut report);
+        fill_holes(&mut positions, &mut triangles, repair, &mut report);
         turn_closed_outward(&positions, &mut triangles, &mut report);
         let mesh = Self::from_checked(positions, triangles);
         report.non_manifold_edges = mesh.edges.iter().filter(|e| e.triangles.len() > 2).count();
+        report.boundary_edges = mesh.boundary_edges().count();
+        report.slivers = (0..mesh.triangles.len() as u32)
+            .filter(|&t| mesh.thinness(t) < 0.01)
+            .count();
         Ok((mesh, report))
     }
 
@@ -151,6 +192,13 @@ impl TriMesh {
         &self.vertex_normals
     }
 
+    /// The same surface with its inside out.
+    #[must_use]
+    pub fn turned_over(&self) -> Self {
+        let turned = self.triangles.iter().map(|&[a, b, c]| [a, c, b]);
+        Self::from_checked(self.positions.clone(), turned.collect())
+    }
+
     /// The three corners of a triangle (m).
     #[must_use]
     pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
@@ -169,6 +217,16 @@ impl TriMesh {
     pub fn facet_area(&self, triangle: u32) -> f64 {
         let [a, b, c] = self.corners(triangle);
         (b - a).cross(c - a).length() / 2.0
+    }
+
+    /// Height of a facet over its longest side.
+    #[must_use]
+    pub fn thinness(&self, triangle: u32) -> f64 {
+        let p = self.corners(triangle);
+        let longest = (0..3)
+            .map(|i| p[i].distance_squared(p[(i + 1) % 3]))
+            .fold(0.0, f64::max);
+        2.0 * self.facet_area(triangle) / longest
     }
 
     /// Area of the whole surface (m²).
@@ -379,6 +437,29 @@ fn keep_body(
     Ok((kept, chosen))
 }
 
+fn fill_holes(
+    positions: &mut Vec<DVec3>,
+    triangles: &mut Vec<[u32; 3]>,
+    repair: &Repair,
+    report: &mut RepairReport,
+) {
+    if repair.fill_holes <= 0.0 {
+        return;
+    }
+    for rim in repair::holes(positions, triangles, repair.fill_holes) {
+        report.filled_holes += 1;
+        if let Some(filling) = repair::fill(positions, &rim) {
+            triangles.extend(filling);
+            continue;
+        }
+        // Too long for the best filling: a fan round the middle.
+        let middle = rim.iter().map(|&v| positions[v as usize]).sum::<DVec3>() / rim.len() as f64;
+        let centre = positions.len() as u32;
+        positions.push(middle);
+        triangles.extend((0..rim.len()).map(|i| [rim[i], rim[(i + 1) % rim.len()], centre]));
+    }
+}
+
 /// The representative of a vertex in a union-find forest, with its path halved.
 fn root(parent: &mut [u32], mut v: u32) -> u32 {
     while parent[v as usize] != v {
@@ -530,6 +611,7 @@ mod tests {
             report,
             RepairReport {
                 bodies: 1,
+                boundary_edges: 4,
                 ..Default::default()
             }
         );

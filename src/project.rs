@@ -1,13 +1,18 @@
 //! A project: everything a design depends on, as plain data in the units of its file.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::budget::Quality;
 use crate::dataset::Signal;
+use crate::elasticity::support::Region;
 use crate::elasticity::{Freedoms, Material, Section, Support};
 use crate::feasible::FeasibleRules;
 use crate::limb::BoxMm;
+use crate::mesh::repair::Repair;
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
 use crate::placement::candidates::Reduction;
@@ -103,6 +108,15 @@ pub struct Part {
     pub unit: Option<Unit>,
     #[serde(default)]
     pub body: usize,
+    /// Vertices nearer to each other than this are joined; zero joins equal ones only.
+    #[serde(default)]
+    pub weld_mm: f64,
+    /// Holes up to this far across are filled.
+    #[serde(default)]
+    pub fill_holes_mm: f64,
+    /// What the elastic model is computed on.
+    #[serde(default)]
+    pub elements: Elements,
     #[serde(default)]
     pub model: PartModel,
     #[serde(default = "defaults::thickness")]
@@ -110,6 +124,28 @@ pub struct Part {
     /// The axis the part is unrolled about.
     #[serde(default)]
     pub axis: Axis,
+}
+
+impl Part {
+    /// The repairs asked for when the mesh is read.
+    #[must_use]
+    pub fn repair(&self) -> Repair {
+        Repair {
+            weld: self.weld_mm * MM,
+            fill_holes: self.fill_holes_mm * MM,
+        }
+    }
+}
+
+/// What the elastic model is computed on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Elements {
+    /// A mesh of its own on the part's surface, finer where the strain changes.
+    #[default]
+    Graded,
+    /// The triangles of the mesh file.
+    AsGiven,
 }
 
 /// How the mesh is meant.
@@ -145,7 +181,13 @@ pub enum SupportKind {
 pub struct SupportKeys {
     #[serde(default)]
     pub kind: SupportKind,
-    pub box_mm: BoxMm,
+    /// Every point of the part inside it is held.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_mm: Option<BoxMm>,
+    /// Instead of a box: a mask of the part's vertices, by its name in the arrays beside the project
+    /// file, or a group of the mesh file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertices: Option<String>,
     #[serde(default)]
     pub normal: Axis,
 }
@@ -346,6 +388,9 @@ impl Project {
                 mesh: mesh.to_owned(),
                 unit,
                 body: 0,
+                weld_mm: 0.0,
+                fill_holes_mm: 0.0,
+                elements: Elements::Graded,
                 model: PartModel::Shell,
                 thickness_mm: defaults::thickness(),
                 axis: Axis::Z,
@@ -374,22 +419,24 @@ impl Project {
         }
     }
 
-    #[must_use]
-    pub fn supports(&self) -> Vec<Support> {
+    /// The supports, with the masks of the part's vertices that some of them name.
+    ///
+    /// # Errors
+    /// [`BadValue`] for a support without a region, or with a mask that is not there.
+    pub fn supports(&self, masks: &Masks) -> Result<Vec<Support>, BadValue> {
         let axis = |a: Axis| [Axis::X, Axis::Y, Axis::Z].iter().position(|&b| a == b);
+        let held = |s: &SupportKeys| match s.kind {
+            SupportKind::Clamped => Freedoms::ALL,
+            SupportKind::Pinned => Freedoms::DISPLACEMENTS,
+            SupportKind::Symmetry => Freedoms::symmetry(axis(s.normal).unwrap_or(2)),
+        };
         self.supports
             .iter()
             .map(|s| {
-                let [a, b] = s.box_mm.map(|p| DVec3::from_array(p) * MM);
-                Support {
-                    lower: a.min(b),
-                    upper: a.max(b),
-                    held: match s.kind {
-                        SupportKind::Clamped => Freedoms::ALL,
-                        SupportKind::Pinned => Freedoms::DISPLACEMENTS,
-                        SupportKind::Symmetry => Freedoms::symmetry(axis(s.normal).unwrap_or(2)),
-                    },
-                }
+                Ok(Support {
+                    region: region(s, masks)?,
+                    held: held(s),
+                })
             })
             .collect()
     }
@@ -456,6 +503,8 @@ impl Project {
             check(key, "a number above zero", value, value > 0.0)?;
         }
         let least_zero = [
+            ("part.weld_mm", self.part.weld_mm),
+            ("part.fill_holes_mm", self.part.fill_holes_mm),
             ("touch.edge_margin_mm", self.touch.edge_margin_mm),
             ("gauge.noise_microstrain", self.gauge.noise_microstrain),
             (
@@ -518,7 +567,10 @@ impl Project {
         }
         let c = self.selection.c_mm;
         check("selection.c_mm", "above 0 and at most 1e12", c, c <= 1e12)?;
-        let boxes = self.supports.iter().map(|s| ("support.box_mm", &s.box_mm));
+        let boxes = self
+            .supports
+            .iter()
+            .filter_map(|s| Some(("support.box_mm", s.box_mm.as_ref()?)));
         let regions = self
             .evaluation
             .regions
@@ -530,6 +582,41 @@ impl Project {
             }
         }
         Ok(())
+    }
+}
+
+/// Masks of the part's vertices by name: arrays beside the project file, and groups of the mesh file.
+pub type Masks = BTreeMap<String, Arc<Vec<bool>>>;
+
+fn region(support: &SupportKeys, masks: &Masks) -> Result<Region, BadValue> {
+    match (&support.box_mm, &support.vertices) {
+        (Some(corners), None) => {
+            let [a, b] = corners.map(|p| DVec3::from_array(p) * MM);
+            Ok(Region::Box {
+                lower: a.min(b),
+                upper: a.max(b),
+            })
+        }
+        (None, Some(name)) => {
+            let mask = masks.get(name).ok_or_else(|| BadValue {
+                key: "support.vertices".into(),
+                rule: "the name of an array beside the project file or of a group of the mesh file",
+                value: format!(
+                    "\"{name}\" (there is {})",
+                    if masks.is_empty() {
+                        "none".into()
+                    } else {
+                        masks.keys().cloned().collect::<Vec<_>>().join(", ")
+                    }
+                ),
+            })?;
+            Ok(Region::Vertices(Arc::clone(mask)))
+        }
+        (both, _) => Err(BadValue {
+            key: "support".into(),
+            rule: "given one region: box_mm or vertices",
+            value: if both.is_some() { "given both" } else { "given neither" }.into(),
+        }),
     }
 }
 

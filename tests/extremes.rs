@@ -7,10 +7,12 @@ use glam::DVec3;
 use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::dataset::Signal;
 use hapdef::design::{self, Design, DesignError, Inputs};
+use hapdef::elasticity::Touch;
+use hapdef::given::{self, GivenSite};
 use hapdef::limb::LimbSpec;
 use hapdef::mesh::TriMesh;
 use hapdef::placement::{PlacementError, SelectorKind};
-use hapdef::project::{Lattice, Project, SupportKeys, SupportKind};
+use hapdef::project::{Elements, Lattice, Masks, Project, SupportKeys, SupportKind};
 
 fn budget() -> Budget {
     Budget {
@@ -151,7 +153,13 @@ fn noise_above_every_signal_leaves_no_site() {
 
 #[test]
 fn the_same_limb_at_a_micrometre_and_at_a_metre() {
-    // Geometric similarity: lengths and tip times k, force times k²: strains stay.
+    // Geometric similarity: lengths and tip times k, force times k²: strains stay. On the part's own
+    // triangles, for remeshing takes other turns where two choices are equal.
+    let limb = || {
+        let mut inputs = limb();
+        inputs.project.part.elements = Elements::AsGiven;
+        inputs
+    };
     let base = sound("limb", &limb());
     for k in [1e-5, 10.0] {
         let mut inputs = limb();
@@ -159,7 +167,7 @@ fn the_same_limb_at_a_micrometre_and_at_a_metre() {
         inputs.part = Arc::new(TriMesh::new(&scaled, inputs.part.triangles(), 0).unwrap().0);
         let p = &mut inputs.project;
         for support in &mut p.supports {
-            support.box_mm = support.box_mm.map(|c| c.map(|x| x * k));
+            support.box_mm = support.box_mm.map(|b| b.map(|c| c.map(|x| x * k)));
         }
         p.part.thickness_mm *= k;
         p.touch.force_n *= k * k;
@@ -195,7 +203,8 @@ fn one_triangle_and_a_sliver() {
         let mut project = Project::around("t.glb", None);
         project.supports.push(SupportKeys {
             kind: SupportKind::Clamped,
-            box_mm: [[-1.0, -0.001, -1.0], [51.0, 0.001, 1.0]],
+            box_mm: Some([[-1.0, -0.001, -1.0], [51.0, 0.001, 1.0]]),
+            vertices: None,
             normal: hapdef::mesh::unroll::Axis::Z,
         });
         project.touch.edge_margin_mm = 0.0;
@@ -208,6 +217,7 @@ fn one_triangle_and_a_sliver() {
             project,
             part: Arc::new(TriMesh::new(&p, &[[0, 1, 2]], 0).unwrap().0),
             painted: None,
+            masks: Masks::new(),
         }
     };
     sound("one triangle", &tri(0.04));
@@ -218,7 +228,7 @@ fn one_triangle_and_a_sliver() {
 #[test]
 fn a_part_held_all_over_and_too_few_touches_are_refused() {
     let mut inputs = limb();
-    inputs.project.supports[0].box_mm = [[-1e3; 3], [1e3; 3]];
+    inputs.project.supports[0].box_mm = Some([[-1e3; 3], [1e3; 3]]);
     let error = run(&inputs).err().unwrap().to_string();
     assert!(error.contains("every point of the part is held"), "{error}");
     for count in [3, 7, 19] {
@@ -250,7 +260,7 @@ fn values_outside_their_range_are_named() {
         (|p| p.touch.count = usize::MAX, "touch.count"),
         (|p| p.feasible.edge_neighbours = 100_000, "edge_neighbours"),
         (|p| p.candidates.unexplained = 1.0, "unexplained"),
-        (|p| p.supports[0].box_mm[0][1] = f64::NAN, "box_mm"),
+        (|p| p.supports[0].box_mm = Some([[f64::NAN; 3]; 2]), "box_mm"),
     ];
     for (change, key) in cases {
         let mut inputs = limb();
@@ -261,4 +271,242 @@ fn values_outside_their_range_are_named() {
             .unwrap_or_default();
         assert!(error.contains(key), "{key}: {error}");
     }
+}
+
+/// A round plate (clamped outside 40 mm of 50 mm) pressed in its middle, as a project: its deflection is
+/// known in closed form for any thickness and Poisson's ratio.
+fn plate(thickness: f64, nu: f64, sliver: f64) -> (Inputs, f64) {
+    let (spokes, rings, outer, clear) = (120, 10, 50.0, 40.0);
+    let mut p = vec![DVec3::ZERO];
+    for ring in 1..=rings {
+        for k in 0..spokes {
+            let a = f64::from(k) / f64::from(spokes) * std::f64::consts::TAU;
+            let mut r = outer * f64::from(ring) / f64::from(rings);
+            if sliver > 0.0 && ring == 3 {
+                // This ring lies a hair outside the one before it.
+                r = outer * 2.0 / f64::from(rings) + sliver;
+            }
+            p.push(DVec3::new(a.cos(), a.sin(), 0.0) * r * 1e-3);
+        }
+    }
+    let at = |ring: u32, k: u32| 1 + (ring - 1) * spokes + k % spokes;
+    let mut t: Vec<[u32; 3]> = (0..spokes).map(|k| [0, at(1, k), at(1, k + 1)]).collect();
+    for ring in 1..rings as u32 {
+        for k in 0..spokes {
+            let [a, b, c, d] = [at(ring, k), at(ring + 1, k), at(ring + 1, k + 1), at(ring, k + 1)];
+            t.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    let mut project = Project::around("plate.glb", None);
+    project.part.thickness_mm = thickness;
+    project.material.poissons_ratio = nu;
+    project.supports.push(SupportKeys {
+        kind: SupportKind::Clamped,
+        box_mm: None,
+        vertices: Some("rim".into()),
+        normal: hapdef::mesh::unroll::Axis::Z,
+    });
+    let part = TriMesh::new(&p, &t, 0).unwrap().0;
+    let rim = part.positions().iter().map(|p| p.length() > clear * (1.0 - 1e-6) * 1e-3);
+    let mut masks = Masks::new();
+    masks.insert("rim".into(), Arc::new(rim.collect()));
+    let s = project.section();
+    let inputs = Inputs {
+        project,
+        part: Arc::new(part),
+        painted: None,
+        masks,
+    };
+    // 1 N in the middle, tip 4 mm: m = a²/4 is the tip's mean squared radius, and the mean of
+    // r² ln r over it is had by quadrature; deflection 20 mm from the middle needs only m.
+    let (big, r, m) = (clear * 1e-3, 20e-3, 4e-6_f64);
+    let bending = ((r * r + m) * (r / big).ln()
+        + (big * big + m) * (big * big - r * r) / (2.0 * big * big))
+        / (8.0 * std::f64::consts::PI * s.bending_stiffness());
+    let shear = (big / r).ln() / (2.0 * std::f64::consts::PI * s.shear_stiffness());
+    (inputs, bending + shear)
+}
+
+fn pressed(inputs: &Inputs) -> Result<given::Answer, DesignError> {
+    let touch = Touch {
+        position: DVec3::ZERO,
+        normal: DVec3::Z,
+        force: 1.0,
+        tip_radius: 4e-3,
+    };
+    let site = GivenSite {
+        position: DVec3::new(0.0, 20e-3, 0.0),
+        direction: DVec3::Y,
+    };
+    given::answer(inputs, &[touch], &[site], &Quality::Draft.budget().clone(), &unwatched)
+}
+
+fn deflection(inputs: &Inputs) -> f64 {
+    let answer = pressed(inputs).unwrap();
+    let pair = answer.pairs().next().unwrap();
+    assert!(pair.strain.is_finite() && answer.checks.reaction_error < 1e-4);
+    -pair.displacement.z
+}
+
+#[test]
+fn a_plate_of_any_thickness_deflects_as_theory_says() {
+    // Thickness over radius from 1e-1 to 1e-6.
+    for thickness in [4.0, 1.0, 0.1, 4e-3, 4e-4, 4e-5] {
+        let (inputs, known) = plate(thickness, 0.3, 0.0);
+        let ratio = deflection(&inputs) / known;
+        println!("t {thickness} mm: {ratio:.4}");
+        assert!((ratio - 1.0).abs() < 0.02, "t {thickness} mm: {ratio}");
+    }
+}
+
+#[test]
+fn a_plate_of_any_poissons_ratio_deflects_as_theory_says() {
+    for nu in [-0.9, 0.0, 0.45, 0.499] {
+        let (inputs, known) = plate(1.0, nu, 0.0);
+        let ratio = deflection(&inputs) / known;
+        println!("ν {nu}: {ratio:.4}");
+        assert!((ratio - 1.0).abs() < 0.02, "ν {nu}: {ratio}");
+    }
+}
+
+#[test]
+fn slivers_of_the_file_do_not_reach_the_answer() {
+    // A ring of triangles 1 mm long and down to 0.1 µm high: aspect 1e4.
+    for sliver in [1e-2, 1e-4] {
+        let (inputs, known) = plate(1.0, 0.3, sliver);
+        let thinnest = (0..inputs.part.triangles().len() as u32)
+            .map(|t| inputs.part.thinness(t))
+            .fold(1.0, f64::min);
+        let ratio = deflection(&inputs) / known;
+        println!("thinnest {thinnest:.0e}: {ratio:.4}");
+        assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+    }
+}
+
+#[test]
+fn millimetres_taken_for_metres_and_the_other_way_are_refused_in_plain_words() {
+    let scaled = |k: f64| {
+        let mut inputs = limb();
+        let points: Vec<DVec3> = inputs.part.positions().iter().map(|&p| p * k).collect();
+        inputs.part = Arc::new(TriMesh::new(&points, inputs.part.triangles(), 0).unwrap().0);
+        inputs
+    };
+    for k in [1e3, 1e-3] {
+        let error = run(&scaled(k)).err().expect("refused").to_string();
+        assert!(error.contains("check the unit of the mesh") || error.contains("support box"), "{error}");
+    }
+    // The supports' boxes moved along, so that only the sizes are wrong.
+    for k in [1e3, 1e-3] {
+        let mut inputs = scaled(k);
+        for support in &mut inputs.project.supports {
+            support.box_mm = support.box_mm.map(|b| b.map(|c| c.map(|x| x * k)));
+        }
+        let error = run(&inputs).err().expect("refused").to_string();
+        assert!(error.contains("unit of the mesh"), "{error}");
+    }
+}
+
+#[test]
+fn a_second_body_that_nothing_holds_is_left_out_or_named() {
+    let near = limb();
+    let mut points = near.part.positions().to_vec();
+    let mut triangles = near.part.triangles().to_vec();
+    let base = points.len() as u32;
+    points.extend([0.5, 0.51, 0.52].map(|x| DVec3::new(x, 0.01 * (x - 0.5).sin(), 0.0)));
+    triangles.push([base, base + 1, base + 2]);
+    let (kept, report) = TriMesh::new(&points, &triangles, 0).unwrap();
+    assert_eq!((report.bodies, kept.positions().len()), (2, near.part.positions().len()));
+    let mut inputs = limb();
+    inputs.part = Arc::new(TriMesh::new(&points, &triangles, 1).unwrap().0);
+    let error = run(&inputs).err().expect("nothing holds it").to_string();
+    assert!(error.contains("support"), "{error}");
+}
+
+#[test]
+fn touches_off_the_part_are_projected_or_refused() {
+    let (inputs, _) = plate(1.0, 0.3, 0.0);
+    let at = |height: f64, x: f64| {
+        let touch = Touch {
+            position: DVec3::new(x, 0.0, height),
+            normal: DVec3::Z,
+            force: 1.0,
+            tip_radius: 4e-3,
+        };
+        let site = GivenSite {
+            position: DVec3::new(0.0, 20e-3, -0.5e-3),
+            direction: DVec3::Y,
+        };
+        given::answer(&inputs, &[touch], &[site], &Quality::Draft.budget(), &unwatched)
+    };
+    let answer = at(3e-3, 0.0).unwrap();
+    assert!((answer.touch_distances[0] - 3e-3).abs() < 1e-9);
+    assert!((answer.site_distances[0] - 0.5e-3).abs() < 1e-9);
+    let straight = at(0.0, 0.0).unwrap();
+    let strain = |a: &given::Answer| a.pairs().next().unwrap().strain;
+    assert!((strain(&answer) / strain(&straight) - 1.0).abs() < 1e-9);
+    // Pressed on what is held: nothing moves, and that is no error.
+    let held = at(0.0, 0.047).unwrap();
+    assert!(strain(&held).abs() < 1e-6 * strain(&straight).abs());
+    let error = at(5.0, 0.0).err().expect("5 m away").to_string();
+    assert!(error.contains("touch 0") && error.contains("unit"), "{error}");
+}
+
+#[test]
+fn a_tip_larger_than_the_part_presses_all_of_it() {
+    let (inputs, _) = plate(1.0, 0.3, 0.0);
+    let touch = |tip_radius| Touch {
+        position: DVec3::ZERO,
+        normal: DVec3::Z,
+        force: 1.0,
+        tip_radius,
+    };
+    let site = GivenSite {
+        position: DVec3::ZERO,
+        direction: DVec3::Y,
+    };
+    let budget = Quality::Draft.budget();
+    let answer = given::answer(&inputs, &[touch(10.0), touch(20.0)], &[site], &budget, &unwatched);
+    let answer = answer.unwrap();
+    let down: Vec<f64> = answer.pairs().map(|p| -p.displacement.z).collect();
+    // 1 N over a disc of 50 mm, of which 40 mm are free: q R⁴ / 64 D with q = 1 N over all of it.
+    let s = inputs.project.section();
+    let known = 0.04_f64.powi(4) / (std::f64::consts::PI * 0.05 * 0.05) / (64.0 * s.bending_stiffness());
+    for w in down {
+        assert!((w / known - 1.0).abs() < 0.03, "{w:e} {known:e}");
+    }
+}
+
+#[test]
+fn a_million_triangles_are_taken_in_and_computed_on() {
+    let n = 708u32;
+    let p: Vec<DVec3> = (0..=n)
+        .flat_map(|j| (0..=n).map(move |i| DVec3::new(f64::from(i), f64::from(j), 0.0) * 1e-4))
+        .collect();
+    let at = |i: u32, j: u32| j * (n + 1) + i;
+    let t: Vec<[u32; 3]> = (0..n)
+        .flat_map(|j| {
+            (0..n).flat_map(move |i| {
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                [[a, b, c], [a, c, d]]
+            })
+        })
+        .collect();
+    assert!(t.len() > 1_000_000);
+    let mut project = Project::around("plate.glb", None);
+    project.supports.push(SupportKeys {
+        kind: SupportKind::Clamped,
+        box_mm: Some([[-1.0, -1.0, -1.0], [80.0, 10.0, 1.0]]),
+        vertices: None,
+        normal: hapdef::mesh::unroll::Axis::Z,
+    });
+    let inputs = Inputs {
+        project,
+        part: Arc::new(TriMesh::new(&p, &t, 0).unwrap().0),
+        painted: None,
+        masks: Masks::new(),
+    };
+    let simulated = design::simulate(&inputs, &budget(), &unwatched).unwrap();
+    let vertices = simulated.mesh.positions().len();
+    assert!((1500..8000).contains(&vertices), "{vertices}");
+    assert!(simulated.dataset.x.values().iter().all(|x| x.is_finite()));
 }

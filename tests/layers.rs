@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// From the bottom up; a module may use those above it in this list, itself included.
-const ORDER: [&[&str]; 10] = [
+const ORDER: [&[&str]; 11] = [
     &["budget"],
     &["mesh"],
     &["limb", "elasticity"],
@@ -13,6 +13,7 @@ const ORDER: [&[&str]; 10] = [
     &["placement", "evaluation"],
     &["project"],
     &["design"],
+    &["given"],
     &["io", "job", "document", "render", "cli", "studio"],
 ];
 

@@ -12,7 +12,8 @@ use hapdef::design::{self, Inputs};
 use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::{Face, Observer};
 use hapdef::elasticity::support::held_freedoms;
-use hapdef::elasticity::{ShellModel, Touch};
+use hapdef::elasticity::respond::{Reading, Responses, Side, respond, respond_from};
+use hapdef::elasticity::{Freedoms, ShellModel, Touch};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::locate::SurfaceIndex;
 use hapdef::placement::greedy_svr::GreedySvr;
@@ -24,8 +25,13 @@ fn bundled() -> Inputs {
     hapdef::cli::bundled().unwrap().inputs
 }
 
-fn model(inputs: &Inputs) -> ShellModel<'_> {
-    let held = held_freedoms(&inputs.part, &inputs.project.supports());
+fn held(inputs: &Inputs) -> Vec<Freedoms> {
+    let supports = inputs.project.supports(&inputs.masks).unwrap();
+    held_freedoms(&inputs.part, &supports)
+}
+
+fn model(inputs: &Inputs) -> ShellModel {
+    let held = held(inputs);
     ShellModel::new(&inputs.part, inputs.project.section(), &held, &unwatched).unwrap()
 }
 
@@ -99,8 +105,8 @@ fn a_turned_limb_deforms_the_same() {
     let turned = TriMesh::new(&positions, inputs.part.triangles(), 0)
         .unwrap()
         .0;
-    let held = held_freedoms(&inputs.part, &inputs.project.supports());
-    let m = ShellModel::new(&turned, inputs.project.section(), &held, &unwatched).unwrap();
+    let held = held(&inputs);
+    let m = ShellModel::new(&Arc::new(turned), inputs.project.section(), &held, &unwatched).unwrap();
     let mut t = touch(&inputs, DVec3::new(0.03, 0.01, 0.07));
     t.position = turn * t.position;
     t.normal = turn * t.normal;
@@ -151,28 +157,82 @@ fn touches_superpose_and_are_reciprocal_and_in_balance() {
     assert!(check.reaction_error < 1e-8, "{check:?}");
 }
 
+/// All responses, outputs by rows.
+fn table(responses: &Responses, touches: usize) -> Vec<f64> {
+    let mut row = vec![0.0; touches];
+    (0..responses.rows())
+        .flat_map(|r| {
+            responses.row_into(r, &mut row);
+            row.clone()
+        })
+        .collect()
+}
+
+fn many_touches(inputs: &Inputs) -> Vec<Touch> {
+    (0..70)
+        .map(|k| touch(inputs, DVec3::new(0.03, 0.001 * f64::from(k) - 0.03, 0.06)))
+        .collect()
+}
+
+fn some_sites(inputs: &Inputs) -> Vec<hapdef::mesh::SurfacePoint> {
+    hapdef::mesh::sample::random(&inputs.part, 12, 3, |_| true)
+}
+
 #[test]
 fn blocks_give_the_bytes_of_single_touches() {
     let inputs = bundled();
     let m = model(&inputs);
-    let touches: Vec<Touch> = (0..70)
-        .map(|k| touch(&inputs, DVec3::new(0.03, 0.001 * f64::from(k) - 0.03, 0.06)))
-        .collect();
-    let firsts = m
-        .solve_touches(&touches, &unwatched, |first, rows| {
-            let width = rows.len() / (6 * inputs.part.positions().len());
-            (
-                first,
-                rows[6 * 1000 * width + 2],
-                rows[6 * 1000 * width + width + 5],
-            )
-        })
-        .unwrap();
-    assert_eq!(firsts.len(), 2);
-    let single = m.solve(&m.forces(&touches[2]));
-    assert_eq!(firsts[0].1.to_bits(), single[6000].to_bits());
-    let single = m.solve(&m.forces(&touches[64 + 5]));
-    assert_eq!(firsts[1].2.to_bits(), single[6001].to_bits());
+    let touches = many_touches(&inputs);
+    let observer = Observer::new(&m, &some_sites(&inputs), Face::Inside);
+    let read = |touches: &[Touch]| {
+        let reading = Reading::StrainAndDisplacement;
+        let r = respond_from(Side::Loads, &m, touches, &observer, reading, &unwatched).unwrap();
+        table(&r, touches.len())
+    };
+    let all = read(&touches);
+    for t in [2, 69] {
+        let single = read(&touches[t..=t]);
+        let column: Vec<f64> = all.iter().skip(t).step_by(touches.len()).copied().collect();
+        let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&column), bits(&single));
+        let u = m.solve(&m.forces(&touches[t]));
+        let direct = observer.displacement_of(&m, &u)[5];
+        let read = DVec3::from_array(std::array::from_fn(|k| single[3 * (12 + 5) + k]));
+        assert!(direct.distance(read) < 1e-12 * direct.length());
+    }
+}
+
+/// Maxwell and Betti: solving for the loads or for the outputs gives the same, and the fewer are solved.
+#[test]
+fn loads_and_outputs_are_reciprocal() {
+    let inputs = bundled();
+    let m = model(&inputs);
+    let touches = many_touches(&inputs);
+    let observer = Observer::new(&m, &some_sites(&inputs), Face::Inside);
+    let angles: Vec<f64> = (0..12).map(|k| 0.3 * f64::from(k)).collect();
+    for reading in [
+        Reading::Strain,
+        Reading::StrainAndDisplacement,
+        Reading::Gauge(&angles),
+        Reading::GaugeAndDisplacement(&angles),
+        Reading::Displacement,
+    ] {
+        let [a, b] = [Side::Loads, Side::Outputs].map(|side| {
+            let r = respond_from(side, &m, &touches, &observer, reading, &unwatched).unwrap();
+            table(&r, touches.len())
+        });
+        assert_eq!(a.len(), b.len());
+        for (x, y) in a.chunks(touches.len()).zip(b.chunks(touches.len())) {
+            let apart: Vec<f64> = x.iter().zip(y).map(|(x, y)| x - y).collect();
+            assert!(norm(&apart) < 1e-9 * norm(x), "{:e}", norm(&apart) / norm(x));
+        }
+    }
+    let fewer = |count: usize| {
+        let reading = Reading::Gauge(&angles);
+        respond(&m, &touches[..count], &observer, reading, &unwatched).unwrap()
+    };
+    assert_eq!((fewer(70).side, fewer(70).solves), (Side::Outputs, 12));
+    assert_eq!((fewer(5).side, fewer(5).solves), (Side::Loads, 5));
 }
 
 #[test]
@@ -187,15 +247,15 @@ fn the_inside_face_is_the_outside_face_of_the_shell_turned_over() {
     let other = TriMesh::new(inputs.part.positions(), &flipped, 0)
         .unwrap()
         .0;
-    let held = held_freedoms(&inputs.part, &inputs.project.supports());
+    let held = held(&inputs);
     let section = inputs.project.section();
     let m = ShellModel::new(&inputs.part, section, &held, &unwatched).unwrap();
-    let n = ShellModel::new(&other, section, &held, &unwatched).unwrap();
+    let n = ShellModel::new(&Arc::new(other), section, &held, &unwatched).unwrap();
     let u = m.solve(&m.forces(&touch(&inputs, DVec3::new(0.03, 0.01, 0.07))));
     let place = DVec3::new(0.028, 0.012, 0.06);
     let size = |m: &ShellModel, face| {
         let at = m.index.nearest(place).0;
-        let [xx, yy, xy] = Observer::new(m, &[at], face).strain_of(&u)[0];
+        let [xx, yy, xy] = Observer::new(m, &[at], face).strain_of(m, &u)[0];
         (f64::midpoint(xx, yy), ((xx - yy) / 2.0).hypot(xy / 2.0))
     };
     let (inside, outside) = (size(&m, Face::Inside), size(&n, Face::Outside));
@@ -276,7 +336,8 @@ fn the_work_is_counted_and_nothing_is_done_twice() {
     let work = simulated.dataset.work;
     assert_eq!(
         (work.assemblies, work.factorizations, work.solves),
-        (1, 1, 200)
+        // An even mesh, a graded one, and that one halved; on each the sample of the loads, then all.
+        (3, 3, 3 * 50 + 200)
     );
     let design = design::run_from(
         &inputs,
@@ -288,11 +349,12 @@ fn the_work_is_counted_and_nothing_is_done_twice() {
     )
     .unwrap();
     let total = design.work();
-    // The truth is the only other model, and only the test touches are solved on it.
-    assert_eq!(
-        (total.assemblies, total.factorizations, total.solves),
-        (2, 2, 260)
-    );
+    // The truth is the only other model, and on it the fewer of sites and test touches are solved for.
+    let truth = design.truth.work;
+    assert_eq!((truth.assemblies, truth.factorizations), (1, 1));
+    assert!(truth.solves <= 60, "{truth:?}");
+    assert_eq!(total.assemblies, work.assemblies + 1);
+    assert_eq!(total.solves, work.solves + truth.solves);
 }
 
 /// The greedy selector against a naive one that trains every set from nothing.

@@ -12,7 +12,7 @@ use crate::io::{atomic, glb, project_file};
 use crate::limb::{LimbSpec, LimbSupport};
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
-use crate::project::{Lattice, Project, RegionKeys, SupportKeys, SupportKind};
+use crate::project::{Masks, Lattice, Project, RegionKeys, SupportKeys, SupportKind};
 
 /// Lengths in millimetres. Without options it writes the bundled limb.
 #[derive(Args, Debug, Clone)]
@@ -122,7 +122,7 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
             .mesh;
         project.selection.sites = choose_sites(&project, stored)?;
     }
-    project_file::save(&args.out.join("limb.hapdef.toml"), &project, None)?;
+    project_file::save(&args.out.join("limb.hapdef.toml"), &project, None, &Masks::new())?;
     let figures = json!({
         "vertices": mesh.positions().len(),
         "triangles": mesh.triangles().len(),
@@ -146,7 +146,8 @@ fn project(spec: &LimbSpec, boxes: &[[[f64; 3]; 2]]) -> Project {
         .iter()
         .map(|&box_mm| SupportKeys {
             kind: SupportKind::Clamped,
-            box_mm,
+            box_mm: Some(box_mm),
+            vertices: None,
             normal: Axis::default(),
         })
         .collect();
@@ -169,6 +170,7 @@ fn choose_sites(
         project: project.clone(),
         part: Arc::new(mesh),
         painted: None,
+        masks: Masks::new(),
     };
     let budget = Quality::Draft.budget();
     let simulated = crate::design::simulate(&inputs, &budget, &unwatched)?;

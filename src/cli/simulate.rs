@@ -1,21 +1,36 @@
-//! `hapdef simulate`: the elastic model only.
+//! `hapdef simulate`: the elastic model only, over the whole part or at given points.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use anyhow::ensure;
 use clap::Args;
 use serde_json::json;
 
 use super::{Common, progress::Bar};
 use crate::design;
+use crate::given;
 use crate::io::artifacts::save_dataset;
+use crate::io::project_file::LoadedProject;
+use crate::io::{points, vtu};
 
 #[derive(Args, Debug, Clone)]
 pub struct SimulateArgs {
     #[command(flatten)]
     pub common: Common,
-    /// The dataset (.npz).
+    /// Touches to answer for (.csv): x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm. The force pushes
+    /// along the opposite of the outward normal n.
+    #[arg(long, requires = "sites")]
+    pub touches: Option<PathBuf>,
+    /// Gauges to answer for (.csv): x_mm,y_mm,z_mm,dx,dy,dz, with d the direction of the gauge.
+    #[arg(long, requires = "touches")]
+    pub sites: Option<PathBuf>,
+    /// The dataset (.npz), or the answers at given points (.csv or .npz): touch, site, displacement
+    /// (mm) and strain on the inside face, and how far the given points lay from the part (mm).
     #[arg(long)]
     pub out: PathBuf,
+    /// Fields for ParaView (.vtu): mesh, supports, displacements and strains under the first touches.
+    #[arg(long)]
+    pub vtu: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -23,19 +38,38 @@ pub struct SimulateArgs {
 /// # Errors
 /// A message in the user's terms.
 pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
+    let given = args.touches.as_deref().zip(args.sites.as_deref());
+    let endings: &[&str] = if given.is_some() { &["csv", "npz"] } else { &["npz"] };
+    check_output(&args.out, endings)?;
+    if let Some(path) = &args.vtu {
+        check_output(path, &["vtu"])?;
+    }
     let loaded = args.common.load()?;
-    anyhow::ensure!(
-        args.out.extension().is_some_and(|e| e == "npz"),
-        "{}: datasets are written as .npz",
-        args.out.display()
+    match given {
+        Some((touches, sites)) => at_points(args, &loaded, touches, sites),
+        None => everywhere(args, &loaded),
+    }
+}
+
+fn check_output(path: &Path, endings: &[&str]) -> anyhow::Result<()> {
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    ensure!(
+        endings.contains(&ending.as_ref()),
+        "{}: this is written as .{}",
+        path.display(),
+        endings.join(" or .")
     );
-    if let Some(folder) = args.out.parent().filter(|f| !f.as_os_str().is_empty()) {
-        anyhow::ensure!(
+    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+        ensure!(
             folder.is_dir(),
             "{}: there is no such folder. Create it first",
             folder.display()
         );
     }
+    Ok(())
+}
+
+fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()> {
     let budget = loaded.inputs.project.budget.quality.budget();
     let bar = Bar::default();
     let result = args
@@ -44,18 +78,93 @@ pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     bar.finish();
     let simulated = result?;
     save_dataset(&args.out, &simulated.dataset)?;
-    if args.common.json {
-        let summary = json!({
-            "sites": simulated.dataset.sites.len(),
-            "touches": simulated.dataset.touches.len(),
-            "signal": simulated.dataset.signal,
-            "vertices": simulated.mesh.positions().len(),
-            "unknowns": simulated.unknowns,
-            "achieved": simulated.achieved,
-        });
-        println!("{summary}");
-    } else {
-        eprintln!("wrote {}", args.out.display());
+    if let Some(path) = &args.vtu {
+        let model = simulated.model()?;
+        let touches = &simulated.dataset.touches;
+        let first = &touches[..touches.len().min(vtu::TOUCHES)];
+        vtu::write(path, &model.mesh, &vtu::fields(&model, &simulated.held, first))?;
     }
+    say(&simulated.achieved.notes);
+    let dataset = &simulated.dataset;
+    let summary = json!({
+        "sites": dataset.sites.len(),
+        "touches": dataset.touches.len(),
+        "signal": dataset.signal,
+        "bytes": dataset.x.values().len() * size_of::<f64>(),
+        "vertices": simulated.mesh.positions().len(),
+        "unknowns": simulated.unknowns,
+        "discretization": simulated.discretization,
+        "linearity": simulated.linearity,
+        "checks": simulated.checks,
+        "repairs": loaded.repairs,
+        "achieved": simulated.achieved,
+    });
+    finish(args, &summary);
     Ok(())
+}
+
+fn at_points(
+    args: &SimulateArgs,
+    loaded: &LoadedProject,
+    touches: &Path,
+    sites: &Path,
+) -> anyhow::Result<()> {
+    let touches = points::read_touches(touches)?;
+    let sites = points::read_sites(sites)?;
+    let budget = loaded.inputs.project.budget.quality.budget();
+    let bar = Bar::default();
+    let result = args.common.in_pool(|| {
+        let watch = |p| bar.show(p);
+        Ok(given::answer(&loaded.inputs, &touches, &sites, &budget, &watch)?)
+    });
+    bar.finish();
+    let answer = result?;
+    points::write_answers(&args.out, &answer)?;
+    if let Some(path) = &args.vtu {
+        let first = &touches[..touches.len().min(vtu::TOUCHES)];
+        let fields = vtu::fields(&answer.model, &answer.held, first);
+        vtu::write(path, &answer.model.mesh, &fields)?;
+    }
+    say(&answer.notes);
+    let summary = json!({
+        "sites": sites.len(),
+        "touches": touches.len(),
+        "vertices": answer.model.mesh.positions().len(),
+        "unknowns": answer.model.unknowns(),
+        "discretization": answer.discretization,
+        "linearity": answer.linearity,
+        "checks": answer.checks,
+        "repairs": loaded.repairs,
+        "notes": answer.notes,
+    });
+    finish(args, &summary);
+    Ok(())
+}
+
+fn say(notes: &[String]) {
+    for note in notes {
+        eprintln!("note: {note}");
+    }
+}
+
+fn finish(args: &SimulateArgs, summary: &serde_json::Value) {
+    if args.common.json {
+        println!("{summary}");
+        return;
+    }
+    let number = |path: &str| summary.pointer(path).and_then(serde_json::Value::as_f64);
+    if let (Some(mm), Some(percent), Some(strain), Some(linear)) = (
+        number("/discretization/displacement_mm"),
+        number("/discretization/displacement_percent"),
+        number("/discretization/strain_percent"),
+        number("/linearity/largest_percent"),
+    ) {
+        eprintln!(
+            "estimated error of the mesh: {mm:.2e} mm ({percent:.1} %) under the touch, {strain:.1} % of a load's largest strain; of linearity: up to {:.1} %",
+            linear.abs()
+        );
+    }
+    for path in std::iter::once(&args.out).chain(&args.vtu) {
+        eprintln!("wrote {}", path.display());
+    }
 }

@@ -1,12 +1,15 @@
 //! The assembled and factored shell, ready for any number of touches.
 
-use faer::dyn_stack::MemBuffer;
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::element::Facet;
 use super::load::{NodalForces, Touch, nodal_forces};
-use super::solver::{BLOCK, Factor, FactorError, SymmetricMatrix};
+use super::rows::Rows;
+use super::solver::{BLOCK, Block, Factor, FactorError, SymmetricMatrix};
 use super::{Freedoms, Section};
 use crate::budget::{Cancelled, Watch, Work, report};
 use crate::mesh::TriMesh;
@@ -44,7 +47,7 @@ pub enum ElasticError {
 }
 
 /// Results of the checks that a solved load is put through.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LoadCheck {
     /// |sum of reactions + load| over the load.
     pub reaction_error: f64,
@@ -53,8 +56,8 @@ pub struct LoadCheck {
 }
 
 /// A shell: mesh, section and supports, assembled once and factored once.
-pub struct ShellModel<'a> {
-    pub mesh: &'a TriMesh,
+pub struct ShellModel {
+    pub mesh: Arc<TriMesh>,
     pub section: Section,
     pub index: SurfaceIndex,
     /// Unknown of each freedom (6 a vertex), or `HELD`.
@@ -66,13 +69,13 @@ pub struct ShellModel<'a> {
 
 const HELD: u32 = u32::MAX;
 
-impl<'a> ShellModel<'a> {
+impl ShellModel {
     /// Assembles and factors. `held` names the held freedoms of every vertex.
     ///
     /// # Errors
     /// [`ElasticError`] for values outside their range, and for parts that are not held.
     pub fn new(
-        mesh: &'a TriMesh,
+        mesh: &Arc<TriMesh>,
         section: Section,
         held: &[Freedoms],
         watch: Watch,
@@ -87,7 +90,7 @@ impl<'a> ShellModel<'a> {
         let factor = Factor::new(&stiffness).map_err(|e| explain(mesh, &unknowns, e))?;
         report(watch, "Factoring", 2, 2)?;
         Ok(Self {
-            mesh,
+            mesh: Arc::clone(mesh),
             section,
             index: SurfaceIndex::new(mesh),
             unknowns,
@@ -120,10 +123,20 @@ impl<'a> ShellModel<'a> {
         self.factor.smallest_pivot
     }
 
+    /// Connected pieces of the mesh, each of which was found held.
+    #[must_use]
+    pub fn pieces(&self) -> usize {
+        let mut labels =
+            crate::mesh::components(self.mesh.positions().len(), self.mesh.triangles());
+        labels.sort_unstable();
+        labels.dedup();
+        labels.len()
+    }
+
     /// Nodal forces of a touch.
     #[must_use]
     pub fn forces(&self, touch: &Touch) -> NodalForces {
-        nodal_forces(self.mesh, &self.index, touch)
+        nodal_forces(&self.mesh, &self.index, touch)
     }
 
     /// Displacements and rotations under one load: 6 × vertices, m and rad.
@@ -135,50 +148,111 @@ impl<'a> ShellModel<'a> {
     /// As [`Self::solve`] for loads given by freedom (6 × vertex + component): N and N·m.
     #[must_use]
     pub fn solve_freedoms(&self, loads: &[(usize, f64)]) -> Vec<f64> {
-        let n = self.unknowns();
-        let mut block = vec![0.0; n * BLOCK];
-        self.fill(loads, &mut block[..n]);
-        self.factor
-            .solve_block(&mut block, &mut self.factor.scratch());
-        self.expand(&block[..n])
+        let mut block = self.factor.block();
+        self.load(&mut block, 0, loads);
+        self.factor.solve(&mut block);
+        self.column(&block, 0)
     }
 
-    /// Solves all touches in blocks, spread over the rayon pool this is called in, and hands each
-    /// block to `consume`: the first touch's number and, by rows, the displacement of every freedom
-    /// (6 × vertices rows, [`BLOCK`] columns; columns beyond the last touch are zero). Results come
-    /// back in the order of the touches.
-    ///
-    /// # Errors
-    /// [`Cancelled`] when the watch asks for it.
-    pub fn solve_touches<T: Send>(
+    /// As [`Self::solve`] for several loads.
+    #[must_use]
+    pub fn solve_many(&self, loads: &[NodalForces]) -> Vec<Vec<f64>> {
+        self.solve_loads(&loads.iter().map(spread).collect::<Vec<_>>())
+    }
+
+    /// As [`Self::solve_freedoms`] for several loads, one block at a time.
+    #[must_use]
+    pub fn solve_loads(&self, loads: &[Vec<(usize, f64)>]) -> Vec<Vec<f64>> {
+        let mut solutions = Vec::with_capacity(loads.len());
+        let mut block = self.factor.block();
+        for chunk in loads.chunks(BLOCK) {
+            block.clear();
+            for (column, load) in chunk.iter().enumerate() {
+                self.load(&mut block, column, load);
+            }
+            self.factor.solve(&mut block);
+            solutions.extend((0..chunk.len()).map(|column| self.column(&block, column)));
+        }
+        solutions
+    }
+
+    /// One column of a solved block, by freedom.
+    fn column(&self, block: &Block, column: usize) -> Vec<f64> {
+        self.unknowns
+            .iter()
+            .map(|&u| {
+                if u == HELD {
+                    return 0.0;
+                }
+                let row = self.factor.order[u as usize] as usize;
+                block.rows[row * BLOCK + column] * self.factor.scale[u as usize]
+            })
+            .collect()
+    }
+
+    fn load(&self, block: &mut Block, column: usize, loads: &[(usize, f64)]) {
+        for &(freedom, force) in loads {
+            let unknown = self.unknowns[freedom];
+            if unknown != HELD {
+                self.factor.load(block, unknown as usize, column, force);
+            }
+        }
+    }
+
+    /// Solutions by freedom, at most [`BLOCK`], as the first columns of a solved block.
+    pub(super) fn widened(&self, solutions: &[impl AsRef<[f64]>]) -> Vec<f64> {
+        let mut rows = vec![0.0; self.unknowns() * BLOCK];
+        for (column, displacement) in solutions.iter().enumerate() {
+            for (freedom, &u) in displacement.as_ref().iter().enumerate() {
+                if let Some((row, scale)) = self.place(freedom) {
+                    rows[row as usize * BLOCK + column] = u / scale;
+                }
+            }
+        }
+        rows
+    }
+
+    /// Where a freedom stands in a solved block and what its value there is to be multiplied with;
+    /// nothing where it is held.
+    pub(super) fn place(&self, freedom: usize) -> Option<(u32, f64)> {
+        let unknown = self.unknowns[freedom];
+        (unknown != HELD).then(|| {
+            let unknown = unknown as usize;
+            (self.factor.order[unknown], self.factor.scale[unknown])
+        })
+    }
+
+    /// Solves for every row of `loads` (its entries by solver row, as [`Self::place`] gives them) and
+    /// hands each block to `consume`: a buffer of the thread's own, which rows the block holds, column by
+    /// column, and the solved block. The rows are taken in an order in which neighbours share blocks; blocks come back in that order,
+    /// which does not depend on the threads.
+    pub(super) fn solve_rows<T: Send>(
         &self,
-        touches: &[Touch],
+        loads: &Rows,
+        stage: &'static str,
         watch: Watch,
-        consume: impl Fn(usize, &[f64]) -> T + Sync,
+        consume: impl Fn(&mut Vec<f64>, &[u32], &[f64]) -> T + Sync,
     ) -> Result<Vec<T>, Cancelled> {
-        let n = self.unknowns();
+        let first = |row: u32| loads.row(row as usize).iter().map(|e| e.0).min();
+        let mut order: Vec<u32> = (0..loads.count() as u32).collect();
+        order.sort_by_key(|&row| (first(row), row));
         let done = std::sync::atomic::AtomicUsize::new(0);
-        touches
+        order
             .par_chunks(BLOCK)
-            .enumerate()
             .map_init(
-                || Scratch {
-                    memory: self.factor.scratch(),
-                    block: vec![0.0; n * BLOCK],
-                    rows: vec![0.0; self.unknowns.len() * BLOCK],
-                },
-                |scratch, (b, chunk)| {
+                || (self.factor.block(), Vec::new()),
+                |(block, buffer), chunk| {
                     let so_far = done.load(std::sync::atomic::Ordering::Relaxed);
-                    report(watch, "Solving touches", so_far, touches.len())?;
-                    scratch.block.fill(0.0);
-                    for (touch, column) in chunk.iter().zip(scratch.block.chunks_exact_mut(n)) {
-                        self.fill(&spread(&self.forces(touch)), column);
+                    report(watch, stage, so_far, order.len())?;
+                    block.clear();
+                    for (column, &row) in chunk.iter().enumerate() {
+                        for &(place, value) in loads.row(row as usize) {
+                            self.factor.load_place(block, place, column, value);
+                        }
                     }
-                    self.factor
-                        .solve_block(&mut scratch.block, &mut scratch.memory);
-                    self.transpose(&scratch.block, &mut scratch.rows);
+                    self.factor.solve(block);
                     done.fetch_add(chunk.len(), std::sync::atomic::Ordering::Relaxed);
-                    Ok(consume(b * BLOCK, &scratch.rows))
+                    Ok(consume(buffer, chunk, &block.rows))
                 },
             )
             .collect()
@@ -187,16 +261,45 @@ impl<'a> ShellModel<'a> {
     /// Checks a solution against its load: reactions and energy.
     #[must_use]
     pub fn check(&self, forces: &NodalForces, displacement: &[f64]) -> LoadCheck {
-        let mut internal = vec![0.0; displacement.len()];
+        self.check_solved(&[forces.clone()], &[displacement])
+    }
+
+    /// The worst of the checks of several solved touches.
+    #[must_use]
+    pub fn check_all(&self, touches: &[Touch], solutions: &[Vec<f64>]) -> LoadCheck {
+        let forces: Vec<NodalForces> = touches.iter().map(|t| self.forces(t)).collect();
+        let solutions: Vec<&[f64]> = solutions.iter().map(Vec::as_slice).collect();
+        self.check_solved(&forces, &solutions)
+    }
+
+    /// Element by element, apart from the assembled matrix and its factor.
+    fn check_solved(&self, loads: &[NodalForces], solutions: &[&[f64]]) -> LoadCheck {
+        let freedoms = self.unknowns.len();
+        let mut internal = vec![vec![0.0; freedoms]; solutions.len()];
         for (t, tri) in self.mesh.triangles().iter().enumerate() {
             let k = Facet::new(self.mesh.corners(t as u32), &self.section).stiffness(&self.section);
-            let freedoms = element_freedoms(tri);
-            let u = nalgebra::SVector::<f64, 18>::from_fn(|i, _| displacement[freedoms[i]]);
-            let f = k * u;
-            for i in 0..18 {
-                internal[freedoms[i]] += f[i];
+            let place = element_freedoms(tri);
+            for (internal, displacement) in internal.iter_mut().zip(solutions) {
+                let u = nalgebra::SVector::<f64, 18>::from_fn(|i, _| displacement[place[i]]);
+                let f = k * u;
+                for i in 0..18 {
+                    internal[place[i]] += f[i];
+                }
             }
         }
+        let mut worst = LoadCheck {
+            reaction_error: 0.0,
+            energy_error: 0.0,
+        };
+        for ((forces, displacement), internal) in loads.iter().zip(solutions).zip(&internal) {
+            let check = self.balance(forces, displacement, internal);
+            worst.reaction_error = worst.reaction_error.max(check.reaction_error);
+            worst.energy_error = worst.energy_error.max(check.energy_error);
+        }
+        worst
+    }
+
+    fn balance(&self, forces: &NodalForces, displacement: &[f64], internal: &[f64]) -> LoadCheck {
         // Held freedoms carry the reactions: the internal force less what presses there directly.
         let mut reaction = DVec3::ZERO;
         for (freedom, force) in spread(forces) {
@@ -215,10 +318,14 @@ impl<'a> ShellModel<'a> {
             .iter()
             .map(|&(d, f)| displacement[d] * f)
             .sum();
+        let energy_error = if external == 0.0 && twice_energy == 0.0 {
+            0.0 // pressed on the support itself
+        } else {
+            (external - twice_energy).abs() / twice_energy.abs().max(f64::MIN_POSITIVE)
+        };
         LoadCheck {
             reaction_error: (reaction + load).length() / load.length().max(f64::MIN_POSITIVE),
-            energy_error: (external - twice_energy).abs()
-                / twice_energy.abs().max(f64::MIN_POSITIVE),
+            energy_error,
         }
     }
 
@@ -232,7 +339,11 @@ impl<'a> ShellModel<'a> {
             }
         }
         let mut f = vec![0.0; self.unknowns()];
-        self.fill(&spread(forces), &mut f);
+        for (freedom, force) in spread(forces) {
+            if self.unknowns[freedom] != HELD {
+                f[self.unknowns[freedom] as usize] += force;
+            }
+        }
         let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         let r: Vec<f64> = self
             .stiffness
@@ -244,51 +355,20 @@ impl<'a> ShellModel<'a> {
         norm(&r) / norm(&f)
     }
 
-    fn fill(&self, loads: &[(usize, f64)], column: &mut [f64]) {
-        for &(freedom, force) in loads {
-            let unknown = self.unknowns[freedom];
-            if unknown != HELD {
-                column[unknown as usize] += force;
-            }
-        }
-    }
-
-    fn expand(&self, column: &[f64]) -> Vec<f64> {
-        self.unknowns
-            .iter()
-            .map(|&u| if u == HELD { 0.0 } else { column[u as usize] })
-            .collect()
-    }
-
-    /// From unknowns by columns to freedoms by rows, so that what reads it works on whole rows.
-    fn transpose(&self, block: &[f64], rows: &mut [f64]) {
-        let n = self.unknowns();
-        for (row, &unknown) in rows.chunks_exact_mut(BLOCK).zip(&self.unknowns) {
-            if unknown == HELD {
-                row.fill(0.0);
-            } else {
-                for (k, value) in row.iter_mut().enumerate() {
-                    *value = block[k * n + unknown as usize];
-                }
-            }
-        }
-    }
 }
 
-struct Scratch {
-    memory: MemBuffer,
-    block: Vec<f64>,
-    rows: Vec<f64>,
-}
-
-fn spread(forces: &NodalForces) -> Vec<(usize, f64)> {
+pub(super) fn spread(forces: &NodalForces) -> Vec<(usize, f64)> {
     forces
         .iter()
         .flat_map(|&(v, f)| (0..3).map(move |c| (6 * v as usize + c, f[c])))
         .collect()
 }
 
-fn check_section(section: &Section) -> Result<(), ElasticError> {
+/// Material and thickness within their ranges.
+///
+/// # Errors
+/// [`ElasticError::Value`] naming the one that is not.
+pub fn check_section(section: &Section) -> Result<(), ElasticError> {
     let range = |what, rule, value: f64, ok: bool| {
         if ok && value.is_finite() {
             Ok(())
@@ -318,7 +398,10 @@ fn check_section(section: &Section) -> Result<(), ElasticError> {
 }
 
 /// Each connected piece must have its six rigid motions held.
-fn check_held(mesh: &TriMesh, held: &[Freedoms]) -> Result<(), ElasticError> {
+///
+/// # Errors
+/// [`ElasticError`] saying what is loose.
+pub fn check_held(mesh: &TriMesh, held: &[Freedoms]) -> Result<(), ElasticError> {
     let (lower, upper) = mesh.bounds();
     if held.iter().all(|h| h.0 == 0) {
         return Err(ElasticError::NothingHeld {

@@ -8,9 +8,10 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DQuat, DVec3};
 
+use super::ShellModel;
 use super::element::Facet;
+use super::rows::Rows;
 use super::solver::BLOCK;
-use super::{Section, ShellModel};
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// A facet turned further than this from the mean normal at a corner is across a crease, where strains
@@ -38,40 +39,6 @@ impl Face {
     }
 }
 
-/// Rows of a sparse matrix, each a list of (column, weight).
-#[derive(Default)]
-struct Rows {
-    starts: Vec<usize>,
-    entries: Vec<(u32, f64)>,
-}
-
-impl Rows {
-    fn push(&mut self, row: impl IntoIterator<Item = (u32, f64)>) {
-        if self.starts.is_empty() {
-            self.starts.push(0);
-        }
-        self.entries.extend(row);
-        self.starts.push(self.entries.len());
-    }
-
-    /// `into` (a row each of [`BLOCK`] values) = this matrix × `from` (rows of [`BLOCK`] values).
-    fn apply(&self, from: &[f64], into: &mut [f64]) {
-        for (out, range) in into.chunks_exact_mut(BLOCK).zip(self.starts.windows(2)) {
-            out.fill(0.0);
-            for &(column, weight) in &self.entries[range[0]..range[1]] {
-                let row = &from[column as usize * BLOCK..][..BLOCK];
-                for (o, x) in out.iter_mut().zip(row) {
-                    *o += weight * x;
-                }
-            }
-        }
-    }
-
-    fn count(&self) -> usize {
-        self.starts.len().saturating_sub(1)
-    }
-}
-
 /// The tangent frame of a site: columns are two directions in the surface and the outward normal.
 pub type SiteFrame = DMat3;
 
@@ -86,21 +53,12 @@ pub struct Observer {
     frames: Vec<SiteFrame>,
 }
 
-/// The values of one block at all points: three rows a point, [`BLOCK`] columns.
-pub struct Observed {
-    /// Strain (xx, yy, 2xy) in each point's frame.
-    pub strain: Vec<f64>,
-    /// Displacement (x, y, z) (m).
-    pub displacement: Vec<f64>,
-}
-
 impl Observer {
     #[must_use]
     pub fn new(model: &ShellModel, points: &[SurfacePoint], face: Face) -> Self {
         let z = face.height(model.section.thickness);
         let mut builder = CornerRows {
-            mesh: model.mesh,
-            section: model.section,
+            model,
             z,
             rows: Rows::default(),
             known: BTreeMap::new(),
@@ -115,8 +73,8 @@ impl Observer {
             for row in strain_rows(&builder.frames, corners, at, frame) {
                 strains.push(row);
             }
-            for row in displacement_rows(model.mesh, at, frame.z_axis * z) {
-                displacements.push(row);
+            for row in displacement_rows(&model.mesh, at, frame.z_axis * z) {
+                displacements.push(placed(model, row));
             }
             frames.push(frame);
         }
@@ -134,61 +92,77 @@ impl Observer {
         &self.frames
     }
 
-    /// Observes one block of solutions, as [`ShellModel::solve_touches`] hands it over.
-    #[must_use]
-    pub fn observe(&self, rows: &[f64]) -> Observed {
-        Observed {
-            strain: self.strain(rows),
-            displacement: self.displacement(rows),
-        }
+    /// The strain rows as one matrix on solved blocks, three (xx, yy, 2xy) a point.
+    pub(super) fn strain_rows(&self) -> Rows {
+        self.strains.times(&self.corners)
     }
 
-    /// Strains only.
-    #[must_use]
-    pub fn strain(&self, rows: &[f64]) -> Vec<f64> {
-        let mut corners = vec![0.0; self.corners.count() * BLOCK];
-        self.corners.apply(rows, &mut corners);
-        let mut strain = vec![0.0; self.strains.count() * BLOCK];
-        self.strains.apply(&corners, &mut strain);
+    /// The displacement rows on solved blocks, three (x, y, z) a point.
+    pub(super) fn displacement_rows(&self) -> &Rows {
+        &self.displacements
+    }
+
+    /// Strains of a solved block: three rows (xx, yy, 2xy) of [`BLOCK`] values a point.
+    pub(super) fn strain(&self, solved: &[f64]) -> Vec<f64> {
+        let mut buffer = Vec::new();
+        self.strain_into(solved, &mut buffer).to_vec()
+    }
+
+    /// As [`Self::strain`], in a buffer that is used again and again.
+    pub(super) fn strain_into<'b>(&self, solved: &[f64], buffer: &'b mut Vec<f64>) -> &'b mut [f64] {
+        let corners = self.corners.count() * BLOCK;
+        buffer.resize(corners + self.strains.count() * BLOCK, 0.0);
+        let (corners, strain) = buffer.split_at_mut(corners);
+        self.corners.apply(solved, corners);
+        self.strains.apply(corners, strain);
         strain
     }
 
-    /// Displacements only.
-    #[must_use]
-    pub fn displacement(&self, rows: &[f64]) -> Vec<f64> {
+    /// Displacements of a solved block: three rows of [`BLOCK`] values a point.
+    pub(super) fn displacement(&self, solved: &[f64]) -> Vec<f64> {
         let mut displacement = vec![0.0; self.displacements.count() * BLOCK];
-        self.displacements.apply(rows, &mut displacement);
+        self.displacements.apply(solved, &mut displacement);
         displacement
     }
 
     /// Strain tensors (xx, yy, 2xy) at each point for a single solution (6 × vertices freedoms).
     #[must_use]
-    pub fn strain_of(&self, displacement: &[f64]) -> Vec<[f64; 3]> {
-        let rows = widen(displacement);
-        let strain = self.strain(&rows);
-        strain
+    pub fn strain_of(&self, model: &ShellModel, displacement: &[f64]) -> Vec<[f64; 3]> {
+        self.strain(&model.widened(&[displacement]))
             .chunks_exact(3 * BLOCK)
             .map(|s| [s[0], s[BLOCK], s[2 * BLOCK]])
             .collect()
     }
 
+    /// As [`Self::strain_of`] for several solutions.
+    #[must_use]
+    pub fn strains_of(&self, model: &ShellModel, solutions: &[Vec<f64>]) -> Vec<Vec<[f64; 3]>> {
+        let mut all = Vec::with_capacity(solutions.len());
+        for chunk in solutions.chunks(BLOCK) {
+            let strain = self.strain(&model.widened(chunk));
+            for k in 0..chunk.len() {
+                let points = strain.chunks_exact(3 * BLOCK);
+                all.push(points.map(|s| [s[k], s[BLOCK + k], s[2 * BLOCK + k]]).collect());
+            }
+        }
+        all
+    }
+
     /// Displacements (m) at each point for a single solution.
     #[must_use]
-    pub fn displacement_of(&self, displacement: &[f64]) -> Vec<DVec3> {
-        let rows = widen(displacement);
-        let u = self.displacement(&rows);
-        u.chunks_exact(3 * BLOCK)
+    pub fn displacement_of(&self, model: &ShellModel, displacement: &[f64]) -> Vec<DVec3> {
+        self.displacement(&model.widened(&[displacement]))
+            .chunks_exact(3 * BLOCK)
             .map(|s| DVec3::new(s[0], s[BLOCK], s[2 * BLOCK]))
             .collect()
     }
 }
 
-fn widen(displacement: &[f64]) -> Vec<f64> {
-    let mut rows = vec![0.0; displacement.len() * BLOCK];
-    for (row, &u) in rows.chunks_exact_mut(BLOCK).zip(displacement) {
-        row[0] = u;
-    }
-    rows
+/// What strain components (xx, yy, 2xy) weigh in the strain along an angle of their frame.
+#[must_use]
+pub fn along(angle: f64) -> [f64; 3] {
+    let (s, c) = angle.sin_cos();
+    [c * c, s * s, c * s]
 }
 
 /// Two directions across a normal: the first as near to "around z" as there is one.
@@ -205,7 +179,7 @@ pub fn tangent_frame(normal: DVec3) -> SiteFrame {
 
 /// Turns strain components (xx, yy, 2xy) from one tangent frame into another, the planes laid onto each
 /// other by the smallest rotation.
-fn turn(from: SiteFrame, to: SiteFrame) -> [[f64; 3]; 3] {
+pub(super) fn turn(from: SiteFrame, to: SiteFrame) -> [[f64; 3]; 3] {
     let lay = DQuat::from_rotation_arc(from.z_axis, to.z_axis);
     let x = lay * from.x_axis;
     let (c, s) = (x.dot(to.x_axis), x.dot(to.y_axis));
@@ -218,8 +192,7 @@ fn turn(from: SiteFrame, to: SiteFrame) -> [[f64; 3]; 3] {
 
 /// Builds the corner stage: one entry for each vertex in use, or for a facet's own corner at a crease.
 struct CornerRows<'m> {
-    mesh: &'m TriMesh,
-    section: Section,
+    model: &'m ShellModel,
     z: f64,
     rows: Rows,
     known: BTreeMap<(u32, Option<u32>), u32>,
@@ -228,16 +201,16 @@ struct CornerRows<'m> {
 
 impl CornerRows<'_> {
     fn corners_of(&mut self, triangle: u32) -> [u32; 3] {
-        let tri = self.mesh.triangles()[triangle as usize];
+        let tri = self.model.mesh.triangles()[triangle as usize];
         std::array::from_fn(|corner| self.corner(triangle, tri[corner]))
     }
 
     fn corner(&mut self, triangle: u32, vertex: u32) -> u32 {
-        let normal = self.mesh.vertex_normals()[vertex as usize];
-        let around = &self.mesh.vertex_triangles()[vertex as usize];
+        let normal = self.model.mesh.vertex_normals()[vertex as usize];
+        let around = &self.model.mesh.vertex_triangles()[vertex as usize];
         let smooth = around
             .iter()
-            .all(|&t| self.mesh.facet_normal(t).dot(normal) > CREASE);
+            .all(|&t| self.model.mesh.facet_normal(t).dot(normal) > CREASE);
         let key = (vertex, (!smooth).then_some(triangle));
         if let Some(&known) = self.known.get(&key) {
             return known;
@@ -246,7 +219,7 @@ impl CornerRows<'_> {
             (tangent_frame(normal), around.clone())
         } else {
             (
-                tangent_frame(self.mesh.facet_normal(triangle)),
+                tangent_frame(self.model.mesh.facet_normal(triangle)),
                 vec![triangle],
             )
         };
@@ -259,15 +232,15 @@ impl CornerRows<'_> {
 
     /// The mean over facets, weighted by area, of their strains at the vertex.
     fn push_average(&mut self, vertex: u32, frame: SiteFrame, facets: &[u32]) {
-        let total: f64 = facets.iter().map(|&t| self.mesh.facet_area(t)).sum();
+        let total: f64 = facets.iter().map(|&t| self.model.mesh.facet_area(t)).sum();
         let mut rows: [BTreeMap<u32, f64>; 3] = Default::default();
         for &t in facets {
-            let tri = self.mesh.triangles()[t as usize];
+            let tri = self.model.mesh.triangles()[t as usize];
             let zeta = std::array::from_fn(|i| if tri[i] == vertex { 1.0 } else { 0.0 });
-            let facet = Facet::new(self.mesh.corners(t), &self.section);
+            let facet = Facet::new(self.model.mesh.corners(t), &self.model.section);
             let strain = facet.strain(zeta, self.z);
             let turned = turn(facet.frame, frame);
-            let share = self.mesh.facet_area(t) / total;
+            let share = self.model.mesh.facet_area(t) / total;
             for (row, weights) in rows.iter_mut().zip(turned) {
                 for i in 0..18 {
                     let value: f64 = (0..3).map(|k| weights[k] * strain[(k, i)]).sum();
@@ -276,9 +249,20 @@ impl CornerRows<'_> {
             }
         }
         for row in rows {
-            self.rows.push(row);
+            self.rows.push(placed(self.model, row));
         }
     }
+}
+
+/// A row over freedoms as a row over solved blocks: held freedoms are zero.
+fn placed(
+    model: &ShellModel,
+    row: impl IntoIterator<Item = (u32, f64)>,
+) -> impl Iterator<Item = (u32, f64)> {
+    row.into_iter().filter_map(|(freedom, weight)| {
+        let (place, scale) = model.place(freedom as usize)?;
+        Some((place, weight * scale))
+    })
 }
 
 fn strain_rows(

@@ -4,12 +4,17 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::{
+    solve_lower_triangular_in_place, solve_upper_triangular_in_place,
+};
+use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Conj, MatMut, Par, Side, Spec};
+use faer::{Accum, MatMut, MatRef, Par, Side, Spec};
 
 /// Right-hand sides solved together. Fixed, so that a load gives the same bytes in any company.
 pub const BLOCK: usize = 64;
@@ -65,14 +70,36 @@ impl SymmetricMatrix {
     }
 }
 
-/// L Lᵀ of the matrix scaled to a unit diagonal.
+/// L Lᵀ of the matrix scaled to a unit diagonal, its rows in the order of elimination.
 pub struct Factor {
     symbolic: SymbolicCholesky<usize>,
     values: Vec<f64>,
-    /// 1/√ of the diagonal.
-    scale: Vec<f64>,
+    /// Where each row of the matrix stands in the order of elimination, and 1/√ of its diagonal.
+    pub order: Vec<u32>,
+    pub scale: Vec<f64>,
+    /// Supernode that each row (in the order of elimination) belongs to.
+    supernode: Vec<u32>,
+    /// Rows below the largest supernode.
+    tallest: usize,
     /// Smallest pivot of the scaled matrix: near zero means nearly unheld.
     pub smallest_pivot: f64,
+}
+
+/// Right-hand sides, then solutions, of one block: rows in the order of elimination, scaled, [`BLOCK`]
+/// columns side by side.
+pub struct Block {
+    pub rows: Vec<f64>,
+    /// Supernodes with anything on their right-hand sides.
+    active: Vec<bool>,
+    below: Vec<f64>,
+}
+
+impl Block {
+    /// Empties it for the next right-hand sides.
+    pub fn clear(&mut self) {
+        self.rows.fill(0.0);
+        self.active.fill(false);
+    }
 }
 
 impl Factor {
@@ -86,7 +113,7 @@ impl Factor {
         let scale: Vec<f64> = (0..n).map(|c| matrix.diagonal(c).sqrt().recip()).collect();
         let scaled = scaled(matrix, &scale);
         let params = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::AUTO,
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
         let symbolic = factorize_symbolic_cholesky(
@@ -96,7 +123,11 @@ impl Factor {
             params,
         )
         .map_err(|_| FactorError::OutOfMemory)?;
-        let mut values = vec![0.0; symbolic.len_val()];
+        let mut values = Vec::new();
+        values
+            .try_reserve_exact(symbolic.len_val())
+            .map_err(|_| FactorError::OutOfMemory)?;
+        values.resize(symbolic.len_val(), 0.0);
         let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
         let mut memory = MemBuffer::try_new(scratch).map_err(|_| FactorError::OutOfMemory)?;
         let outcome = symbolic
@@ -115,43 +146,125 @@ impl Factor {
                 row: original_row(&symbolic, index),
             });
         }
+        Ok(Self::finished(symbolic, values, scale))
+    }
+
+    fn finished(symbolic: SymbolicCholesky<usize>, values: Vec<f64>, scale: Vec<f64>) -> Self {
+        let n = scale.len();
+        let order = symbolic.perm().map_or_else(
+            || (0..n as u32).collect(),
+            |p| p.arrays().1.iter().map(|&i| i as u32).collect(),
+        );
         let smallest_pivot = smallest_pivot(&symbolic, &values);
-        Ok(Self {
+        let mut factor = Self {
             symbolic,
             values,
+            order,
             scale,
+            supernode: vec![0; n],
+            tallest: 0,
             smallest_pivot,
-        })
+        };
+        let (mut supernode, mut tallest) = (vec![0; n], 0);
+        let l = factor.supernodes();
+        for s in 0..l.symbolic().n_supernodes() {
+            let node = l.supernode(s);
+            let columns = node.val().ncols();
+            supernode[node.start()..][..columns].fill(s as u32);
+            tallest = tallest.max(node.pattern().len());
+        }
+        (factor.supernode, factor.tallest) = (supernode, tallest);
+        factor
+    }
+
+    /// The library was made to build supernodes.
+    fn supernodes(&self) -> SupernodalLltRef<'_, usize, f64> {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(s) => SupernodalLltRef::new(s, &self.values),
+            SymbolicCholeskyRaw::Simplicial(_) => unreachable!("supernodes were asked for"),
+        }
     }
 
     pub fn dimension(&self) -> usize {
         self.scale.len()
     }
 
-    /// Memory for solving one block; each thread has its own.
-    pub fn scratch(&self) -> MemBuffer {
-        MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(BLOCK, Par::Seq))
+    /// An empty block; each thread has its own.
+    pub fn block(&self) -> Block {
+        let l = self.supernodes().symbolic();
+        Block {
+            rows: vec![0.0; self.dimension() * BLOCK],
+            active: vec![false; l.n_supernodes()],
+            below: vec![0.0; self.tallest * BLOCK],
+        }
     }
 
-    /// Solves in place for [`BLOCK`] right-hand sides, `n` × `BLOCK` by columns.
-    pub fn solve_block(&self, block: &mut [f64], memory: &mut MemBuffer) {
-        let n = self.dimension();
-        let rescale = |block: &mut [f64]| {
-            for column in block.chunks_exact_mut(n) {
-                for (x, s) in column.iter_mut().zip(&self.scale) {
-                    *x *= s;
-                }
-            }
-        };
-        rescale(block);
-        LltRef::<'_, usize, f64>::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(block, n, BLOCK),
-            Par::Seq,
-            MemStack::new(memory),
-        );
-        rescale(block);
+    /// Adds to a right-hand side: `row` as the matrix counts them.
+    pub fn load(&self, block: &mut Block, row: usize, column: usize, value: f64) {
+        let at = self.order[row] as usize;
+        block.rows[at * BLOCK + column] += value * self.scale[row];
+        block.active[self.supernode[at] as usize] = true;
     }
+
+    /// As [`Self::load`] for a row in the order of elimination and a value that is scaled already.
+    pub fn load_place(&self, block: &mut Block, at: u32, column: usize, value: f64) {
+        block.rows[at as usize * BLOCK + column] += value;
+        block.active[self.supernode[at as usize] as usize] = true;
+    }
+
+    /// Solves in place. Forward, only the supernodes that a load reaches do any work: loads that lie
+    /// near each other, and so in the same branches of the elimination tree, should share a block.
+    pub fn solve(&self, block: &mut Block) {
+        let l = self.supernodes();
+        let count = l.symbolic().n_supernodes();
+        for s in 0..count {
+            if block.active[s] {
+                self.forward(l, s, block);
+            }
+        }
+        for s in (0..count).rev() {
+            backward(l, s, block);
+        }
+    }
+
+    fn forward(&self, l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut Block) {
+        let node = l.supernode(s);
+        let columns = node.val().ncols();
+        let (top, bottom) = node.val().split_at_row(columns);
+        let own = &mut block.rows[node.start() * BLOCK..][..columns * BLOCK];
+        let mut x = MatMut::from_row_major_slice_mut(own, columns, BLOCK);
+        solve_lower_triangular_in_place(top, x.rb_mut(), Par::Seq);
+        let Some(&first) = node.pattern().first() else {
+            return;
+        };
+        let below = &mut block.below[..node.pattern().len() * BLOCK];
+        let product = MatMut::from_row_major_slice_mut(below, node.pattern().len(), BLOCK);
+        matmul(product, Accum::Replace, bottom, x.rb(), 1.0, Par::Seq);
+        for (&row, part) in node.pattern().iter().zip(below.chunks_exact(BLOCK)) {
+            let into = &mut block.rows[row * BLOCK..][..BLOCK];
+            for (x, p) in into.iter_mut().zip(part) {
+                *x -= p;
+            }
+        }
+        block.active[self.supernode[first] as usize] = true;
+    }
+}
+
+fn backward(l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut Block) {
+    let node = l.supernode(s);
+    let columns = node.val().ncols();
+    let (top, bottom) = node.val().split_at_row(columns);
+    let below = &mut block.below[..node.pattern().len() * BLOCK];
+    for (&row, part) in node.pattern().iter().zip(below.chunks_exact_mut(BLOCK)) {
+        part.copy_from_slice(&block.rows[row * BLOCK..][..BLOCK]);
+    }
+    let own = &mut block.rows[node.start() * BLOCK..][..columns * BLOCK];
+    let mut x = MatMut::from_row_major_slice_mut(own, columns, BLOCK);
+    if !below.is_empty() {
+        let known = MatRef::from_row_major_slice(below, node.pattern().len(), BLOCK);
+        matmul(x.rb_mut(), Accum::Add, bottom.transpose(), known, -1.0, Par::Seq);
+    }
+    solve_upper_triangular_in_place(top.transpose(), x, Par::Seq);
 }
 
 fn scaled(matrix: &SymmetricMatrix, scale: &[f64]) -> SparseColMat<usize, f64> {

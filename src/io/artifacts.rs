@@ -38,7 +38,7 @@ pub fn write_all(
     save_dataset(&at("dataset.npz"), &design.simulated.dataset)?;
     let project = with_result(&inputs.project, design, &project_path, provenance.mesh_path);
     let painted = inputs.painted.as_ref().map(|m| m.as_slice());
-    project_file::save(&project_path, &project, painted)?;
+    project_file::save(&project_path, &project, painted, &inputs.masks)?;
     let html = report::html(inputs, design, provenance);
     atomic::write(&at("report.html"), html.as_bytes())?;
     Ok([
@@ -229,9 +229,9 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
             "unknowns": design.simulated.unknowns,
             "element_mm": design.simulated.mesh.mean_edge() * 1000.0,
             "truth_element_mm": design.truth.element_mm,
-            "smallest_pivot": design.simulated.smallest_pivot,
-            "reaction_error": design.simulated.balance.reaction_error,
-            "energy_error": design.simulated.balance.energy_error,
+            "checks": design.simulated.checks,
+            "discretization": design.simulated.discretization,
+            "linearity": design.simulated.linearity,
         },
         "budget": design.budget,
         "seconds": seconds,

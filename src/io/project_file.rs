@@ -1,5 +1,6 @@
 //! Project files: readable, commented, versioned TOML, with arrays in NPZ beside them.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,7 +10,7 @@ use super::npz::{NpzFile, read_mask};
 use super::{FileError, atomic};
 use crate::design::Inputs;
 use crate::mesh::RepairReport;
-use crate::project::{FORMAT, Project};
+use crate::project::{FORMAT, Masks, Project};
 
 /// Name of the painted mask among the arrays.
 const PAINTED: &str = "painted";
@@ -36,7 +37,17 @@ pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
         .parent()
         .unwrap_or(Path::new("."))
         .join(&project.part.mesh);
-    let LoadedMesh { mesh, repairs } = read_mesh(&mesh_path, project.part.unit, project.part.body)?;
+    let LoadedMesh {
+        mesh,
+        repairs,
+        groups,
+    } = read_mesh(
+        &mesh_path,
+        project.part.unit,
+        project.part.body,
+        project.part.repair(),
+    )?;
+    let masks = read_masks(path, &project, groups, mesh.positions().len())?;
     let painted = match &project.feasible.painted {
         Some(name) => Some(read_painted(path, name, mesh.positions().len())?),
         None => None,
@@ -46,12 +57,30 @@ pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
             project,
             part: Arc::new(mesh),
             painted: painted.map(Arc::new),
+            masks,
         },
         repairs,
         path: path.to_owned(),
         mesh_path,
         bundled: false,
     })
+}
+
+/// The masks that supports name: arrays beside the project come before groups of the mesh file.
+fn read_masks(
+    path: &Path,
+    project: &Project,
+    groups: Masks,
+    vertices: usize,
+) -> Result<Masks, FileError> {
+    let mut masks = groups;
+    let arrays = arrays_path(path);
+    for name in project.supports.iter().filter_map(|s| s.vertices.as_ref()) {
+        if arrays.is_file() && super::npz::holds(&arrays, name)? {
+            masks.insert(name.clone(), Arc::new(read_painted(path, name, vertices)?));
+        }
+    }
+    Ok(masks)
 }
 
 fn read_painted(path: &Path, name: &str, vertices: usize) -> Result<Vec<bool>, FileError> {
@@ -133,14 +162,26 @@ pub fn parse(text: &str) -> Result<Project, String> {
 /// # Errors
 /// [`FileError`] naming the file that could not be written; what was there before is whole, in its place
 /// or as its `.bak`.
-pub fn save(path: &Path, project: &Project, painted: Option<&[bool]>) -> Result<(), FileError> {
+pub fn save(
+    path: &Path,
+    project: &Project,
+    painted: Option<&[bool]>,
+    masks: &Masks,
+) -> Result<(), FileError> {
     let mut project = project.clone();
     project.feasible.painted = painted.map(|_| PAINTED.to_owned());
-    if let Some(mask) = painted {
+    let named = project.supports.iter().filter_map(|s| s.vertices.as_ref());
+    let mut kept: BTreeMap<&str, &[bool]> = named
+        .filter_map(|name| Some((name.as_str(), masks.get(name)?.as_slice())))
+        .collect();
+    kept.extend(painted.map(|mask| (PAINTED, mask)));
+    if !kept.is_empty() {
         let arrays = arrays_path(path);
         let mut file = NpzFile::default();
-        file.add(PAINTED, &[mask.len()], mask)
-            .map_err(|e| FileError::of(&arrays, &e))?;
+        for (name, mask) in kept {
+            file.add(name, &[mask.len()], mask)
+                .map_err(|e| FileError::of(&arrays, &e))?;
+        }
         let bytes = file.finish().map_err(|e| FileError::of(&arrays, &e))?;
         atomic::write_with_backup(&arrays, &bytes)?;
     }
@@ -186,7 +227,7 @@ pub fn to_text(project: &Project) -> String {
 fn part(t: &mut Text, project: &Project) {
     t.table("part");
     let part = &project.part;
-    t.key("mesh", quoted(&part.mesh), "glTF/GLB, OBJ or STL");
+    t.key("mesh", quoted(&part.mesh), "glTF/GLB, OBJ, STL or PLY");
     t.maybe(
         "unit",
         part.unit.map(|u| quoted(u.name())),
@@ -196,6 +237,21 @@ fn part(t: &mut Text, project: &Project) {
         "body",
         part.body,
         "which connected body, 0 being the largest",
+    );
+    t.key(
+        "weld_mm",
+        float(part.weld_mm),
+        "vertices nearer than this are joined; 0 joins equal ones only",
+    );
+    t.key(
+        "fill_holes_mm",
+        float(part.fill_holes_mm),
+        "holes up to this far across are filled",
+    );
+    t.key(
+        "elements",
+        serialized(&part.elements),
+        "\"graded\": computed on a mesh of its own, finer where the strain changes; \"as-given\": on the file's triangles",
     );
     t.key(
         "model",
@@ -222,10 +278,15 @@ fn part(t: &mut Text, project: &Project) {
     for support in &project.supports {
         t.list("support");
         t.key("kind", serialized(&support.kind), "\"clamped\" (no displacement, no rotation), \"pinned\" (no displacement) or \"symmetry\"");
-        t.key(
+        t.maybe(
             "box_mm",
-            corners(&support.box_mm),
+            support.box_mm.as_ref().map(corners),
             "every point of the part inside it is held",
+        );
+        t.maybe(
+            "vertices",
+            support.vertices.as_deref().map(quoted),
+            "instead of a box: a mask in the NPZ file beside this one, or a group of the mesh file",
         );
         t.key(
             "normal",
@@ -445,8 +506,15 @@ mod tests {
         let mut p = Project::around("a \"part\".stl", Some(Unit::Inch));
         p.supports.push(SupportKeys {
             kind: SupportKind::Symmetry,
-            box_mm: [[0.0, 1e-3, -2.0], [1.0, 2.0, 3.0]],
+            box_mm: Some([[0.0, 1e-3, -2.0], [1.0, 2.0, 3.0]]),
+            vertices: None,
             normal: Axis::X,
+        });
+        p.supports.push(SupportKeys {
+            kind: SupportKind::Pinned,
+            box_mm: None,
+            vertices: Some("rim \"left\"".into()),
+            normal: Axis::Z,
         });
         p.candidates.count = Some(407);
         p.feasible.painted = Some("painted".into());

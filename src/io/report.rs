@@ -349,7 +349,35 @@ fn settings(page: &mut String, inputs: &Inputs, design: &Design, provenance: &Pr
                 "{} vertices, {} unknowns, smallest scaled pivot {:.1e}",
                 design.simulated.mesh.positions().len(),
                 design.simulated.unknowns,
-                design.simulated.smallest_pivot
+                design.simulated.checks.smallest_pivot
+            ),
+        ),
+        (
+            "Error of the mesh, estimated",
+            format!(
+                "{:.1e} mm ({:.1} %) under a touch, {:.1} % of a touch's largest strain (rms over {} touches)",
+                design.simulated.discretization.displacement_mm,
+                design.simulated.discretization.displacement_percent,
+                design.simulated.discretization.strain_percent,
+                design.simulated.discretization.loads
+            ),
+        ),
+        (
+            "Error of linearity, estimated",
+            format!(
+                "up to {:.1} %, half of the touches below {:.1} %, at {} N",
+                design.simulated.linearity.largest_percent.abs(),
+                design.simulated.linearity.median_percent,
+                design.simulated.linearity.force_n
+            ),
+        ),
+        (
+            "Checks",
+            format!(
+                "reactions sum to the load to {:.0e}, ½ u·f is the strain energy to {:.0e}, {} piece held",
+                design.simulated.checks.reaction_error,
+                design.simulated.checks.energy_error,
+                design.simulated.checks.pieces_held
             ),
         ),
         (

@@ -189,7 +189,6 @@ impl Studio {
         let Some(simulation) = self.simulation.as_ref() else {
             return vec![0.0; vertices];
         };
-        // A refined model keeps the part's vertices as its first ones, but not its triangles.
         let mesh = &simulation.simulated.mesh;
         let (mut sum, mut weight) = (
             vec![0.0; mesh.positions().len()],
@@ -216,15 +215,13 @@ impl Studio {
                 }
             }
         }
-        (0..vertices)
-            .map(|v| {
-                if weight[v] > 0.0 {
-                    sum[v] / weight[v]
-                } else {
-                    0.0
-                }
-            })
-            .collect()
+        let values: Vec<f64> = sum
+            .iter()
+            .zip(&weight)
+            .map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 })
+            .collect();
+        let carried = &simulation.simulated.carried;
+        carried.iter().map(|&at| mesh.interpolate(&values, at)).collect()
     }
 
     /// How much the deformation is exaggerated; nothing without a touch, nor while painting: the brush

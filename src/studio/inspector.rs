@@ -189,7 +189,13 @@ fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm) {
             kind_name,
             "Clamped: no displacement, no rotation. Pinned: no displacement. Symmetry: a mirror plane",
         );
-        for (end, corner) in ["from", "to"].into_iter().zip(&mut support.box_mm) {
+        if let Some(name) = &support.vertices {
+            ui.label("Vertices");
+            ui.label(name);
+            ui.end_row();
+        }
+        let corners = support.box_mm.iter_mut().flatten();
+        for (end, corner) in ["from", "to"].into_iter().zip(corners) {
             ui.label(format!("{end} (mm)"));
             ui.horizontal(|ui| {
                 for (axis, value) in ["x", "y", "z"].into_iter().zip(corner) {
@@ -222,7 +228,8 @@ fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm) {
         high[2] = low[2] + 0.05 * (high[2] - low[2]);
         project.supports.push(SupportKeys {
             kind: SupportKind::Clamped,
-            box_mm: [low.map(|x| x - 0.01), high.map(|x| x + 0.01)],
+            box_mm: Some([low.map(|x| x - 0.01), high.map(|x| x + 0.01)]),
+            vertices: None,
             normal: Axis::Z,
         });
     }

@@ -1,16 +1,15 @@
 //! A click presses the limb: a worker keeps the factored model and solves the latest touch.
 
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use glam::DVec3;
 
 use crate::budget::unwatched;
 use crate::document::Document;
+use crate::design::{self, DesignError, Inputs};
 use crate::elasticity::observe::{Face, Observer};
-use crate::elasticity::support::held_freedoms;
-use crate::elasticity::{ElasticError, Section, ShellModel, Support, Touch};
-use crate::mesh::{SurfacePoint, TriMesh};
+use crate::elasticity::{ShellModel, Touch};
+use crate::mesh::SurfacePoint;
 
 /// What a touch did, at every vertex of the part.
 pub struct Touched {
@@ -26,9 +25,7 @@ pub struct Touched {
 
 struct Request {
     key: String,
-    part: Arc<TriMesh>,
-    section: Section,
-    supports: Vec<Support>,
+    inputs: Inputs,
     touch: Touch,
 }
 
@@ -51,9 +48,7 @@ impl Touching {
         let (force, tip_radius) = project.tip();
         let request = Request {
             key: document.model_key(),
-            part: Arc::clone(&document.part),
-            section: project.section(),
-            supports: project.supports(),
+            inputs: document.inputs(),
             touch: Touch {
                 position: document.part.point(at),
                 normal: document.part.normal(at),
@@ -137,16 +132,15 @@ fn serve(
         let _ = outbox.send(reply);
         ctx.request_repaint();
     };
-    let part = Arc::clone(&first.part);
-    let held = held_freedoms(&part, &first.supports);
-    let model = match ShellModel::new(&part, first.section, &held, &unwatched) {
+    let model = match build(&first.inputs) {
         Ok(model) => model,
         Err(error) => {
-            answer(Err(explain(&error)));
+            answer(Err(format!("The touch could not be computed: {error}")));
             return inbox.recv().ok();
         }
     };
-    let observer = Observer::new(&model, &every_vertex(&part), Face::Inside);
+    let vertices = design::carry(&model, &first.inputs.part);
+    let observer = Observer::new(&model, &vertices, Face::Inside);
     let key = first.key.clone();
     let mut request = first;
     loop {
@@ -162,18 +156,18 @@ fn serve(
     }
 }
 
-fn explain(error: &ElasticError) -> String {
-    format!("The touch could not be computed: {error}")
+/// An even mesh, quick to have: the click is answered at once, the simulation brings the graded one.
+fn build(inputs: &Inputs) -> Result<ShellModel, DesignError> {
+    inputs.project.check()?;
+    let ground = design::ground(inputs)?;
+    Ok(ground.model(&ground.even(design::LAYOUT), &unwatched)?)
 }
 
 fn solve(model: &ShellModel, observer: &Observer, request: &Request) -> Touched {
     let u = model.solve(&model.forces(&request.touch));
-    let displacement: Vec<DVec3> = u
-        .chunks_exact(6)
-        .map(|f| DVec3::new(f[0], f[1], f[2]))
-        .collect();
+    let displacement = observer.displacement_of(model, &u);
     let strain = observer
-        .strain_of(&u)
+        .strain_of(model, &u)
         .into_iter()
         .map(|[xx, yy, xy]| {
             let (mean, radius) = (f64::midpoint(xx, yy), ((xx - yy) / 2.0).hypot(xy / 2.0));
@@ -187,20 +181,4 @@ fn solve(model: &ShellModel, observer: &Observer, request: &Request) -> Touched 
         strain,
         key: request.key.clone(),
     }
-}
-
-/// A surface point at each vertex, in order.
-fn every_vertex(mesh: &TriMesh) -> Vec<SurfacePoint> {
-    mesh.vertex_triangles()
-        .iter()
-        .enumerate()
-        .map(|(v, around)| {
-            let triangle = around.first().copied().unwrap_or(0);
-            let tri = mesh.triangles()[triangle as usize];
-            SurfacePoint {
-                triangle,
-                barycentric: std::array::from_fn(|k| f64::from(u8::from(tri[k] as usize == v))),
-            }
-        })
-        .collect()
 }

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test uses its own part of these")]
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
 
 use glam::DVec3;
 use hapdef::budget::unwatched;
@@ -57,7 +58,7 @@ fn solve(
         .iter()
         .map(|&p| Freedoms(held(p)))
         .collect();
-    let model = ShellModel::new(mesh, section, &held, &unwatched).unwrap();
+    let model = ShellModel::new(&Arc::new(mesh.clone()), section, &held, &unwatched).unwrap();
     model.solve(&forces.to_vec())
 }
 

@@ -1,0 +1,161 @@
+//! How far a solution is from the converged one, from two meshes of which one halves the other's
+//! elements.
+//!
+//! With an error that falls as hᵖ, what changes from 2h to h is 2ᵖ - 1 times what is left (L. F.
+//! Richardson 1911).
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::load::Touch;
+use crate::budget::Elements;
+use super::observe::{Face, Observer, turn};
+use super::{NodalForces, ShellModel};
+
+/// Change from 2h to h over the error at h. Displacements and smoothed strains converge with h² where all
+/// is smooth (3), with less near corners of supports and openings: between the two.
+const DISPLACEMENT: f64 = 2.0;
+/// Strains a little slower, near the borders of supports and at slot ends.
+const STRAIN: f64 = 2.0;
+/// Strains are judged farther than this from the touch, in tip radii.
+const BEYOND: f64 = 2.0;
+
+/// Estimated discretization error.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Discretization {
+    /// Rms over the loads of the error of the displacement under the load (mm).
+    pub displacement_mm: f64,
+    /// The same as a share of each load's displacement (%).
+    pub displacement_percent: f64,
+    /// Rms over loads and places of the strain's error on the inside, farther than two tip radii from
+    /// the touch, as a share of the load's largest strain there (%).
+    pub strain_percent: f64,
+    /// Loads and places it was measured with.
+    pub loads: usize,
+    pub places: usize,
+}
+
+impl Discretization {
+    /// The error of the coarser of the two meshes: what changed, and what was left after that.
+    #[must_use]
+    pub fn of_the_coarser(self) -> Self {
+        Self {
+            displacement_mm: self.displacement_mm * (1.0 + DISPLACEMENT),
+            displacement_percent: self.displacement_percent * (1.0 + DISPLACEMENT),
+            strain_percent: self.strain_percent * (1.0 + STRAIN),
+            ..self
+        }
+    }
+
+    /// Whether the estimated errors are within what was asked for.
+    #[must_use]
+    pub fn meets(&self, aim: &Elements) -> bool {
+        self.displacement_percent <= aim.displacement_percent
+            && self.strain_percent <= aim.strain_percent
+    }
+}
+
+/// What one mesh says of some loads at some places.
+pub struct Sample {
+    /// Displacement under each load, along it (m).
+    under: Vec<f64>,
+    /// Strains (xx, yy, 2xy) at the places, load by load.
+    strains: Vec<Vec<[f64; 3]>>,
+    frames: Vec<super::observe::SiteFrame>,
+}
+
+impl Sample {
+    /// Reads solved loads at places on the inside (m).
+    #[must_use]
+    pub fn of(
+        model: &ShellModel,
+        touches: &[Touch],
+        solutions: &[Vec<f64>],
+        places: &[DVec3],
+    ) -> Self {
+        let points: Vec<_> = places.iter().map(|&p| model.index.nearest(p).0).collect();
+        let observer = Observer::new(model, &points, Face::Inside);
+        let loads: Vec<NodalForces> = touches.iter().map(|t| model.forces(t)).collect();
+        Self {
+            under: loads
+                .iter()
+                .zip(touches.iter().zip(solutions))
+                .map(|(forces, (touch, u))| under_load(forces, touch, u))
+                .collect(),
+            strains: observer.strains_of(model, solutions),
+            frames: observer.frames().to_vec(),
+        }
+    }
+}
+
+/// Work-conjugate displacement of a touch: the mean under the tip, along the force (m).
+#[must_use]
+pub fn under_load(forces: &NodalForces, touch: &Touch, u: &[f64]) -> f64 {
+    let work: f64 = forces
+        .iter()
+        .map(|&(v, f)| {
+            let at = 6 * v as usize;
+            f.dot(DVec3::new(u[at], u[at + 1], u[at + 2]))
+        })
+        .sum();
+    work / touch.force
+}
+
+/// The error left in `fine`, from `coarse` with elements of twice the size.
+#[must_use]
+pub fn between(
+    coarse: &Sample,
+    fine: &Sample,
+    touches: &[Touch],
+    places: &[DVec3],
+) -> Discretization {
+    let (mut square, mut relative) = (0.0, 0.0);
+    for (c, f) in coarse.under.iter().zip(&fine.under) {
+        let left = (f - c) / DISPLACEMENT;
+        square += left * left;
+        if *f != 0.0 {
+            relative += (left / f).powi(2);
+        }
+    }
+    let loads = touches.len().max(1) as f64;
+    Discretization {
+        displacement_mm: (square / loads).sqrt() * 1000.0,
+        displacement_percent: (relative / loads).sqrt() * 100.0,
+        strain_percent: 100.0 * strain_apart(coarse, fine, touches, places) / STRAIN,
+        loads: touches.len(),
+        places: places.len(),
+    }
+}
+
+/// Rms over loads and places beyond the tip of the difference of strains over the load's largest.
+#[must_use]
+pub fn strain_apart(coarse: &Sample, fine: &Sample, touches: &[Touch], places: &[DVec3]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0usize);
+    for (load, touch) in touches.iter().enumerate() {
+        let far = |i: &usize| {
+            places[*i].distance(touch.position) > BEYOND * touch.tip_radius
+        };
+        let largest = (0..places.len())
+            .filter(far)
+            .map(|i| norm(fine.strains[load][i]))
+            .fold(0.0, f64::max);
+        if largest == 0.0 {
+            continue;
+        }
+        for i in (0..places.len()).filter(far) {
+            let turned = turn(coarse.frames[i], fine.frames[i]);
+            let c = coarse.strains[load][i];
+            let f = fine.strains[load][i];
+            let apart: [f64; 3] =
+                std::array::from_fn(|r| (0..3).map(|k| turned[r][k] * c[k]).sum::<f64>() - f[r]);
+            sum += (norm(apart) / largest).powi(2);
+            count += 1;
+        }
+    }
+    (sum / count.max(1) as f64).sqrt()
+}
+
+/// Largest principal strain in size.
+fn norm([xx, yy, xy]: [f64; 3]) -> f64 {
+    f64::midpoint(xx, yy).abs() + ((xx - yy) / 2.0).hypot(xy / 2.0)
+}

@@ -1,0 +1,312 @@
+//! The mesh that a part is computed on: laid on the part's surface, finer where the strain needs it.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::estimate::{self, Discretization, Sample};
+use super::linearity::{Linearity, linearity};
+use super::load::Touch;
+use super::model::LoadCheck;
+use super::recover::facet_errors;
+use super::support::{Freedoms, HeldPart, Support};
+use super::{ElasticError, Section, ShellModel, scope};
+use crate::budget::{Elements, Watch, report};
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::remesh::{Remeshed, as_given, quarter, remesh};
+use crate::mesh::surface::Surface;
+use crate::mesh::TriMesh;
+
+/// A part ready to have elements laid on it.
+pub struct Ground {
+    pub held: HeldPart,
+    surface: Surface,
+    section: Section,
+    as_given: bool,
+}
+
+/// The elements, with the model built on them.
+pub struct Graded {
+    pub laid: Remeshed,
+    pub held: Vec<Freedoms>,
+    pub model: ShellModel,
+    pub estimate: Discretization,
+    pub linearity: Linearity,
+    /// The worst balance over the sample of the loads.
+    pub balance: LoadCheck,
+    /// Assemblies and factorizations, and loads solved on the way here.
+    pub models: u64,
+    pub solves: u64,
+}
+
+/// Loads and places that the error is measured with, at most.
+const LOADS: usize = 64;
+const PLACES: usize = 400;
+/// Facets × loads that the smoothed strain is built for, at most.
+const RECOVERED: usize = 250_000;
+/// A size may change by this factor in one pass.
+const FINER: f64 = 0.3;
+const COARSER: f64 = 2.5;
+/// Vertices that remeshing lays per area over the squared size (an equilateral mesh of that very size
+/// would have 1.155), and per length of free rim over the size.
+const AREA: f64 = 1.4;
+const RIM: f64 = 0.5;
+/// Sizes of neighbours: one may be larger by this share of their distance.
+const SLOPE: f64 = 0.35;
+/// No element smaller than this share of the thickness (before halving): thin-shell theory sees nothing
+/// there.
+const LEAST_IN_THICKNESS: f64 = 0.7;
+/// The error is an estimate: stop at this share of the tolerance.
+const SAFETY: f64 = 0.6;
+
+impl Ground {
+    /// Cuts the part along its supports and finds its feature lines. With `as_given` the part's own
+    /// triangles will be the elements.
+    #[must_use]
+    pub fn new(
+        part: &Arc<TriMesh>,
+        section: Section,
+        supports: &[Support],
+        as_given: bool,
+    ) -> Self {
+        let held = if as_given {
+            HeldPart::uncut(part, supports)
+        } else {
+            HeldPart::new(part, supports)
+        };
+        let surface = Surface::new(&held.mesh, |e| held.is_border(e), |v| held.is_spot(v));
+        Self {
+            held,
+            surface,
+            section,
+            as_given,
+        }
+    }
+
+    /// Where thin-shell theory itself is off for this part and a tip of this radius (m).
+    #[must_use]
+    pub fn cautions(&self, tip_radius: f64) -> Vec<String> {
+        scope::cautions(&self.surface, &self.section, tip_radius)
+    }
+
+    /// Elements of one size, about as many vertices as asked for.
+    #[must_use]
+    pub fn even(&self, vertices: usize) -> Remeshed {
+        if self.as_given {
+            return as_given(&self.surface);
+        }
+        let rim: f64 = self.held.mesh.boundary_edges().map(|e| self.length(e)).sum();
+        // Vertices for edges of length h: 1/h² times what the area takes, 1/h times what the rims take.
+        let (a, b, n) = (AREA * self.held.mesh.area(), RIM * rim, vertices.max(4) as f64);
+        let size = (b + (b * b + 4.0 * n * a).sqrt()) / (2.0 * n);
+        let size = size.max(LEAST_IN_THICKNESS * self.section.thickness);
+        remesh(&self.surface, &|_| size)
+    }
+
+    fn length(&self, edge: &crate::mesh::Edge) -> f64 {
+        let p = self.held.mesh.positions();
+        p[edge.a as usize].distance(p[edge.b as usize])
+    }
+
+    /// The same elements, halved.
+    #[must_use]
+    pub fn halved(&self, laid: &Remeshed) -> Remeshed {
+        quarter(&self.surface, laid)
+    }
+
+    /// What is held at the vertices of a mesh on this ground.
+    #[must_use]
+    pub fn held(&self, laid: &Remeshed) -> Vec<Freedoms> {
+        laid.places.iter().map(|&at| self.held.held_at(at)).collect()
+    }
+
+    /// A model on a mesh laid on this ground.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for what cannot be computed.
+    pub fn model(&self, laid: &Remeshed, watch: Watch) -> Result<ShellModel, ElasticError> {
+        ShellModel::new(&laid.mesh, self.section, &self.held(laid), watch)
+    }
+
+    /// Lays elements for these touches, finer where their strain changes, until the error is small
+    /// enough or the most vertices are spent. `places` (m) are where strains matter.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for what cannot be computed.
+    pub fn grade(
+        &self,
+        touches: &[Touch],
+        places: &[DVec3],
+        aim: &Elements,
+        watch: Watch,
+    ) -> Result<Graded, ElasticError> {
+        let most = aim.most_for(touches.len());
+        let touches: Vec<Touch> = spread(touches, LOADS);
+        let places: Vec<DVec3> = spread(places, PLACES);
+        // A second round for a few more vertices would cost more than it brings.
+        let near = 2 * most <= 3 * aim.vertices;
+        let mut vertices = if near { most } else { aim.vertices };
+        // The fine mesh halves this one: a quarter of the vertices.
+        let mut coarse = Solved::new(self, self.even(vertices / 4), &touches, watch)?;
+        let (mut models, mut solves) = (1, touches.len() as u64);
+        loop {
+            for pass in 0..if self.as_given { 0 } else { aim.passes } {
+                report(watch, "Laying elements", pass, aim.passes)?;
+                let laid = self.regraded(&coarse, vertices / 4);
+                coarse = Solved::new(self, laid, &touches, watch)?;
+                models += 1;
+                solves += touches.len() as u64;
+            }
+            report(watch, "Laying elements", aim.passes, aim.passes)?;
+            let fine = Solved::new(self, self.halved(&coarse.laid), &touches, watch)?;
+            models += 1;
+            solves += touches.len() as u64;
+            let sample = |s: &Solved| Sample::of(&s.model, &touches, &s.solutions, &places);
+            let estimate = estimate::between(&sample(&coarse), &sample(&fine), &touches, &places);
+            if self.as_given {
+                // The part's own triangles are the model; the halved ones only say how good they are.
+                let estimate = estimate.of_the_coarser();
+                return Ok(coarse.graded(self, &touches, estimate, models, solves));
+            }
+            let excess = (estimate.displacement_percent / aim.displacement_percent)
+                .max(estimate.strain_percent / aim.strain_percent)
+                / SAFETY;
+            let spent = vertices >= most;
+            if excess <= 1.0 || spent || excess.is_nan() {
+                return Ok(fine.graded(self, &touches, estimate, models, solves));
+            }
+            // Errors fall about as one over the number of vertices.
+            let more = (vertices as f64 * (1.2 * excess).clamp(1.5, 4.0)) as usize;
+            vertices = more.min(most);
+        }
+    }
+
+    /// Elements sized so that every one carries the same share of the error.
+    fn regraded(&self, solved: &Solved, vertices: usize) -> Remeshed {
+        let mesh = &solved.laid.mesh;
+        let loads = (RECOVERED / mesh.triangles().len()).clamp(4, LOADS);
+        let errors = facet_errors(&solved.model, &spread(&solved.solutions, loads));
+        let least = LEAST_IN_THICKNESS * self.section.thickness;
+        let sizes = sizes(mesh, &errors, vertices, least);
+        let index = SurfaceIndex::new(mesh);
+        remesh(&self.surface, &|p| {
+            mesh.interpolate(&sizes, index.nearest(p).0)
+        })
+    }
+}
+
+/// A mesh with its model and the sample loads solved on it.
+struct Solved {
+    laid: Remeshed,
+    model: ShellModel,
+    solutions: Vec<Vec<f64>>,
+}
+
+impl Solved {
+    fn new(
+        ground: &Ground,
+        laid: Remeshed,
+        touches: &[Touch],
+        watch: Watch,
+    ) -> Result<Self, ElasticError> {
+        let model = ground.model(&laid, watch)?;
+        let loads: Vec<_> = touches.iter().map(|t| model.forces(t)).collect();
+        Ok(Self {
+            solutions: model.solve_many(&loads),
+            laid,
+            model,
+        })
+    }
+
+    fn graded(
+        self,
+        ground: &Ground,
+        touches: &[Touch],
+        estimate: Discretization,
+        models: u64,
+        solves: u64,
+    ) -> Graded {
+        Graded {
+            linearity: linearity(&self.model, touches, &self.solutions),
+            balance: self.model.check_all(touches, &self.solutions),
+            held: ground.held(&self.laid),
+            laid: self.laid,
+            model: self.model,
+            estimate,
+            models,
+            solves,
+        }
+    }
+}
+
+/// At most `count` of the items, evenly through the list.
+fn spread<T: Clone>(items: &[T], count: usize) -> Vec<T> {
+    let step = items.len().div_ceil(count.max(1)).max(1);
+    items.iter().step_by(step).cloned().collect()
+}
+
+/// Wanted edge length (m) at each vertex: equal errors for all elements (the error of strain falls with h,
+/// its square times area with h⁴), changing gradually, for about as many vertices as asked for.
+fn sizes(mesh: &TriMesh, errors: &[f64], vertices: usize, least: f64) -> Vec<f64> {
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    let count = mesh.positions().len();
+    let (mut logs, mut weights) = (vec![0.0; count], vec![0.0; count]);
+    for (t, tri) in mesh.triangles().iter().enumerate() {
+        let area = mesh.facet_area(t as u32);
+        let now = (area * 4.0 / 3f64.sqrt()).sqrt();
+        let change = (mean / errors[t].max(1e-12 * mean).max(f64::MIN_POSITIVE)).powf(0.25);
+        let wanted = now * change.clamp(FINER, COARSER);
+        for &v in tri {
+            logs[v as usize] += area * wanted.max(f64::MIN_POSITIVE).ln();
+            weights[v as usize] += area;
+        }
+    }
+    let mut sizes: Vec<f64> = logs.iter().zip(&weights).map(|(l, w)| (l / w).exp()).collect();
+    for _ in 0..3 {
+        let inside: f64 = mesh
+            .triangles()
+            .iter()
+            .enumerate()
+            .map(|(t, tri)| {
+                let size: f64 = tri.iter().map(|&v| sizes[v as usize]).sum::<f64>() / 3.0;
+                AREA * mesh.facet_area(t as u32) / (size * size)
+            })
+            .sum();
+        let rims: f64 = mesh
+            .boundary_edges()
+            .map(|e| {
+                let ends = [e.a, e.b].map(|v| v as usize);
+                let length = mesh.positions()[ends[0]].distance(mesh.positions()[ends[1]]);
+                RIM * length / f64::midpoint(sizes[ends[0]], sizes[ends[1]])
+            })
+            .sum();
+        // As many as asked for: inside / s² + rims / s.
+        let n = vertices.max(4) as f64;
+        let scale = (rims + (rims * rims + 4.0 * n * inside).sqrt()) / (2.0 * n);
+        for size in &mut sizes {
+            *size = (*size * scale).max(least);
+        }
+        limit_slope(mesh, &mut sizes);
+    }
+    sizes
+}
+
+fn limit_slope(mesh: &TriMesh, sizes: &mut [f64]) {
+    const SWEEPS: usize = 30;
+    for _ in 0..SWEEPS {
+        let mut changed = false;
+        for edge in mesh.edges() {
+            let (a, b) = (edge.a as usize, edge.b as usize);
+            let rise = SLOPE * mesh.positions()[a].distance(mesh.positions()[b]);
+            for (i, j) in [(a, b), (b, a)] {
+                if sizes[i] > sizes[j] + rise {
+                    sizes[i] = sizes[j] + rise;
+                    changed = true;
+                }
+            }
+        }
+        if !changed {
+            return;
+        }
+    }
+}

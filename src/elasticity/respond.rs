@@ -1,0 +1,240 @@
+//! What given outputs read under given loads, solving for whichever are fewer.
+//!
+//! With K the stiffness, F the loads and B what is read, the answer is B K⁻¹ F. K is symmetric, so it may
+//! be had from a solution for every load or from one for every output (Maxwell–Betti reciprocity).
+
+use rayon::prelude::*;
+
+use super::load::Touch;
+use super::model::spread;
+use super::observe::Observer;
+use super::rows::Rows;
+use super::solver::BLOCK;
+use super::{ShellModel, observe};
+use crate::budget::{Cancelled, Watch};
+
+/// Which side was solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    Loads,
+    Outputs,
+}
+
+/// What is read at the points of an observer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reading<'a> {
+    /// Strain tensors: rows 3 i … 3 i + 2 are xx, yy, 2xy at point i.
+    Strain,
+    /// As [`Self::Strain`] for all points, then displacements: rows 3 (n + i) … are x, y, z at point i.
+    StrainAndDisplacement,
+    /// Strain along one direction a point (angle in its frame): row i; then displacements: rows n + 3 i ….
+    GaugeAndDisplacement(&'a [f64]),
+    /// Strain along one direction a point: row i.
+    Gauge(&'a [f64]),
+    /// Rows 3 i … 3 i + 2 are x, y, z at point i.
+    Displacement,
+}
+
+/// Outputs × loads, as it came out of the solver.
+pub struct Responses {
+    loads: usize,
+    rows: usize,
+    pub side: Side,
+    /// Right-hand sides solved.
+    pub solves: usize,
+    /// Which loads (outputs) a block holds and, by rows, outputs × its loads (its outputs × all loads).
+    blocks: Vec<(Vec<u32>, Vec<f64>)>,
+    /// Where each output is when outputs were solved for.
+    found: Vec<(u32, u32)>,
+}
+
+impl Responses {
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// One output under all loads, in their order; `into` has a place for each load.
+    pub fn row_into(&self, row: usize, into: &mut [f64]) {
+        if self.side == Side::Outputs {
+            let (block, place) = self.found[row];
+            let values = &self.blocks[block as usize].1;
+            into.copy_from_slice(&values[place as usize * self.loads..][..self.loads]);
+            return;
+        }
+        for (columns, values) in &self.blocks {
+            let part = &values[row * columns.len()..][..columns.len()];
+            for (&load, &value) in columns.iter().zip(part) {
+                into[load as usize] = value;
+            }
+        }
+    }
+}
+
+impl Reading<'_> {
+    fn displaces(&self) -> bool {
+        !matches!(self, Self::Strain | Self::Gauge(_))
+    }
+}
+
+/// Strain along one direction a point from its three components.
+fn along_gauges(strain: &[f64], angles: &[f64]) -> Vec<f64> {
+    let mut along = Vec::with_capacity(strain.len() / 3);
+    for (s, &angle) in strain.chunks_exact(3 * BLOCK).zip(angles) {
+        let w = observe::along(angle);
+        along.extend(
+            (0..BLOCK).map(|k| w[0] * s[k] + w[1] * s[BLOCK + k] + w[2] * s[2 * BLOCK + k]),
+        );
+    }
+    along
+}
+
+/// Reads `observer`'s points under all touches.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn respond(
+    model: &ShellModel,
+    touches: &[Touch],
+    observer: &Observer,
+    reading: Reading,
+    watch: Watch,
+) -> Result<Responses, Cancelled> {
+    let points = observer.frames().len();
+    let rows = match reading {
+        Reading::Strain | Reading::Displacement => 3 * points,
+        Reading::StrainAndDisplacement => 6 * points,
+        Reading::Gauge(_) => points,
+        Reading::GaugeAndDisplacement(_) => 4 * points,
+    };
+    let side = if rows < touches.len() {
+        Side::Outputs
+    } else {
+        Side::Loads
+    };
+    respond_from(side, model, touches, observer, reading, watch)
+}
+
+/// As [`respond`], solving for the side that is named: both give the same to rounding.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn respond_from(
+    side: Side,
+    model: &ShellModel,
+    touches: &[Touch],
+    observer: &Observer,
+    reading: Reading,
+    watch: Watch,
+) -> Result<Responses, Cancelled> {
+    let loads = touch_rows(model, touches);
+    if side == Side::Outputs {
+        let outputs = output_rows(observer, reading);
+        return by_outputs(model, &loads, &outputs, watch);
+    }
+    let blocks = model.solve_rows(&loads, "Solving touches", watch, |buffer, columns, solved| {
+        let width = columns.len();
+        let mut values = Vec::new();
+        let mut keep = |rows: &[f64]| {
+            values.extend(rows.chunks_exact(BLOCK).flat_map(|r| &r[..width]));
+        };
+        match reading {
+            Reading::Strain | Reading::StrainAndDisplacement => {
+                keep(observer.strain_into(solved, buffer));
+            }
+            Reading::Gauge(angles) | Reading::GaugeAndDisplacement(angles) => {
+                keep(&along_gauges(observer.strain_into(solved, buffer), angles));
+            }
+            Reading::Displacement => {}
+        }
+        if reading.displaces() {
+            keep(&observer.displacement(solved));
+        }
+        (columns.to_vec(), values)
+    })?;
+    let rows = blocks.first().map_or(0, |(c, v)| v.len() / c.len());
+    Ok(Responses {
+        loads: touches.len(),
+        rows,
+        side,
+        solves: touches.len(),
+        blocks,
+        found: Vec::new(),
+    })
+}
+
+fn by_outputs(
+    model: &ShellModel,
+    loads: &Rows,
+    outputs: &Rows,
+    watch: Watch,
+) -> Result<Responses, Cancelled> {
+    let blocks = model.solve_rows(outputs, "Solving sites", watch, |wide, rows, solved| {
+        wide.resize(loads.count() * BLOCK, 0.0);
+        loads.apply(solved, wide);
+        let values = (0..rows.len())
+            .flat_map(|k| wide.iter().skip(k).step_by(BLOCK).copied())
+            .collect();
+        (rows.to_vec(), values)
+    })?;
+    let mut found = vec![(0, 0); outputs.count()];
+    for (b, (rows, _)) in blocks.iter().enumerate() {
+        for (k, &row) in rows.iter().enumerate() {
+            found[row as usize] = (b as u32, k as u32);
+        }
+    }
+    Ok(Responses {
+        loads: loads.count(),
+        rows: outputs.count(),
+        side: Side::Outputs,
+        solves: outputs.count(),
+        blocks,
+        found,
+    })
+}
+
+/// The touches' nodal forces as rows over solved blocks.
+fn touch_rows(model: &ShellModel, touches: &[Touch]) -> Rows {
+    let forces: Vec<Vec<(u32, f64)>> = touches
+        .par_iter()
+        .map(|touch| {
+            spread(&model.forces(touch))
+                .into_iter()
+                .filter_map(|(freedom, force)| {
+                    let (place, scale) = model.place(freedom)?;
+                    Some((place, force * scale))
+                })
+                .collect()
+        })
+        .collect();
+    let mut rows = Rows::default();
+    for row in forces {
+        rows.push(row);
+    }
+    rows
+}
+
+fn output_rows(observer: &Observer, reading: Reading) -> Rows {
+    let gauge = |angles: &[f64]| {
+        let mut along = Rows::default();
+        for (i, &angle) in (0u32..).zip(angles) {
+            let weights = observe::along(angle);
+            along.push((0..3).map(|k| (3 * i + k as u32, weights[k])));
+        }
+        along.times(&observer.strain_rows())
+    };
+    let both = |mut first: Rows| {
+        let displacement = observer.displacement_rows();
+        for row in 0..displacement.count() {
+            first.push(displacement.row(row).iter().copied());
+        }
+        first
+    };
+    match reading {
+        Reading::Strain => observer.strain_rows(),
+        Reading::StrainAndDisplacement => both(observer.strain_rows()),
+        Reading::Gauge(angles) => gauge(angles),
+        Reading::GaugeAndDisplacement(angles) => both(gauge(angles)),
+        Reading::Displacement => observer.displacement_rows().clone(),
+    }
+}

@@ -1,0 +1,221 @@
+//! What may be done to a mesh on its way in, each step only when asked for and each counted.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, IVec3};
+
+/// Repairs that are asked for; without them only what must be is done.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Repair {
+    /// Vertices nearer to each other than this are joined (m); zero joins equal ones only.
+    pub weld: f64,
+    /// Holes up to this far across are filled (m).
+    pub fill_holes: f64,
+}
+
+/// For each point the first of the points kept that it is joined with, and those kept. Points within
+/// `tolerance` of a kept one join it.
+pub(super) fn join_near(positions: &[DVec3], tolerance: f64) -> (Vec<u32>, Vec<DVec3>) {
+    let cell = |p: DVec3| (p / tolerance).floor().as_ivec3();
+    let mut grid: HashMap<IVec3, Vec<u32>> = HashMap::new();
+    let mut kept: Vec<DVec3> = Vec::new();
+    let renumber = positions
+        .iter()
+        .map(|&p| {
+            let home = cell(p);
+            let near = (0..27)
+                .flat_map(|k| {
+                    let step = IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+                    grid.get(&home.wrapping_add(step)).into_iter().flatten()
+                })
+                .copied()
+                .filter(|&v| kept[v as usize].distance(p) <= tolerance)
+                .min();
+            near.unwrap_or_else(|| {
+                let v = kept.len() as u32;
+                kept.push(p);
+                grid.entry(home).or_default().push(v);
+                v
+            })
+        })
+        .collect();
+    (renumber, kept)
+}
+
+/// Rims of holes no further across than `across` (m): closed lines of edges with a triangle on one side
+/// only, in the winding of the triangles that would fill them. The longest rim of an open surface is
+/// its border and no hole.
+pub(super) fn holes(positions: &[DVec3], triangles: &[[u32; 3]], across: f64) -> Vec<Vec<u32>> {
+    let mut rims = rims(triangles);
+    let size = |rim: &Vec<u32>| {
+        let (low, high) = rim
+            .iter()
+            .map(|&v| positions[v as usize])
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
+                (l.min(p), h.max(p))
+            });
+        (high - low).length()
+    };
+    rims.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.cmp(b)));
+    rims.retain(|rim| size(rim) <= across);
+    rims
+}
+
+fn rims(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let mut sides: HashMap<(u32, u32), u32> = HashMap::new();
+    for tri in triangles {
+        for i in 0..3 {
+            let (a, b) = (tri[i], tri[(i + 1) % 3]);
+            *sides.entry((a.min(b), a.max(b))).or_default() += 1;
+        }
+    }
+    // A filling triangle runs along a rim the other way round than the triangle that is there.
+    let mut next: HashMap<u32, Vec<u32>> = HashMap::new();
+    for tri in triangles {
+        for i in 0..3 {
+            let (a, b) = (tri[i], tri[(i + 1) % 3]);
+            if sides[&(a.min(b), a.max(b))] == 1 {
+                next.entry(b).or_default().push(a);
+            }
+        }
+    }
+    let mut starts: Vec<u32> = next.keys().copied().collect();
+    starts.sort_unstable();
+    let mut rims = Vec::new();
+    for start in starts {
+        let mut rim = vec![start];
+        let mut at = start;
+        // Where rims touch in a vertex the way on is not known: leave them open.
+        while let Some([only]) = next.get(&at).map(Vec::as_slice) {
+            at = *only;
+            if at == start {
+                break;
+            }
+            rim.push(at);
+            if rim.len() > triangles.len() * 3 {
+                break;
+            }
+        }
+        if at == start && rim.len() >= 3 && rim.iter().all(|v| next.contains_key(v)) {
+            for v in &rim {
+                next.remove(v);
+            }
+            rims.push(rim);
+        }
+    }
+    rims
+}
+
+/// Longest rim that is filled without a new vertex: the work grows with the cube of it.
+const LONGEST: usize = 120;
+
+/// The triangulation of a closed line with the least area (G. Barequet and M. Sharir, "Filling gaps in
+/// the boundary of a polyhedron", Computer Aided Geometric Design 12 (1995)).
+pub(super) fn fill(positions: &[DVec3], rim: &[u32]) -> Option<Vec<[u32; 3]>> {
+    let n = rim.len();
+    if n > LONGEST {
+        return None;
+    }
+    let p: Vec<DVec3> = rim.iter().map(|&v| positions[v as usize]).collect();
+    let area = |i: usize, j: usize, k: usize| {
+        let (u, v) = (p[j] - p[i], p[k] - p[i]);
+        let longest = u.length_squared().max(v.length_squared());
+        let twice = u.cross(v).length();
+        // Three points in a line close nothing: only where there is no other way.
+        if twice > 1e-6 * longest { twice } else { 1e3 * longest }
+    };
+    let mut least = vec![vec![0.0; n]; n];
+    let mut split = vec![vec![0; n]; n];
+    for span in 2..n {
+        for i in 0..n - span {
+            let k = i + span;
+            let (mut best, mut at) = (f64::INFINITY, i + 1);
+            for j in i + 1..k {
+                let cost = least[i][j] + least[j][k] + area(i, j, k);
+                if cost < best {
+                    (best, at) = (cost, j);
+                }
+            }
+            (least[i][k], split[i][k]) = (best, at);
+        }
+    }
+    let mut triangles = Vec::with_capacity(n - 2);
+    let mut open = vec![(0, n - 1)];
+    while let Some((i, k)) = open.pop() {
+        if k > i + 1 {
+            let j = split[i][k];
+            triangles.push([rim[i], rim[j], rim[k]]);
+            open.extend([(i, j), (j, k)]);
+        }
+    }
+    Some(triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{MeshError, TriMesh};
+    use super::*;
+
+    /// A box without its lid, its corners torn apart by a hair where `torn`.
+    fn open_box(torn: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+        let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
+        let quads = [[0, 2, 3, 1], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]];
+        let (mut p, mut t) = (Vec::new(), Vec::new());
+        for (q, quad) in (0..).zip(quads) {
+            let base = p.len() as u32;
+            p.extend(quad.map(|k| corner(k) + DVec3::splat(torn * f64::from(q))));
+            t.extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
+        }
+        (p, t)
+    }
+
+    #[test]
+    fn torn_corners_are_welded_only_when_asked() {
+        let (p, t) = open_box(1e-6);
+        let (_, apart) = TriMesh::new(&p, &t, 0).unwrap();
+        assert_eq!(apart.bodies, 5);
+        let weld = Repair {
+            weld: 1e-4,
+            ..Repair::default()
+        };
+        let (mesh, joined) = TriMesh::repaired(&p, &t, 0, &weld).unwrap();
+        assert_eq!((joined.bodies, joined.joined_vertices), (1, 12));
+        assert_eq!(mesh.boundary_edges().count(), 4);
+        assert!((mesh.area() - 5.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_hole_is_filled_only_when_asked_and_small() {
+        let (p, t) = open_box(0.0);
+        let fill = |across| {
+            let repair = Repair {
+                fill_holes: across,
+                ..Repair::default()
+            };
+            TriMesh::repaired(&p, &t, 0, &repair).unwrap()
+        };
+        let (open, report) = fill(1.0);
+        assert_eq!((open.boundary_edges().count(), report.filled_holes), (4, 0));
+        let (closed, report) = fill(1.5);
+        assert_eq!((closed.boundary_edges().count(), report.filled_holes), (0, 1));
+        assert!((closed.area() - 6.0).abs() < 1e-12);
+        // Closed, and so turned outward: every facet looks away from the middle.
+        for t in 0..closed.triangles().len() as u32 {
+            let middle = closed.corners(t).iter().sum::<DVec3>() / 3.0;
+            assert!(closed.facet_normal(t).dot(middle - 0.5) > 0.0);
+        }
+    }
+
+    #[test]
+    fn a_weld_wider_than_the_part_is_refused() {
+        let (p, t) = open_box(0.0);
+        let weld = Repair {
+            weld: 9.0,
+            ..Repair::default()
+        };
+        assert_eq!(
+            TriMesh::repaired(&p, &t, 0, &weld).unwrap_err(),
+            MeshError::AllDegenerate
+        );
+    }
+}

@@ -1,0 +1,405 @@
+//! How fast the shell converges, in displacement and in the strain of its inner face; and whether what it
+//! says about its own error is true.
+
+mod bench;
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use bench::{Cut, grid, section};
+use glam::DVec3;
+use hapdef::budget::{Elements, Quality, unwatched};
+use hapdef::elasticity::grade::{Graded, Ground};
+use hapdef::elasticity::linearity::linearity;
+use hapdef::elasticity::observe::{Face, Observer};
+use hapdef::elasticity::support::Region;
+use hapdef::elasticity::{Freedoms, Section, ShellModel, Support, Touch};
+use hapdef::mesh::{SurfacePoint, TriMesh};
+
+/// Observed order from three meshes of which each halves the last: log₂ of successive changes.
+fn order(values: [f64; 3]) -> f64 {
+    ((values[1] - values[0]) / (values[2] - values[1])).abs().log2()
+}
+
+#[test]
+fn displacements_converge_with_the_square_of_the_element_size() {
+    type Case = (&'static str, fn(usize) -> f64, usize, f64);
+    let cases: [Case; 6] = [
+        ("Scordelis–Lo roof", bench::ratio_roof, 8, 1.7),
+        ("pinched cylinder", bench::ratio_cylinder, 4, 1.3),
+        ("clamped square plate", bench::ratio_plate, 8, 1.4),
+        // Under a point load the exact solution is not smooth.
+        ("clamped circular plate", bench::ratio_disc, 4, 1.0),
+        ("twisted beam", |n| bench::ratio_twisted(n)[0], 2, 1.2),
+        ("Cook's membrane", bench::ratio_cook, 8, 1.2),
+    ];
+    for (name, ratio, n, least) in cases {
+        let values = [n, 2 * n, 4 * n].map(ratio);
+        let p = order(values);
+        println!("{name}: order {p:.2} from {values:.4?}");
+        assert!(p > least, "{name}: order {p:.2} from {values:?}");
+    }
+}
+
+/// Nodal forces of a pressure of 1 Pa on a flat part, against z.
+fn pressure(mesh: &TriMesh) -> Vec<(u32, DVec3)> {
+    let mut forces = vec![0.0; mesh.positions().len()];
+    for (t, tri) in (0..).zip(mesh.triangles()) {
+        for &v in tri {
+            forces[v as usize] += mesh.facet_area(t) / 3.0;
+        }
+    }
+    (0..).zip(forces).map(|(v, f)| (v, DVec3::NEG_Z * f)).collect()
+}
+
+/// Rms over places of the inner face's strain against a closed form along x and y, over the largest.
+fn strain_error(
+    model: &ShellModel,
+    u: &[f64],
+    places: &[DVec3],
+    exact: impl Fn(DVec3) -> [f64; 3],
+) -> f64 {
+    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
+    let observer = Observer::new(model, &points, Face::Inside);
+    let (mut sum, mut largest) = (0.0, 0.0f64);
+    for ((&p, strain), frame) in places.iter().zip(observer.strain_of(model, u)).zip(observer.frames()) {
+        // Turn into x and y: the frame lies in the plane.
+        let [xx, yy, xy] = strain;
+        let component = |d: DVec3, e: DVec3| {
+            let (a, b) = (d.dot(frame.x_axis), d.dot(frame.y_axis));
+            let (c, f) = (e.dot(frame.x_axis), e.dot(frame.y_axis));
+            xx * a * c + yy * b * f + xy / 2.0 * (a * f + b * c)
+        };
+        let found = [
+            component(DVec3::X, DVec3::X),
+            component(DVec3::Y, DVec3::Y),
+            component(DVec3::X, DVec3::Y),
+        ];
+        for (f, e) in found.iter().zip(exact(p)) {
+            sum += (f - e).powi(2);
+            largest = largest.max(e.abs());
+        }
+    }
+    (sum / places.len() as f64).sqrt() / largest
+}
+
+fn clamped_where(mesh: &TriMesh, test: impl Fn(DVec3) -> bool) -> Vec<Freedoms> {
+    let all = |p: &DVec3| if test(*p) { Freedoms::ALL } else { Freedoms::default() };
+    mesh.positions().iter().map(all).collect()
+}
+
+/// A clamped strip under its own pressure: on the face ε = 3 q (L - x)² / E t² with ν = 0.
+#[test]
+fn inner_strain_of_a_clamped_beam_converges_to_the_closed_form() {
+    let (length, width, s) = (0.1, 0.01, section(1e9, 0.0, 1e-3));
+    let error = |n: usize| {
+        let mesh = Arc::new(grid(10 * n, n, Cut::Rising, |u, v| {
+            DVec3::new(u * length, v * width, 0.0)
+        }));
+        let held = clamped_where(&mesh, |p| p.x < 1e-9);
+        let model = ShellModel::new(&mesh, s, &held, &unwatched).unwrap();
+        let u = model.solve(&pressure(&mesh));
+        let places: Vec<DVec3> = (0..40)
+            .map(|k| DVec3::new(0.01 + 0.002 * f64::from(k), 0.002 + 0.001 * f64::from(k % 7), 0.0))
+            .collect();
+        // Pressed down, the top stretches and the inside (below) is compressed.
+        strain_error(&model, &u, &places, |p| {
+            [-3.0 * (length - p.x).powi(2) / (1e9 * s.thickness.powi(2)), 0.0, 0.0]
+        })
+    };
+    let errors = [2, 4, 8].map(error);
+    println!("beam: {errors:?}");
+    assert!(errors[1] < 0.01 && errors[2] < 0.003, "{errors:?}");
+    for pair in errors.windows(2) {
+        assert!((pair[0] / pair[1]).log2() > 1.5, "{errors:?}");
+    }
+}
+
+/// A clamped disc under pressure: w = q (R² - r²)² / 64 D.
+#[test]
+fn inner_strain_of_a_clamped_disc_converges_to_the_closed_form() {
+    let (r, s) = (5.0, section(1.7472e7, 0.3, 0.02));
+    let error = |n: usize| {
+        let mesh = Arc::new(bench::disc(n, r));
+        let held: Vec<Freedoms> = mesh
+            .positions()
+            .iter()
+            .map(|p| {
+                let mut mask = 0;
+                if p.x.abs() < 1e-9 {
+                    mask |= Freedoms::symmetry(0).0;
+                }
+                if p.y.abs() < 1e-9 {
+                    mask |= Freedoms::symmetry(1).0;
+                }
+                if p.length() > r * (1.0 - 1e-9) {
+                    mask |= Freedoms::ALL.0;
+                }
+                Freedoms(mask)
+            })
+            .collect();
+        let model = ShellModel::new(&mesh, s, &held, &unwatched).unwrap();
+        let u = model.solve(&pressure(&mesh));
+        let places: Vec<DVec3> = (0..60)
+            .map(|k| {
+                let a = 0.1 + 1.3 * f64::from(k % 8) / 7.0;
+                DVec3::new(a.cos(), a.sin(), 0.0) * (0.3 + 4.2 * f64::from(k) / 59.0)
+            })
+            .collect();
+        strain_error(&model, &u, &places, |p| {
+            let rr = p.length_squared();
+            let c = -1.0 / (16.0 * s.bending_stiffness());
+            // -z w″ and -z w′/r on the face below, w downward being negative.
+            let half = s.thickness / 2.0;
+            let radial = half * c * (3.0 * rr - r * r) * -1.0;
+            let hoop = half * c * (rr - r * r) * -1.0;
+            let (x, y) = (p.x / p.length(), p.y / p.length());
+            [
+                -(radial * x * x + hoop * y * y),
+                -(radial * y * y + hoop * x * x),
+                -(radial - hoop) * x * y,
+            ]
+        })
+    };
+    let errors = [4, 8, 16].map(error);
+    println!("disc: {errors:?}");
+    assert!(errors[1] < 0.02 && errors[2] < 0.006, "{errors:?}");
+    for pair in errors.windows(2) {
+        assert!((pair[0] / pair[1]).log2() > 1.4, "{errors:?}");
+    }
+}
+
+/// A disc (radius 50 mm) of rings and spokes, clamped outside 40 mm so that the support has a border of
+/// its own to be cut; and a tip in the middle.
+struct Disc {
+    part: Arc<TriMesh>,
+    section: Section,
+    clear: f64,
+    touch: Touch,
+}
+
+impl Disc {
+    fn new(spokes: u32, thickness: f64) -> Self {
+        // The clear radius is the fourth fifth of the rings.
+        let (outer, rings) = (0.05, spokes / 12 * 5 / 2);
+        let mut p = vec![DVec3::ZERO];
+        for ring in 1..=rings {
+            for k in 0..spokes {
+                let a = f64::from(k) / f64::from(spokes) * 2.0 * PI;
+                let r = outer * f64::from(ring) / f64::from(rings);
+                p.push(DVec3::new(a.cos(), a.sin(), 0.0) * r);
+            }
+        }
+        let at = |ring: u32, k: u32| 1 + (ring - 1) * spokes + k % spokes;
+        let mut t: Vec<[u32; 3]> = (0..spokes).map(|k| [0, at(1, k), at(1, k + 1)]).collect();
+        for ring in 1..rings {
+            for k in 0..spokes {
+                let [a, b, c, d] = [at(ring, k), at(ring + 1, k), at(ring + 1, k + 1), at(ring, k + 1)];
+                t.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        Self {
+            part: Arc::new(TriMesh::new(&p, &t, 0).unwrap().0),
+            section: section(2e9, 0.3, thickness),
+            clear: 0.04,
+            touch: Touch {
+                position: DVec3::ZERO,
+                normal: DVec3::Z,
+                force: 1.0,
+                tip_radius: 4e-3,
+            },
+        }
+    }
+
+    /// Everything outside the clear radius, as a mask of the vertices.
+    fn support(&self) -> Support {
+        let edge = self.clear * (1.0 - 1e-9);
+        let mask = self.part.positions().iter().map(|p| p.length() > edge);
+        Support {
+            region: Region::Vertices(Arc::new(mask.collect())),
+            held: Freedoms::ALL,
+        }
+    }
+
+    /// w between rings of radius r ≤ s (Timoshenko and Woinowsky-Krieger, art. 19), per newton.
+    fn ring(&self, r: f64, s: f64) -> f64 {
+        let (r, s, big) = (r.min(s), r.max(s), self.clear);
+        let log = if s > 0.0 { (s / big).ln() } else { 0.0 };
+        ((r * r + s * s) * log + (big * big + r * r) * (big * big - s * s) / (2.0 * big * big))
+            / (8.0 * PI * self.section.bending_stiffness())
+    }
+
+    /// Mean displacement under the tip along its force (m): bending, and the shear of Reissner's plate.
+    fn under(&self) -> f64 {
+        let (a, n) = (self.touch.tip_radius, 400);
+        let weight = |x: f64| 6.0 * x * (1.0 - x * x).powi(2); // ∫ over x in 0..1 is one
+        let rings: Vec<(f64, f64)> = (0..n)
+            .map(|k| (f64::from(k) + 0.5) / f64::from(n))
+            .map(|x| (a * x, weight(x) / f64::from(n)))
+            .collect();
+        let shear = |r: f64, s: f64| {
+            (self.clear / r.max(s)).ln() / (2.0 * PI * self.section.shear_stiffness())
+        };
+        let mut sum = 0.0;
+        for &(r, wr) in &rings {
+            for &(s, ws) in &rings {
+                sum += wr * ws * (self.ring(r, s) + shear(r, s));
+            }
+        }
+        sum * self.touch.force
+    }
+
+    /// Strains (xx, yy, xy) of the inside beyond the tip.
+    fn strain(&self, p: DVec3) -> [f64; 3] {
+        let (r, big) = (p.length(), self.clear);
+        // Mean squared radius of the tip's pressure is a²/4.
+        let m = self.touch.tip_radius.powi(2) / 4.0;
+        let c = self.touch.force / (8.0 * PI * self.section.bending_stiffness());
+        let log = (r / big).ln();
+        let slope = c * (2.0 * r * log + (r * r + m) / r - (big * big + m) * r / (big * big));
+        let bend = c * (2.0 * log + 3.0 - m / (r * r) - (big * big + m) / (big * big));
+        // The plate moves down by w; below, at z = -t/2, strains are -z (-w″) = -t/2 w″.
+        let half = self.section.thickness / 2.0;
+        let (radial, hoop) = (-half * bend, -half * slope / r);
+        let (x, y) = (p.x / r, p.y / r);
+        [
+            radial * x * x + hoop * y * y,
+            radial * y * y + hoop * x * x,
+            (radial - hoop) * x * y,
+        ]
+    }
+
+    fn places(&self) -> Vec<DVec3> {
+        (0..80)
+            .map(|k| {
+                let (a, r) = (2.4 * f64::from(k), 0.009 + 0.029 * f64::from(k) / 79.0);
+                DVec3::new(a.cos(), a.sin(), 0.0) * r
+            })
+            .collect()
+    }
+
+    fn graded(&self, aim: &Elements, as_given: bool) -> Graded {
+        let ground = Ground::new(&self.part, self.section, &[self.support()], as_given);
+        ground.grade(&[self.touch], &self.places(), aim, &unwatched).unwrap()
+    }
+
+    /// True errors (%) of the displacement under the tip and of the strains.
+    fn errors(&self, model: &ShellModel) -> [f64; 2] {
+        let u = model.solve(&model.forces(&self.touch));
+        let under = hapdef::elasticity::estimate::under_load(&model.forces(&self.touch), &self.touch, &u);
+        let strain = strain_error(model, &u, &self.places(), |p| self.strain(p));
+        [100.0 * (under / self.under() - 1.0).abs(), 100.0 * strain]
+    }
+}
+
+fn aim(vertices: usize, passes: usize) -> Elements {
+    Elements {
+        vertices,
+        most_vertices: vertices,
+        effort: usize::MAX,
+        displacement_percent: 1e-9,
+        strain_percent: 1e-9,
+        passes,
+    }
+}
+
+#[test]
+fn the_estimated_error_is_the_true_one_to_a_factor_of_two() {
+    let mut all = Vec::new();
+    for thickness in [0.4e-3, 1e-3, 2e-3] {
+        for spokes in [48, 96] {
+            let disc = Disc::new(spokes, thickness);
+            let graded = disc.graded(&aim(400, 0), true);
+            all.push((format!("as given, {spokes} spokes, {thickness} m"), graded, disc));
+        }
+        for (vertices, passes) in [(800, 1), (1600, 2), (4000, 2)] {
+            let disc = Disc::new(96, thickness);
+            let graded = disc.graded(&aim(vertices, passes), false);
+            all.push((format!("graded, {vertices}, {thickness} m"), graded, disc));
+        }
+    }
+    for (name, graded, disc) in all {
+        let [displacement, strain] = disc.errors(&graded.model);
+        let e = graded.estimate;
+        let effect = [e.displacement_percent / displacement, e.strain_percent / strain];
+        println!(
+            "{name}: {} vertices; displacement {:.3} % of {displacement:.3} %, strain {:.3} % of {strain:.3} %: effectivity {effect:.2?}",
+            graded.model.mesh.positions().len(),
+            e.displacement_percent,
+            e.strain_percent
+        );
+        for (k, effect) in effect.into_iter().enumerate() {
+            assert!((0.5..=2.0).contains(&effect), "{name}, {k}: {effect}");
+        }
+    }
+}
+
+#[test]
+fn grading_is_worth_its_elements() {
+    // The same number of vertices, even and graded.
+    let disc = Disc::new(96, 1e-3);
+    let even = disc.errors(&disc.graded(&aim(1600, 0), false).model);
+    let graded = disc.errors(&disc.graded(&aim(1600, 2), false).model);
+    println!("even {even:.3?}, graded {graded:.3?}");
+    assert!(graded[1] < even[1], "{graded:?} {even:?}");
+}
+
+/// A clamped disc pressed in its middle stiffens: w/t + 0.443 (w/t)³ = linear w/t (Timoshenko and
+/// Woinowsky-Krieger, table 82, immovable edge).
+#[test]
+fn the_estimate_of_linearity_is_that_of_a_clamped_disc() {
+    let mut disc = Disc::new(96, 0.5e-3);
+    disc.touch.tip_radius = 1.5e-3;
+    let graded = disc.graded(&aim(3000, 1), false);
+    for share in [0.1, 0.3, 0.6] {
+        let mut touch = disc.touch;
+        touch.force = share * disc.section.thickness / disc.under();
+        let u = graded.model.solve(&graded.model.forces(&touch));
+        let found = linearity(&graded.model, &[touch], &[u]);
+        let mut w = share;
+        for _ in 0..100 {
+            w = share - 0.443 * w * w * w;
+        }
+        let known = 100.0 * (w / share - 1.0);
+        println!("w/t {share}: {:.2} %, known {known:.2} %", found.largest_percent);
+        assert!((found.largest_percent / known - 1.0).abs() < 0.25);
+        assert_eq!(found.beyond, 0);
+    }
+}
+
+/// A strip held at one end bends without stretching: the second displacement must relax what the first
+/// would stretch. The elastica at F L² / E I = 0.4 deflects by 0.1310 L (K. E. Bisshopp and D. C. Drucker,
+/// Quarterly of Applied Mathematics 3 (1945)), 1.75 % less than the linear 0.1333 L.
+#[test]
+fn a_strip_that_only_bends_is_nearly_linear() {
+    let (length, width, s) = (0.1, 0.01, section(1e9, 0.0, 1e-3));
+    let mesh = Arc::new(grid(40, 4, Cut::Rising, |u, v| {
+        DVec3::new(u * length, v * width, 0.0)
+    }));
+    let held = clamped_where(&mesh, |p| p.x < 1e-9);
+    let model = ShellModel::new(&mesh, s, &held, &unwatched).unwrap();
+    let inertia = width * s.thickness.powi(3) / 12.0;
+    let touch = Touch {
+        position: DVec3::new(length - 1e-3, width / 2.0, 0.0),
+        normal: DVec3::Z,
+        force: 0.4 * 1e9 * inertia / length.powi(2),
+        tip_radius: 1e-3,
+    };
+    let u = model.solve(&model.forces(&touch));
+    let found = linearity(&model, &[touch], &[u]);
+    println!("{found:?}");
+    assert!((found.largest_percent / -1.75 - 1.0).abs() < 0.15, "{found:?}");
+}
+
+#[test]
+fn a_higher_quality_is_nearer_to_the_truth() {
+    let disc = Disc::new(96, 1e-3);
+    let errors: Vec<[f64; 2]> = Quality::ALL
+        .iter()
+        .map(|q| disc.errors(&disc.graded(&q.budget().elements, false).model))
+        .collect();
+    println!("{errors:?}");
+    assert!(errors[2][0] < 1.0 && errors[2][1] < 2.0, "{errors:?}");
+    assert!(errors[1][0] < 2.0 && errors[1][1] < 5.0, "{errors:?}");
+    assert!(errors[2][1] <= errors[0][1]);
+}

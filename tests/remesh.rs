@@ -1,0 +1,203 @@
+//! Remeshing: the same surface, the size asked for, well-shaped triangles, and every feature kept.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::DVec3;
+use hapdef::io::mesh_file::read_mesh;
+use hapdef::mesh::{Edge, TriMesh};
+use hapdef::mesh::locate::SurfaceIndex;
+use hapdef::mesh::repair::Repair;
+use hapdef::mesh::remesh::{as_given, quarter, remesh};
+use hapdef::mesh::surface::Surface;
+use hapdef::project::Unit;
+
+/// Angles in degrees: the smallest, and the one that a hundredth of all are below.
+fn angles(mesh: &TriMesh) -> [f64; 2] {
+    let mut all: Vec<f64> = (0..mesh.triangles().len() as u32)
+        .map(|t| {
+            let p = mesh.corners(t);
+            (0..3)
+                .map(|i| (p[(i + 1) % 3] - p[i]).angle_between(p[(i + 2) % 3] - p[i]))
+                .fold(f64::INFINITY, f64::min)
+                .to_degrees()
+        })
+        .collect();
+    all.sort_by(f64::total_cmp);
+    [all[0], all[all.len() / 100]]
+}
+
+fn limb() -> Arc<TriMesh> {
+    hapdef::cli::bundled().unwrap().inputs.part
+}
+
+fn plain(part: &Arc<TriMesh>) -> Surface {
+    Surface::new(part, |_| false, |_| false)
+}
+
+fn length(mesh: &TriMesh, edge: &Edge) -> f64 {
+    mesh.positions()[edge.a as usize].distance(mesh.positions()[edge.b as usize])
+}
+
+fn rim(mesh: &TriMesh) -> f64 {
+    mesh.boundary_edges().map(|e| length(mesh, e)).sum()
+}
+
+/// The largest distance of the vertices of one mesh from the surface of the other.
+fn away(mesh: &TriMesh, from: &TriMesh) -> f64 {
+    let index = SurfaceIndex::new(from);
+    let distances = mesh.positions().iter().map(|&p| index.nearest(p).1);
+    distances.fold(0.0, f64::max)
+}
+
+#[test]
+fn the_limb_keeps_its_surface_its_rims_and_its_openings() {
+    let part = limb();
+    for h in [5e-3, 2e-3] {
+        let new = remesh(&plain(&part), &|_: DVec3| h);
+        let mesh = &new.mesh;
+        assert!((mesh.area() / part.area() - 1.0).abs() < 2e-3);
+        assert!((rim(mesh) / rim(&part) - 1.0).abs() < 2e-3);
+        // The facets of the part are 0.025 mm off its cylinder.
+        assert!(away(mesh, &part) < 3e-5 && away(&part, mesh) < 2e-4);
+        let euler = |m: &TriMesh| {
+            m.positions().len() as i64 + m.triangles().len() as i64 - m.edges().len() as i64
+        };
+        assert_eq!(euler(mesh), euler(&part), "openings");
+        let [least, hundredth] = angles(mesh);
+        assert!(least > 20.0 && hundredth > 28.0, "{least} {hundredth}");
+        let long = mesh.edges().iter().map(|e| length(mesh, e)).fold(0.0, f64::max);
+        assert!(long < 1.5 * h && mesh.mean_edge() > 0.75 * h, "{long}");
+        let consistent = |e: &&Edge| e.triangles.len() == 2;
+        for edge in mesh.edges().iter().filter(consistent) {
+            let [s, t] = [edge.triangles[0], edge.triangles[1]];
+            assert!(mesh.facet_normal(s).dot(mesh.facet_normal(t)) > 0.7);
+        }
+    }
+}
+
+#[test]
+fn the_size_is_followed_from_place_to_place() {
+    let part = limb();
+    let size = |p: DVec3| if p.z < 0.06 { 1.5e-3 } else { 4e-3 };
+    let mesh = remesh(&plain(&part), &size).mesh;
+    let mean = |low: f64, high: f64| {
+        let near = mesh.edges().iter().filter(|e| {
+            let z = mesh.positions()[e.a as usize].z;
+            (low..high).contains(&z)
+        });
+        let (sum, count) = near.fold((0.0, 0), |(s, n), e| (s + length(&mesh, e), n + 1));
+        sum / f64::from(count)
+    };
+    assert!((1.1e-3..1.7e-3).contains(&mean(0.0, 0.05)), "{}", mean(0.0, 0.05));
+    assert!((3e-3..4.4e-3).contains(&mean(0.07, 0.12)), "{}", mean(0.07, 0.12));
+}
+
+#[test]
+fn halving_finds_the_curved_surface_and_not_the_chords() {
+    // A coarse tube: 16 facets round, whose chords are 1.9 % inside the circle.
+    let (n, m) = (16u32, 5u32);
+    let p: Vec<DVec3> = (0..=m)
+        .flat_map(|j| {
+            (0..n).map(move |i| {
+                let a = f64::from(i) / f64::from(n) * std::f64::consts::TAU;
+                DVec3::new(a.cos(), a.sin(), f64::from(j) * 0.4)
+            })
+        })
+        .collect();
+    let at = |i: u32, j: u32| j * n + i % n;
+    let t: Vec<[u32; 3]> = (0..m)
+        .flat_map(|j| {
+            (0..n).flat_map(move |i| {
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                [[a, b, c], [a, c, d]]
+            })
+        })
+        .collect();
+    let part = Arc::new(TriMesh::new(&p, &t, 0).unwrap().0);
+    let surface = plain(&part);
+    let fine = quarter(&surface, &as_given(&surface));
+    assert_eq!(fine.mesh.triangles().len(), 4 * t.len());
+    let inner = |q: &&DVec3| q.z > 0.1 && q.z < 1.9;
+    let worst = fine
+        .mesh
+        .positions()
+        .iter()
+        .filter(inner)
+        .map(|q| (q.truncate().length() - 1.0).abs())
+        .fold(0.0, f64::max);
+    assert!(worst < 5e-3, "{worst}");
+}
+
+#[test]
+fn creases_and_lines_that_are_marked_stay() {
+    // An L of two plates, and a line across one of them.
+    let p: Vec<DVec3> = (0..=4)
+        .flat_map(|i| {
+            let x = f64::from(i);
+            [
+                DVec3::new(x, 0.0, 3.0),
+                DVec3::new(x, 0.0, 0.0),
+                DVec3::new(x, 3.0, 0.0),
+            ]
+        })
+        .collect();
+    let t: Vec<[u32; 3]> = (0..4)
+        .flat_map(|i| {
+            let [a, b, c] = [3 * i, 3 * i + 1, 3 * i + 2];
+            [[a, b, a + 3], [a + 3, b, b + 3], [b, c, b + 3], [b + 3, c, c + 3]]
+        })
+        .collect();
+    let part = Arc::new(TriMesh::new(&p, &t, 0).unwrap().0);
+    let across = |e: &Edge| {
+        let at = |v: u32| part.positions()[v as usize];
+        at(e.a).x == 2.0 && at(e.b).x == 2.0
+    };
+    let surface = Surface::new(&part, across, |_| false);
+    let new = remesh(&surface, &|_: DVec3| 0.7);
+    let on = |test: &dyn Fn(DVec3) -> bool| -> f64 {
+        let mesh = &new.mesh;
+        let lines = new.lines.iter();
+        lines
+            .map(|&(a, b)| [a, b].map(|v| mesh.positions()[v as usize]))
+            .filter(|e| e.iter().all(|&p| test(p)))
+            .map(|[a, b]| a.distance(b))
+            .sum()
+    };
+    assert!((on(&|p| p.y == 0.0 && p.z == 0.0) - 4.0).abs() < 1e-9, "crease");
+    assert!((on(&|p| (p.x - 2.0).abs() < 1e-12) - 6.0).abs() < 1e-9, "marked");
+    assert!((new.mesh.area() - 24.0).abs() < 1e-9);
+}
+
+/// Parts as CAD programs leave them. They are not part of this repository.
+#[test]
+fn real_limbs_are_remeshed() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
+    let names = [
+        "poppy_humanoid_2015_l_shin_hires.STL",
+        "poppy_humanoid_l_shin_visual.STL",
+        "poppy_humanoid_l_thigh_visual.STL",
+    ];
+    for name in names {
+        let path = folder.join(name);
+        if !path.is_file() {
+            println!("{name}: absent, not tried");
+            continue;
+        }
+        let loaded = read_mesh(&path, Some(Unit::Metre), 0, Repair::default()).unwrap();
+        assert_eq!(loaded.repairs.bodies, 9);
+        let part = Arc::new(loaded.mesh);
+        let new = remesh(&plain(&part), &|_: DVec3| 4e-3);
+        let [_, hundredth] = angles(&new.mesh);
+        println!(
+            "{name}: {} slivers of {}; now {} triangles, a hundredth below {hundredth:.0}°, {:.2} mm away",
+            loaded.repairs.slivers,
+            part.triangles().len(),
+            new.mesh.triangles().len(),
+            away(&new.mesh, &part) * 1e3
+        );
+        assert!(hundredth > 3.0 && angles(&part)[1] < 1.5);
+        assert!(away(&new.mesh, &part) < 0.6e-3);
+        assert!((new.mesh.area() / part.area() - 1.0).abs() < 0.06);
+    }
+}
