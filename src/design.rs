@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::budget::{Achieved, Budget, Cancelled, StopReason, Watch, Work};
+use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset, SignalMatrix};
 use crate::elasticity::load::Touch;
 use crate::elasticity::estimate::Discretization;
@@ -285,11 +285,16 @@ pub fn cautions(
     let mut notes = Vec::new();
     if !discretization.meets(aim) {
         notes.push(format!(
-            "The mesh is coarser than this quality asks for: about {:.1} % error in displacement (asked: {:.0} %) and {:.1} % in strain (asked: {:.0} %). Choose a higher quality.",
+            "The mesh leaves about {:.1} % error in displacement (asked: {:.0} %) and {:.1} % in strain (asked: {:.0} %): {}.",
             discretization.displacement_percent,
             aim.displacement_percent,
             discretization.strain_percent,
-            aim.strain_percent
+            aim.strain_percent,
+            if *aim == Quality::Reference.budget().elements {
+                "more vertices than this quality allows for so many touches would be needed"
+            } else {
+                "choose a higher quality, or fewer touches"
+            }
         ));
     }
     if linearity.beyond > 0 {

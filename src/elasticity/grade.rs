@@ -55,7 +55,7 @@ const RIM: f64 = 0.5;
 const SLOPE: f64 = 0.35;
 /// No element smaller than this share of the thickness (before halving): thin-shell theory sees nothing
 /// there.
-const LEAST_IN_THICKNESS: f64 = 0.7;
+const LEAST_IN_THICKNESS: f64 = 0.3;
 /// The error is an estimate: stop at this share of the tolerance.
 const SAFETY: f64 = 0.6;
 
@@ -149,6 +149,7 @@ impl Ground {
         // The fine mesh halves this one: a quarter of the vertices.
         let mut coarse = Solved::new(self, self.even(vertices / 4), &touches, watch)?;
         let (mut models, mut solves) = (1, touches.len() as u64);
+        let mut last = 0;
         loop {
             for pass in 0..if self.as_given { 0 } else { aim.passes } {
                 report(watch, "Laying elements", pass, aim.passes)?;
@@ -171,7 +172,10 @@ impl Ground {
             let excess = (estimate.displacement_percent / aim.displacement_percent)
                 .max(estimate.strain_percent / aim.strain_percent)
                 / SAFETY;
-            let spent = vertices >= most;
+            // Where the least size holds everywhere, more vertices are asked for than are laid.
+            let grown = coarse.laid.mesh.positions().len();
+            let spent = vertices >= most || grown * 10 < last * 11;
+            last = grown;
             if excess <= 1.0 || spent || excess.is_nan() {
                 return Ok(fine.graded(self, &touches, estimate, models, solves));
             }

@@ -40,6 +40,10 @@ pub enum ElasticError {
         "every point of the part is held, so nothing can deform: make the support boxes smaller"
     )]
     AllHeld,
+    #[error(
+        "a triangle of the mesh near {place:.1} mm has no area, so nothing can be computed on it: repair the mesh, or set part.elements to \"graded\""
+    )]
+    NoArea { place: DVec3 },
     #[error("the model does not fit into memory: use a coarser mesh")]
     OutOfMemory,
     #[error(transparent)]
@@ -82,6 +86,7 @@ impl ShellModel {
     ) -> Result<Self, ElasticError> {
         check_section(&section)?;
         check_held(mesh, held)?;
+        check_areas(mesh)?;
         report(watch, "Assembling", 0, 2)?;
         let unknowns = number_unknowns(held);
         let mut stiffness = pattern(mesh, &unknowns);
@@ -395,6 +400,19 @@ pub fn check_section(section: &Section) -> Result<(), ElasticError> {
         thickness,
         thickness > 0.0,
     )
+}
+
+fn check_areas(mesh: &TriMesh) -> Result<(), ElasticError> {
+    /// Height over length below which rounding decides the normal.
+    const FLAT: f64 = 1e-11;
+    let flat = (0..mesh.triangles().len() as u32).find(|&t| {
+        let thinness = mesh.thinness(t);
+        thinness.is_nan() || thinness < FLAT
+    });
+    flat.map_or(Ok(()), |t| {
+        let place = mesh.corners(t)[0] * 1000.0;
+        Err(ElasticError::NoArea { place })
+    })
 }
 
 /// Each connected piece must have its six rigid motions held.

@@ -190,6 +190,64 @@ pub(super) fn turn(from: SiteFrame, to: SiteFrame) -> [[f64; 3]; 3] {
     ]
 }
 
+/// Curvatures (11, 22, 12) of the surface at a vertex along its frame (1/m, positive where the outside is
+/// convex): the change of the normal along the edges, in the least-squares sense.
+fn curvature(mesh: &TriMesh, vertex: u32, facets: &[u32], frame: SiteFrame) -> [f64; 3] {
+    let (here, normals) = (mesh.positions()[vertex as usize], mesh.vertex_normals());
+    // Across a crease the mean normal belongs to neither side.
+    if normals[vertex as usize].dot(frame.z_axis) < 0.98 {
+        return [0.0; 3];
+    }
+    let mut gram = nalgebra::Matrix3::zeros();
+    let mut right = nalgebra::Vector3::zeros();
+    for &t in facets {
+        for v in mesh.triangles()[t as usize].into_iter().filter(|&v| v != vertex) {
+            let (d, n) = (mesh.positions()[v as usize] - here, normals[v as usize]);
+            if n.dot(frame.z_axis) < CREASE {
+                continue;
+            }
+            let (x, y) = (d.dot(frame.x_axis), d.dot(frame.y_axis));
+            let change = n - normals[vertex as usize];
+            for (row, value) in [
+                (nalgebra::Vector3::new(x, 0.0, y), change.dot(frame.x_axis)),
+                (nalgebra::Vector3::new(0.0, y, x), change.dot(frame.y_axis)),
+            ] {
+                gram += row * row.transpose();
+                right += row * value;
+            }
+        }
+    }
+    let least = 1e-12 * gram.trace();
+    (gram + nalgebra::Matrix3::from_diagonal_element(least.max(f64::MIN_POSITIVE)))
+        .cholesky()
+        .map_or([0.0; 3], |c| c.solve(&right).into())
+}
+
+/// How strains (xx, yy, 2xy) of the flat formula read at height z of a curved wall, where a fibre is 1 + z/R
+/// times as long as on the mid-surface: ε = S ε S with S = (I + z B)^-½ (Flügge's exact metric; without it
+/// the inside of a shell of t/R = 0.1 reads 5 % too little).
+fn thickened([b11, b22, b12]: [f64; 3], z: f64) -> [[f64; 3]; 3] {
+    /// A wall is never taken for curved more sharply than this share of its thickness allows.
+    const SHORTEST: f64 = 0.5;
+    let metric = nalgebra::Matrix2::new(1.0 + z * b11, z * b12, z * b12, 1.0 + z * b22);
+    let eigen = metric.symmetric_eigen();
+    let root = eigen
+        .eigenvalues
+        .map(|l| l.clamp(SHORTEST, 1.0 / SHORTEST).sqrt().recip());
+    let q = eigen.eigenvectors;
+    let s = q * nalgebra::Matrix2::from_diagonal(&root) * q.transpose();
+    let (a, b, c) = (s[(0, 0)], s[(1, 1)], s[(0, 1)]);
+    [
+        [a * a, c * c, a * c],
+        [c * c, b * b, b * c],
+        [2.0 * a * c, 2.0 * b * c, a * b + c * c],
+    ]
+}
+
+fn times(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
 /// Builds the corner stage: one entry for each vertex in use, or for a facet's own corner at a crease.
 struct CornerRows<'m> {
     model: &'m ShellModel,
@@ -232,14 +290,16 @@ impl CornerRows<'_> {
 
     /// The mean over facets, weighted by area, of their strains at the vertex.
     fn push_average(&mut self, vertex: u32, frame: SiteFrame, facets: &[u32]) {
+        let mesh = &self.model.mesh;
         let total: f64 = facets.iter().map(|&t| self.model.mesh.facet_area(t)).sum();
+        let curved = thickened(curvature(mesh, vertex, facets, frame), self.z);
         let mut rows: [BTreeMap<u32, f64>; 3] = Default::default();
         for &t in facets {
             let tri = self.model.mesh.triangles()[t as usize];
             let zeta = std::array::from_fn(|i| if tri[i] == vertex { 1.0 } else { 0.0 });
             let facet = Facet::new(self.model.mesh.corners(t), &self.model.section);
             let strain = facet.strain(zeta, self.z);
-            let turned = turn(facet.frame, frame);
+            let turned = times(curved, turn(facet.frame, frame));
             let share = self.model.mesh.facet_area(t) / total;
             for (row, weights) in rows.iter_mut().zip(turned) {
                 for i in 0..18 {

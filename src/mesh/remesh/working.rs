@@ -184,7 +184,13 @@ impl<'s> Working<'s> {
             Mobility::Line => line || tiny,
             Mobility::Free => true,
         };
-        if !allowed {
+        let rank = |v: u32| self.vertices[v as usize].mobility;
+        // A line is never drawn into what lies beside it, nor bent back onto itself.
+        let folds = || {
+            let mut near = self.neighbours(gone).into_iter();
+            near.any(|v| self.is_line(gone, v) && self.is_line(kept, v))
+        };
+        if !allowed || rank(gone) > rank(kept) || (!line && rank(gone) != Mobility::Free && folds()) {
             return false;
         }
         // Link condition: only the triangles on the edge may lie between the two.
