@@ -25,6 +25,15 @@ pub fn read(bytes: &[u8], folder: Option<&Path>) -> Result<Soup, String> {
     Ok(soup)
 }
 
+/// An accessor that announces more entries than its buffers have bytes is not believed.
+fn check_size(accessor: &gltf::Accessor, buffers: &[gltf::buffer::Data]) -> Result<(), String> {
+    let bytes: usize = buffers.iter().map(|b| b.0.len()).sum();
+    if accessor.count() > bytes {
+        return Err("an array of the glTF file is longer than its data".into());
+    }
+    Ok(())
+}
+
 fn check_glb_length(bytes: &[u8]) -> Result<(), String> {
     let announced = bytes
         .get(8..12)
@@ -74,6 +83,10 @@ fn read_primitive(
     let accessor = primitive.get(&gltf::Semantic::Positions).ok_or(damaged)?;
     if accessor.count() == 0 || accessor.data_type() != gltf::accessor::DataType::F32 {
         return Err(damaged.into());
+    }
+    check_size(&accessor, buffers)?;
+    if let Some(indices) = primitive.indices() {
+        check_size(&indices, buffers)?;
     }
     let reader = primitive.reader(|b| buffers.get(b.index()).map(|d| d.0.as_slice()));
     let positions: Vec<[f32; 3]> = reader.read_positions().ok_or(damaged)?.collect();

@@ -48,7 +48,23 @@ fn number(property: &Property) -> Option<f64> {
     }
 }
 
+/// Every element takes at least a byte; a header that announces more is not believed.
+fn check_counts(bytes: &[u8]) -> Result<(), String> {
+    let header = Parser::<Element>::new()
+        .read_ply_header(&mut Cursor::new(bytes))
+        .map_err(|e| format!("not a readable PLY file ({e})"))?;
+    let too_many = |count: usize| count > bytes.len();
+    match header.elements.values().find(|e| too_many(e.count)) {
+        Some(element) => Err(format!(
+            "the PLY file is truncated: it announces {} of \"{}\"",
+            element.count, element.name
+        )),
+        None => Ok(()),
+    }
+}
+
 pub fn read(bytes: &[u8]) -> Result<Soup, String> {
+    check_counts(bytes)?;
     let ply = Parser::<Element>::new()
         .read_ply(&mut Cursor::new(bytes))
         .map_err(|e| format!("not a readable PLY file ({e})"))?;
