@@ -1,20 +1,21 @@
 //! Remakes `RESULTS.md`: `cargo bench --bench results`. With a word as argument (`draft`) it runs only the
 //! Draft designs and prints without writing.
 
-#[path = "../tests/bench/mod.rs"]
-mod bench;
+mod timing;
 
 use std::fmt::Write as _;
+
+use glam::DVec3;
 
 use hapdef::budget::{Quality, unwatched};
 use hapdef::dataset::{self, Signal};
 use hapdef::design::{self, Design, Inputs};
-use hapdef::elasticity::ShellModel;
+use hapdef::elasticity::grade::Ground;
 use hapdef::elasticity::load::Touch;
-use hapdef::elasticity::support::held_freedoms;
 use hapdef::mesh::TriMesh;
-use hapdef::mesh::refine::refine;
+use hapdef::mesh::remesh::Remeshed;
 use hapdef::placement::SelectorKind;
+use timing::{cpu_seconds, reference_seconds};
 
 fn main() {
     let draft_only = std::env::args().any(|a| a == "draft");
@@ -29,7 +30,6 @@ Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the eleme
         "Reference: a 4000 × 4000 matrix product on one core took {reference:.1} s beside these runs.\n"
     );
     limb(&mut text);
-    shell(&mut text);
     let qualities: &[Quality] = if draft_only {
         &[Quality::Draft]
     } else {
@@ -45,6 +45,9 @@ Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the eleme
     errors(&mut text, &designs);
     reduction(&mut text, &designs);
     times(&mut text, &designs, reference);
+    if let Ok(elastic) = std::fs::read_to_string("benches/elastic.md") {
+        let _ = writeln!(text, "{elastic}");
+    }
     if let Ok(build) = std::fs::read_to_string("benches/build-times.txt") {
         let _ = writeln!(text, "## Build times\n\n{build}");
     }
@@ -52,32 +55,6 @@ Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the eleme
     if !draft_only {
         std::fs::write("RESULTS.md", text).expect("RESULTS.md can be written");
     }
-}
-
-/// Processor seconds of this process so far.
-fn cpu_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let fields: Vec<&str> = stat
-        .rsplit(')')
-        .next()
-        .unwrap_or("")
-        .split_whitespace()
-        .collect();
-    let ticks = |k: usize| {
-        fields
-            .get(k)
-            .and_then(|f| f.parse::<f64>().ok())
-            .unwrap_or(0.0)
-    };
-    (ticks(11) + ticks(12)) / 100.0
-}
-
-fn reference_seconds() -> f64 {
-    let a = faer::Mat::<f64>::from_fn(4000, 4000, |i, j| ((i * 7 + j * 3) % 11) as f64);
-    let before = cpu_seconds();
-    let b = &a * &a;
-    assert!(b[(3, 4)] > 0.0);
-    cpu_seconds() - before
 }
 
 fn inputs(signal: Signal) -> Inputs {
@@ -104,9 +81,12 @@ fn limb(text: &mut String) {
     let part = &inputs.part;
     let sites = design::lay_out_sites(part, &inputs.project).expect("sites fit");
     let touches = touches(part, &inputs, 1000);
-    let coarse = solve(part, &inputs, &touches);
-    let fine = refine(part);
-    let finer = solve(&fine, &inputs, &touches);
+    // The generator's own triangles, and those halved: what the reference was measured on.
+    let supports = inputs.project.supports(&inputs.masks).expect("boxes");
+    let ground = Ground::new(part, inputs.project.section(), &supports, true);
+    let given = ground.even(0);
+    let coarse = solve(&ground, &given, &inputs, &touches);
+    let finer = solve(&ground, &ground.halved(&given), &inputs, &touches);
     let mut forces: Vec<f64> = coarse.0.iter().map(|u| 10.0 * 2e-3 / u).collect();
     forces.sort_by(f64::total_cmp);
     let at = |q: f64| forces[(q * (forces.len() - 1) as f64) as usize];
@@ -190,29 +170,26 @@ fn touches(part: &TriMesh, inputs: &Inputs, count: usize) -> Vec<Touch> {
 }
 
 /// Displacement along the normal under each touch (m), and strain at the feasible sites.
-fn solve(mesh: &TriMesh, inputs: &Inputs, touches: &[Touch]) -> (Vec<f64>, dataset::SignalMatrix) {
-    let held = held_freedoms(mesh, &inputs.project.supports());
-    let model = ShellModel::new(mesh, inputs.project.section(), &held, &unwatched)
-        .expect("the limb is held");
-    let under = model
-        .solve_touches(touches, &unwatched, |first, rows| {
-            let width = rows.len() / (6 * mesh.positions().len());
-            (first..touches.len().min(first + width))
-                .map(|t| {
-                    let at = model.index.nearest(touches[t].position).0;
-                    let tri = mesh.triangles()[at.triangle as usize];
-                    let n = touches[t].normal;
-                    -(0..3)
-                        .map(|k| {
-                            let u = |c: usize| rows[(6 * tri[k] as usize + c) * width + t - first];
-                            at.barycentric[k] * (u(0) * n.x + u(1) * n.y + u(2) * n.z)
-                        })
-                        .sum::<f64>()
-                })
-                .collect::<Vec<f64>>()
+fn solve(
+    ground: &Ground,
+    laid: &Remeshed,
+    inputs: &Inputs,
+    touches: &[Touch],
+) -> (Vec<f64>, dataset::SignalMatrix) {
+    let model = ground.model(laid, &unwatched).expect("the limb is held");
+    let loads: Vec<_> = touches.iter().map(|t| model.forces(t)).collect();
+    let under = touches
+        .iter()
+        .zip(model.solve_many(&loads))
+        .map(|(touch, u)| {
+            let at = model.index.nearest(touch.position).0;
+            let tri = model.mesh.triangles()[at.triangle as usize];
+            let moved: DVec3 = (0..3)
+                .map(|k| DVec3::from_slice(&u[6 * tri[k] as usize..]) * at.barycentric[k])
+                .sum();
+            -moved.dot(touch.normal)
         })
-        .expect("nobody cancels")
-        .concat();
+        .collect();
     let reference =
         design::simulate(inputs, &Quality::Draft.budget(), &unwatched).expect("the limb simulates");
     let feasible = design::filter(inputs, &reference).sites();
@@ -223,56 +200,6 @@ fn solve(mesh: &TriMesh, inputs: &Inputs, touches: &[Touch]) -> (Vec<f64>, datas
     let x = dataset::measure(&model, touches, &sites, Signal::Strain, &unwatched)
         .expect("nobody cancels");
     (under, x)
-}
-
-fn shell(text: &mut String) {
-    let _ = writeln!(
-        text,
-        "## The shell element\n\nComputed over reference on n × n meshes (twisted beam 6n × n), as asserted by `tests/analytic.rs`; in brackets what the same pair of elements is known to reach.\n\n| test | n: ratio |\n|---|---|"
-    );
-    let mut row = |name: &str, ratio: &dyn Fn(usize) -> f64, known: &[(usize, f64)]| {
-        let cells: Vec<String> = known
-            .iter()
-            .map(|&(n, k)| format!("{n}: {:.3} ({k:.3})", ratio(n)))
-            .collect();
-        let _ = writeln!(text, "| {name} | {} |", cells.join(", "));
-    };
-    row(
-        "Scordelis–Lo roof",
-        &bench::ratio_roof,
-        &[(4, 1.086), (8, 1.015), (16, 0.999), (32, 0.995)],
-    );
-    row(
-        "pinched cylinder, end diaphragms",
-        &bench::ratio_cylinder,
-        &[(4, 0.630), (8, 0.934), (16, 1.020), (32, 1.019)],
-    );
-    row(
-        "clamped square plate",
-        &bench::ratio_plate,
-        &[(4, 1.020), (8, 1.008), (16, 1.004)],
-    );
-    row(
-        "clamped circular plate",
-        &bench::ratio_disc,
-        &[(4, 1.003), (8, 1.001)],
-    );
-    row(
-        "twisted beam, first direction",
-        &|n| bench::ratio_twisted(n)[0],
-        &[(2, 0.995), (4, 0.997)],
-    );
-    row(
-        "twisted beam, second direction",
-        &|n| bench::ratio_twisted(n)[1],
-        &[(2, 0.995), (4, 0.997)],
-    );
-    row(
-        "Cook's membrane",
-        &bench::ratio_cook,
-        &[(4, 0.857), (8, 0.937), (16, 0.975)],
-    );
-    text.push('\n');
 }
 
 fn errors(text: &mut String, designs: &[(Quality, Signal, Design)]) {

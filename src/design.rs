@@ -9,10 +9,10 @@ use serde::Serialize;
 
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset, SignalMatrix};
-use crate::elasticity::load::Touch;
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::grade::{Graded, Ground};
 use crate::elasticity::linearity::Linearity;
+use crate::elasticity::load::Touch;
 use crate::elasticity::model::{check_held, check_section};
 use crate::elasticity::support::supported_vertices;
 use crate::elasticity::{ElasticError, Freedoms, ShellModel};

@@ -91,7 +91,10 @@ pub fn answer(
     } = graded;
     notes.extend(checks.distrust());
     notes.extend(design::cautions(&estimate, &linearity, &budget.elements));
-    let smallest = touches.iter().map(|t| t.tip_radius).fold(f64::INFINITY, f64::min);
+    let smallest = touches
+        .iter()
+        .map(|t| t.tip_radius)
+        .fold(f64::INFINITY, f64::min);
     notes.extend(ground.cautions(smallest));
     let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
     let observer = Observer::new(&model, &points, Face::Inside);

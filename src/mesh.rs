@@ -5,7 +5,6 @@
 pub mod cut;
 pub mod geodesic;
 pub mod locate;
-pub mod refine;
 pub mod remesh;
 pub mod repair;
 pub mod sample;

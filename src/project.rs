@@ -615,7 +615,12 @@ fn region(support: &SupportKeys, masks: &Masks) -> Result<Region, BadValue> {
         (both, _) => Err(BadValue {
             key: "support".into(),
             rule: "given one region: box_mm or vertices",
-            value: if both.is_some() { "given both" } else { "given neither" }.into(),
+            value: if both.is_some() {
+                "given both"
+            } else {
+                "given neither"
+            }
+            .into(),
         }),
     }
 }

@@ -1,4 +1,8 @@
 //! The real program: what it writes, what it prints, and how it refuses.
+#![allow(
+    clippy::format_push_string,
+    reason = "small files are put together here"
+)]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -353,7 +357,8 @@ fn wrong_usage_is_two() {
     assert!(help.status.success());
 }
 
-const TOUCHES: &str = "x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm\n31.8,0,60,1,0,0,10,5\n0,33.331,58,0,1,0,5,5\n";
+const TOUCHES: &str =
+    "x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm\n31.8,0,60,1,0,0,10,5\n0,33.331,58,0,1,0,5,5\n";
 
 #[test]
 fn given_points_are_answered_pair_by_pair() {
@@ -364,18 +369,39 @@ fn given_points_are_answered_pair_by_pair() {
         path
     };
     let touches = file("t.csv", TOUCHES);
-    let sites = file("s.csv", "x_mm,y_mm,z_mm,dx,dy,dz\n30,8,60,0,0,1\n30,8,60,-0.26,0.97,0\n30,-8,31,0,0,1\n");
+    let sites = file(
+        "s.csv",
+        "x_mm,y_mm,z_mm,dx,dy,dz\n30,8,60,0,0,1\n30,8,60,-0.26,0.97,0\n30,-8,31,0,0,1\n",
+    );
     let (out, vtu) = (folder.path().join("r.csv"), folder.path().join("f.vtu"));
     let run = |out: &Path| {
         hapdef(&[
-            "simulate", text(&project), "--touches", text(&touches), "--sites", text(&sites),
-            "--out", text(out), "--vtu", text(&vtu), "--json",
+            "simulate",
+            text(&project),
+            "--touches",
+            text(&touches),
+            "--sites",
+            text(&sites),
+            "--out",
+            text(out),
+            "--vtu",
+            text(&vtu),
+            "--json",
         ])
     };
     let output = run(&out);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(summary["discretization"]["strain_percent"].as_f64().unwrap() > 0.0);
+    assert!(
+        summary["discretization"]["strain_percent"]
+            .as_f64()
+            .unwrap()
+            > 0.0
+    );
     assert!(summary["checks"]["reaction_error"].as_f64().unwrap() < 1e-6);
     assert!(summary["linearity"]["loads"] == 2);
     let result = std::fs::read_to_string(&out).unwrap();
@@ -388,17 +414,31 @@ fn given_points_are_answered_pair_by_pair() {
         .map(|l| l.split(',').map(|x| x.parse().unwrap()).collect())
         .collect();
     let order: Vec<(f64, f64)> = rows.iter().map(|r| (r[0], r[1])).collect();
-    assert_eq!(order, [(0., 0.), (0., 1.), (0., 2.), (1., 0.), (1., 1.), (1., 2.)]);
+    assert_eq!(
+        order,
+        [(0., 0.), (0., 1.), (0., 2.), (1., 0.), (1., 1.), (1., 2.)]
+    );
     // Pressed inward at x = 31.8: what lies beside it moves to smaller x.
     assert!(rows[0][2] < -0.01 && rows[0][2] == rows[1][2]);
     assert!(rows[0][5] != rows[1][5], "the strain is along the gauge");
-    assert!(rows[3][6] > 1.4 && rows[3][6] < 1.6, "1.5 mm off the mid-surface");
+    assert!(
+        rows[3][6] > 1.4 && rows[3][6] < 1.6,
+        "1.5 mm off the mid-surface"
+    );
     assert!((rows[0][7] - (31.831 - 30f64.hypot(8.0))).abs() < 0.1);
     // The same bytes again, on one thread; and as arrays.
     let again = folder.path().join("again.csv");
     let output = hapdef(&[
-        "simulate", text(&project), "--touches", text(&touches), "--sites", text(&sites),
-        "--out", text(&again), "--threads", "1",
+        "simulate",
+        text(&project),
+        "--touches",
+        text(&touches),
+        "--sites",
+        text(&sites),
+        "--out",
+        text(&again),
+        "--threads",
+        "1",
     ]);
     assert!(output.status.success());
     assert!(String::from_utf8_lossy(&output.stderr).contains("estimated error of the mesh"));
@@ -420,7 +460,14 @@ fn given_points_that_make_no_sense_are_refused() {
     let out = folder.path().join("r.csv");
     let simulate = |touches: &Path, sites: &Path, out: &Path, words: &[&str]| {
         let arguments = [
-            "simulate", text(&project), "--touches", text(touches), "--sites", text(sites), "--out", text(out),
+            "simulate",
+            text(&project),
+            "--touches",
+            text(touches),
+            "--sites",
+            text(sites),
+            "--out",
+            text(out),
         ];
         refused(&arguments, 1, words);
         assert!(!out.exists());
@@ -430,11 +477,28 @@ fn given_points_that_make_no_sense_are_refused() {
     simulate(&touches, &through, &out, &["site 0", "lies in it"]);
     let far = file("far.csv", "x_mm,y_mm,z_mm,dx,dy,dz\n30000,8,60,0,0,1\n");
     simulate(&touches, &far, &out, &["site 0", "unit"]);
-    simulate(&touches, &folder.path().join("no.csv"), &out, &["no.csv", "no such file"]);
+    simulate(
+        &touches,
+        &folder.path().join("no.csv"),
+        &out,
+        &["no.csv", "no such file"],
+    );
     simulate(&good, &good, &out, &["good.csv", "nx"]);
-    simulate(&touches, &good, &folder.path().join("r.txt"), &["r.txt", ".csv or .npz"]);
+    simulate(
+        &touches,
+        &good,
+        &folder.path().join("r.txt"),
+        &["r.txt", ".csv or .npz"],
+    );
     // Touches without sites: wrong usage.
-    let arguments = ["simulate", text(&project), "--touches", text(&touches), "--out", text(&out)];
+    let arguments = [
+        "simulate",
+        text(&project),
+        "--touches",
+        text(&touches),
+        "--out",
+        text(&out),
+    ];
     refused(&arguments, 2, &["--sites"]);
 }
 
@@ -464,33 +528,70 @@ fn supports_by_mask_and_by_group_of_the_mesh_file() {
     };
     file("strip.obj", &obj);
     let project = |support: &str| {
-        format!("format = 1\n[part]\nmesh = \"strip.obj\"\nunit = \"mm\"\nthickness_mm = 1.0\n[budget]\nquality = \"draft\"\n[[support]]\n{support}\n")
+        format!(
+            "format = 1\n[part]\nmesh = \"strip.obj\"\nunit = \"mm\"\nthickness_mm = 1.0\n[budget]\nquality = \"draft\"\n[[support]]\n{support}\n"
+        )
     };
-    let touches = file("t.csv", "x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm\n98,5,0,0,0,1,1,2\n");
+    let touches = file(
+        "t.csv",
+        "x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm\n98,5,0,0,0,1,1,2\n",
+    );
     let sites = file("s.csv", "x_mm,y_mm,z_mm,dx,dy,dz\n98,5,0,1,0,0\n");
     let deflection = |name: &str, support: &str| -> f64 {
         let path = file(name, &project(support));
         let out = folder.path().join("r.csv");
         let output = hapdef(&[
-            "simulate", text(&path), "--touches", text(&touches), "--sites", text(&sites), "--out", text(&out),
+            "simulate",
+            text(&path),
+            "--touches",
+            text(&touches),
+            "--sites",
+            text(&sites),
+            "--out",
+            text(&out),
         ]);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         let result = std::fs::read_to_string(&out).unwrap();
-        result.lines().nth(1).unwrap().split(',').nth(4).unwrap().parse().unwrap()
+        result
+            .lines()
+            .nth(1)
+            .unwrap()
+            .split(',')
+            .nth(4)
+            .unwrap()
+            .parse()
+            .unwrap()
     };
     let by_box = deflection("box.hapdef.toml", "box_mm = [[-1, -1, -1], [20, 11, 1]]");
     let by_group = deflection("group.hapdef.toml", "vertices = \"held\"");
     // A strip of 78 mm: F L³ / 3 E I, a little less for its width.
     let known = 78f64.powi(3) / (3.0 * 1700.0 * 10.0 / 12.0);
-    assert!((by_box / by_group - 1.0).abs() < 0.01, "{by_box} {by_group}");
+    assert!(
+        (by_box / by_group - 1.0).abs() < 0.01,
+        "{by_box} {by_group}"
+    );
     assert!((-by_box / known - 1.0).abs() < 0.05, "{by_box} {known}");
     let missing = file("missing.hapdef.toml", &project("vertices = \"nothing\""));
     let out = folder.path().join("never.csv");
     let arguments = [
-        "simulate", text(&missing), "--touches", text(&touches), "--sites", text(&sites), "--out", text(&out),
+        "simulate",
+        text(&missing),
+        "--touches",
+        text(&touches),
+        "--sites",
+        text(&sites),
+        "--out",
+        text(&out),
     ];
     refused(&arguments, 1, &["support.vertices", "nothing", "held"]);
-    let both = file("both.hapdef.toml", &project("vertices = \"held\"\nbox_mm = [[0, 0, 0], [1, 1, 1]]"));
+    let both = file(
+        "both.hapdef.toml",
+        &project("vertices = \"held\"\nbox_mm = [[0, 0, 0], [1, 1, 1]]"),
+    );
     let arguments = ["simulate", text(&both), "--out", "x.npz"];
     refused(&arguments, 1, &["one region"]);
 }

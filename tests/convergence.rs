@@ -3,22 +3,21 @@
 
 mod bench;
 
-use std::f64::consts::PI;
 use std::sync::Arc;
 
+use bench::round::{Disc, aim, strain_error};
 use bench::{Cut, grid, section};
 use glam::DVec3;
-use hapdef::budget::{Elements, Quality, unwatched};
-use hapdef::elasticity::grade::{Graded, Ground};
+use hapdef::budget::{Quality, unwatched};
 use hapdef::elasticity::linearity::linearity;
-use hapdef::elasticity::observe::{Face, Observer};
-use hapdef::elasticity::support::Region;
-use hapdef::elasticity::{Freedoms, Section, ShellModel, Support, Touch};
-use hapdef::mesh::{SurfacePoint, TriMesh};
+use hapdef::elasticity::{Freedoms, ShellModel, Touch};
+use hapdef::mesh::TriMesh;
 
 /// Observed order from three meshes of which each halves the last: log₂ of successive changes.
 fn order(values: [f64; 3]) -> f64 {
-    ((values[1] - values[0]) / (values[2] - values[1])).abs().log2()
+    ((values[1] - values[0]) / (values[2] - values[1]))
+        .abs()
+        .log2()
 }
 
 #[test]
@@ -49,42 +48,20 @@ fn pressure(mesh: &TriMesh) -> Vec<(u32, DVec3)> {
             forces[v as usize] += mesh.facet_area(t) / 3.0;
         }
     }
-    (0..).zip(forces).map(|(v, f)| (v, DVec3::NEG_Z * f)).collect()
-}
-
-/// Rms over places of the inner face's strain against a closed form along x and y, over the largest.
-fn strain_error(
-    model: &ShellModel,
-    u: &[f64],
-    places: &[DVec3],
-    exact: impl Fn(DVec3) -> [f64; 3],
-) -> f64 {
-    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
-    let observer = Observer::new(model, &points, Face::Inside);
-    let (mut sum, mut largest) = (0.0, 0.0f64);
-    for ((&p, strain), frame) in places.iter().zip(observer.strain_of(model, u)).zip(observer.frames()) {
-        // Turn into x and y: the frame lies in the plane.
-        let [xx, yy, xy] = strain;
-        let component = |d: DVec3, e: DVec3| {
-            let (a, b) = (d.dot(frame.x_axis), d.dot(frame.y_axis));
-            let (c, f) = (e.dot(frame.x_axis), e.dot(frame.y_axis));
-            xx * a * c + yy * b * f + xy / 2.0 * (a * f + b * c)
-        };
-        let found = [
-            component(DVec3::X, DVec3::X),
-            component(DVec3::Y, DVec3::Y),
-            component(DVec3::X, DVec3::Y),
-        ];
-        for (f, e) in found.iter().zip(exact(p)) {
-            sum += (f - e).powi(2);
-            largest = largest.max(e.abs());
-        }
-    }
-    (sum / places.len() as f64).sqrt() / largest
+    (0..)
+        .zip(forces)
+        .map(|(v, f)| (v, DVec3::NEG_Z * f))
+        .collect()
 }
 
 fn clamped_where(mesh: &TriMesh, test: impl Fn(DVec3) -> bool) -> Vec<Freedoms> {
-    let all = |p: &DVec3| if test(*p) { Freedoms::ALL } else { Freedoms::default() };
+    let all = |p: &DVec3| {
+        if test(*p) {
+            Freedoms::ALL
+        } else {
+            Freedoms::default()
+        }
+    };
     mesh.positions().iter().map(all).collect()
 }
 
@@ -100,11 +77,21 @@ fn inner_strain_of_a_clamped_beam_converges_to_the_closed_form() {
         let model = ShellModel::new(&mesh, s, &held, &unwatched).unwrap();
         let u = model.solve(&pressure(&mesh));
         let places: Vec<DVec3> = (0..40)
-            .map(|k| DVec3::new(0.01 + 0.002 * f64::from(k), 0.002 + 0.001 * f64::from(k % 7), 0.0))
+            .map(|k| {
+                DVec3::new(
+                    0.01 + 0.002 * f64::from(k),
+                    0.002 + 0.001 * f64::from(k % 7),
+                    0.0,
+                )
+            })
             .collect();
         // Pressed down, the top stretches and the inside (below) is compressed.
         strain_error(&model, &u, &places, |p| {
-            [-3.0 * (length - p.x).powi(2) / (1e9 * s.thickness.powi(2)), 0.0, 0.0]
+            [
+                -3.0 * (length - p.x).powi(2) / (1e9 * s.thickness.powi(2)),
+                0.0,
+                0.0,
+            ]
         })
     };
     let errors = [2, 4, 8].map(error);
@@ -151,8 +138,8 @@ fn inner_strain_of_a_clamped_disc_converges_to_the_closed_form() {
             let c = -1.0 / (16.0 * s.bending_stiffness());
             // -z w″ and -z w′/r on the face below, w downward being negative.
             let half = s.thickness / 2.0;
-            let radial = half * c * (3.0 * rr - r * r) * -1.0;
-            let hoop = half * c * (rr - r * r) * -1.0;
+            let radial = -(half * c * (3.0 * rr - r * r));
+            let hoop = -(half * c * (rr - r * r));
             let (x, y) = (p.x / p.length(), p.y / p.length());
             [
                 -(radial * x * x + hoop * y * y),
@@ -169,140 +156,6 @@ fn inner_strain_of_a_clamped_disc_converges_to_the_closed_form() {
     }
 }
 
-/// A disc (radius 50 mm) of rings and spokes, clamped outside 40 mm so that the support has a border of
-/// its own to be cut; and a tip in the middle.
-struct Disc {
-    part: Arc<TriMesh>,
-    section: Section,
-    clear: f64,
-    touch: Touch,
-}
-
-impl Disc {
-    fn new(spokes: u32, thickness: f64) -> Self {
-        // The clear radius is the fourth fifth of the rings.
-        let (outer, rings) = (0.05, spokes / 12 * 5 / 2);
-        let mut p = vec![DVec3::ZERO];
-        for ring in 1..=rings {
-            for k in 0..spokes {
-                let a = f64::from(k) / f64::from(spokes) * 2.0 * PI;
-                let r = outer * f64::from(ring) / f64::from(rings);
-                p.push(DVec3::new(a.cos(), a.sin(), 0.0) * r);
-            }
-        }
-        let at = |ring: u32, k: u32| 1 + (ring - 1) * spokes + k % spokes;
-        let mut t: Vec<[u32; 3]> = (0..spokes).map(|k| [0, at(1, k), at(1, k + 1)]).collect();
-        for ring in 1..rings {
-            for k in 0..spokes {
-                let [a, b, c, d] = [at(ring, k), at(ring + 1, k), at(ring + 1, k + 1), at(ring, k + 1)];
-                t.extend([[a, b, c], [a, c, d]]);
-            }
-        }
-        Self {
-            part: Arc::new(TriMesh::new(&p, &t, 0).unwrap().0),
-            section: section(2e9, 0.3, thickness),
-            clear: 0.04,
-            touch: Touch {
-                position: DVec3::ZERO,
-                normal: DVec3::Z,
-                force: 1.0,
-                tip_radius: 4e-3,
-            },
-        }
-    }
-
-    /// Everything outside the clear radius, as a mask of the vertices.
-    fn support(&self) -> Support {
-        let edge = self.clear * (1.0 - 1e-9);
-        let mask = self.part.positions().iter().map(|p| p.length() > edge);
-        Support {
-            region: Region::Vertices(Arc::new(mask.collect())),
-            held: Freedoms::ALL,
-        }
-    }
-
-    /// w between rings of radius r ≤ s (Timoshenko and Woinowsky-Krieger, art. 19), per newton.
-    fn ring(&self, r: f64, s: f64) -> f64 {
-        let (r, s, big) = (r.min(s), r.max(s), self.clear);
-        let log = if s > 0.0 { (s / big).ln() } else { 0.0 };
-        ((r * r + s * s) * log + (big * big + r * r) * (big * big - s * s) / (2.0 * big * big))
-            / (8.0 * PI * self.section.bending_stiffness())
-    }
-
-    /// Mean displacement under the tip along its force (m): bending, and the shear of Reissner's plate.
-    fn under(&self) -> f64 {
-        let (a, n) = (self.touch.tip_radius, 400);
-        let weight = |x: f64| 6.0 * x * (1.0 - x * x).powi(2); // ∫ over x in 0..1 is one
-        let rings: Vec<(f64, f64)> = (0..n)
-            .map(|k| (f64::from(k) + 0.5) / f64::from(n))
-            .map(|x| (a * x, weight(x) / f64::from(n)))
-            .collect();
-        let shear = |r: f64, s: f64| {
-            (self.clear / r.max(s)).ln() / (2.0 * PI * self.section.shear_stiffness())
-        };
-        let mut sum = 0.0;
-        for &(r, wr) in &rings {
-            for &(s, ws) in &rings {
-                sum += wr * ws * (self.ring(r, s) + shear(r, s));
-            }
-        }
-        sum * self.touch.force
-    }
-
-    /// Strains (xx, yy, xy) of the inside beyond the tip.
-    fn strain(&self, p: DVec3) -> [f64; 3] {
-        let (r, big) = (p.length(), self.clear);
-        // Mean squared radius of the tip's pressure is a²/4.
-        let m = self.touch.tip_radius.powi(2) / 4.0;
-        let c = self.touch.force / (8.0 * PI * self.section.bending_stiffness());
-        let log = (r / big).ln();
-        let slope = c * (2.0 * r * log + (r * r + m) / r - (big * big + m) * r / (big * big));
-        let bend = c * (2.0 * log + 3.0 - m / (r * r) - (big * big + m) / (big * big));
-        // The plate moves down by w; below, at z = -t/2, strains are -z (-w″) = -t/2 w″.
-        let half = self.section.thickness / 2.0;
-        let (radial, hoop) = (-half * bend, -half * slope / r);
-        let (x, y) = (p.x / r, p.y / r);
-        [
-            radial * x * x + hoop * y * y,
-            radial * y * y + hoop * x * x,
-            (radial - hoop) * x * y,
-        ]
-    }
-
-    fn places(&self) -> Vec<DVec3> {
-        (0..80)
-            .map(|k| {
-                let (a, r) = (2.4 * f64::from(k), 0.009 + 0.029 * f64::from(k) / 79.0);
-                DVec3::new(a.cos(), a.sin(), 0.0) * r
-            })
-            .collect()
-    }
-
-    fn graded(&self, aim: &Elements, as_given: bool) -> Graded {
-        let ground = Ground::new(&self.part, self.section, &[self.support()], as_given);
-        ground.grade(&[self.touch], &self.places(), aim, &unwatched).unwrap()
-    }
-
-    /// True errors (%) of the displacement under the tip and of the strains.
-    fn errors(&self, model: &ShellModel) -> [f64; 2] {
-        let u = model.solve(&model.forces(&self.touch));
-        let under = hapdef::elasticity::estimate::under_load(&model.forces(&self.touch), &self.touch, &u);
-        let strain = strain_error(model, &u, &self.places(), |p| self.strain(p));
-        [100.0 * (under / self.under() - 1.0).abs(), 100.0 * strain]
-    }
-}
-
-fn aim(vertices: usize, passes: usize) -> Elements {
-    Elements {
-        vertices,
-        most_vertices: vertices,
-        effort: usize::MAX,
-        displacement_percent: 1e-9,
-        strain_percent: 1e-9,
-        passes,
-    }
-}
-
 #[test]
 fn the_estimated_error_is_the_true_one_to_a_factor_of_two() {
     let mut all = Vec::new();
@@ -310,7 +163,11 @@ fn the_estimated_error_is_the_true_one_to_a_factor_of_two() {
         for spokes in [48, 96] {
             let disc = Disc::new(spokes, thickness);
             let graded = disc.graded(&aim(400, 0), true);
-            all.push((format!("as given, {spokes} spokes, {thickness} m"), graded, disc));
+            all.push((
+                format!("as given, {spokes} spokes, {thickness} m"),
+                graded,
+                disc,
+            ));
         }
         for (vertices, passes) in [(800, 1), (1600, 2), (4000, 2)] {
             let disc = Disc::new(96, thickness);
@@ -321,7 +178,10 @@ fn the_estimated_error_is_the_true_one_to_a_factor_of_two() {
     for (name, graded, disc) in all {
         let [displacement, strain] = disc.errors(&graded.model);
         let e = graded.estimate;
-        let effect = [e.displacement_percent / displacement, e.strain_percent / strain];
+        let effect = [
+            e.displacement_percent / displacement,
+            e.strain_percent / strain,
+        ];
         println!(
             "{name}: {} vertices; displacement {:.3} % of {displacement:.3} %, strain {:.3} % of {strain:.3} %: effectivity {effect:.2?}",
             graded.model.mesh.positions().len(),
@@ -361,7 +221,10 @@ fn the_estimate_of_linearity_is_that_of_a_clamped_disc() {
             w = share - 0.443 * w * w * w;
         }
         let known = 100.0 * (w / share - 1.0);
-        println!("w/t {share}: {:.2} %, known {known:.2} %", found.largest_percent);
+        println!(
+            "w/t {share}: {:.2} %, known {known:.2} %",
+            found.largest_percent
+        );
         assert!((found.largest_percent / known - 1.0).abs() < 0.25);
         assert_eq!(found.beyond, 0);
     }
@@ -388,7 +251,10 @@ fn a_strip_that_only_bends_is_nearly_linear() {
     let u = model.solve(&model.forces(&touch));
     let found = linearity(&model, &[touch], &[u]);
     println!("{found:?}");
-    assert!((found.largest_percent / -1.75 - 1.0).abs() < 0.15, "{found:?}");
+    assert!(
+        (found.largest_percent / -1.75 - 1.0).abs() < 0.15,
+        "{found:?}"
+    );
 }
 
 #[test]

@@ -260,7 +260,10 @@ fn values_outside_their_range_are_named() {
         (|p| p.touch.count = usize::MAX, "touch.count"),
         (|p| p.feasible.edge_neighbours = 100_000, "edge_neighbours"),
         (|p| p.candidates.unexplained = 1.0, "unexplained"),
-        (|p| p.supports[0].box_mm = Some([[f64::NAN; 3]; 2]), "box_mm"),
+        (
+            |p| p.supports[0].box_mm = Some([[f64::NAN; 3]; 2]),
+            "box_mm",
+        ),
     ];
     for (change, key) in cases {
         let mut inputs = limb();
@@ -293,7 +296,12 @@ fn plate(thickness: f64, nu: f64, sliver: f64) -> (Inputs, f64) {
     let mut t: Vec<[u32; 3]> = (0..spokes).map(|k| [0, at(1, k), at(1, k + 1)]).collect();
     for ring in 1..rings as u32 {
         for k in 0..spokes {
-            let [a, b, c, d] = [at(ring, k), at(ring + 1, k), at(ring + 1, k + 1), at(ring, k + 1)];
+            let [a, b, c, d] = [
+                at(ring, k),
+                at(ring + 1, k),
+                at(ring + 1, k + 1),
+                at(ring, k + 1),
+            ];
             t.extend([[a, b, c], [a, c, d]]);
         }
     }
@@ -307,7 +315,10 @@ fn plate(thickness: f64, nu: f64, sliver: f64) -> (Inputs, f64) {
         normal: hapdef::mesh::unroll::Axis::Z,
     });
     let part = TriMesh::new(&p, &t, 0).unwrap().0;
-    let rim = part.positions().iter().map(|p| p.length() > clear * (1.0 - 1e-6) * 1e-3);
+    let rim = part
+        .positions()
+        .iter()
+        .map(|p| p.length() > clear * (1.0 - 1e-6) * 1e-3);
     let mut masks = Masks::new();
     masks.insert("rim".into(), Arc::new(rim.collect()));
     let s = project.section();
@@ -338,7 +349,13 @@ fn pressed(inputs: &Inputs) -> Result<given::Answer, DesignError> {
         position: DVec3::new(0.0, 20e-3, 0.0),
         direction: DVec3::Y,
     };
-    given::answer(inputs, &[touch], &[site], &Quality::Draft.budget().clone(), &unwatched)
+    given::answer(
+        inputs,
+        &[touch],
+        &[site],
+        &Quality::Draft.budget().clone(),
+        &unwatched,
+    )
 }
 
 fn deflection(inputs: &Inputs) -> f64 {
@@ -393,7 +410,10 @@ fn millimetres_taken_for_metres_and_the_other_way_are_refused_in_plain_words() {
     };
     for k in [1e3, 1e-3] {
         let error = run(&scaled(k)).err().expect("refused").to_string();
-        assert!(error.contains("the unit of the mesh") || error.contains("support box"), "{error}");
+        assert!(
+            error.contains("the unit of the mesh") || error.contains("support box"),
+            "{error}"
+        );
     }
     // The supports' boxes moved along, so that only the sizes are wrong.
     for k in [1e3, 1e-3] {
@@ -415,7 +435,10 @@ fn a_second_body_that_nothing_holds_is_left_out_or_named() {
     points.extend([0.5, 0.51, 0.52].map(|x| DVec3::new(x, 0.01 * (x - 0.5).sin(), 0.0)));
     triangles.push([base, base + 1, base + 2]);
     let (kept, report) = TriMesh::new(&points, &triangles, 0).unwrap();
-    assert_eq!((report.bodies, kept.positions().len()), (2, near.part.positions().len()));
+    assert_eq!(
+        (report.bodies, kept.positions().len()),
+        (2, near.part.positions().len())
+    );
     let mut inputs = limb();
     inputs.part = Arc::new(TriMesh::new(&points, &triangles, 1).unwrap().0);
     let error = run(&inputs).err().expect("nothing holds it").to_string();
@@ -436,7 +459,13 @@ fn touches_off_the_part_are_projected_or_refused() {
             position: DVec3::new(0.0, 20e-3, -0.5e-3),
             direction: DVec3::Y,
         };
-        given::answer(&inputs, &[touch], &[site], &Quality::Draft.budget(), &unwatched)
+        given::answer(
+            &inputs,
+            &[touch],
+            &[site],
+            &Quality::Draft.budget(),
+            &unwatched,
+        )
     };
     let answer = at(3e-3, 0.0).unwrap();
     assert!((answer.touch_distances[0] - 3e-3).abs() < 1e-9);
@@ -448,7 +477,10 @@ fn touches_off_the_part_are_projected_or_refused() {
     let held = at(0.0, 0.047).unwrap();
     assert!(strain(&held).abs() < 1e-6 * strain(&straight).abs());
     let error = at(5.0, 0.0).err().expect("5 m away").to_string();
-    assert!(error.contains("touch 0") && error.contains("unit"), "{error}");
+    assert!(
+        error.contains("touch 0") && error.contains("unit"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -465,12 +497,19 @@ fn a_tip_larger_than_the_part_presses_all_of_it() {
         direction: DVec3::Y,
     };
     let budget = Quality::Draft.budget();
-    let answer = given::answer(&inputs, &[touch(10.0), touch(20.0)], &[site], &budget, &unwatched);
+    let answer = given::answer(
+        &inputs,
+        &[touch(10.0), touch(20.0)],
+        &[site],
+        &budget,
+        &unwatched,
+    );
     let answer = answer.unwrap();
     let down: Vec<f64> = answer.pairs().map(|p| -p.displacement.z).collect();
     // 1 N over a disc of 50 mm, of which 40 mm are free: q R⁴ / 64 D with q = 1 N over all of it.
     let s = inputs.project.section();
-    let known = 0.04_f64.powi(4) / (std::f64::consts::PI * 0.05 * 0.05) / (64.0 * s.bending_stiffness());
+    let known =
+        0.04_f64.powi(4) / (std::f64::consts::PI * 0.05 * 0.05) / (64.0 * s.bending_stiffness());
     for w in down {
         assert!((w / known - 1.0).abs() < 0.03, "{w:e} {known:e}");
     }

@@ -4,6 +4,11 @@
 //! A few thousand files a format in the ordinary run; a million with
 //! `HAPDEF_FUZZ=1000000 cargo test --test fuzz -- --nocapture`. Every file is made from its number alone.
 
+#![allow(
+    clippy::format_push_string,
+    reason = "files are put together here, once"
+)]
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -67,7 +72,12 @@ fn obj(mesh: &TriMesh) -> Vec<u8> {
         if k % 20 == 0 {
             text += &format!("g group{k}\n");
         }
-        text += &format!("f {}//1 {} {}\n", t[0] + 1, t[1] + 1, t[2] as i64 - mesh.positions().len() as i64);
+        text += &format!(
+            "f {}//1 {} {}\n",
+            t[0] + 1,
+            t[1] + 1,
+            i64::from(t[2]) - mesh.positions().len() as i64
+        );
     }
     text.into_bytes()
 }
@@ -89,14 +99,17 @@ fn ply(mesh: &TriMesh, format: &str) -> Vec<u8> {
         }
     }
     for t in mesh.triangles() {
-        match format {
-            "ascii" => bytes.extend(format!("3 {} {} {}\n", t[0], t[1], t[2]).bytes()),
-            _ => {
-                bytes.push(3);
-                for v in t {
-                    bytes.extend(if little { v.to_le_bytes() } else { v.to_be_bytes() });
-                }
-            }
+        if format == "ascii" {
+            bytes.extend(format!("3 {} {} {}\n", t[0], t[1], t[2]).bytes());
+            continue;
+        }
+        bytes.push(3);
+        for v in t {
+            bytes.extend(if little {
+                v.to_le_bytes()
+            } else {
+                v.to_be_bytes()
+            });
         }
     }
     bytes
@@ -108,7 +121,20 @@ fn gltf() -> Vec<u8> {
 }
 
 const WORDS: [&str; 14] = [
-    "nan", "inf", "-1", "0", "4294967295", "1e400", "-2147483649", "\n", " ", "99999999999999999999", "/", "1e-320", "{", "]",
+    "nan",
+    "inf",
+    "-1",
+    "0",
+    "4294967295",
+    "1e400",
+    "-2147483649",
+    "\n",
+    " ",
+    "99999999999999999999",
+    "/",
+    "1e-320",
+    "{",
+    "]",
 ];
 
 /// One to three changes: bits, bytes, numbers, words, blocks taken out, doubled or cut off.
@@ -171,10 +197,16 @@ fn check(loaded: &LoadedMesh) -> Result<(), String> {
     let vertices = mesh.positions().len() as u32;
     let mut used = vec![false; vertices as usize];
     for (t, tri) in (0..).zip(mesh.triangles()) {
-        if tri.iter().any(|&v| v >= vertices) || tri[0] == tri[1] || tri[1] == tri[2] || tri[2] == tri[0] {
+        if tri.iter().any(|&v| v >= vertices)
+            || tri[0] == tri[1]
+            || tri[1] == tri[2]
+            || tri[2] == tri[0]
+        {
             return Err(format!("triangle {tri:?} of {vertices} vertices"));
         }
-        tri.iter().for_each(|&v| used[v as usize] = true);
+        for &v in tri {
+            used[v as usize] = true;
+        }
         let normal = mesh.facet_normal(t);
         if (normal.length() - 1.0).abs() > 1e-6 || mesh.facet_area(t) <= 0.0 {
             return Err(format!("triangle {t} has normal {normal}"));
@@ -188,7 +220,11 @@ fn check(loaded: &LoadedMesh) -> Result<(), String> {
             return Err(format!("{edge:?}"));
         }
     }
-    if loaded.groups.values().any(|mask| mask.len() != vertices as usize) {
+    if loaded
+        .groups
+        .values()
+        .any(|mask| mask.len() != vertices as usize)
+    {
         return Err("a group of another size".into());
     }
     Ok(())
@@ -212,17 +248,26 @@ fn fuzz(name: &str, ending: &str, seed: &[u8]) {
                 Err(_) => Some(format!("{name} {number}: panic")),
                 Ok(Err(message)) => {
                     refused.fetch_add(1, Ordering::Relaxed);
-                    message.is_empty().then(|| format!("{name} {number}: no message"))
+                    message
+                        .is_empty()
+                        .then(|| format!("{name} {number}: no message"))
                 }
                 Ok(Ok(loaded)) => {
                     accepted.fetch_add(1, Ordering::Relaxed);
-                    check(&loaded).err().map(|e| format!("{name} {number}: {e}"))
+                    check(&loaded)
+                        .err()
+                        .map(|e| format!("{name} {number}: {e}"))
                 }
             }
         })
         .collect();
     println!("{name}: {accepted:?} accepted, {refused:?} refused");
-    assert!(bad.is_empty(), "{}: {:?}", bad.len(), &bad[..bad.len().min(5)]);
+    assert!(
+        bad.is_empty(),
+        "{}: {:?}",
+        bad.len(),
+        &bad[..bad.len().min(5)]
+    );
     assert!(refused.into_inner() > 0 && accepted.into_inner() > 0);
 }
 
@@ -239,7 +284,11 @@ fn spoiled_files_of_every_format_are_refused_or_sound() {
         ("STL, text", "stl", ascii_stl(&mesh)),
         ("OBJ", "obj", obj(&mesh)),
         ("PLY, text", "ply", ply(&mesh, "ascii")),
-        ("PLY, little-endian", "ply", ply(&mesh, "binary_little_endian")),
+        (
+            "PLY, little-endian",
+            "ply",
+            ply(&mesh, "binary_little_endian"),
+        ),
         ("PLY, big-endian", "ply", ply(&mesh, "binary_big_endian")),
         ("GLB", "glb", write_glb(&mesh).unwrap()),
         ("glTF", "gltf", gltf()),

@@ -11,8 +11,8 @@ use hapdef::dataset::{Signal, SignalMatrix};
 use hapdef::design::{self, Inputs};
 use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::{Face, Observer};
-use hapdef::elasticity::support::held_freedoms;
 use hapdef::elasticity::respond::{Reading, Responses, Side, respond, respond_from};
+use hapdef::elasticity::support::held_freedoms;
 use hapdef::elasticity::{Freedoms, ShellModel, Touch};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::locate::SurfaceIndex;
@@ -106,7 +106,13 @@ fn a_turned_limb_deforms_the_same() {
         .unwrap()
         .0;
     let held = held(&inputs);
-    let m = ShellModel::new(&Arc::new(turned), inputs.project.section(), &held, &unwatched).unwrap();
+    let m = ShellModel::new(
+        &Arc::new(turned),
+        inputs.project.section(),
+        &held,
+        &unwatched,
+    )
+    .unwrap();
     let mut t = touch(&inputs, DVec3::new(0.03, 0.01, 0.07));
     t.position = turn * t.position;
     t.normal = turn * t.normal;
@@ -224,7 +230,11 @@ fn loads_and_outputs_are_reciprocal() {
         assert_eq!(a.len(), b.len());
         for (x, y) in a.chunks(touches.len()).zip(b.chunks(touches.len())) {
             let apart: Vec<f64> = x.iter().zip(y).map(|(x, y)| x - y).collect();
-            assert!(norm(&apart) < 1e-9 * norm(x), "{:e}", norm(&apart) / norm(x));
+            assert!(
+                norm(&apart) < 1e-9 * norm(x),
+                "{:e}",
+                norm(&apart) / norm(x)
+            );
         }
     }
     let fewer = |count: usize| {
@@ -331,9 +341,9 @@ fn one_thread_or_many_give_the_same_bytes() {
 
 #[test]
 fn the_work_is_counted_and_nothing_is_done_twice() {
-    let (inputs, budget) = small(Signal::Displacement);
     // Every fourth of 200 touches.
     const SAMPLE: u64 = 50;
+    let (inputs, budget) = small(Signal::Displacement);
     let mut budget = budget;
     budget.elements.most_vertices = budget.elements.vertices;
     let simulated = Arc::new(design::simulate(&inputs, &budget, &unwatched).unwrap());

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use hapdef::io::mesh_file::read_mesh;
-use hapdef::mesh::{Edge, TriMesh};
 use hapdef::mesh::locate::SurfaceIndex;
-use hapdef::mesh::repair::Repair;
 use hapdef::mesh::remesh::{as_given, quarter, remesh};
+use hapdef::mesh::repair::Repair;
 use hapdef::mesh::surface::Surface;
+use hapdef::mesh::{Edge, TriMesh};
 use hapdef::project::Unit;
 
 /// Angles in degrees: the smallest, and the one that a hundredth of all are below.
@@ -66,7 +66,11 @@ fn the_limb_keeps_its_surface_its_rims_and_its_openings() {
         assert_eq!(euler(mesh), euler(&part), "openings");
         let [least, hundredth] = angles(mesh);
         assert!(least > 20.0 && hundredth > 28.0, "{least} {hundredth}");
-        let long = mesh.edges().iter().map(|e| length(mesh, e)).fold(0.0, f64::max);
+        let long = mesh
+            .edges()
+            .iter()
+            .map(|e| length(mesh, e))
+            .fold(0.0, f64::max);
         assert!(long < 1.5 * h && mesh.mean_edge() > 0.75 * h, "{long}");
         let consistent = |e: &&Edge| e.triangles.len() == 2;
         for edge in mesh.edges().iter().filter(consistent) {
@@ -89,8 +93,16 @@ fn the_size_is_followed_from_place_to_place() {
         let (sum, count) = near.fold((0.0, 0), |(s, n), e| (s + length(&mesh, e), n + 1));
         sum / f64::from(count)
     };
-    assert!((1.1e-3..1.7e-3).contains(&mean(0.0, 0.05)), "{}", mean(0.0, 0.05));
-    assert!((3e-3..4.4e-3).contains(&mean(0.07, 0.12)), "{}", mean(0.07, 0.12));
+    assert!(
+        (1.1e-3..1.7e-3).contains(&mean(0.0, 0.05)),
+        "{}",
+        mean(0.0, 0.05)
+    );
+    assert!(
+        (3e-3..4.4e-3).contains(&mean(0.07, 0.12)),
+        "{}",
+        mean(0.07, 0.12)
+    );
 }
 
 #[test]
@@ -145,7 +157,12 @@ fn creases_and_lines_that_are_marked_stay() {
     let t: Vec<[u32; 3]> = (0..4)
         .flat_map(|i| {
             let [a, b, c] = [3 * i, 3 * i + 1, 3 * i + 2];
-            [[a, b, a + 3], [a + 3, b, b + 3], [b, c, b + 3], [b + 3, c, c + 3]]
+            [
+                [a, b, a + 3],
+                [a + 3, b, b + 3],
+                [b, c, b + 3],
+                [b + 3, c, c + 3],
+            ]
         })
         .collect();
     let part = Arc::new(TriMesh::new(&p, &t, 0).unwrap().0);
@@ -164,8 +181,14 @@ fn creases_and_lines_that_are_marked_stay() {
             .map(|[a, b]| a.distance(b))
             .sum()
     };
-    assert!((on(&|p| p.y == 0.0 && p.z == 0.0) - 4.0).abs() < 1e-9, "crease");
-    assert!((on(&|p| (p.x - 2.0).abs() < 1e-12) - 6.0).abs() < 1e-9, "marked");
+    assert!(
+        (on(&|p| p.y == 0.0 && p.z == 0.0) - 4.0).abs() < 1e-9,
+        "crease"
+    );
+    assert!(
+        (on(&|p| (p.x - 2.0).abs() < 1e-12) - 6.0).abs() < 1e-9,
+        "marked"
+    );
     assert!((new.mesh.area() - 24.0).abs() < 1e-9);
 }
 

@@ -12,7 +12,7 @@ use crate::io::{atomic, glb, project_file};
 use crate::limb::{LimbSpec, LimbSupport};
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
-use crate::project::{Masks, Lattice, Project, RegionKeys, SupportKeys, SupportKind};
+use crate::project::{Lattice, Masks, Project, RegionKeys, SupportKeys, SupportKind};
 
 /// Lengths in millimetres. Without options it writes the bundled limb.
 #[derive(Args, Debug, Clone)]
@@ -122,7 +122,12 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
             .mesh;
         project.selection.sites = choose_sites(&project, stored)?;
     }
-    project_file::save(&args.out.join("limb.hapdef.toml"), &project, None, &Masks::new())?;
+    project_file::save(
+        &args.out.join("limb.hapdef.toml"),
+        &project,
+        None,
+        &Masks::new(),
+    )?;
     let figures = json!({
         "vertices": mesh.positions().len(),
         "triangles": mesh.triangles().len(),

@@ -17,18 +17,18 @@ use crate::io::{points, vtu};
 pub struct SimulateArgs {
     #[command(flatten)]
     pub common: Common,
-    /// Touches to answer for (.csv): x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm. The force pushes
+    /// Touches to answer for (.csv): `x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm`. The force pushes
     /// along the opposite of the outward normal n.
     #[arg(long, requires = "sites")]
     pub touches: Option<PathBuf>,
-    /// Gauges to answer for (.csv): x_mm,y_mm,z_mm,dx,dy,dz, with d the direction of the gauge.
+    /// Gauges to answer for (.csv): `x_mm,y_mm,z_mm,dx,dy,dz`, with d the direction of the gauge.
     #[arg(long, requires = "touches")]
     pub sites: Option<PathBuf>,
     /// The dataset (.npz), or the answers at given points (.csv or .npz): touch, site, displacement
     /// (mm) and strain on the inside face, and how far the given points lay from the part (mm).
     #[arg(long)]
     pub out: PathBuf,
-    /// Fields for ParaView (.vtu): mesh, supports, displacements and strains under the first touches.
+    /// Fields for `ParaView` (.vtu): mesh, supports, displacements and strains under the first touches.
     #[arg(long)]
     pub vtu: Option<PathBuf>,
 }
@@ -39,7 +39,11 @@ pub struct SimulateArgs {
 /// A message in the user's terms.
 pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     let given = args.touches.as_deref().zip(args.sites.as_deref());
-    let endings: &[&str] = if given.is_some() { &["csv", "npz"] } else { &["npz"] };
+    let endings: &[&str] = if given.is_some() {
+        &["csv", "npz"]
+    } else {
+        &["npz"]
+    };
     check_output(&args.out, endings)?;
     if let Some(path) = &args.vtu {
         check_output(path, &["vtu"])?;
@@ -82,7 +86,11 @@ fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()>
         let model = simulated.model()?;
         let touches = &simulated.dataset.touches;
         let first = &touches[..touches.len().min(vtu::TOUCHES)];
-        vtu::write(path, &model.mesh, &vtu::fields(&model, &simulated.held, first))?;
+        vtu::write(
+            path,
+            &model.mesh,
+            &vtu::fields(&model, &simulated.held, first),
+        )?;
     }
     say(&simulated.achieved.notes);
     let dataset = &simulated.dataset;
@@ -90,7 +98,7 @@ fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()>
         "sites": dataset.sites.len(),
         "touches": dataset.touches.len(),
         "signal": dataset.signal,
-        "bytes": dataset.x.values().len() * size_of::<f64>(),
+        "bytes": size_of_val(dataset.x.values()),
         "vertices": simulated.mesh.positions().len(),
         "unknowns": simulated.unknowns,
         "discretization": simulated.discretization,
@@ -115,7 +123,13 @@ fn at_points(
     let bar = Bar::default();
     let result = args.common.in_pool(|| {
         let watch = |p| bar.show(p);
-        Ok(given::answer(&loaded.inputs, &touches, &sites, &budget, &watch)?)
+        Ok(given::answer(
+            &loaded.inputs,
+            &touches,
+            &sites,
+            &budget,
+            &watch,
+        )?)
     });
     bar.finish();
     let answer = result?;

@@ -8,9 +8,9 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::load::Touch;
-use crate::budget::Elements;
 use super::observe::{Face, Observer, turn};
 use super::{NodalForces, ShellModel};
+use crate::budget::Elements;
 
 /// Change from 2h to h over the error at h. Displacements and smoothed strains converge with h² where all
 /// is smooth (3), with less near corners of supports and openings: between the two.
@@ -132,9 +132,7 @@ pub fn between(
 pub fn strain_apart(coarse: &Sample, fine: &Sample, touches: &[Touch], places: &[DVec3]) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);
     for (load, touch) in touches.iter().enumerate() {
-        let far = |i: &usize| {
-            places[*i].distance(touch.position) > BEYOND * touch.tip_radius
-        };
+        let far = |i: &usize| places[*i].distance(touch.position) > BEYOND * touch.tip_radius;
         let largest = (0..places.len())
             .filter(far)
             .map(|i| norm(fine.strains[load][i]))

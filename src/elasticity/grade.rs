@@ -12,10 +12,10 @@ use super::recover::facet_errors;
 use super::support::{Freedoms, HeldPart, Support};
 use super::{ElasticError, Section, ShellModel, scope};
 use crate::budget::{Elements, Watch, report};
+use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::remesh::{Remeshed, as_given, quarter, remesh};
 use crate::mesh::surface::Surface;
-use crate::mesh::TriMesh;
 
 /// A part ready to have elements laid on it.
 pub struct Ground {
@@ -95,9 +95,18 @@ impl Ground {
         if self.as_given {
             return as_given(&self.surface);
         }
-        let rim: f64 = self.held.mesh.boundary_edges().map(|e| self.length(e)).sum();
+        let rim: f64 = self
+            .held
+            .mesh
+            .boundary_edges()
+            .map(|e| self.length(e))
+            .sum();
         // Vertices for edges of length h: 1/h² times what the area takes, 1/h times what the rims take.
-        let (a, b, n) = (AREA * self.held.mesh.area(), RIM * rim, vertices.max(4) as f64);
+        let (a, b, n) = (
+            AREA * self.held.mesh.area(),
+            RIM * rim,
+            vertices.max(4) as f64,
+        );
         let size = (b + (b * b + 4.0 * n * a).sqrt()) / (2.0 * n);
         let size = size.max(LEAST_IN_THICKNESS * self.section.thickness);
         remesh(&self.surface, &|_| size)
@@ -117,7 +126,10 @@ impl Ground {
     /// What is held at the vertices of a mesh on this ground.
     #[must_use]
     pub fn held(&self, laid: &Remeshed) -> Vec<Freedoms> {
-        laid.places.iter().map(|&at| self.held.held_at(at)).collect()
+        laid.places
+            .iter()
+            .map(|&at| self.held.held_at(at))
+            .collect()
     }
 
     /// A model on a mesh laid on this ground.
@@ -265,7 +277,11 @@ fn sizes(mesh: &TriMesh, errors: &[f64], vertices: usize, least: f64) -> Vec<f64
             weights[v as usize] += area;
         }
     }
-    let mut sizes: Vec<f64> = logs.iter().zip(&weights).map(|(l, w)| (l / w).exp()).collect();
+    let mut sizes: Vec<f64> = logs
+        .iter()
+        .zip(&weights)
+        .map(|(l, w)| (l / w).exp())
+        .collect();
     for _ in 0..3 {
         let inside: f64 = mesh
             .triangles()

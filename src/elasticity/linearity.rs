@@ -35,7 +35,11 @@ pub fn linearity(model: &ShellModel, touches: &[Touch], solutions: &[Vec<f64>]) 
     let relaxed = model.solve_loads(&second.iter().map(|s| s.force.clone()).collect::<Vec<_>>());
     let mut changes = Vec::new();
     let mut beyond = 0;
-    for ((touch, u), (second, u2)) in touches.iter().zip(solutions).zip(second.iter().zip(&relaxed)) {
+    for ((touch, u), (second, u2)) in touches
+        .iter()
+        .zip(solutions)
+        .zip(second.iter().zip(&relaxed))
+    {
         let forces: NodalForces = model.forces(touch);
         let twice_energy = estimate::under_load(&forces, touch, u) * touch.force;
         if twice_energy <= 0.0 {
@@ -110,7 +114,8 @@ impl Second {
             let frame = facet.frame;
             // The element's own mean membrane strain, so that what it can relax is relaxed.
             let mean = facet.strain([1.0 / 3.0; 3], 0.0);
-            let own = nalgebra::SVector::<f64, 18>::from_fn(|i, _| u[6 * tri[i / 6] as usize + i % 6]);
+            let own =
+                nalgebra::SVector::<f64, 18>::from_fn(|i, _| u[6 * tri[i / 6] as usize + i % 6]);
             let (gradients, area) = shape_gradients(mesh.corners(t), frame.x_axis, frame.y_axis);
             let moved = tri.map(|v| DVec3::from_slice(&u[6 * v as usize..]));
             // ∂u/∂x and ∂u/∂y, constant on the facet.

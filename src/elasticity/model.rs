@@ -266,7 +266,7 @@ impl ShellModel {
     /// Checks a solution against its load: reactions and energy.
     #[must_use]
     pub fn check(&self, forces: &NodalForces, displacement: &[f64]) -> LoadCheck {
-        self.check_solved(&[forces.clone()], &[displacement])
+        self.check_solved(std::slice::from_ref(forces), &[displacement])
     }
 
     /// The worst of the checks of several solved touches.
@@ -359,7 +359,6 @@ impl ShellModel {
             .collect();
         norm(&r) / norm(&f)
     }
-
 }
 
 pub(super) fn spread(forces: &NodalForces) -> Vec<(usize, f64)> {

@@ -109,7 +109,11 @@ impl Observer {
     }
 
     /// As [`Self::strain`], in a buffer that is used again and again.
-    pub(super) fn strain_into<'b>(&self, solved: &[f64], buffer: &'b mut Vec<f64>) -> &'b mut [f64] {
+    pub(super) fn strain_into<'b>(
+        &self,
+        solved: &[f64],
+        buffer: &'b mut Vec<f64>,
+    ) -> &'b mut [f64] {
         let corners = self.corners.count() * BLOCK;
         buffer.resize(corners + self.strains.count() * BLOCK, 0.0);
         let (corners, strain) = buffer.split_at_mut(corners);
@@ -142,7 +146,11 @@ impl Observer {
             let strain = self.strain(&model.widened(chunk));
             for k in 0..chunk.len() {
                 let points = strain.chunks_exact(3 * BLOCK);
-                all.push(points.map(|s| [s[k], s[BLOCK + k], s[2 * BLOCK + k]]).collect());
+                all.push(
+                    points
+                        .map(|s| [s[k], s[BLOCK + k], s[2 * BLOCK + k]])
+                        .collect(),
+                );
             }
         }
         all
@@ -201,7 +209,10 @@ fn curvature(mesh: &TriMesh, vertex: u32, facets: &[u32], frame: SiteFrame) -> [
     let mut gram = nalgebra::Matrix3::zeros();
     let mut right = nalgebra::Vector3::zeros();
     for &t in facets {
-        for v in mesh.triangles()[t as usize].into_iter().filter(|&v| v != vertex) {
+        for v in mesh.triangles()[t as usize]
+            .into_iter()
+            .filter(|&v| v != vertex)
+        {
             let (d, n) = (mesh.positions()[v as usize] - here, normals[v as usize]);
             if n.dot(frame.z_axis) < CREASE {
                 continue;

@@ -33,8 +33,12 @@ pub fn facet_errors(model: &ShellModel, solutions: &[Vec<f64>]) -> Vec<f64> {
                 .sum()
         })
         .collect();
-    let normals: Vec<DVec3> = (0..strains.len() as u32).map(|t| mesh.facet_normal(t)).collect();
-    let areas: Vec<f64> = (0..strains.len() as u32).map(|t| mesh.facet_area(t)).collect();
+    let normals: Vec<DVec3> = (0..strains.len() as u32)
+        .map(|t| mesh.facet_normal(t))
+        .collect();
+    let areas: Vec<f64> = (0..strains.len() as u32)
+        .map(|t| mesh.facet_area(t))
+        .collect();
     (0..strains.len())
         .into_par_iter()
         .map(|t| {
@@ -97,9 +101,8 @@ fn facet_strains(model: &ShellModel, t: u32, solutions: &[Vec<f64>]) -> Vec<Face
     solutions
         .iter()
         .map(|u| {
-            let local = nalgebra::SVector::<f64, 18>::from_fn(|i, _| {
-                u[6 * tri[i / 6] as usize + i % 6]
-            });
+            let local =
+                nalgebra::SVector::<f64, 18>::from_fn(|i, _| u[6 * tri[i / 6] as usize + i % 6]);
             operators.map(|faces| faces.map(|b| in_space(e, n, b * local)))
         })
         .collect()
@@ -108,7 +111,9 @@ fn facet_strains(model: &ShellModel, t: u32, solutions: &[Vec<f64>]) -> Vec<Face
 /// The tensor of strains (xx, yy, 2xy) along two directions.
 fn in_space(e: DVec3, n: DVec3, strain: nalgebra::Vector3<f64>) -> Tensor {
     let entry = |i: usize, j: usize| {
-        strain.x * e[i] * e[j] + strain.y * n[i] * n[j] + strain.z / 2.0 * (e[i] * n[j] + n[i] * e[j])
+        strain.x * e[i] * e[j]
+            + strain.y * n[i] * n[j]
+            + strain.z / 2.0 * (e[i] * n[j] + n[i] * e[j])
     };
     [
         entry(0, 0),

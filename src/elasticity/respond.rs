@@ -132,26 +132,31 @@ pub fn respond_from(
         let outputs = output_rows(observer, reading);
         return by_outputs(model, &loads, &outputs, watch);
     }
-    let blocks = model.solve_rows(&loads, "Solving touches", watch, |buffer, columns, solved| {
-        let width = columns.len();
-        let mut values = Vec::new();
-        let mut keep = |rows: &[f64]| {
-            values.extend(rows.chunks_exact(BLOCK).flat_map(|r| &r[..width]));
-        };
-        match reading {
-            Reading::Strain | Reading::StrainAndDisplacement => {
-                keep(observer.strain_into(solved, buffer));
+    let blocks = model.solve_rows(
+        &loads,
+        "Solving touches",
+        watch,
+        |buffer, columns, solved| {
+            let width = columns.len();
+            let mut values = Vec::new();
+            let mut keep = |rows: &[f64]| {
+                values.extend(rows.chunks_exact(BLOCK).flat_map(|r| &r[..width]));
+            };
+            match reading {
+                Reading::Strain | Reading::StrainAndDisplacement => {
+                    keep(observer.strain_into(solved, buffer));
+                }
+                Reading::Gauge(angles) | Reading::GaugeAndDisplacement(angles) => {
+                    keep(&along_gauges(observer.strain_into(solved, buffer), angles));
+                }
+                Reading::Displacement => {}
             }
-            Reading::Gauge(angles) | Reading::GaugeAndDisplacement(angles) => {
-                keep(&along_gauges(observer.strain_into(solved, buffer), angles));
+            if reading.displaces() {
+                keep(&observer.displacement(solved));
             }
-            Reading::Displacement => {}
-        }
-        if reading.displaces() {
-            keep(&observer.displacement(solved));
-        }
-        (columns.to_vec(), values)
-    })?;
+            (columns.to_vec(), values)
+        },
+    )?;
     let rows = blocks.first().map_or(0, |(c, v)| v.len() / c.len());
     Ok(Responses {
         loads: touches.len(),

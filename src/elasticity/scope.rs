@@ -75,7 +75,12 @@ fn is_joint(mesh: &TriMesh, edge: &Edge) -> bool {
 fn tightly_curved(surface: &Surface, radius: f64) -> f64 {
     let mesh = &surface.mesh;
     let mut curved = vec![false; mesh.triangles().len()];
-    for (edge, _) in mesh.edges().iter().zip(&surface.features).filter(|(_, f)| !**f) {
+    for (edge, _) in mesh
+        .edges()
+        .iter()
+        .zip(&surface.features)
+        .filter(|(_, f)| !**f)
+    {
         let [s, t] = edge.triangles[..] else { continue };
         // The angle between two facets spreads over half of either's height over the edge.
         let angle = mesh.facet_normal(s).angle_between(mesh.facet_normal(t));
@@ -119,7 +124,10 @@ mod tests {
     fn a_thin_limb_is_in_scope_and_a_thick_one_is_not() {
         assert!(notes(1.5e-3, 5e-3).is_empty(), "{:?}", notes(1.5e-3, 5e-3));
         let thick = notes(5e-3, 5e-3).join(" ");
-        assert!(thick.contains("radius of curvature") && thick.contains("strips"), "{thick}");
+        assert!(
+            thick.contains("radius of curvature") && thick.contains("strips"),
+            "{thick}"
+        );
         assert!(notes(1.5e-3, 1e-3)[0].contains("tip"));
     }
 }

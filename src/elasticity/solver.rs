@@ -2,13 +2,13 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
 use faer::reborrow::{Reborrow, ReborrowMut};
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
@@ -262,7 +262,14 @@ fn backward(l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut Block) {
     let mut x = MatMut::from_row_major_slice_mut(own, columns, BLOCK);
     if !below.is_empty() {
         let known = MatRef::from_row_major_slice(below, node.pattern().len(), BLOCK);
-        matmul(x.rb_mut(), Accum::Add, bottom.transpose(), known, -1.0, Par::Seq);
+        matmul(
+            x.rb_mut(),
+            Accum::Add,
+            bottom.transpose(),
+            known,
+            -1.0,
+            Par::Seq,
+        );
     }
     solve_upper_triangular_in_place(top.transpose(), x, Par::Seq);
 }

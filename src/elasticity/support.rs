@@ -105,7 +105,9 @@ impl HeldPart {
         Freedoms(
             among
                 .filter(|(_, w)| *w > 1e-7)
-                .fold(Freedoms::ALL.0, |mask, (v, _)| mask & self.held[v as usize].0),
+                .fold(Freedoms::ALL.0, |mask, (v, _)| {
+                    mask & self.held[v as usize].0
+                }),
         )
     }
 
@@ -115,7 +117,10 @@ impl HeldPart {
         let on = self.held[edge.a as usize].0 & self.held[edge.b as usize].0;
         edge.triangles.iter().any(|&t| {
             let tri = self.mesh.triangles()[t as usize];
-            on & !tri.iter().fold(on, |mask, &v| mask & self.held[v as usize].0) != 0
+            on & !tri
+                .iter()
+                .fold(on, |mask, &v| mask & self.held[v as usize].0)
+                != 0
         })
     }
 
@@ -182,7 +187,12 @@ mod tests {
             .flat_map(|i| [0.0, 1.0].map(|y| DVec3::new(f64::from(i), y, 0.0)))
             .collect();
         let t: Vec<[u32; 3]> = (0..4)
-            .flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 1], [2 * i + 1, 2 * i + 2, 2 * i + 3]])
+            .flat_map(|i| {
+                [
+                    [2 * i, 2 * i + 2, 2 * i + 1],
+                    [2 * i + 1, 2 * i + 2, 2 * i + 3],
+                ]
+            })
             .collect();
         Arc::new(TriMesh::new(&p, &t, 0).unwrap().0)
     }
@@ -208,8 +218,13 @@ mod tests {
             .map(|t| part.mesh.facet_area(t))
             .sum();
         assert!((held - 1.3).abs() < 1e-12, "{held}");
-        let border = part.mesh.edges().iter().filter(|e| part.is_border(e)).count();
-        assert!(border >= 1 && border <= 3, "{border}");
+        let border = part
+            .mesh
+            .edges()
+            .iter()
+            .filter(|e| part.is_border(e))
+            .count();
+        assert!((1..=3).contains(&border), "{border}");
     }
 
     #[test]
@@ -225,7 +240,12 @@ mod tests {
         mask[8] = true;
         let line = HeldPart::new(&strip(), &[support(mask)]);
         assert!(!line.is_spot(9));
-        let borders: Vec<_> = line.mesh.edges().iter().filter(|e| line.is_border(e)).collect();
+        let borders: Vec<_> = line
+            .mesh
+            .edges()
+            .iter()
+            .filter(|e| line.is_border(e))
+            .collect();
         assert_eq!(borders.len(), 1);
         assert_eq!((borders[0].a, borders[0].b), (8, 9));
     }

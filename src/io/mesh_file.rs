@@ -57,9 +57,9 @@ impl Soup {
                 .map(|&v| key(self.positions[v as usize]))
                 .collect();
             let mask = mesh.positions().iter().map(|&p| members.contains(&key(p)));
-            let known = masks.entry(name.clone()).or_insert_with(|| {
-                Arc::new(vec![false; mesh.positions().len()])
-            });
+            let known = masks
+                .entry(name.clone())
+                .or_insert_with(|| Arc::new(vec![false; mesh.positions().len()]));
             for (k, m) in Arc::make_mut(known).iter_mut().zip(mask) {
                 *k |= m;
             }
@@ -243,7 +243,9 @@ mod tests {
             ("e.ply", &binary_ply),
         ] {
             let (_keep, path) = file(name, bytes);
-            let mesh = read_mesh(&path, Some(Unit::Millimetre), 0, Repair::default()).unwrap().mesh;
+            let mesh = read_mesh(&path, Some(Unit::Millimetre), 0, Repair::default())
+                .unwrap()
+                .mesh;
             assert!((mesh.area() - 50e-6).abs() < 1e-12, "{name}");
             let error = read_mesh(&path, None, 0, Repair::default()).err().unwrap();
             assert!(error.to_string().contains("--unit"));
@@ -265,12 +267,18 @@ mod tests {
 
     #[test]
     fn groups_of_a_file_are_known_by_name() {
-        let obj = b"o shell\nv 0 0 0\nv 10 0 0\nv 0 10 0\nv 10 10 0\ng left\nf 1 2 3\ng right\nf 2 4 3\n";
+        let obj =
+            b"o shell\nv 0 0 0\nv 10 0 0\nv 0 10 0\nv 10 10 0\ng left\nf 1 2 3\ng right\nf 2 4 3\n";
         let (_keep, path) = file("g.obj", obj);
         let loaded = read_mesh(&path, Some(Unit::Millimetre), 0, Repair::default()).unwrap();
         let left: Vec<bool> = loaded.groups["left"].to_vec();
         assert_eq!(left.iter().filter(|&&m| m).count(), 3);
-        let only_right = loaded.mesh.positions().iter().zip(&left).find(|(_, m)| !**m);
+        let only_right = loaded
+            .mesh
+            .positions()
+            .iter()
+            .zip(&left)
+            .find(|(_, m)| !**m);
         assert!((only_right.unwrap().0.x - 0.01).abs() < 1e-12);
     }
 }

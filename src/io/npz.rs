@@ -98,9 +98,8 @@ impl NpzFile {
 /// [`FileError`] when it is no readable archive.
 pub fn holds(path: &Path, name: &str) -> Result<bool, FileError> {
     let file = std::fs::File::open(path).map_err(|e| FileError::of(path, &e))?;
-    let archive = ZipArchive::new(file).map_err(|e| {
-        FileError::broken(path, format!("this is not a readable NPZ file ({e})"))
-    })?;
+    let archive = ZipArchive::new(file)
+        .map_err(|e| FileError::broken(path, format!("this is not a readable NPZ file ({e})")))?;
     Ok(archive.index_for_name(&format!("{name}.npy")).is_some())
 }
 

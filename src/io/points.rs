@@ -79,10 +79,7 @@ pub fn read_sites(path: &Path) -> Result<Vec<GivenSite>, FileError> {
 }
 
 /// The columns asked for of every row, with the row's line; columns may come in any order.
-fn read<const N: usize>(
-    path: &Path,
-    names: &[&str; N],
-) -> Result<Vec<(u64, [f64; N])>, FileError> {
+fn read<const N: usize>(path: &Path, names: &[&str; N]) -> Result<Vec<(u64, [f64; N])>, FileError> {
     let bytes = std::fs::read(path).map_err(|e| FileError::of(path, &e))?;
     let broken = |message: String| FileError::broken(path, message);
     // Programs that write tables like to begin them with a byte-order mark.
@@ -114,7 +111,9 @@ fn read<const N: usize>(
             let text = record.get(column).unwrap_or_default();
             let number = text.parse::<f64>().ok().filter(|x| x.is_finite());
             *value = number.ok_or_else(|| {
-                broken(format!("line {line}: {name} is \"{text}\", which is no number"))
+                broken(format!(
+                    "line {line}: {name} is \"{text}\", which is no number"
+                ))
             })?;
         }
         rows.push((line, values));
@@ -174,7 +173,11 @@ fn write_npz(path: &Path, answer: &Answer) -> std::io::Result<Result<(), FileErr
         file.add(name, &shape, column)?;
     }
     let mm = |d: &[f64]| d.iter().map(|d| d * 1000.0).collect::<Vec<_>>();
-    file.add("touch_distance_mm", &shape[..1], &mm(&answer.touch_distances))?;
+    file.add(
+        "touch_distance_mm",
+        &shape[..1],
+        &mm(&answer.touch_distances),
+    )?;
     file.add("site_distance_mm", &shape[1..], &mm(&answer.site_distances))?;
     Ok(file.save(path))
 }

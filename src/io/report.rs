@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::artifacts::{Provenance, range, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Series, escape};
-use crate::design::{Design, Inputs};
+use crate::design::{Design, Inputs, Simulated};
 use crate::mesh::unroll::Unrolling;
 use crate::placement::SelectorKind;
 
@@ -294,6 +294,40 @@ fn errors(page: &mut String, design: &Design) {
     page.push_str("</table>");
 }
 
+/// What the elastic model says of its own error, and what it was checked for.
+fn trust(simulated: &Simulated) -> [(&'static str, String); 3] {
+    [
+        (
+            "Error of the mesh, estimated",
+            format!(
+                "{:.1e} mm ({:.1} %) under a touch, {:.1} % of a touch's largest strain (rms over {} touches)",
+                simulated.discretization.displacement_mm,
+                simulated.discretization.displacement_percent,
+                simulated.discretization.strain_percent,
+                simulated.discretization.loads
+            ),
+        ),
+        (
+            "Error of linearity, estimated",
+            format!(
+                "up to {:.1} %, half of the touches below {:.1} %, at {} N",
+                simulated.linearity.largest_percent.abs(),
+                simulated.linearity.median_percent,
+                simulated.linearity.force_n
+            ),
+        ),
+        (
+            "Checks",
+            format!(
+                "reactions sum to the load to {:.0e}, ½ u·f is the strain energy to {:.0e}, pieces held: {}",
+                simulated.checks.reaction_error,
+                simulated.checks.energy_error,
+                simulated.checks.pieces_held
+            ),
+        ),
+    ]
+}
+
 fn settings(page: &mut String, inputs: &Inputs, design: &Design, provenance: &Provenance) {
     page.push_str("<h2>Filters</h2><table><tr><th>Filter</th><th>Sites taken</th></tr>");
     for (filter, count) in design.feasibility.taken() {
@@ -353,34 +387,6 @@ fn settings(page: &mut String, inputs: &Inputs, design: &Design, provenance: &Pr
             ),
         ),
         (
-            "Error of the mesh, estimated",
-            format!(
-                "{:.1e} mm ({:.1} %) under a touch, {:.1} % of a touch's largest strain (rms over {} touches)",
-                design.simulated.discretization.displacement_mm,
-                design.simulated.discretization.displacement_percent,
-                design.simulated.discretization.strain_percent,
-                design.simulated.discretization.loads
-            ),
-        ),
-        (
-            "Error of linearity, estimated",
-            format!(
-                "up to {:.1} %, half of the touches below {:.1} %, at {} N",
-                design.simulated.linearity.largest_percent.abs(),
-                design.simulated.linearity.median_percent,
-                design.simulated.linearity.force_n
-            ),
-        ),
-        (
-            "Checks",
-            format!(
-                "reactions sum to the load to {:.0e}, ½ u·f is the strain energy to {:.0e}, {} piece held",
-                design.simulated.checks.reaction_error,
-                design.simulated.checks.energy_error,
-                design.simulated.checks.pieces_held
-            ),
-        ),
-        (
             "Work",
             format!(
                 "{} assemblies, {} factorizations, {} solves, {} kernel entries, {} fits",
@@ -392,7 +398,7 @@ fn settings(page: &mut String, inputs: &Inputs, design: &Design, provenance: &Pr
             ),
         ),
     ];
-    for (label, value) in rows {
+    for (label, value) in rows.into_iter().chain(trust(&design.simulated)) {
         let _ = write!(page, "<tr><td>{label}</td><td>{value}</td></tr>");
     }
     for stage in &design.seconds {

@@ -86,13 +86,26 @@ fn to_text(mesh: &TriMesh, fields: &[Field]) -> String {
     let mut t = String::from(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\">\n<UnstructuredGrid>\n",
     );
-    let _ = writeln!(t, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">");
+    let _ = writeln!(
+        t,
+        "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">"
+    );
     t.push_str("<PointData>\n");
     for field in fields {
-        array(&mut t, &field.name, "Float64", field.width, field.values.chunks(field.width));
+        array(
+            &mut t,
+            &field.name,
+            "Float64",
+            field.width,
+            field.values.chunks(field.width),
+        );
     }
     t.push_str("</PointData>\n<Points>\n");
-    let positions: Vec<[f64; 3]> = mesh.positions().iter().map(|p| (*p * 1000.0).to_array()).collect();
+    let positions: Vec<[f64; 3]> = mesh
+        .positions()
+        .iter()
+        .map(|p| (*p * 1000.0).to_array())
+        .collect();
     array(&mut t, "Points", "Float64", 3, positions.iter());
     t.push_str("</Points>\n<Cells>\n");
     array(&mut t, "connectivity", "Int32", 1, mesh.triangles().iter());

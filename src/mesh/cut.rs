@@ -65,7 +65,13 @@ impl Cutter {
             .iter()
             .map(|t| self.reaches(t, axis, low, high))
             .collect();
-        for (tri, _) in self.triangles.clone().iter().zip(&reaching).filter(|(_, r)| **r) {
+        for (tri, _) in self
+            .triangles
+            .clone()
+            .iter()
+            .zip(&reaching)
+            .filter(|(_, r)| **r)
+        {
             for i in 0..3 {
                 let (p, q) = (tri[i], tri[(i + 1) % 3]);
                 if side[p as usize] * side[q as usize] < 0.0 {
@@ -91,13 +97,7 @@ impl Cutter {
         })
     }
 
-    fn cut_edge(
-        &mut self,
-        a: u32,
-        b: u32,
-        side: &[f64],
-        middles: &mut HashMap<(u32, u32), u32>,
-    ) {
+    fn cut_edge(&mut self, a: u32, b: u32, side: &[f64], middles: &mut HashMap<(u32, u32), u32>) {
         let next = self.positions.len() as u32;
         if *middles.entry((a, b)).or_insert(next) != next {
             return;
@@ -120,12 +120,8 @@ fn divided(tri: [u32; 3], middles: &HashMap<(u32, u32), u32>) -> Vec<[u32; 3]> {
         [None, None, None] => vec![tri],
         // A plane meets at most two edges away from their ends; turn the triangle to one case of each.
         [Some(m), None, None] => vec![[tri[0], m, tri[2]], [m, tri[1], tri[2]]],
-        [None, Some(_), None] | [None, Some(_), Some(_)] => {
-            divided([tri[1], tri[2], tri[0]], middles)
-        }
-        [None, None, Some(_)] | [Some(_), None, Some(_)] => {
-            divided([tri[2], tri[0], tri[1]], middles)
-        }
+        [None, Some(_), _] => divided([tri[1], tri[2], tri[0]], middles),
+        [_, None, Some(_)] => divided([tri[2], tri[0], tri[1]], middles),
         [Some(m), Some(n), _] => vec![[tri[0], m, n], [m, tri[1], n], [tri[0], n, tri[2]]],
     }
 }

@@ -65,7 +65,10 @@ pub fn as_given(surface: &Surface) -> Remeshed {
         places: (0..mesh.positions().len() as u32)
             .filter_map(|v| surface.vertex(v))
             .collect(),
-        lines: lines.filter(|(_, f)| **f).map(|(e, _)| (e.a, e.b)).collect(),
+        lines: lines
+            .filter(|(_, f)| **f)
+            .map(|(e, _)| (e.a, e.b))
+            .collect(),
     }
 }
 
@@ -348,6 +351,7 @@ fn turns_nothing_over(work: &Working, v: u32, to: DVec3) -> bool {
     work.around[v as usize].iter().all(|&t| {
         let (old, new) = (work.normal(t), work.normal_with(t, v, to));
         new.dot(old) > 0.5 * new.length() * old.length()
-            && thinness(work, t, v, to) > 0.05_f64.min(0.9 * thinness(work, t, u32::MAX, DVec3::ZERO))
+            && thinness(work, t, v, to)
+                > 0.05_f64.min(0.9 * thinness(work, t, u32::MAX, DVec3::ZERO))
     })
 }

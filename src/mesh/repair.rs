@@ -122,7 +122,11 @@ pub(super) fn fill(positions: &[DVec3], rim: &[u32]) -> Option<Vec<[u32; 3]>> {
         let longest = u.length_squared().max(v.length_squared());
         let twice = u.cross(v).length();
         // Three points in a line close nothing: only where there is no other way.
-        if twice > 1e-6 * longest { twice } else { 1e3 * longest }
+        if twice > 1e-6 * longest {
+            twice
+        } else {
+            1e3 * longest
+        }
     };
     let mut least = vec![vec![0.0; n]; n];
     let mut split = vec![vec![0; n]; n];
@@ -158,8 +162,15 @@ mod tests {
 
     /// A box without its lid, its corners torn apart by a hair where `torn`.
     fn open_box(torn: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-        let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
-        let quads = [[0, 2, 3, 1], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]];
+        let corner =
+            |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
+        let quads = [
+            [0, 2, 3, 1],
+            [0, 1, 5, 4],
+            [1, 3, 7, 5],
+            [3, 2, 6, 7],
+            [2, 0, 4, 6],
+        ];
         let (mut p, mut t) = (Vec::new(), Vec::new());
         for (q, quad) in (0..).zip(quads) {
             let base = p.len() as u32;
@@ -197,7 +208,10 @@ mod tests {
         let (open, report) = fill(1.0);
         assert_eq!((open.boundary_edges().count(), report.filled_holes), (4, 0));
         let (closed, report) = fill(1.5);
-        assert_eq!((closed.boundary_edges().count(), report.filled_holes), (0, 1));
+        assert_eq!(
+            (closed.boundary_edges().count(), report.filled_holes),
+            (0, 1)
+        );
         assert!((closed.area() - 6.0).abs() < 1e-12);
         // Closed, and so turned outward: every facet looks away from the middle.
         for t in 0..closed.triangles().len() as u32 {

@@ -70,9 +70,7 @@ impl Surface {
             .iter()
             .map(|edge| {
                 let smooth = match edge.triangles[..] {
-                    [s, t] => {
-                        facet_normals[s as usize].dot(facet_normals[t as usize]) > CREASE
-                    }
+                    [s, t] => facet_normals[s as usize].dot(facet_normals[t as usize]) > CREASE,
                     _ => false,
                 };
                 !smooth || line(edge)

@@ -247,7 +247,8 @@ impl Studio {
             let mut project = self.document.state.project.clone();
             project.part.mesh = project_file::relative_to(path, &mesh);
             let painted = self.document.state.painted.as_ref().map(|m| m.as_slice());
-            project_file::save(path, &project, painted, &self.document.state.masks).map_err(|e| e.to_string())?;
+            project_file::save(path, &project, painted, &self.document.state.masks)
+                .map_err(|e| e.to_string())?;
             Ok((project.part.mesh, mesh))
         });
         match saved {

@@ -221,7 +221,10 @@ impl Studio {
             .map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 })
             .collect();
         let carried = &simulation.simulated.carried;
-        carried.iter().map(|&at| mesh.interpolate(&values, at)).collect()
+        carried
+            .iter()
+            .map(|&at| mesh.interpolate(&values, at))
+            .collect()
     }
 
     /// How much the deformation is exaggerated; nothing without a touch, nor while painting: the brush

@@ -5,8 +5,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use glam::DVec3;
 
 use crate::budget::unwatched;
-use crate::document::Document;
 use crate::design::{self, DesignError, Inputs};
+use crate::document::Document;
 use crate::elasticity::observe::{Face, Observer};
 use crate::elasticity::{ShellModel, Touch};
 use crate::mesh::SurfacePoint;

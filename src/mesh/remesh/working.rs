@@ -78,7 +78,10 @@ impl<'s> Working<'s> {
 
     /// Edge length wanted between two vertices (m).
     pub fn wanted(&self, a: u32, b: u32) -> f64 {
-        f64::midpoint(self.vertices[a as usize].size, self.vertices[b as usize].size)
+        f64::midpoint(
+            self.vertices[a as usize].size,
+            self.vertices[b as usize].size,
+        )
     }
 
     pub fn is_line(&self, a: u32, b: u32) -> bool {
@@ -109,13 +112,8 @@ impl<'s> Working<'s> {
 
     /// Unit normal times twice the area of a triangle with one vertex moved.
     pub fn normal_with(&self, t: u32, moved: u32, to: DVec3) -> DVec3 {
-        let [a, b, c] = self.triangles[t as usize].map(|v| {
-            if v == moved {
-                to
-            } else {
-                self.position(v)
-            }
-        });
+        let [a, b, c] =
+            self.triangles[t as usize].map(|v| if v == moved { to } else { self.position(v) });
         (b - a).cross(c - a)
     }
 
@@ -190,7 +188,8 @@ impl<'s> Working<'s> {
             let mut near = self.neighbours(gone).into_iter();
             near.any(|v| self.is_line(gone, v) && self.is_line(kept, v))
         };
-        if !allowed || rank(gone) > rank(kept) || (!line && rank(gone) != Mobility::Free && folds()) {
+        if !allowed || rank(gone) > rank(kept) || (!line && rank(gone) != Mobility::Free && folds())
+        {
             return false;
         }
         // Link condition: only the triangles on the edge may lie between the two.
