@@ -181,20 +181,8 @@ impl Common {
 
 /// What was changed or left out while the mesh was taken in, on stderr.
 fn say_repairs(loaded: &LoadedProject) {
-    let r = loaded.repairs;
-    let changed =
-        r.degenerate_triangles + r.duplicate_triangles + r.flipped_triangles + r.non_manifold_edges;
-    if changed > 0 || r.bodies > 1 {
-        eprintln!(
-            "{}: body {} of {}; {} triangles without area and {} duplicates dropped, {} turned over, {} edges join more than two triangles",
-            loaded.mesh_path.display(),
-            loaded.inputs.project.part.body,
-            r.bodies,
-            r.degenerate_triangles,
-            r.duplicate_triangles,
-            r.flipped_triangles,
-            r.non_manifold_edges
-        );
+    if let Some(said) = loaded.repairs.in_words(loaded.inputs.project.part.body) {
+        eprintln!("{}: {said}", loaded.mesh_path.display());
     }
 }
 

@@ -296,7 +296,7 @@ impl Moments {
             m.ab += a * b;
             m.ac += a * c;
             m.bc += b * c;
-            m.peak = m.peak.max(a.abs() + b.hypot(c));
+            m.peak = m.peak.max(a.abs() + (b * b + c * c).sqrt());
         }
         m
     }

@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use crate::design::Inputs;
 use crate::io::project_file::LoadedProject;
+use crate::mesh::repair::Repair;
+use crate::mesh::unroll::Axis;
 use crate::mesh::{RepairReport, SurfacePoint, TriMesh, geodesic};
-use crate::project::{Masks, Project};
+use crate::project::{Masks, Project, SupportKeys, SupportKind};
 
 /// What undo brings back. The mesh is not part of it: opening a file begins a new history.
 #[derive(Clone, PartialEq)]
@@ -27,6 +29,8 @@ pub struct Document {
     pub mesh_path: PathBuf,
     /// The mesh is the one inside the program and lies in no file yet.
     pub bundled: bool,
+    /// Body and repairs that the part was taken in with.
+    taken_in: (usize, Repair),
     saved: State,
     /// The state at the last finished gesture.
     settled: State,
@@ -52,7 +56,9 @@ impl Document {
             painted: loaded.inputs.painted,
             masks: loaded.inputs.masks,
         };
+        let part = &state.project.part;
         Self {
+            taken_in: (part.body, part.repair()),
             part: loaded.inputs.part,
             repairs: loaded.repairs,
             path,
@@ -64,6 +70,34 @@ impl Document {
             past: Vec::new(),
             future: Vec::new(),
         }
+    }
+
+    /// Whether the project asks for another body or other repairs than the part was taken in with.
+    #[must_use]
+    pub fn asks_for_another_part(&self) -> bool {
+        let part = &self.state.project.part;
+        self.taken_in != (part.body, part.repair())
+    }
+
+    /// Holds what is painted: a support on those vertices, under a name of its own. The painted region
+    /// itself is free again.
+    pub fn hold_painted(&mut self) {
+        let Some(mask) = self.state.painted.take() else {
+            return;
+        };
+        let free = |name: &String| !self.state.masks.contains_key(name);
+        let numbered = (1..).map(|k| format!("support-{k}"));
+        let Some(name) = numbered.take(10_000).find(free) else {
+            return;
+        };
+        self.state.masks.insert(name.clone(), mask);
+        self.state.project.supports.push(SupportKeys {
+            kind: SupportKind::Clamped,
+            box_mm: None,
+            vertices: Some(name),
+            normal: Axis::Z,
+        });
+        self.settle();
     }
 
     /// A snapshot for a job.
@@ -175,6 +209,13 @@ impl Document {
         }
     }
 
+    /// The supports with what the masks they name hold.
+    fn supports_key(&self) -> Vec<(SupportKeys, Option<u64>)> {
+        let mask = |s: &SupportKeys| self.state.masks.get(s.vertices.as_ref()?).map(|m| hash(m));
+        let supports = &self.state.project.supports;
+        supports.iter().map(|s| (s.clone(), mask(s))).collect()
+    }
+
     /// What the simulation depends on, as a key.
     #[must_use]
     pub fn simulation_key(&self) -> String {
@@ -184,7 +225,7 @@ impl Document {
             Arc::as_ptr(&self.part),
             self.part_key(),
             p.material,
-            p.supports,
+            self.supports_key(),
             p.touch,
             p.sites,
             p.gauge.signal,
@@ -201,7 +242,7 @@ impl Document {
             Arc::as_ptr(&self.part),
             self.part_key(),
             p.material,
-            p.supports
+            self.supports_key()
         )
     }
 

@@ -70,6 +70,37 @@ pub struct RepairReport {
     pub slivers: usize,
 }
 
+impl RepairReport {
+    /// What was done and found, in words; nothing for a clean mesh.
+    #[must_use]
+    pub fn in_words(&self, body: usize) -> Option<String> {
+        let mut parts = Vec::new();
+        if self.bodies > 1 {
+            parts.push(format!(
+                "body {body} of {} is used (0 to {}, by falling area; the part's body setting picks another)",
+                self.bodies,
+                self.bodies - 1
+            ));
+        }
+        let mut count = |n: usize, what: &str| {
+            if n > 0 {
+                parts.push(format!("{n} {what}"));
+            }
+        };
+        count(self.joined_vertices, "near vertices joined");
+        count(self.degenerate_triangles, "triangles without area dropped");
+        count(self.duplicate_triangles, "duplicate triangles dropped");
+        count(self.flipped_triangles, "triangles turned over");
+        count(self.filled_holes, "holes filled");
+        count(
+            self.non_manifold_edges,
+            "edges join more than two triangles",
+        );
+        count(self.slivers, "slivers (elements are laid anew)");
+        (!parts.is_empty()).then(|| parts.join(", "))
+    }
+}
+
 /// An edge between two vertices (`a < b`) and the triangles on it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Edge {

@@ -350,14 +350,8 @@ impl Studio {
         self.feasibility = None;
         self.design = None;
         let repairs = self.document.repairs;
-        if repairs.degenerate_triangles + repairs.duplicate_triangles + repairs.flipped_triangles
-            > 0
-            || repairs.bodies > 1
-        {
-            self.tell(format!(
-                "Taking the mesh in: body {} of {} is shown, {} triangles without area and {} duplicates dropped, {} turned over",
-                self.document.state.project.part.body, repairs.bodies, repairs.degenerate_triangles, repairs.duplicate_triangles, repairs.flipped_triangles
-            ));
+        if let Some(said) = repairs.in_words(self.document.state.project.part.body) {
+            self.tell(format!("Taking the mesh in: {said}"));
         }
     }
 

@@ -1,5 +1,9 @@
 //! The real window: driven by its accessible names, rendered by a real wgpu adapter.
 #![cfg(feature = "studio")]
+#![allow(
+    clippy::format_push_string,
+    reason = "a small file is put together here"
+)]
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -283,15 +287,20 @@ fn from_the_limb_to_the_report() {
             .iter()
             .any(|r| r.selector == "pca-qr")
     );
-    let picture = w.picture();
-    let view = w.harness.state().view.rect;
-    let orange = (view.top() as u32..view.bottom() as u32)
-        .flat_map(|y| (view.left() as u32..view.right() as u32).map(move |x| (x, y)))
-        .filter(|&(x, y)| {
-            let [r, g, b, _] = picture.get_pixel(x, y).0;
-            r > 200 && (80..150).contains(&g) && b < 70
-        })
-        .count();
+    // Wherever on the limb they are: from one side or from the other.
+    let mut orange = 0;
+    for side in ["Front", "Back"] {
+        w.press(side);
+        let picture = w.picture();
+        let view = w.harness.state().view.rect;
+        orange += (view.top() as u32..view.bottom() as u32)
+            .flat_map(|y| (view.left() as u32..view.right() as u32).map(move |x| (x, y)))
+            .filter(|&(x, y)| {
+                let [r, g, b, _] = picture.get_pixel(x, y).0;
+                r > 200 && (80..150).contains(&g) && b < 70
+            })
+            .count();
+    }
     assert!(
         orange > 150,
         "the gauges are drawn: {orange} pixels of their colour"
@@ -431,4 +440,81 @@ fn a_saved_project_opens_again() {
         "{:?}",
         w.harness.state().messages
     );
+}
+
+#[test]
+fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
+    let Some(mut w) = Window::open() else { return };
+    // Two plates, the smaller one with a hole.
+    let folder = tempfile::tempdir().unwrap();
+    let mut obj = String::new();
+    let mut base = 0;
+    for (size, n, hole) in [(80.0, 8, false), (40.0, 8, true)] {
+        for j in 0..=n {
+            for i in 0..=n {
+                let step = size / f64::from(n);
+                obj.push_str(&format!(
+                    "v {} {} {}\n",
+                    step * f64::from(i),
+                    step * f64::from(j),
+                    size
+                ));
+            }
+        }
+        for j in 0..n {
+            for i in 0..n {
+                if hole && i == 4 && j == 4 {
+                    continue;
+                }
+                let a = base + j * (n + 1) + i + 1;
+                obj.push_str(&format!("f {} {} {} {}\n", a, a + 1, a + n + 2, a + n + 1));
+            }
+        }
+        base += (n + 1) * (n + 1);
+    }
+    let path = folder.path().join("two.obj");
+    std::fs::write(&path, obj).unwrap();
+    w.harness
+        .state_mut()
+        .open_path(&path, Some(hapdef::project::Unit::Millimetre));
+    w.harness.run_ok();
+    let said = &w.harness.state().messages[0].text;
+    assert!(said.contains("body 0 of 2"), "{said}");
+    let triangles = |w: &Window| w.harness.state().document.part.triangles().len();
+    assert_eq!(triangles(&w), 128);
+    let part = &mut w.harness.state_mut().document.state.project.part;
+    part.body = 1;
+    part.fill_holes_mm = 10.0;
+    w.harness.run_ok();
+    w.press("Read the mesh again");
+    assert_eq!(triangles(&w), 128, "126 and the two that fill the hole");
+    let document = &w.harness.state().document;
+    assert_eq!(document.repairs.filled_holes, 1);
+    let (_, upper) = document.part.bounds();
+    assert!((upper.x - 0.04).abs() < 1e-9 && !document.asks_for_another_part());
+    // Hold what is painted: a support that undoes.
+    let at = hapdef::mesh::SurfacePoint {
+        triangle: 0,
+        barycentric: [1.0 / 3.0; 3],
+    };
+    let document = &mut w.harness.state_mut().document;
+    document.dab(hapdef::document::Brush::Paint, at, 0.02);
+    document.settle();
+    w.harness.run_ok();
+    w.harness.get_by_label("Supports").click();
+    w.harness.run_ok();
+    w.press("Hold what is painted");
+    let state = &w.harness.state().document.state;
+    assert_eq!(
+        state.project.supports[0].vertices.as_deref(),
+        Some("support-1")
+    );
+    assert!(state.painted.is_none() && state.masks.contains_key("support-1"));
+    w.harness.state_mut().document.state.project.budget.quality = Quality::Draft;
+    w.press("Simulate");
+    w.wait("the simulation", 120, |s| !s.busy());
+    assert!(w.harness.state().simulation.is_some());
+    w.harness.state_mut().document.undo();
+    w.harness.state_mut().document.undo();
+    assert!(w.harness.state().document.state.project.supports.is_empty());
 }

@@ -42,6 +42,8 @@ pub struct Graded {
 /// Loads and places that the error is measured with, at most.
 const LOADS: usize = 64;
 const PLACES: usize = 400;
+/// Loads whose reactions and energy are added up element by element, at most.
+const CHECKED: usize = 16;
 /// Facets × loads that the smoothed strain is built for, at most.
 const RECOVERED: usize = 250_000;
 /// A size may change by this factor in one pass.
@@ -244,7 +246,9 @@ impl Solved {
     ) -> Graded {
         Graded {
             linearity: linearity(&self.model, touches, &self.solutions),
-            balance: self.model.check_all(touches, &self.solutions),
+            balance: self
+                .model
+                .check_all(&spread(touches, CHECKED), &spread(&self.solutions, CHECKED)),
             held: ground.held(&self.laid),
             laid: self.laid,
             model: self.model,

@@ -9,7 +9,7 @@
 use glam::DVec3;
 use serde::Serialize;
 
-use super::element::Facet;
+use super::element::{Facet, Matrix3x18};
 use super::load::Touch;
 use super::{NodalForces, ShellModel, estimate};
 
@@ -31,7 +31,7 @@ pub struct Linearity {
 /// Estimates it from solved loads.
 #[must_use]
 pub fn linearity(model: &ShellModel, touches: &[Touch], solutions: &[Vec<f64>]) -> Linearity {
-    let second: Vec<Second> = solutions.iter().map(|u| Second::of(model, u)).collect();
+    let second = Second::of_all(model, solutions);
     let relaxed = model.solve_loads(&second.iter().map(|s| s.force.clone()).collect::<Vec<_>>());
     let mut changes = Vec::new();
     let mut beyond = 0;
@@ -102,52 +102,103 @@ struct Second {
 }
 
 impl Second {
-    fn of(model: &ShellModel, u: &[f64]) -> Self {
-        let mesh = &model.mesh;
+    /// For several solutions at once: what belongs to a facet is built once for all of them.
+    fn of_all(model: &ShellModel, solutions: &[Vec<f64>]) -> Vec<Self> {
+        let mut terms: Vec<Terms> = solutions.iter().map(|u| Terms::new(u)).collect();
         let membrane = model.section.plane_stress() * model.section.thickness;
         let bending = model.section.plane_stress() * (model.section.thickness.powi(3) / 12.0);
-        let mut force = vec![0.0; u.len()];
-        let (mut cubic, mut quartic) = (0.0, 0.0);
-        for (t, tri) in mesh.triangles().iter().enumerate() {
-            let t = t as u32;
-            let facet = Facet::new(mesh.corners(t), &model.section);
+        for (t, tri) in (0..).zip(model.mesh.triangles()) {
+            let facet = Facet::new(model.mesh.corners(t), &model.section);
             let frame = facet.frame;
             // The element's own mean membrane strain, so that what it can relax is relaxed.
             let mean = facet.strain([1.0 / 3.0; 3], 0.0);
-            let own =
-                nalgebra::SVector::<f64, 18>::from_fn(|i, _| u[6 * tri[i / 6] as usize + i % 6]);
-            let (gradients, area) = shape_gradients(mesh.corners(t), frame.x_axis, frame.y_axis);
-            let moved = tri.map(|v| DVec3::from_slice(&u[6 * v as usize..]));
-            // ∂u/∂x and ∂u/∂y, constant on the facet.
-            let [dx, dy]: [DVec3; 2] =
-                std::array::from_fn(|k| (0..3).map(|i| moved[i] * gradients[i][k]).sum());
-            let linear = mean * own;
-            let square = nalgebra::Vector3::new(dx.dot(dx) / 2.0, dy.dot(dy) / 2.0, dx.dot(dy));
-            let (n1, n2) = (membrane * linear, membrane * square);
-            cubic += area * n1.dot(&square);
-            quartic += area * n2.dot(&square) / 2.0;
-            // What bends at a slope bends more than its displacement along the normal says:
-            // κ² = w″² (1 + w′²).
-            let bent = (facet.strain([1.0 / 3.0; 3], 1.0) - mean) * own;
-            let slope = dx.dot(frame.z_axis).powi(2) + dy.dot(frame.z_axis).powi(2);
-            quartic += area * bent.dot(&(bending * bent)) * slope / 2.0;
-            // N(e₂)·e₁(δ) + N(e₁)·δe₂, with δe₂ the product of gradients.
-            let from_second = mean.transpose() * n2 * area;
-            for i in 0..18 {
-                force[6 * tri[i / 6] as usize + i % 6] -= from_second[i];
-            }
-            for i in 0..3 {
-                let [gx, gy] = gradients[i];
-                let from_first = dx * (n1.x * gx + n1.z * gy) + dy * (n1.y * gy + n1.z * gx);
-                for c in 0..3 {
-                    force[6 * tri[i] as usize + c] -= from_first[c] * area;
-                }
+            let (gradients, area) =
+                shape_gradients(model.mesh.corners(t), frame.x_axis, frame.y_axis);
+            let part = FacetPart {
+                tri: *tri,
+                normal: frame.z_axis,
+                curvature: facet.strain([1.0 / 3.0; 3], 1.0) - mean,
+                mean,
+                gradients,
+                area,
+                membrane,
+                bending,
+            };
+            for (terms, u) in terms.iter_mut().zip(solutions) {
+                part.add(u, terms);
             }
         }
+        terms.into_iter().map(Terms::finish).collect()
+    }
+}
+
+/// Sums over the facets for one solution.
+struct Terms {
+    cubic: f64,
+    quartic: f64,
+    force: Vec<f64>,
+}
+
+impl Terms {
+    fn new(u: &[f64]) -> Self {
         Self {
-            cubic,
-            quartic,
-            force: force.into_iter().enumerate().collect(),
+            cubic: 0.0,
+            quartic: 0.0,
+            force: vec![0.0; u.len()],
+        }
+    }
+
+    fn finish(self) -> Second {
+        Second {
+            cubic: self.cubic,
+            quartic: self.quartic,
+            force: self.force.into_iter().enumerate().collect(),
+        }
+    }
+}
+
+/// One facet, ready for any solution.
+struct FacetPart {
+    tri: [u32; 3],
+    normal: DVec3,
+    /// Mean membrane strain and curvature from the facet's freedoms.
+    mean: Matrix3x18,
+    curvature: Matrix3x18,
+    gradients: [[f64; 2]; 3],
+    area: f64,
+    membrane: nalgebra::Matrix3<f64>,
+    bending: nalgebra::Matrix3<f64>,
+}
+
+impl FacetPart {
+    fn add(&self, u: &[f64], into: &mut Terms) {
+        let place = |i: usize| 6 * self.tri[i / 6] as usize + i % 6;
+        let own = nalgebra::SVector::<f64, 18>::from_fn(|i, _| u[place(i)]);
+        let moved = self.tri.map(|v| DVec3::from_slice(&u[6 * v as usize..]));
+        // ∂u/∂x and ∂u/∂y, constant on the facet.
+        let [dx, dy]: [DVec3; 2] =
+            std::array::from_fn(|k| (0..3).map(|i| moved[i] * self.gradients[i][k]).sum());
+        let square = nalgebra::Vector3::new(dx.dot(dx) / 2.0, dy.dot(dy) / 2.0, dx.dot(dy));
+        let n1 = self.membrane * (self.mean * own);
+        let n2 = self.membrane * square;
+        into.cubic += self.area * n1.dot(&square);
+        into.quartic += self.area * n2.dot(&square) / 2.0;
+        // What bends at a slope bends more than its displacement along the normal says:
+        // κ² = w″² (1 + w′²).
+        let bent = self.curvature * own;
+        let slope = dx.dot(self.normal).powi(2) + dy.dot(self.normal).powi(2);
+        into.quartic += self.area * bent.dot(&(self.bending * bent)) * slope / 2.0;
+        // N(e₂)·e₁(δ) + N(e₁)·δe₂, with δe₂ the product of gradients.
+        let from_second = self.mean.transpose() * n2 * self.area;
+        for i in 0..18 {
+            into.force[place(i)] -= from_second[i];
+        }
+        for i in 0..3 {
+            let [gx, gy] = self.gradients[i];
+            let from_first = dx * (n1.x * gx + n1.z * gy) + dy * (n1.y * gy + n1.z * gx);
+            for c in 0..3 {
+                into.force[6 * self.tri[i] as usize + c] -= from_first[c] * self.area;
+            }
         }
     }
 }

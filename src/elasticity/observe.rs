@@ -115,8 +115,11 @@ impl Observer {
         buffer: &'b mut Vec<f64>,
     ) -> &'b mut [f64] {
         let corners = self.corners.count() * BLOCK;
-        buffer.resize(corners + self.strains.count() * BLOCK, 0.0);
-        let (corners, strain) = buffer.split_at_mut(corners);
+        let all = corners + self.strains.count() * BLOCK;
+        if buffer.len() < all {
+            buffer.resize(all, 0.0);
+        }
+        let (corners, strain) = buffer[..all].split_at_mut(corners);
         self.corners.apply(solved, corners);
         self.strains.apply(corners, strain);
         strain
@@ -124,8 +127,22 @@ impl Observer {
 
     /// Displacements of a solved block: three rows of [`BLOCK`] values a point.
     pub(super) fn displacement(&self, solved: &[f64]) -> Vec<f64> {
-        let mut displacement = vec![0.0; self.displacements.count() * BLOCK];
-        self.displacements.apply(solved, &mut displacement);
+        let mut buffer = Vec::new();
+        self.displacement_into(solved, &mut buffer).to_vec()
+    }
+
+    /// As [`Self::displacement`], in a buffer that is used again and again.
+    pub(super) fn displacement_into<'b>(
+        &self,
+        solved: &[f64],
+        buffer: &'b mut Vec<f64>,
+    ) -> &'b mut [f64] {
+        let rows = self.displacements.count() * BLOCK;
+        if buffer.len() < rows {
+            buffer.resize(rows, 0.0);
+        }
+        let displacement = &mut buffer[..rows];
+        self.displacements.apply(solved, displacement);
         displacement
     }
 

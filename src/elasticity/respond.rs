@@ -72,6 +72,16 @@ impl Responses {
 }
 
 impl Reading<'_> {
+    /// Rows for so many points.
+    fn rows(&self, points: usize) -> usize {
+        match self {
+            Self::Strain | Self::Displacement => 3 * points,
+            Self::StrainAndDisplacement => 6 * points,
+            Self::Gauge(_) => points,
+            Self::GaugeAndDisplacement(_) => 4 * points,
+        }
+    }
+
     fn displaces(&self) -> bool {
         !matches!(self, Self::Strain | Self::Gauge(_))
     }
@@ -100,14 +110,7 @@ pub fn respond(
     reading: Reading,
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
-    let points = observer.frames().len();
-    let rows = match reading {
-        Reading::Strain | Reading::Displacement => 3 * points,
-        Reading::StrainAndDisplacement => 6 * points,
-        Reading::Gauge(_) => points,
-        Reading::GaugeAndDisplacement(_) => 4 * points,
-    };
-    let side = if rows < touches.len() {
+    let side = if reading.rows(observer.frames().len()) < touches.len() {
         Side::Outputs
     } else {
         Side::Loads
@@ -128,6 +131,7 @@ pub fn respond_from(
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
     let loads = touch_rows(model, touches);
+    let points = observer.frames().len();
     if side == Side::Outputs {
         let outputs = output_rows(observer, reading);
         return by_outputs(model, &loads, &outputs, watch);
@@ -138,9 +142,12 @@ pub fn respond_from(
         watch,
         |buffer, columns, solved| {
             let width = columns.len();
-            let mut values = Vec::new();
+            // At its full size from the start: this is where the memory of a dataset goes.
+            let mut values = Vec::with_capacity(reading.rows(points) * width);
             let mut keep = |rows: &[f64]| {
-                values.extend(rows.chunks_exact(BLOCK).flat_map(|r| &r[..width]));
+                for row in rows.chunks_exact(BLOCK) {
+                    values.extend_from_slice(&row[..width]);
+                }
             };
             match reading {
                 Reading::Strain | Reading::StrainAndDisplacement => {
@@ -152,7 +159,7 @@ pub fn respond_from(
                 Reading::Displacement => {}
             }
             if reading.displaces() {
-                keep(&observer.displacement(solved));
+                keep(observer.displacement_into(solved, buffer));
             }
             (columns.to_vec(), values)
         },

@@ -4,9 +4,9 @@
 //! disk sample sets", Computer Graphics Forum 34 (2015)): it gives exactly the count asked for.
 
 use std::cmp::Ordering;
-use std::collections::{BinaryHeap, HashMap};
+use std::collections::{BTreeMap, BinaryHeap};
 
-use glam::{DVec3, IVec3};
+use glam::DVec3;
 use rand::RngExt;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -95,11 +95,14 @@ impl PartialOrd for Crowded {
 /// Removes the most crowded point again and again until `count` are left; their indices, rising.
 fn eliminate(positions: &[DVec3], count: usize, radius: f64) -> Vec<usize> {
     let reach = 2.0 * radius;
-    let neighbours = neighbours_within(positions, reach);
-    let crowding = |d: f64| (1.0 - d / reach).powi(8);
+    let mut neighbours = neighbours_within(positions, reach);
+    for (_, d) in neighbours.iter_mut().flatten() {
+        // From here on not the distance but how much it crowds.
+        *d = (1.0 - *d / reach).powi(8);
+    }
     let mut weight: Vec<f64> = neighbours
         .iter()
-        .map(|list| list.iter().map(|&(_, d)| crowding(d)).sum())
+        .map(|list| list.iter().map(|n| n.1).sum())
         .collect();
     let mut alive = vec![true; positions.len()];
     let mut heap: BinaryHeap<Crowded> = weight
@@ -112,18 +115,19 @@ fn eliminate(positions: &[DVec3], count: usize, radius: f64) -> Vec<usize> {
         let Some(Crowded { weight: w, index }) = heap.pop() else {
             break;
         };
-        if !alive[index] || w.to_bits() != weight[index].to_bits() {
-            continue; // an entry from before a neighbour was removed
+        if w.to_bits() != weight[index].to_bits() {
+            // From before a neighbour was removed: weights only fall, so it waits its turn.
+            heap.push(Crowded {
+                weight: weight[index],
+                index,
+            });
+            continue;
         }
         alive[index] = false;
         left -= 1;
-        for &(other, d) in &neighbours[index] {
+        for &(other, crowding) in &neighbours[index] {
             if alive[other] {
-                weight[other] -= crowding(d);
-                heap.push(Crowded {
-                    weight: weight[other],
-                    index: other,
-                });
+                weight[other] -= crowding;
             }
         }
     }
@@ -133,27 +137,31 @@ fn eliminate(positions: &[DVec3], count: usize, radius: f64) -> Vec<usize> {
 /// For each point the others within `reach`, with their distances, by a hash grid.
 pub(crate) fn neighbours_within(positions: &[DVec3], reach: f64) -> Vec<Vec<(usize, f64)>> {
     let cell = |p: DVec3| (p / reach).floor().as_ivec3();
-    let mut grid: HashMap<IVec3, Vec<usize>> = HashMap::new();
+    let mut grid: BTreeMap<[i32; 3], Vec<usize>> = BTreeMap::new();
     for (i, &p) in positions.iter().enumerate() {
-        grid.entry(cell(p)).or_default().push(i);
+        grid.entry(cell(p).to_array()).or_default().push(i);
     }
-    positions
-        .iter()
-        .enumerate()
-        .map(|(i, &p)| {
-            let mut near = Vec::new();
-            for offset in 0..27 {
-                let step = IVec3::new(offset % 3 - 1, offset / 3 % 3 - 1, offset / 9 - 1);
-                for &j in grid.get(&(cell(p) + step)).into_iter().flatten() {
-                    let d = p.distance(positions[j]);
-                    if j != i && d < reach {
-                        near.push((j, d));
-                    }
+    let mut near = vec![Vec::new(); positions.len()];
+    for (&home, members) in &grid {
+        let around: Vec<usize> = (0..27)
+            .filter_map(|k| {
+                let step = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
+                let key: [i32; 3] = std::array::from_fn(|a| home[a].wrapping_add(step[a]));
+                grid.get(&key)
+            })
+            .flatten()
+            .copied()
+            .collect();
+        for &i in members {
+            for &j in &around {
+                let d = positions[i].distance(positions[j]);
+                if j != i && d < reach {
+                    near[i].push((j, d));
                 }
             }
-            near
-        })
-        .collect()
+        }
+    }
+    near
 }
 
 #[cfg(test)]

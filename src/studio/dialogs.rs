@@ -1,14 +1,16 @@
 //! Opening, saving and exporting: a typed path always works; "Browse…" asks the desktop for a dialog.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
 use egui::Context;
 
 use super::Studio;
 use crate::cli;
+use crate::design::Inputs;
 use crate::document::Document;
-use crate::io::mesh_file::{ENDINGS, needs_unit};
+use crate::io::mesh_file::{ENDINGS, needs_unit, read_mesh};
 use crate::io::project_file;
 use crate::project::Unit;
 
@@ -97,7 +99,7 @@ impl Dialog {
 
     fn hint(&self) -> &'static str {
         match self.purpose {
-            Purpose::Open => "NAME.hapdef.toml, or a mesh: glb, gltf, obj, stl",
+            Purpose::Open => "NAME.hapdef.toml, or a mesh: glb, gltf, obj, ply, stl",
             Purpose::SaveAs => "NAME.hapdef.toml",
             Purpose::Export => "A folder for report.html, sites.csv, design.json, dataset.npz",
         }
@@ -236,6 +238,39 @@ impl Studio {
                 self.replace(loaded, is_project.then(|| path.to_owned()));
             }
             Err(error) => self.complain(format!("{error:#}")),
+        }
+    }
+
+    /// Takes the open mesh in again, with the body and the repairs the project now asks for. What was
+    /// painted on other vertices is gone with them; on an error everything stays as it is.
+    pub(super) fn take_in_again(&mut self) {
+        let part = &self.document.state.project.part;
+        let read = read_mesh(
+            &self.document.mesh_path,
+            part.unit,
+            part.body,
+            part.repair(),
+        );
+        match read {
+            Ok(mesh) => {
+                let same = mesh.mesh.positions() == self.document.part.positions();
+                let inputs = Inputs {
+                    project: self.document.state.project.clone(),
+                    part: Arc::new(mesh.mesh),
+                    painted: self.document.state.painted.clone().filter(|_| same),
+                    masks: mesh.groups,
+                };
+                let loaded = project_file::LoadedProject {
+                    inputs,
+                    repairs: mesh.repairs,
+                    path: self.document.path.clone().unwrap_or_default(),
+                    mesh_path: self.document.mesh_path.clone(),
+                    bundled: false,
+                };
+                let path = self.document.path.clone();
+                self.replace(loaded, path);
+            }
+            Err(error) => self.complain(error.to_string()),
         }
     }
 

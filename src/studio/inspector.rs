@@ -14,14 +14,26 @@ impl Studio {
     pub(super) fn inspector(&mut self, ui: &mut Ui) {
         let bounds = self.document.part.bounds();
         let bounds = [bounds.0, bounds.1].map(|p| (p * 1000.0).to_array());
+        let from_file = !self.document.bundled;
+        let bodies = self.document.repairs.bodies;
+        let again = from_file && self.document.asks_for_another_part();
+        let painted = self.document.state.painted.is_some();
+        let mut asked = Asked::default();
         let project = &mut self.document.state.project;
         egui::ScrollArea::vertical()
             .auto_shrink(false)
             .show(ui, |ui| {
                 ui.add_space(6.0);
                 quality(ui, project);
-                section(ui, "Part and material", true, |ui| part(ui, project));
-                section(ui, "Supports", false, |ui| supports(ui, project, bounds));
+                section(ui, "Part and material", true, |ui| {
+                    part(ui, project);
+                    if from_file {
+                        asked.take_in_again = taking_in(ui, project, bodies, again);
+                    }
+                });
+                section(ui, "Supports", false, |ui| {
+                    asked.hold_painted = supports(ui, project, bounds, painted);
+                });
                 section(ui, "Touch", true, |ui| touch(ui, project));
                 section(ui, "Gauge", true, |ui| gauge(ui, project));
                 section(ui, "Feasible region and sites", false, |ui| {
@@ -29,7 +41,63 @@ impl Studio {
                 });
                 section(ui, "Selection", true, |ui| selection(ui, project));
             });
+        if asked.hold_painted {
+            self.document.hold_painted();
+        }
+        if asked.take_in_again {
+            self.take_in_again();
+        }
     }
+}
+
+/// What was pressed that concerns more than the settings.
+#[derive(Default)]
+struct Asked {
+    hold_painted: bool,
+    take_in_again: bool,
+}
+
+/// How the mesh file is taken in; whether it is to be read again.
+fn taking_in(ui: &mut Ui, project: &mut Project, bodies: usize, again: bool) -> bool {
+    if bodies > 1 {
+        count(
+            ui,
+            "Body",
+            &mut project.part.body,
+            0..=bodies - 1,
+            "Which connected body of the file, 0 being the one with the largest surface",
+        );
+    }
+    number(
+        ui,
+        "Weld",
+        &mut project.part.weld_mm,
+        0.0..=1e3,
+        0.001,
+        " mm",
+        "Vertices nearer to each other than this are joined; 0 joins equal ones only",
+    );
+    number(
+        ui,
+        "Fill holes",
+        &mut project.part.fill_holes_mm,
+        0.0..=1e4,
+        0.1,
+        " mm",
+        "Holes up to this far across are filled",
+    );
+    if !again {
+        return false;
+    }
+    ui.label("");
+    let pressed = ui
+        .button("Read the mesh again")
+        .on_hover_text(
+            "With this body and these repairs. What was painted on other vertices is lost",
+        )
+        .clicked();
+    ui.end_row();
+    pressed
 }
 
 fn section(ui: &mut Ui, title: &str, open: bool, content: impl FnOnce(&mut Ui)) {
@@ -171,7 +239,8 @@ fn part(ui: &mut Ui, project: &mut Project) {
     );
 }
 
-fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm) {
+/// Whether what is painted is to be held.
+fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm, painted: bool) -> bool {
     let mut removed = None;
     for (k, support) in project.supports.iter_mut().enumerate() {
         let number = k + 1;
@@ -233,7 +302,13 @@ fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm) {
             normal: Axis::Z,
         });
     }
+    let pressed = ui
+        .add_enabled(painted, egui::Button::new("Hold what is painted"))
+        .on_hover_text("A support on the painted vertices; the painted region itself is free again")
+        .on_disabled_hover_text("Paint a region first (B)")
+        .clicked();
     ui.end_row();
+    pressed
 }
 
 fn kind_name(kind: SupportKind) -> &'static str {

@@ -3,6 +3,7 @@
 use egui::{RichText, Ui};
 
 use super::{Command, Studio, theme};
+use crate::design::Simulated;
 
 /// How a stage stands.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -75,14 +76,16 @@ impl Studio {
         let standing = standing(self.simulation.as_ref().map(|s| s.key == key), running);
         let lines = self.simulation.as_ref().map_or_else(Vec::new, |s| {
             let dataset = &s.simulated.dataset;
-            vec![
+            let mut lines = vec![
                 format!(
                     "{} sites × {} touches",
                     dataset.sites.len(),
                     dataset.touches.len()
                 ),
                 format!("{} unknowns, {:.1} s", s.simulated.unknowns, s.seconds),
-            ]
+            ];
+            lines.extend(trust(&s.simulated));
+            lines
         });
         stage(ui, "Simulate", standing, &lines);
         self.button(ui, Command::Simulate);
@@ -193,6 +196,25 @@ impl Studio {
             ui.weak("Ready");
         }
     }
+}
+
+/// What the elastic model says of its own error, and what must be known before it is believed.
+fn trust(simulated: &Simulated) -> Vec<String> {
+    let d = &simulated.discretization;
+    let l = &simulated.linearity;
+    let mut lines = vec![
+        format!(
+            "mesh: about {:.1} % ({:.3} mm) under a touch, strain {:.1} %",
+            d.displacement_percent, d.displacement_mm, d.strain_percent
+        ),
+        format!(
+            "linearity: up to {:.1} % at {:.1} N",
+            l.largest_percent.abs(),
+            l.force_n
+        ),
+    ];
+    lines.extend(simulated.achieved.notes.iter().cloned());
+    lines
 }
 
 /// `current` says whether there is a result and whether it still holds.

@@ -188,8 +188,8 @@ impl<'s> Working<'s> {
             let mut near = self.neighbours(gone).into_iter();
             near.any(|v| self.is_line(gone, v) && self.is_line(kept, v))
         };
-        if !allowed || rank(gone) > rank(kept) || (!line && rank(gone) != Mobility::Free && folds())
-        {
+        let beside = rank(gone) != Mobility::Free && rank(kept) == Mobility::Free;
+        if !allowed || beside || (!line && rank(gone) != Mobility::Free && folds()) {
             return false;
         }
         // Link condition: only the triangles on the edge may lie between the two.
