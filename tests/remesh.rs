@@ -4,13 +4,15 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
+use hapdef::budget::{Quality, unwatched};
+use hapdef::design::Inputs;
 use hapdef::io::mesh_file::read_mesh;
 use hapdef::mesh::locate::SurfaceIndex;
 use hapdef::mesh::remesh::{as_given, quarter, remesh};
 use hapdef::mesh::repair::Repair;
 use hapdef::mesh::surface::Surface;
 use hapdef::mesh::{Edge, TriMesh};
-use hapdef::project::Unit;
+use hapdef::project::{Masks, Project, SupportKeys, SupportKind, Unit};
 
 /// Angles in degrees: the smallest, and the one that a hundredth of all are below.
 fn angles(mesh: &TriMesh) -> [f64; 2] {
@@ -234,5 +236,47 @@ fn real_limbs_are_remeshed() {
         assert!(after < 0.02 && before > 10.0 * after, "{before} {after}");
         assert!(away(&new.mesh, &part) < 0.6e-3);
         assert!((new.mesh.area() / part.area() - 1.0).abs() < 0.06);
+        computed(part);
     }
+}
+
+/// The elastic model on the upper part of a limb as it comes, held below.
+fn computed(part: Arc<TriMesh>) {
+    let (lower, upper) = part.bounds();
+    let mut project = Project::around("limb.stl", Some(Unit::Metre));
+    project.part.thickness_mm = 2.8;
+    project.touch.count = 60;
+    project.sites.spacing_mm = 8.0;
+    let (low, mut high) = (lower * 1000.0 - 1.0, upper * 1000.0 + 1.0);
+    high.y = low.y + 0.3 * (high.y - low.y);
+    project.supports.push(SupportKeys {
+        kind: SupportKind::Clamped,
+        box_mm: Some([low.to_array(), high.to_array()]),
+        vertices: None,
+        normal: hapdef::mesh::unroll::Axis::Z,
+    });
+    let inputs = Inputs {
+        project,
+        part,
+        painted: None,
+        masks: Masks::new(),
+    };
+    let budget = Quality::Draft.budget();
+    let simulated = hapdef::design::simulate(&inputs, &budget, &unwatched).unwrap();
+    let estimate = simulated.discretization;
+    println!(
+        "  computed on {} vertices: {estimate:.2?}",
+        simulated.mesh.positions().len()
+    );
+    assert!(simulated.checks.reaction_error < 1e-6 && simulated.checks.energy_error < 1e-6);
+    assert!(simulated.dataset.x.values().iter().all(|x| x.is_finite()));
+    assert!(estimate.strain_percent < 20.0);
+    // A closed limb with thick walls is no thin shell everywhere, and that is said.
+    assert!(
+        simulated
+            .achieved
+            .notes
+            .iter()
+            .any(|n| n.contains("thin-shell"))
+    );
 }

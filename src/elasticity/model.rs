@@ -41,7 +41,7 @@ pub enum ElasticError {
     )]
     AllHeld,
     #[error(
-        "a triangle of the mesh near {place:.1} mm has no area, so nothing can be computed on it: repair the mesh, or set part.elements to \"graded\""
+        "a triangle of the mesh near {place:.1} mm has no area, so nothing can be computed on it: repair the mesh there (part.weld_mm joins what lies too close)"
     )]
     NoArea { place: DVec3 },
     #[error("the model does not fit into memory: use a coarser mesh")]

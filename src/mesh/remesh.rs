@@ -47,6 +47,7 @@ pub fn remesh(surface: &Surface, size: &dyn Fn(DVec3) -> f64) -> Remeshed {
         smooth(&mut work, size, round);
     }
     flip(&mut work);
+    remove_flat(&mut work);
     let (mesh, places, lines) = work.finish();
     Remeshed {
         mesh: Arc::new(mesh),
@@ -90,19 +91,52 @@ pub fn quarter(surface: &Surface, coarse: &Remeshed) -> Remeshed {
             lines.extend([key(edge.a, number), key(edge.b, number)]);
         }
     }
+    settle_middles(mesh, &mut positions);
     let triangles = mesh
         .triangles()
         .iter()
         .zip(mesh.triangle_edges())
-        .flat_map(|(&[a, b, c], opposite)| {
-            let [bc, ca, ab] = opposite.map(|e| old + e);
-            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-        })
+        .flat_map(|(tri, opposite)| quarters(tri, opposite, old))
         .collect();
     Remeshed {
         mesh: Arc::new(TriMesh::from_checked(positions, triangles)),
         places,
         lines,
+    }
+}
+
+/// The four triangles of a split one; middles of edges are numbered from `old` on.
+fn quarters(&[a, b, c]: &[u32; 3], opposite: &[u32; 3], old: u32) -> [[u32; 3]; 4] {
+    let [bc, ca, ab] = opposite.map(|e| old + e);
+    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+}
+
+/// Puts middles back onto their edges wherever moving them to the surface turned a triangle over.
+fn settle_middles(mesh: &TriMesh, positions: &mut [DVec3]) {
+    const ROUNDS: usize = 4;
+    let old = mesh.positions().len() as u32;
+    for _ in 0..ROUNDS {
+        let mut moved = false;
+        for (t, (tri, opposite)) in (0..).zip(mesh.triangles().iter().zip(mesh.triangle_edges())) {
+            let (normal, area) = (mesh.facet_normal(t), mesh.facet_area(t));
+            let sound = quarters(tri, opposite, old).iter().all(|part| {
+                let [a, b, c] = part.map(|v| positions[v as usize]);
+                (b - a).cross(c - a).dot(normal) > 0.1 * area
+            });
+            if sound {
+                continue;
+            }
+            for &e in opposite {
+                let edge = &mesh.edges()[e as usize];
+                let ends = [edge.a, edge.b].map(|v| mesh.positions()[v as usize]);
+                let middle = ends[0].midpoint(ends[1]);
+                moved |= positions[(old + e) as usize] != middle;
+                positions[(old + e) as usize] = middle;
+            }
+        }
+        if !moved {
+            return;
+        }
     }
 }
 
@@ -121,6 +155,70 @@ fn middle_on(surface: &Surface, a: DVec3, b: DVec3, line: bool) -> (DVec3, Surfa
     } else {
         (middle, at)
     }
+}
+
+/// Takes out what has no height to speak of and that nothing before could better: needles are drawn
+/// together along their short edge, caps give their long edge to their apex, whatever line it was on.
+fn remove_flat(work: &mut Working) {
+    const FLAT: f64 = 0.01;
+    const PASSES: usize = 5;
+    for _ in 0..PASSES {
+        let mut changed = false;
+        for t in 0..work.triangles.len() as u32 {
+            if work.is_gone(t) || thinness(work, t, u32::MAX, DVec3::ZERO) > FLAT {
+                continue;
+            }
+            let tri = work.triangles[t as usize];
+            let side = |i: usize| work.length(tri[i], tri[(i + 1) % 3]);
+            let by = |i: &usize, j: &usize| side(*i).total_cmp(&side(*j));
+            let short = (0..3).min_by(by).unwrap_or(0);
+            let long = (0..3).max_by(by).unwrap_or(0);
+            changed |= if side(short) < 0.1 * side(long) {
+                collapse_anyhow(work, tri[short], tri[(short + 1) % 3])
+            } else {
+                give_to_apex(work, t, tri[long], tri[(long + 1) % 3], tri[(long + 2) % 3])
+            };
+        }
+        if !changed {
+            return;
+        }
+    }
+}
+
+fn collapse_anyhow(work: &mut Working, a: u32, b: u32) -> bool {
+    let rank = |v: u32| work.vertices[v as usize].mobility;
+    let (gone, kept) = if rank(a) > rank(b) { (b, a) } else { (a, b) };
+    let joins = work.links(gone, kept);
+    if joins {
+        work.collapse(gone, kept);
+    }
+    joins
+}
+
+/// The edge a–b of a flat triangle whose apex lies on it: the apex takes its place.
+fn give_to_apex(work: &mut Working, t: u32, a: u32, b: u32, apex: u32) -> bool {
+    let on = work.on_edge(a, b);
+    let line = work.is_line(a, b);
+    match on[..] {
+        [_] => work.drop_triangle(t),
+        [s, u] => {
+            let other = if s == t { u } else { s };
+            let across = work.triangles[other as usize]
+                .into_iter()
+                .find(|&v| v != a && v != b);
+            let Some(d) = across.filter(|&d| d != apex && work.on_edge(apex, d).is_empty()) else {
+                return false;
+            };
+            work.flip(a, b, [t, other], [apex, d]);
+        }
+        _ => return false,
+    }
+    if line {
+        work.lines.remove(&key(a, b));
+        work.lines.extend([key(a, apex), key(apex, b)]);
+        work.vertices[apex as usize].mobility = Mobility::Fixed;
+    }
+    true
 }
 
 fn split_long(work: &mut Working, size: &dyn Fn(DVec3) -> f64) {

@@ -192,7 +192,12 @@ impl<'s> Working<'s> {
         if !allowed || beside || (!line && rank(gone) != Mobility::Free && folds()) {
             return false;
         }
-        // Link condition: only the triangles on the edge may lie between the two.
+        self.links(gone, kept)
+    }
+
+    /// The link condition: only the triangles on the edge lie between the two, so that drawing them
+    /// together joins nothing else.
+    pub fn links(&self, gone: u32, kept: u32) -> bool {
         let near = self.neighbours(gone);
         let common = self
             .neighbours(kept)
@@ -200,6 +205,18 @@ impl<'s> Working<'s> {
             .filter(|v| near.binary_search(v).is_ok())
             .count();
         common == self.on_edge(gone, kept).len()
+    }
+
+    pub fn is_gone(&self, t: u32) -> bool {
+        self.triangles[t as usize] == GONE
+    }
+
+    /// Takes a triangle out.
+    pub fn drop_triangle(&mut self, t: u32) {
+        let tri = std::mem::replace(&mut self.triangles[t as usize], GONE);
+        for v in tri {
+            self.around[v as usize].retain(|&s| s != t);
+        }
     }
 
     /// Draws `gone` into `kept`.
