@@ -283,6 +283,11 @@ pub fn cautions(
     /// Beyond this change a linear answer is the wrong kind of answer (%).
     const NONLINEAR: f64 = 10.0;
     let mut notes = Vec::new();
+    if discretization.strain_percent.is_nan() {
+        notes.push(
+            "No gauge lies farther than two tip radii from a touch: the mesh's error in strain could not be judged.".into(),
+        );
+    }
     if !discretization.meets(aim) {
         notes.push(format!(
             "The mesh leaves about {:.1} % error in displacement (asked: {:.0} %) and {:.1} % in strain (asked: {:.0} %): {}.",
@@ -293,13 +298,13 @@ pub fn cautions(
             if *aim == Quality::Reference.budget().elements {
                 "more vertices than this quality allows for so many touches would be needed"
             } else {
-                "choose a higher quality, or fewer touches"
+                "choose a higher quality, fewer touches, or part.elements = \"graded\""
             }
         ));
     }
     if linearity.beyond > 0 {
         notes.push(format!(
-            "At {:.1} N the shell may snap or fold under {} of {} touches: the linear answer says nothing there. Lower the force.",
+            "At {:.1} N the shell may snap or fold under {} of {} sampled touches: the linear answer says nothing there. Lower the force.",
             linearity.force_n, linearity.beyond, linearity.loads
         ));
     }
@@ -429,7 +434,31 @@ fn check_memory(sites: usize, touches: usize) -> Result<(), DesignError> {
     // evaluation and its distances, on every thread.
     let kernels = 2 * touches * touches * rayon::current_num_threads();
     check_room(4 * sites, touches)?;
-    check_room(kernels.div_ceil(touches.max(1)), touches)
+    check_room(kernels.div_ceil(touches.max(1)), touches).map_err(|error| match error {
+        DesignError::TooLarge {
+            needed_gb,
+            limit_gb,
+            touches,
+            ..
+        } => DesignError::TooLarge {
+            needed_gb,
+            limit_gb,
+            sites,
+            touches,
+        },
+        other => other,
+    })
+}
+
+/// What a simulation will hold at its largest: about how many sites, how many touches, and the memory of
+/// its strains and signals (GB), known before anything is allocated.
+#[must_use]
+pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
+    let spacing = inputs.project.sites.spacing_mm * 1e-3;
+    let sites = (inputs.part.area() / (spacing * spacing)).round() as usize;
+    let touches = inputs.project.touch.count.min(budget.touches);
+    let bytes = 4.0 * sites as f64 * touches as f64 * size_of::<f64>() as f64;
+    (sites, touches, bytes / 1e9)
 }
 
 /// Refuses a dense result of `rows` × `columns` that cannot be held, before it is allocated.

@@ -155,6 +155,17 @@ impl Document {
         self.state != self.saved
     }
 
+    /// The state on disk, as far as is known.
+    #[must_use]
+    pub fn saved(&self) -> &State {
+        &self.saved
+    }
+
+    /// What is on disk is not this state but that one.
+    pub fn compare_with(&mut self, saved: State) {
+        self.saved = saved;
+    }
+
     /// The state on disk is now this one.
     pub fn mark_saved(&mut self, path: PathBuf) {
         self.path = Some(path);

@@ -66,6 +66,8 @@ pub fn answer(
     watch: Watch,
 ) -> Result<Answer, DesignError> {
     inputs.project.check()?;
+    // Solved, read out row by row, and written as text: several times the numbers themselves.
+    design::check_room(24 * sites.len(), touches.len())?;
     let mut notes = Vec::new();
     let inputs = facing_touches(inputs, touches, &mut notes);
     let index = SurfaceIndex::new(&inputs.part);
@@ -99,7 +101,6 @@ pub fn answer(
     let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
     let observer = Observer::new(&model, &points, Face::Inside);
     let angles = angles(sites, &observer)?;
-    design::check_room(4 * sites.len().max(1), touches.len())?;
     let reading = Reading::GaugeAndDisplacement(&angles);
     let responses = respond(&model, touches, &observer, reading, watch)?;
     Ok(Answer {

@@ -36,7 +36,7 @@ pub enum MeshError {
         count: usize,
     },
     #[error(
-        "every triangle of the mesh has zero area: check the unit and the export of the mesh file"
+        "every triangle of the mesh has zero area: check the unit and the export of the mesh file, and that part.weld_mm is small beside the part"
     )]
     AllDegenerate,
     #[error("the mesh has {count} separate bodies, so body {body} does not exist: choose 0 to {}", count - 1)]
@@ -66,7 +66,7 @@ pub struct RepairReport {
     pub boundary_edges: usize,
     /// Holes that were filled because that was asked for.
     pub filled_holes: usize,
-    /// Triangles thinner than a hundredth of their length: kept, a new mesh is laid for computing.
+    /// Triangles thinner than a hundredth of their length: kept; graded elements do not have them.
     pub slivers: usize,
 }
 
@@ -96,7 +96,7 @@ impl RepairReport {
             self.non_manifold_edges,
             "edges join more than two triangles",
         );
-        count(self.slivers, "slivers (elements are laid anew)");
+        count(self.slivers, "slivers");
         (!parts.is_empty()).then(|| parts.join(", "))
     }
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::budget::Quality;
 use crate::dataset::Signal;
-use crate::elasticity::support::Region;
+use crate::elasticity::support::{MOST, Region};
 use crate::elasticity::{Freedoms, Material, Section, Support};
 use crate::feasible::FeasibleRules;
 use crate::limb::BoxMm;
@@ -567,6 +567,8 @@ impl Project {
         }
         let c = self.selection.c_mm;
         check("selection.c_mm", "above 0 and at most 1e12", c, c <= 1e12)?;
+        let supports = self.supports.len();
+        check("support", "at most 128", supports as f64, supports <= MOST)?;
         let boxes = self
             .supports
             .iter()

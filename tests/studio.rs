@@ -486,7 +486,12 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
     part.body = 1;
     part.fill_holes_mm = 10.0;
     w.harness.run_ok();
+    // Nothing is computed on one part and labelled as another.
+    w.press("Simulate");
+    let state = w.harness.state();
+    assert!(!state.busy() && state.messages.last().unwrap().text.contains("read again"));
     w.press("Read the mesh again");
+    assert!(w.harness.state().document.is_dirty());
     assert_eq!(triangles(&w), 128, "126 and the two that fill the hole");
     let document = &w.harness.state().document;
     assert_eq!(document.repairs.filled_holes, 1);

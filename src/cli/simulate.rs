@@ -75,6 +75,8 @@ fn check_output(path: &Path, endings: &[&str]) -> anyhow::Result<()> {
 
 fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()> {
     let budget = loaded.inputs.project.budget.quality.budget();
+    let (sites, touches, gigabytes) = design::expected_size(&loaded.inputs, &budget);
+    eprintln!("about {sites} sites × {touches} touches: {gigabytes:.2} GB while they are computed");
     let bar = Bar::default();
     let result = args
         .common

@@ -50,8 +50,8 @@ impl Discretization {
     /// Whether the estimated errors are within what was asked for.
     #[must_use]
     pub fn meets(&self, aim: &Elements) -> bool {
-        self.displacement_percent <= aim.displacement_percent
-            && self.strain_percent <= aim.strain_percent
+        let strain = self.strain_percent.is_nan() || self.strain_percent <= aim.strain_percent;
+        self.displacement_percent <= aim.displacement_percent && strain
     }
 }
 
@@ -127,7 +127,7 @@ pub fn between(
     }
 }
 
-/// Rms over loads and places beyond the tip of the difference of strains over the load's largest.
+/// Rms over loads and places beyond the tip (NaN where there is none) of the difference of strains over the load's largest.
 #[must_use]
 pub fn strain_apart(coarse: &Sample, fine: &Sample, touches: &[Touch], places: &[DVec3]) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);
@@ -150,7 +150,10 @@ pub fn strain_apart(coarse: &Sample, fine: &Sample, touches: &[Touch], places: &
             count += 1;
         }
     }
-    (sum / count.max(1) as f64).sqrt()
+    if count == 0 {
+        return f64::NAN;
+    }
+    (sum / count as f64).sqrt()
 }
 
 /// Largest principal strain in size.

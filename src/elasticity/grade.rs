@@ -155,7 +155,7 @@ impl Ground {
         watch: Watch,
     ) -> Result<Graded, ElasticError> {
         let most = aim.most_for(touches.len());
-        let touches: Vec<Touch> = spread(touches, LOADS);
+        let touches = sample(touches);
         let places: Vec<DVec3> = spread(places, PLACES);
         // A second round for a few more vertices would cost more than it brings.
         let near = 2 * most <= 3 * aim.vertices;
@@ -183,6 +183,7 @@ impl Ground {
                 let estimate = estimate.of_the_coarser();
                 return Ok(coarse.graded(self, &touches, estimate, models, solves));
             }
+            // Where no place is far enough from a touch, the displacement alone decides.
             let excess = (estimate.displacement_percent / aim.displacement_percent)
                 .max(estimate.strain_percent / aim.strain_percent)
                 / SAFETY;
@@ -257,6 +258,18 @@ impl Solved {
             solves,
         }
     }
+}
+
+/// Touches that stand for all: evenly through the list, and the strongest.
+fn sample(touches: &[Touch]) -> Vec<Touch> {
+    let mut sample: Vec<Touch> = spread(touches, LOADS - 1);
+    let strongest = touches.iter().max_by(|a, b| a.force.total_cmp(&b.force));
+    if let Some(strongest) = strongest
+        && sample.iter().all(|t| t.force < strongest.force)
+    {
+        sample.push(*strongest);
+    }
+    sample
 }
 
 /// At most `count` of the items, evenly through the list.

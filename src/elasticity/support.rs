@@ -51,12 +51,21 @@ pub struct Support {
     pub held: Freedoms,
 }
 
+/// Supports that a vertex belongs to, one bit each.
+type Members = u128;
+/// The most supports a part may have.
+pub const MOST: usize = Members::BITS as usize;
+
 /// A part with its supports, cut so that what is held has edges of the mesh for its border.
 #[derive(Clone, Debug)]
 pub struct HeldPart {
     pub mesh: Arc<TriMesh>,
-    /// For each vertex.
+    /// For each vertex what is held there.
     pub held: Vec<Freedoms>,
+    /// For each vertex the supports it belongs to: what lies between vertices is held by a support only
+    /// when all of them belong to that very one.
+    members: Vec<Members>,
+    kinds: Vec<Freedoms>,
 }
 
 impl HeldPart {
@@ -71,103 +80,127 @@ impl HeldPart {
             })
             .collect();
         let (mesh, parents) = cut_by_boxes(part, &boxes);
-        let mut held = held_freedoms(part, supports);
-        // A cut between two held vertices is held as they are; a cut at a box's face by that box.
-        let (lower, upper) = part.bounds();
-        let slack = ON_PLANE * (upper - lower).length();
+        let mut members = members(part, supports);
+        let slack = slack(part);
         for (k, &(a, b, _)) in parents.iter().enumerate() {
             let p = mesh.positions()[part.positions().len() + k];
-            let between = held[a as usize].0 & held[b as usize].0;
-            held.push(Freedoms(between | held_at(p, supports, slack).0));
+            let between = members[a as usize] & members[b as usize];
+            members.push(between | in_boxes(p, supports, slack));
         }
         let mesh = if parents.is_empty() {
             Arc::clone(part)
         } else {
             Arc::new(mesh)
         };
-        Self { mesh, held }
+        Self::with(mesh, members, supports)
     }
 
     /// The part as it is: what is held ends somewhere between its vertices.
     #[must_use]
     pub fn uncut(part: &Arc<TriMesh>, supports: &[Support]) -> Self {
+        Self::with(Arc::clone(part), members(part, supports), supports)
+    }
+
+    fn with(mesh: Arc<TriMesh>, members: Vec<Members>, supports: &[Support]) -> Self {
+        let kinds: Vec<Freedoms> = supports.iter().map(|s| s.held).collect();
         Self {
-            mesh: Arc::clone(part),
-            held: held_freedoms(part, supports),
+            held: members.iter().map(|&m| together(m, &kinds)).collect(),
+            mesh,
+            members,
+            kinds,
         }
     }
 
-    /// What is held at a point of the (cut) part: what all the corners it lies between have in common.
+    /// What is held at a point of the (cut) part: by the supports that all the corners it lies between
+    /// belong to.
     #[must_use]
     pub fn held_at(&self, at: SurfacePoint) -> Freedoms {
         let tri = self.mesh.triangles()[at.triangle as usize];
-        let among = tri.into_iter().zip(at.barycentric);
-        Freedoms(
-            among
-                .filter(|(_, w)| *w > 1e-7)
-                .fold(Freedoms::ALL.0, |mask, (v, _)| {
-                    mask & self.held[v as usize].0
-                }),
-        )
+        let common = tri
+            .into_iter()
+            .zip(at.barycentric)
+            .filter(|(_, w)| *w > 1e-7)
+            .fold(Members::MAX, |all, (v, _)| all & self.members[v as usize]);
+        together(common, &self.kinds)
     }
 
-    /// Whether an edge is the border of something held: more is held on it than beside it.
+    /// Whether an edge is the border of a support: it belongs to one that a facet beside it does not.
     #[must_use]
     pub fn is_border(&self, edge: &Edge) -> bool {
-        let on = self.held[edge.a as usize].0 & self.held[edge.b as usize].0;
+        let on = self.members[edge.a as usize] & self.members[edge.b as usize];
         edge.triangles.iter().any(|&t| {
             let tri = self.mesh.triangles()[t as usize];
-            on & !tri
+            let beside = tri
                 .iter()
-                .fold(on, |mask, &v| mask & self.held[v as usize].0)
-                != 0
+                .fold(on, |all, &v| all & self.members[v as usize]);
+            on & !beside != 0
         })
     }
 
-    /// Whether more is held at a vertex than along any edge to it.
+    /// Whether a vertex belongs to a support that none of its neighbours does.
     #[must_use]
     pub fn is_spot(&self, vertex: u32) -> bool {
-        let own = self.held[vertex as usize].0;
-        own != 0
-            && self.mesh.vertex_triangles()[vertex as usize]
-                .iter()
-                .flat_map(|&t| self.mesh.triangles()[t as usize])
-                .filter(|&w| w != vertex)
-                .all(|w| self.held[w as usize].0 & own != own)
+        let own = self.members[vertex as usize];
+        let near = self.mesh.vertex_triangles()[vertex as usize]
+            .iter()
+            .flat_map(|&t| self.mesh.triangles()[t as usize])
+            .filter(|&w| w != vertex)
+            .fold(0, |any, w| any | self.members[w as usize]);
+        own & !near != 0
     }
+}
+
+/// What several supports hold together.
+fn together(members: Members, kinds: &[Freedoms]) -> Freedoms {
+    let mine = kinds
+        .iter()
+        .enumerate()
+        .filter(|(k, _)| members >> k & 1 == 1);
+    Freedoms(mine.fold(0, |mask, (_, held)| mask | held.0))
+}
+
+fn slack(mesh: &TriMesh) -> f64 {
+    let (lower, upper) = mesh.bounds();
+    ON_PLANE * (upper - lower).length()
+}
+
+/// The supports that each vertex of the part belongs to.
+fn members(mesh: &TriMesh, supports: &[Support]) -> Vec<Members> {
+    let slack = slack(mesh);
+    let mut members: Vec<Members> = mesh
+        .positions()
+        .iter()
+        .map(|&p| in_boxes(p, supports, slack))
+        .collect();
+    for (k, support) in supports.iter().enumerate().take(MOST) {
+        if let Region::Vertices(mask) = &support.region {
+            for (m, _) in members.iter_mut().zip(mask.iter()).filter(|(_, set)| **set) {
+                *m |= 1 << k;
+            }
+        }
+    }
+    members
+}
+
+/// The boxes that a point lies in.
+fn in_boxes(p: DVec3, supports: &[Support], slack: f64) -> Members {
+    let boxes = supports.iter().enumerate().take(MOST);
+    boxes.fold(0, |members, (k, s)| match s.region {
+        Region::Box { lower, upper }
+            if p.cmpge(lower - slack).all() && p.cmple(upper + slack).all() =>
+        {
+            members | 1 << k
+        }
+        _ => members,
+    })
 }
 
 /// What each vertex of the part has held, from all supports together.
 #[must_use]
 pub fn held_freedoms(mesh: &TriMesh, supports: &[Support]) -> Vec<Freedoms> {
-    let (lower, upper) = mesh.bounds();
-    let slack = ON_PLANE * (upper - lower).length();
-    let mut held: Vec<Freedoms> = mesh
-        .positions()
-        .iter()
-        .map(|&p| held_at(p, supports, slack))
-        .collect();
-    for support in supports {
-        if let Region::Vertices(mask) = &support.region {
-            for (h, _) in held.iter_mut().zip(mask.iter()).filter(|(_, m)| **m) {
-                h.0 |= support.held.0;
-            }
-        }
-    }
-    held
-}
-
-/// What the boxes hold at a point.
-fn held_at(p: DVec3, supports: &[Support], slack: f64) -> Freedoms {
-    let mask = supports.iter().fold(0, |mask, s| match s.region {
-        Region::Box { lower, upper }
-            if p.cmpge(lower - slack).all() && p.cmple(upper + slack).all() =>
-        {
-            mask | s.held.0
-        }
-        _ => mask,
-    });
-    Freedoms(mask)
+    let kinds: Vec<Freedoms> = supports.iter().map(|s| s.held).collect();
+    let members = members(mesh, supports);
+    members.iter().map(|&m| together(m, &kinds)).collect()
 }
 
 /// Vertices with anything held.
@@ -225,6 +258,48 @@ mod tests {
             .filter(|e| part.is_border(e))
             .count();
         assert!((1..=3).contains(&border), "{border}");
+    }
+
+    #[test]
+    fn two_supports_leave_free_what_lies_between_them() {
+        // Two triangles from end to end: the wall between the clamps is free all the same.
+        let p = [
+            DVec3::ZERO,
+            DVec3::new(10.0, 0.0, 0.0),
+            DVec3::new(10.0, 1.0, 0.0),
+            DVec3::new(0.0, 1.0, 0.0),
+        ];
+        let part = Arc::new(TriMesh::new(&p, &[[0, 1, 2], [0, 2, 3]], 0).unwrap().0);
+        let clamp = |from: f64, to: f64| Support {
+            region: Region::Box {
+                lower: DVec3::new(from, -1.0, -1.0),
+                upper: DVec3::new(to, 2.0, 1.0),
+            },
+            held: Freedoms::ALL,
+        };
+        let held = HeldPart::new(&part, &[clamp(-1.0, 1.0), clamp(9.0, 11.0)]);
+        let area: f64 = (0..held.mesh.triangles().len() as u32)
+            .filter(|&t| {
+                let middle = SurfacePoint {
+                    triangle: t,
+                    barycentric: [1.0 / 3.0; 3],
+                };
+                held.held_at(middle) == Freedoms::ALL
+            })
+            .map(|t| held.mesh.facet_area(t))
+            .sum();
+        assert!((area - 2.0).abs() < 1e-9, "{area}");
+        // The borders at x = 1 and x = 9, of one metre each.
+        let border: f64 = held
+            .mesh
+            .edges()
+            .iter()
+            .filter(|e| held.is_border(e))
+            .map(|e| {
+                held.mesh.positions()[e.a as usize].distance(held.mesh.positions()[e.b as usize])
+            })
+            .sum();
+        assert!((border - 2.0).abs() < 1e-9, "{border}");
     }
 
     #[test]

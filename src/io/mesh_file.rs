@@ -1,7 +1,7 @@
 //! Meshes from files: glTF and GLB, OBJ, STL (both kinds), PLY.
 //!
 //! The libraries that parse them may panic on hostile bytes, so they run behind a boundary; what they
-//! return is checked by [`TriMesh::new`] like anything from outside.
+//! return is checked by [`TriMesh::repaired`] like anything from outside.
 
 mod gltf;
 mod obj;
@@ -35,6 +35,8 @@ struct Soup {
     triangles: Vec<[u32; 3]>,
     /// Name, first triangle and the one after the last.
     groups: Vec<(String, usize, usize)>,
+    /// Nodes walked through.
+    visits: usize,
 }
 
 impl Soup {
@@ -47,7 +49,7 @@ impl Soup {
     }
 
     /// Vertices of the mesh that lie in each group, known by their positions.
-    fn masks(&self, mesh: &TriMesh) -> Masks {
+    fn masks(&self, mesh: &TriMesh, weld: f64) -> Masks {
         let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
         let mut masks = Masks::new();
         for (name, first, last) in &self.groups {
@@ -56,7 +58,18 @@ impl Soup {
                 .flatten()
                 .map(|&v| key(self.positions[v as usize]))
                 .collect();
-            let mask = mesh.positions().iter().map(|&p| members.contains(&key(p)));
+            let near = |p: DVec3| {
+                // Welding may have kept a neighbour's point in place of the group's own.
+                weld > 0.0
+                    && self.triangles[*first..*last]
+                        .iter()
+                        .flatten()
+                        .any(|&v| self.positions[v as usize].distance(p) <= weld)
+            };
+            let mask = mesh
+                .positions()
+                .iter()
+                .map(|&p| members.contains(&key(p)) || near(p));
             let known = masks
                 .entry(name.clone())
                 .or_insert_with(|| Arc::new(vec![false; mesh.positions().len()]));
@@ -141,7 +154,7 @@ pub fn parse_mesh(
     let taken_in = TriMesh::repaired(&soup.positions, &soup.triangles, body, repair);
     let (mesh, repairs) = taken_in.map_err(|e: MeshError| e.to_string())?;
     Ok(LoadedMesh {
-        groups: soup.masks(&mesh),
+        groups: soup.masks(&mesh, repair.weld),
         mesh,
         repairs,
     })

@@ -112,7 +112,7 @@ pub fn read_mask(path: &Path, name: &str) -> Result<Vec<bool>, FileError> {
     let broken = |e: &dyn std::fmt::Display| {
         FileError::broken(
             path,
-            format!("the painted mask \"{name}\" cannot be read ({e}). Paint it again"),
+            format!("the mask \"{name}\" cannot be read ({e}). Paint it again"),
         )
     };
     let mut archive = ZipArchive::new(file).map_err(|e| broken(&e))?;

@@ -9,6 +9,7 @@ use super::mesh_file::{LoadedMesh, read_mesh};
 use super::npz::{NpzFile, read_mask};
 use super::{FileError, atomic};
 use crate::design::Inputs;
+use crate::elasticity::support::MOST;
 use crate::mesh::RepairReport;
 use crate::project::{FORMAT, Masks, Project};
 
@@ -77,7 +78,12 @@ fn read_masks(
     let arrays = arrays_path(path);
     for name in project.supports.iter().filter_map(|s| s.vertices.as_ref()) {
         if arrays.is_file() && super::npz::holds(&arrays, name)? {
-            masks.insert(name.clone(), Arc::new(read_painted(path, name, vertices)?));
+            // A mask for another mesh gives way to the group of that name, where the file has one.
+            match read_painted(path, name, vertices) {
+                Ok(mask) => drop(masks.insert(name.clone(), Arc::new(mask))),
+                Err(_) if masks.contains_key(name) => {}
+                Err(error) => return Err(error),
+            }
         }
     }
     Ok(masks)
@@ -90,7 +96,7 @@ fn read_painted(path: &Path, name: &str, vertices: usize) -> Result<Vec<bool>, F
         return Err(FileError::broken(
             &arrays,
             format!(
-                "the painted mask is for a mesh of {} vertices, but the part has {vertices}. Paint it again",
+                "the mask \"{name}\" is for a mesh of {} vertices, but the part has {vertices}. Paint it again, or give that support a box",
                 mask.len()
             ),
         ));
@@ -169,12 +175,27 @@ pub fn save(
     masks: &Masks,
 ) -> Result<(), FileError> {
     let mut project = project.clone();
-    project.feasible.painted = painted.map(|_| PAINTED.to_owned());
+    // Under a name that no support uses.
+    let taken = |name: &str| {
+        project
+            .supports
+            .iter()
+            .any(|s| s.vertices.as_deref() == Some(name))
+    };
+    let free = (0..).map(|k| {
+        if k == 0 {
+            PAINTED.to_owned()
+        } else {
+            format!("{PAINTED}-{k}")
+        }
+    });
+    let name = free.take(MOST + 1).find(|n| !taken(n)).unwrap_or_default();
+    project.feasible.painted = painted.map(|_| name.clone());
     let named = project.supports.iter().filter_map(|s| s.vertices.as_ref());
     let mut kept: BTreeMap<&str, &[bool]> = named
         .filter_map(|name| Some((name.as_str(), masks.get(name)?.as_slice())))
         .collect();
-    kept.extend(painted.map(|mask| (PAINTED, mask)));
+    kept.extend(painted.map(|mask| (name.as_str(), mask)));
     if !kept.is_empty() {
         let arrays = arrays_path(path);
         let mut file = NpzFile::default();

@@ -48,6 +48,9 @@ pub fn remesh(surface: &Surface, size: &dyn Fn(DVec3) -> f64) -> Remeshed {
     }
     flip(&mut work);
     remove_flat(&mut work);
+    if work.triangles.iter().all(|&t| Working::is_nothing(t)) {
+        return as_given(surface);
+    }
     let (mesh, places, lines) = work.finish();
     Remeshed {
         mesh: Arc::new(mesh),

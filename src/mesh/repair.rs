@@ -16,7 +16,14 @@ pub struct Repair {
 /// For each point the first of the points kept that it is joined with, and those kept. Points within
 /// `tolerance` of a kept one join it.
 pub(super) fn join_near(positions: &[DVec3], tolerance: f64) -> (Vec<u32>, Vec<DVec3>) {
-    let cell = |p: DVec3| (p / tolerance).floor().as_ivec3();
+    let (lower, upper) = positions
+        .iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| {
+            (l.min(p), h.max(p))
+        });
+    // Never so fine that cells far apart become one number.
+    let size = tolerance.max(1e-7 * (upper - lower).max_element());
+    let cell = |p: DVec3| ((p - lower) / size).floor().as_ivec3();
     let mut grid: HashMap<IVec3, Vec<u32>> = HashMap::new();
     let mut kept: Vec<DVec3> = Vec::new();
     let renumber = positions
@@ -44,7 +51,7 @@ pub(super) fn join_near(positions: &[DVec3], tolerance: f64) -> (Vec<u32>, Vec<D
 
 /// Rims of holes no further across than `across` (m): closed lines of edges with a triangle on one side
 /// only, in the winding of the triangles that would fill them. The longest rim of an open surface is
-/// its border and no hole.
+/// its border and never counts as a hole, however small it is.
 pub(super) fn holes(positions: &[DVec3], triangles: &[[u32; 3]], across: f64) -> Vec<Vec<u32>> {
     let mut rims = rims(triangles);
     let size = |rim: &Vec<u32>| {
@@ -57,6 +64,14 @@ pub(super) fn holes(positions: &[DVec3], triangles: &[[u32; 3]], across: f64) ->
         (high - low).length()
     };
     rims.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.cmp(b)));
+    // A lone rim may be the one hole of a nearly closed body; it is then shorter than the body is wide.
+    let all: Vec<u32> = triangles.iter().flatten().copied().collect();
+    if rims
+        .first()
+        .is_some_and(|border| size(border) > 0.99 * size(&all))
+    {
+        rims.remove(0);
+    }
     rims.retain(|rim| size(rim) <= across);
     rims
 }
@@ -82,19 +97,21 @@ fn rims(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut starts: Vec<u32> = next.keys().copied().collect();
     starts.sort_unstable();
     let mut rims = Vec::new();
+    let mut visited = std::collections::HashSet::new();
     for start in starts {
+        if visited.contains(&start) {
+            continue;
+        }
         let mut rim = vec![start];
         let mut at = start;
         // Where rims touch in a vertex the way on is not known: leave them open.
         while let Some([only]) = next.get(&at).map(Vec::as_slice) {
             at = *only;
-            if at == start {
+            // Round, or into a way that was walked before.
+            if at == start || !visited.insert(at) {
                 break;
             }
             rim.push(at);
-            if rim.len() > triangles.len() * 3 {
-                break;
-            }
         }
         if at == start && rim.len() >= 3 && rim.iter().all(|v| next.contains_key(v)) {
             for v in &rim {

@@ -65,12 +65,18 @@ impl Surface {
         let facet_normals: Vec<DVec3> = (0..mesh.triangles().len() as u32)
             .map(|t| mesh.facet_normal(t))
             .collect();
+        // The normal of a facet without height says nothing; remeshing takes such facets out.
+        let flat = |t: u32| mesh.thinness(t) < 1e-6;
         let features: Vec<bool> = mesh
             .edges()
             .iter()
             .map(|edge| {
                 let smooth = match edge.triangles[..] {
-                    [s, t] => facet_normals[s as usize].dot(facet_normals[t as usize]) > CREASE,
+                    [s, t] => {
+                        flat(s)
+                            || flat(t)
+                            || facet_normals[s as usize].dot(facet_normals[t as usize]) > CREASE
+                    }
                     _ => false,
                 };
                 !smooth || line(edge)

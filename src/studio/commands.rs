@@ -143,6 +143,16 @@ impl Studio {
         if !self.enabled(command) {
             return;
         }
+        let needs_part = matches!(
+            command,
+            Command::Simulate | Command::Select | Command::Export | Command::Save | Command::SaveAs
+        );
+        if needs_part && self.document.asks_for_another_part() {
+            self.complain(
+                "The body or the repairs were changed, but the mesh was not read again: press “Read the mesh again” (right side, Part and material), or undo",
+            );
+            return;
+        }
         match command {
             Command::Open => self.dialog = Some(Dialog::open(&self.document)),
             Command::Save => match self.document.path.clone() {

@@ -254,11 +254,23 @@ impl Studio {
         match read {
             Ok(mesh) => {
                 let same = mesh.mesh.positions() == self.document.part.positions();
+                let mut masks = mesh.groups;
+                if same {
+                    masks.extend(self.document.state.masks.clone());
+                }
+                let mut project = self.document.state.project.clone();
+                let before = project.supports.len();
+                project.supports.retain(|s| {
+                    s.vertices
+                        .as_ref()
+                        .is_none_or(|name| masks.contains_key(name))
+                });
+                let lost = before - project.supports.len();
                 let inputs = Inputs {
-                    project: self.document.state.project.clone(),
+                    project,
                     part: Arc::new(mesh.mesh),
                     painted: self.document.state.painted.clone().filter(|_| same),
-                    masks: mesh.groups,
+                    masks,
                 };
                 let loaded = project_file::LoadedProject {
                     inputs,
@@ -268,7 +280,14 @@ impl Studio {
                     bundled: false,
                 };
                 let path = self.document.path.clone();
+                let saved = self.document.saved().clone();
                 self.replace(loaded, path);
+                self.document.compare_with(saved);
+                if lost > 0 {
+                    self.tell(format!(
+                        "{lost} supports were on painted vertices that this mesh does not have: they are gone. Hold the part anew"
+                    ));
+                }
             }
             Err(error) => self.complain(error.to_string()),
         }

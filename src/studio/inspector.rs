@@ -17,7 +17,8 @@ impl Studio {
         let from_file = !self.document.bundled;
         let bodies = self.document.repairs.bodies;
         let again = from_file && self.document.asks_for_another_part();
-        let painted = self.document.state.painted.is_some();
+        let mask = self.document.state.painted.as_ref();
+        let painted = mask.is_some_and(|m| m.iter().any(|&set| set));
         let mut asked = Asked::default();
         let project = &mut self.document.state.project;
         egui::ScrollArea::vertical()

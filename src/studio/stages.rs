@@ -74,7 +74,15 @@ impl Studio {
         let key = self.document.simulation_key();
         let running = self.job.as_ref().is_some_and(|j| j.name == "Simulate");
         let standing = standing(self.simulation.as_ref().map(|s| s.key == key), running);
-        let lines = self.simulation.as_ref().map_or_else(Vec::new, |s| {
+        let expected = || {
+            let budget = self.document.state.project.budget.quality.budget();
+            let (sites, touches, gigabytes) =
+                crate::design::expected_size(&self.document.inputs(), &budget);
+            vec![format!(
+                "about {sites} sites × {touches} touches, {gigabytes:.2} GB"
+            )]
+        };
+        let lines = self.simulation.as_ref().map_or_else(expected, |s| {
             let dataset = &s.simulated.dataset;
             let mut lines = vec![
                 format!(

@@ -53,9 +53,14 @@ fn visit(
     depth: usize,
 ) -> Result<(), String> {
     const DEEPEST: usize = 64;
-    if depth > DEEPEST {
-        return Err("the glTF file nests its nodes in a circle".into());
+    /// Far more than a part needs; a file may name the same node again and again.
+    const MOST: usize = 20_000_000;
+    if depth > DEEPEST || soup.visits > 1_000_000 || soup.triangles.len() > MOST {
+        return Err(
+            "the glTF file nests its nodes in a circle, or repeats them without an end".into(),
+        );
     }
+    soup.visits += 1;
     let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4();
     if let Some(mesh) = node.mesh() {
         let first = soup.triangles.len();

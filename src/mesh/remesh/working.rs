@@ -208,7 +208,11 @@ impl<'s> Working<'s> {
     }
 
     pub fn is_gone(&self, t: u32) -> bool {
-        self.triangles[t as usize] == GONE
+        Self::is_nothing(self.triangles[t as usize])
+    }
+
+    pub fn is_nothing(triangle: [u32; 3]) -> bool {
+        triangle == GONE
     }
 
     /// Takes a triangle out.
