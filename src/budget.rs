@@ -132,11 +132,14 @@ impl Quality {
                 touches: 800,
                 test_touches: 300,
                 candidates: 60,
+                locations: 600,
                 selection_touches: 400,
                 selection_candidates: 40,
                 folds: 3,
                 tuning_touches: 300,
-                svr_steps: 100_000,
+                failure_subsets: 4,
+                failure_touches: 400,
+                svr_steps: 300_000,
                 svr_tolerance_mm: 0.1,
             },
             Self::Standard => Budget {
@@ -152,11 +155,14 @@ impl Quality {
                 touches: usize::MAX,
                 test_touches: 800,
                 candidates: usize::MAX,
-                selection_touches: 800,
-                selection_candidates: 60,
+                locations: 4000,
+                selection_touches: 4000,
+                selection_candidates: 407,
                 folds: 5,
                 tuning_touches: 1000,
-                svr_steps: 200_000,
+                failure_subsets: 12,
+                failure_touches: 1200,
+                svr_steps: 1_000_000,
                 svr_tolerance_mm: 0.1,
             },
             Self::Reference => Budget {
@@ -172,10 +178,13 @@ impl Quality {
                 touches: usize::MAX,
                 test_touches: 2000,
                 candidates: usize::MAX,
-                selection_touches: 1600,
-                selection_candidates: 120,
+                locations: 6000,
+                selection_touches: 8000,
+                selection_candidates: 1000,
                 folds: 5,
                 tuning_touches: 1600,
+                failure_subsets: 252,
+                failure_touches: 4000,
                 svr_steps: 10_000_000,
                 svr_tolerance_mm: 0.02,
             },
@@ -220,6 +229,8 @@ pub struct Budget {
     pub test_touches: usize,
     /// Most candidates kept by the reduction.
     pub candidates: usize,
+    /// Most sites that the Gaussian process knows; half as many again where no gauge can go.
+    pub locations: usize,
     /// Most touches that greedy SVR scores its candidates on.
     pub selection_touches: usize,
     /// Most candidates that greedy SVR scores.
@@ -228,6 +239,9 @@ pub struct Budget {
     pub folds: usize,
     /// Most touches that hyper-parameters are searched on.
     pub tuning_touches: usize,
+    /// Most subsets of failed gauges that the regression is trained anew for, and on how many touches.
+    pub failure_subsets: usize,
+    pub failure_touches: usize,
     /// Most SMO steps of one fit.
     pub svr_steps: usize,
     /// Largest violation of the optimality conditions at which a fit counts as converged, in mm of

@@ -1,8 +1,11 @@
 //! The command line: everything the studio computes, without a display.
 
+pub mod data;
 pub mod design;
+pub mod evaluate;
 pub mod limb;
 pub mod progress;
+pub mod select;
 pub mod simulate;
 
 use std::path::{Path, PathBuf};
@@ -41,6 +44,10 @@ pub enum Command {
     Design(design::DesignArgs),
     /// The elastic model only: writes the dataset.
     Simulate(simulate::SimulateArgs),
+    /// Sites for gauges from a dataset alone.
+    Select(select::SelectArgs),
+    /// How well given sites find touches, from a dataset alone.
+    Evaluate(evaluate::EvaluateArgs),
     /// Writes the bundled limb, or another of its family.
     Limb(limb::LimbArgs),
 }
@@ -81,7 +88,7 @@ macro_rules! named {
 }
 named!(QualityArg, Quality, Draft => Quality::Draft, Standard => Quality::Standard, Reference => Quality::Reference);
 named!(SignalArg, Signal, Displacement => Signal::Displacement, NormalDisplacement => Signal::NormalDisplacement, Strain => Signal::Strain);
-named!(SelectorArg, SelectorKind, GreedySvr => SelectorKind::GreedySvr, PcaQr => SelectorKind::PcaQr);
+named!(SelectorArg, SelectorKind, GreedySvr => SelectorKind::GreedySvr, PcaQr => SelectorKind::PcaQr, Entropy => SelectorKind::Entropy, MutualInformation => SelectorKind::MutualInformation);
 named!(UnitArg, Unit, Mm => Unit::Millimetre, Cm => Unit::Centimetre, M => Unit::Metre, In => Unit::Inch);
 
 /// The bundled project and mesh, inside the program.

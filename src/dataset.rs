@@ -68,6 +68,29 @@ impl SignalMatrix {
     pub fn values(&self) -> &[f64] {
         &self.values
     }
+    /// Some rows set to zero.
+    #[must_use]
+    pub fn with_zero_rows(mut self, rows: &[usize]) -> Self {
+        for &r in rows {
+            self.values[r * self.columns..][..self.columns].fill(0.0);
+        }
+        self
+    }
+    /// Each row times a factor of its own.
+    #[must_use]
+    pub fn scaled_rows(mut self, by: impl Iterator<Item = f64>) -> Self {
+        for (row, by) in self.values.chunks_exact_mut(self.columns.max(1)).zip(by) {
+            for v in row {
+                *v *= by;
+            }
+        }
+        self
+    }
+    /// All values times a factor.
+    #[must_use]
+    pub fn scaled(&self, by: f64) -> Self {
+        Self::new(self.columns, self.values.iter().map(|v| v * by).collect())
+    }
     /// Some of the rows, in the order given.
     #[must_use]
     pub fn select_rows(&self, rows: &[usize]) -> Self {

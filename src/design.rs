@@ -2,13 +2,15 @@
 //!
 //! Each stage is a pure function of the ones before it, so that a caller can keep what has not changed.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
-use crate::dataset::{self, Dataset, SignalMatrix};
+use crate::dataset::{self, Dataset, SignalMatrix, Site};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::grade::{Graded, Ground};
 use crate::elasticity::linearity::Linearity;
@@ -16,17 +18,24 @@ use crate::elasticity::load::Touch;
 use crate::elasticity::model::{check_held, check_section};
 use crate::elasticity::support::supported_vertices;
 use crate::elasticity::{ElasticError, Freedoms, ShellModel};
-use crate::evaluation::{self, Candidate, Evaluation, Region, Trial, subset};
+use crate::evaluation::{self, Candidate, Evaluation, Region, Trial};
 use crate::feasible::{Feasibility, FeasibleInput, feasible};
+use crate::gaussian_process::{self, Covariance, Distances, GpKernel};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::remesh::Remeshed;
 use crate::mesh::unroll::Unrolling;
-use crate::mesh::{SurfacePoint, TriMesh, sample};
+use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 use crate::pca::Pca;
 use crate::placement::candidates::{Candidates, reduce};
-use crate::placement::greedy_svr::GreedySvr;
-use crate::placement::{PlacementError, Pool, Selection, Selector, SelectorKind, pca_qr};
+use crate::placement::entropy::Entropy;
+use crate::placement::greedy_svr::{self, GreedySvr};
+use crate::placement::information::Geometry;
+use crate::placement::mutual_information::MutualInformation;
+use crate::placement::{
+    PlacementError, Pool, Request, Selection, Selector, SelectorKind, Wishes, pca_qr,
+};
 use crate::project::{BadValue, Elements, Lattice, Masks, Project};
+use crate::regression::folds::evenly;
 use crate::regression::tune::Effort;
 
 /// Why a stage ended without a result.
@@ -110,6 +119,7 @@ pub const LAYOUT: usize = 3500;
 /// Seeds of the independent draws, apart from each other.
 const TEST_SEED: u64 = 0x7e57;
 const NOISE_SEED: u64 = 0x0153;
+const WORKSHOP_SEED: u64 = 0x30b0;
 
 /// What a design starts from.
 #[derive(Clone)]
@@ -517,8 +527,18 @@ pub struct Reduced {
     pub x: SignalMatrix,
     pub pca: Pca,
     pub candidates: Candidates,
+    /// Made when a selector first asks for it.
+    geometry: OnceLock<(Geometry, Vec<usize>)>,
     /// Candidates as numbered in the dataset, in the order of the pivots.
     pub sites: Vec<usize>,
+}
+
+impl Reduced {
+    /// The Gaussian process, where a selector asked for it.
+    #[must_use]
+    pub fn geometry(&self) -> Option<&Geometry> {
+        self.geometry.get().map(|g| &g.0)
+    }
 }
 
 /// Reduces the feasible sites to candidates.
@@ -570,7 +590,83 @@ pub fn reduce_sites(
         x,
         pca,
         candidates,
+        geometry: OnceLock::new(),
         sites,
+    })
+}
+
+/// The Gaussian process over the feasible sites (first) and all others, and how many of the feasible
+/// ones it knows: rows of the reduced signals.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn geometry(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<(Geometry, Vec<usize>), Cancelled> {
+    /// Locations nearer than this are one (m).
+    const SAME: f64 = 1e-6;
+    let mut feasible = vec![false; simulated.points.len()];
+    for &site in &reduced.feasible {
+        feasible[site] = true;
+    }
+    let others: Vec<usize> = (0..feasible.len()).filter(|&s| !feasible[s]).collect();
+    let rows = evenly(reduced.feasible.len(), budget.locations);
+    let mut order: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
+    let elsewhere = evenly(others.len(), budget.locations / 2);
+    order.extend(elsewhere.iter().map(|&k| others[k]));
+    let count = order.len();
+    let places: Vec<SurfacePoint> = order.iter().map(|&s| simulated.points[s]).collect();
+    let measured = geodesic::between(&simulated.mesh, &places, watch)?;
+    let distances = Distances::new(count, "over the surface (fast marching)", &measured);
+    let keys = &inputs.project.selection.gaussian_process;
+    let noise = keys.noise;
+    let (kernel, map) = if let Some((length_m, power)) = keys.given() {
+        let kernel = GpKernel {
+            length_m,
+            power,
+            noise,
+        };
+        (kernel, Vec::new())
+    } else {
+        let x = reduced.x.select_rows(&rows);
+        let map = gaussian_process::search(&x, &distances, noise, watch)?;
+        (gaussian_process::best(&map).unwrap_or_default(), map)
+    };
+    let geometry = Geometry {
+        covariance: Covariance::new(&distances, &kernel, watch)?,
+        kernel,
+        distance: distances.kind,
+        coinciding: distances.coinciding(SAME),
+        map,
+    };
+    Ok((geometry, rows))
+}
+
+/// What is asked of a selector beside the count: the project's wishes, by places in a pool of sites.
+fn wishes(inputs: &Inputs, positions: &[DVec3]) -> Result<Wishes, DesignError> {
+    let keys = &inputs.project.selection;
+    let nearest = |at: &[f64; 3]| {
+        let at = DVec3::from_array(*at) / 1000.0;
+        (0..positions.len())
+            .min_by(|&a, &b| {
+                (positions[a].distance_squared(at)).total_cmp(&positions[b].distance_squared(at))
+            })
+            .ok_or(PlacementError::NoSites)
+    };
+    let required: Result<Vec<usize>, PlacementError> =
+        keys.required_mm.iter().map(nearest).collect();
+    Ok(Wishes {
+        sensors: keys.sensors,
+        required: required?,
+        spacing: keys.spacing_mm / 1000.0,
+        costs: None,
+        budget: None,
+        target_mm: keys.target_mm,
+        failure: keys.failure,
     })
 }
 
@@ -587,61 +683,126 @@ pub fn select(
     watch: Watch,
 ) -> Result<Selection, DesignError> {
     let targets = simulated.dataset.targets_mm();
-    let sensors = inputs.project.selection.sensors;
-    match kind {
-        SelectorKind::PcaQr => {
-            let pool = Pool {
-                x: &reduced.x,
-                targets: &targets,
-                sites: &reduced.feasible,
-            };
-            Ok(pca_qr::from_components(
-                &reduced.pca,
-                &pool,
-                sensors,
-                watch,
-            )?)
-        }
-        SelectorKind::GreedySvr => {
-            let limit = budget.selection_candidates.max(sensors);
-            let sites = if reduced.sites.len() > limit {
-                let rows = reduced.pca.pivots(limit);
-                rows.iter().map(|&r| reduced.feasible[r]).collect()
-            } else {
-                reduced.sites.clone()
-            };
-            let touches = subset(targets.len(), budget.selection_touches);
-            let x = simulated
-                .dataset
-                .x
-                .select_rows(&sites)
-                .select_columns(&touches);
-            let targets: Vec<[f64; 3]> = touches.iter().map(|&t| targets[t]).collect();
-            let pool = Pool {
-                x: &x,
-                targets: &targets,
-                sites: &sites,
-            };
-            let selector = GreedySvr {
-                hyper: inputs.project.hyper(),
-                folds: budget.folds,
-                seed: inputs.project.budget.seed,
-                effort: Effort {
-                    tolerance: budget.svr_tolerance_mm,
-                    max_steps: budget.svr_steps,
-                },
-            };
-            let mut selection = selector.select(&pool, sensors, watch)?;
-            selection.achieved.notes.push(format!(
-                "Scored on {} of {} touches and {} of {} candidates.",
-                touches.len(),
-                simulated.dataset.touches.len(),
-                sites.len(),
-                reduced.sites.len()
-            ));
-            Ok(selection)
-        }
+    let positions = |sites: &[usize]| -> Vec<DVec3> {
+        sites
+            .iter()
+            .map(|&s| simulated.dataset.sites[s].position)
+            .collect()
+    };
+    if kind == SelectorKind::GreedySvr {
+        return select_by_svr(inputs, simulated, reduced, budget, watch);
     }
+    let places = positions(&reduced.feasible);
+    let pool = Pool {
+        x: &reduced.x,
+        targets: &targets,
+        sites: &reduced.feasible,
+        positions: &places,
+    };
+    let wishes = wishes(inputs, &places)?;
+    let request = Request {
+        wishes: &wishes,
+        watch,
+        found: &|_| (),
+    };
+    if kind == SelectorKind::PcaQr {
+        return Ok(pca_qr::from_components(&reduced.pca, &pool, &request)?);
+    }
+    let (geometry, rows) = if let Some(known) = reduced.geometry.get() {
+        known
+    } else {
+        let made = geometry(inputs, simulated, reduced, budget, watch)?;
+        reduced.geometry.get_or_init(|| made)
+    };
+    let x = reduced.x.select_rows(rows);
+    let known: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
+    let places = positions(&known);
+    let wishes = self::wishes(inputs, &places)?;
+    let pool = Pool {
+        x: &x,
+        targets: &targets,
+        sites: &known,
+        positions: &places,
+    };
+    let request = Request {
+        wishes: &wishes,
+        ..request
+    };
+    let mut selection = if kind == SelectorKind::Entropy {
+        Entropy { geometry }.select(&pool, &request)?
+    } else {
+        MutualInformation { geometry }.select(&pool, &request)?
+    };
+    if known.len() < reduced.feasible.len() {
+        selection.achieved.notes.push(format!(
+            "Chosen from {} of {} feasible sites, evenly taken.",
+            known.len(),
+            reduced.feasible.len()
+        ));
+    }
+    Ok(selection)
+}
+
+fn select_by_svr(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Selection, DesignError> {
+    let all = simulated.dataset.targets_mm();
+    let sensors = inputs.project.selection.sensors;
+    let limit = budget.selection_candidates.max(sensors);
+    let sites = if reduced.sites.len() > limit {
+        let rows = reduced.pca.pivots(limit);
+        rows.iter().map(|&r| reduced.feasible[r]).collect()
+    } else {
+        reduced.sites.clone()
+    };
+    let touches = evenly(all.len(), budget.selection_touches);
+    let x = simulated
+        .dataset
+        .x
+        .select_rows(&sites)
+        .select_columns(&touches);
+    let targets: Vec<[f64; 3]> = touches.iter().map(|&t| all[t]).collect();
+    let positions: Vec<DVec3> = sites
+        .iter()
+        .map(|&s| simulated.dataset.sites[s].position)
+        .collect();
+    let pool = Pool {
+        x: &x,
+        targets: &targets,
+        sites: &sites,
+        positions: &positions,
+    };
+    let wishes = wishes(inputs, &positions)?;
+    let selector = GreedySvr {
+        hyper: inputs.project.hyper(),
+        folds: budget.folds,
+        seed: inputs.project.budget.seed,
+        effort: Effort {
+            tolerance: budget.svr_tolerance_mm,
+            max_steps: budget.svr_steps,
+        },
+        tolerance: greedy_svr::TOLERANCE,
+    };
+    let request = Request {
+        wishes: &wishes,
+        watch,
+        found: &|_| (),
+    };
+    let mut selection = selector.select(&pool, &request)?;
+    if touches.len() < all.len() || sites.len() < reduced.sites.len() {
+        selection.achieved.notes.push(format!(
+            "Scored on {} of {} touches and {} of {} candidates.",
+            touches.len(),
+            all.len(),
+            sites.len(),
+            reduced.sites.len()
+        ));
+    }
+    Ok(selection)
 }
 
 /// The judge: a model of half the element size, with touches of its own.
@@ -654,6 +815,8 @@ pub struct Truth {
     /// Dataset sites that were measured, rising, and their signals.
     pub sites: Vec<usize>,
     pub x: SignalMatrix,
+    /// The same sites as a workshop would build them.
+    pub workshop: SignalMatrix,
 }
 
 /// Measures sites on the truth: a mesh of half the element size, test touches drawn uniformly at random
@@ -679,8 +842,14 @@ pub fn truth(
     rows.dedup();
     let chosen: Vec<_> = rows.iter().map(|&s| simulated.dataset.sites[s]).collect();
     let x = dataset::measure(&model, &touches, &chosen, project.gauge.signal, watch)?;
+    let built: Vec<Site> = (rows.iter().zip(&chosen))
+        .map(|(&s, site)| as_built(site, project.budget.seed, s))
+        .collect();
+    let workshop = dataset::measure(&model, &touches, &built, project.gauge.signal, watch)?;
+    let gains = (rows.iter()).map(|&s| workshop_draw(project.budget.seed, s).gain);
+    let workshop = workshop.scaled_rows(gains);
     let mut work = model.work();
-    work.solves += touches.len() as u64;
+    work.solves += 2 * touches.len() as u64;
     Ok(Truth {
         regions: regions(project, &touches),
         element_mm: mesh.mean_edge() * 1000.0,
@@ -688,7 +857,44 @@ pub fn truth(
         work,
         sites: rows,
         x,
+        workshop,
     })
+}
+
+/// What a workshop does to one gauge: where it is moved to and how far it is turned (radians), and its
+/// gain.
+struct WorkshopDraw {
+    toward: f64,
+    turned: f64,
+    gain: f64,
+}
+
+/// Off by 1 mm in any direction, by 3° either way, and by 3 % either way: the same for a site in whatever
+/// set it is.
+fn workshop_draw(seed: u64, site: usize) -> WorkshopDraw {
+    const TURN: f64 = 3.0 * std::f64::consts::PI / 180.0;
+    const GAIN: f64 = 0.03;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(WORKSHOP_SEED));
+    rng.set_stream(site as u64);
+    let mut sign = || if rng.random::<bool>() { 1.0 } else { -1.0 };
+    let (turned, gain) = (TURN * sign(), 1.0 + GAIN * sign());
+    WorkshopDraw {
+        toward: std::f64::consts::TAU * rng.random::<f64>(),
+        turned,
+        gain,
+    }
+}
+
+fn as_built(site: &Site, seed: u64, number: usize) -> Site {
+    const OFF: f64 = 1e-3;
+    let draw = workshop_draw(seed, number);
+    let across = site.normal.cross(site.direction);
+    let along = |angle: f64| site.direction * angle.cos() + across * angle.sin();
+    Site {
+        position: site.position + along(draw.toward) * OFF,
+        direction: along(draw.turned),
+        ..*site
+    }
 }
 
 fn regions(project: &Project, touches: &[Touch]) -> Vec<Region> {
@@ -750,6 +956,7 @@ pub fn evaluate(
             train: &train,
             train_targets: &simulated.dataset.targets_mm(),
             test: &truth.x,
+            workshop: &truth.workshop,
             test_targets: &test_targets,
             regions: &truth.regions,
             noise: inputs.project.gauge.noise_microstrain * 1e-6,
@@ -880,6 +1087,8 @@ pub fn run_from(
         times.lap(match kind {
             SelectorKind::GreedySvr => "select greedy-svr",
             SelectorKind::PcaQr => "select pca-qr",
+            SelectorKind::Entropy => "select entropy",
+            SelectorKind::MutualInformation => "select mutual-information",
         });
     }
     let judged = sites_to_judge(&reduced, &selections);

@@ -1,12 +1,16 @@
 //! How well a set of gauges finds a touch that nobody trained on.
 
+pub mod failures;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use self::failures::{FailureRow, FailureTrial, failures};
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Signal, SignalMatrix};
+use crate::regression::folds::evenly;
 use crate::regression::tune::{self, CrossValidation, Effort, Grid, distances};
 use crate::regression::{Hyper, PositionModel};
 
@@ -26,6 +30,8 @@ pub struct Trial<'a> {
     pub train_targets: &'a [[f64; 3]],
     /// The same sites under the test touches, from the finer model.
     pub test: &'a SignalMatrix,
+    /// The same as a workshop would build them: a little off their places, directions and gains.
+    pub workshop: &'a SignalMatrix,
     pub test_targets: &'a [[f64; 3]],
     pub regions: &'a [Region],
     /// Standard deviation of the noise added to training and test strain.
@@ -44,6 +50,9 @@ pub struct EvaluationRow {
     pub error_mm: f64,
     pub median_mm: f64,
     pub p95_mm: f64,
+    /// Mean error of the set as a workshop would build it, read with the regression trained for the
+    /// ideal one.
+    pub workshop_mm: f64,
     pub touches: usize,
     pub hyper: Hyper,
     /// Whether the regression met its tolerance.
@@ -64,7 +73,19 @@ pub struct Candidate {
 pub struct Evaluation {
     pub rows: Vec<EvaluationRow>,
     pub errors: Vec<Vec<f64>>,
+    /// What is left of each selector's largest set when gauges fail.
+    pub failures: Vec<Failures>,
     pub work: Work,
+}
+
+/// Errors of one set with failed gauges.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Failures {
+    pub selector: String,
+    pub sensors: usize,
+    /// Touches that were learned from.
+    pub touches: usize,
+    pub rows: Vec<FailureRow>,
 }
 
 /// Judges sets of sites, each with a regression tuned on the training touches.
@@ -81,6 +102,7 @@ pub fn evaluate(
     let mut evaluation = Evaluation {
         rows: Vec::new(),
         errors: Vec::new(),
+        failures: Vec::new(),
         work: Work::default(),
     };
     let done = std::sync::atomic::AtomicUsize::new(0);
@@ -99,13 +121,60 @@ pub fn evaluate(
         evaluation.errors.push(errors);
         evaluation.work += work;
     }
+    evaluation.failures = fail(&noisy, trial, sets, &hypers, budget, watch)?;
     Ok(evaluation)
+}
+
+/// Failures of each selector's last set; the baseline of all candidates is none.
+fn fail(
+    noisy: &Noisy,
+    trial: &Trial,
+    sets: &[Candidate],
+    hypers: &[Hyper],
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Vec<Failures>, Cancelled> {
+    const MOST_FAILED: usize = 5;
+    let touches = evenly(trial.train_targets.len(), budget.failure_touches);
+    let targets: Vec<[f64; 3]> = touches.iter().map(|&t| trial.train_targets[t]).collect();
+    let train = noisy.train.select_columns(&touches);
+    let last_of_its_kind = |k: usize| {
+        sets.get(k + 1)
+            .is_some_and(|next| next.selector != sets[k].selector)
+    };
+    (0..sets.len())
+        .filter(|&k| last_of_its_kind(k) && sets[k].rows.len() > 1)
+        .map(|k| {
+            let set = &sets[k];
+            let rows = failures(
+                &FailureTrial {
+                    train: &train.select_rows(&set.rows),
+                    train_targets: &targets,
+                    test: &noisy.test.select_rows(&set.rows),
+                    test_targets: trial.test_targets,
+                    hyper: hypers[k],
+                    effort: tuning_effort(budget),
+                    failed: MOST_FAILED,
+                    subsets: budget.failure_subsets,
+                    seed: trial.seed,
+                },
+                watch,
+            )?;
+            Ok(Failures {
+                selector: set.selector.clone(),
+                sensors: set.rows.len(),
+                touches: touches.len(),
+                rows,
+            })
+        })
+        .collect()
 }
 
 /// The trial's signals with noise, the same noise for a site in every set it is part of.
 struct Noisy {
     train: SignalMatrix,
     test: SignalMatrix,
+    workshop: SignalMatrix,
 }
 
 impl Noisy {
@@ -118,6 +187,7 @@ impl Noisy {
         Self {
             train: add_noise(trial.train, noise, trial.seed.wrapping_add(1)),
             test: add_noise(trial.test, noise, trial.seed.wrapping_add(2)),
+            workshop: add_noise(trial.workshop, noise, trial.seed.wrapping_add(3)),
         }
     }
 }
@@ -160,7 +230,7 @@ fn tune_sets(
         seed: trial.seed,
         effort: tuning_effort(budget),
     };
-    let columns = subset(trial.train_targets.len(), budget.tuning_touches);
+    let columns = evenly(trial.train_targets.len(), budget.tuning_touches);
     let targets: Vec<[f64; 3]> = columns.iter().map(|&c| trial.train_targets[c]).collect();
     let mut hypers: Vec<Hyper> = Vec::with_capacity(sets.len());
     let mut known: Vec<(String, usize, Hyper)> = Vec::new();
@@ -196,15 +266,8 @@ fn tune_sets(
 fn tuning_effort(budget: &Budget) -> Effort {
     Effort {
         tolerance: budget.svr_tolerance_mm.max(0.1),
-        max_steps: budget.svr_steps.min(50_000),
+        max_steps: budget.svr_steps.min(200_000),
     }
-}
-
-/// At most `most` indices of `count`, evenly spaced: the touches come in no order.
-#[must_use]
-pub fn subset(count: usize, most: usize) -> Vec<usize> {
-    let kept = count.min(most);
-    (0..kept).map(|k| k * count / kept).collect()
 }
 
 fn judge(
@@ -222,6 +285,8 @@ fn judge(
     let model = PositionModel::train(&train, trial.train_targets, hyper, effort);
     let predicted = model.predict(&noisy.test.select_rows(&set.rows));
     let errors = distances(&predicted, trial.test_targets);
+    let built = model.predict(&noisy.workshop.select_rows(&set.rows));
+    let built = distances(&built, trial.test_targets);
     let everywhere = Region {
         name: "all touches".into(),
         contains: vec![true; errors.len()],
@@ -229,7 +294,7 @@ fn judge(
     let rows = std::iter::once(&everywhere)
         .chain(trial.regions)
         .filter(|region| region.contains.contains(&true))
-        .map(|region| row(set, region, &errors, hyper, model.converged().0))
+        .map(|region| row(set, region, [&errors, &built], hyper, model.converged().0))
         .collect();
     (rows, errors, model.work)
 }
@@ -237,15 +302,16 @@ fn judge(
 fn row(
     set: &Candidate,
     region: &Region,
-    errors: &[f64],
+    [errors, built]: [&[f64]; 2],
     hyper: &Hyper,
     converged: bool,
 ) -> EvaluationRow {
-    let mut inside: Vec<f64> = errors
-        .iter()
-        .zip(&region.contains)
-        .filter_map(|(&e, &inside)| inside.then_some(e))
-        .collect();
+    let within = |errors: &[f64]| -> Vec<f64> {
+        (errors.iter().zip(&region.contains))
+            .filter_map(|(&e, &inside)| inside.then_some(e))
+            .collect()
+    };
+    let (mut inside, built) = (within(errors), within(built));
     inside.sort_by(f64::total_cmp);
     let quantile = |q: f64| {
         let last = inside.len().saturating_sub(1);
@@ -261,6 +327,7 @@ fn row(
         error_mm: inside.iter().sum::<f64>() / inside.len() as f64,
         median_mm: quantile(0.5),
         p95_mm: quantile(0.95),
+        workshop_mm: built.iter().sum::<f64>() / built.len() as f64,
         touches: inside.len(),
         hyper: *hyper,
         converged,

@@ -11,9 +11,11 @@ pub mod document;
 pub mod elasticity;
 pub mod evaluation;
 pub mod feasible;
+pub mod gaussian_process;
 pub mod given;
 pub mod io;
 pub mod job;
+mod lanes;
 pub mod limb;
 pub mod mesh;
 pub mod pca;
@@ -23,3 +25,4 @@ pub mod regression;
 pub mod render;
 #[cfg(feature = "studio")]
 pub mod studio;
+pub mod study;

@@ -10,6 +10,8 @@ fn main() -> ExitCode {
     let outcome = match &cli.command {
         Some(Command::Design(args)) => cli::design::run(args),
         Some(Command::Simulate(args)) => cli::simulate::run(args),
+        Some(Command::Select(args)) => cli::select::run(args),
+        Some(Command::Evaluate(args)) => cli::evaluate::run(args),
         Some(Command::Limb(args)) => cli::limb::run(args),
         None => open_studio(&cli),
     };

@@ -9,6 +9,7 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
+use crate::lanes::wide;
 use crate::regression::Standardizer;
 
 /// Eigenvalues below this share of the largest are rounding: the numerical rank ends there.
@@ -97,44 +98,126 @@ impl Pca {
     /// of the pivots; fewer where the rank ends first. Ties go to the lower index.
     #[must_use]
     pub fn pivots(&self, count: usize) -> Vec<usize> {
-        let k = count.min(self.rank());
-        // Column i holds site i's weights in the first k components.
-        let mut columns: Vec<Vec<f64>> = (0..self.sites)
-            .map(|i| (0..k).map(|c| self.modes[(i, c)]).collect())
-            .collect();
-        let mut chosen = Vec::with_capacity(k);
-        for _ in 0..k {
-            let norms: Vec<f64> = columns.iter().map(|c| dot(c, c)).collect();
-            let Some(best) = largest(&norms, &chosen) else {
-                break;
-            };
-            let length = norms[best].sqrt();
-            let direction: Vec<f64> = columns[best].iter().map(|v| v / length).collect();
-            for column in &mut columns {
-                let share = dot(column, &direction);
-                for (v, d) in column.iter_mut().zip(&direction) {
-                    *v -= share * d;
-                }
-            }
+        let mut pivoting = self.pivoting(count);
+        let mut chosen = Vec::new();
+        while let Some(best) = pivoting.largest(0..self.sites, |_, norm| norm) {
+            pivoting.take(best);
             chosen.push(best);
+            if chosen.len() == count {
+                break;
+            }
         }
         chosen
     }
-}
 
-/// The index of the largest value not yet chosen; of those equal to rounding the lowest.
-fn largest(values: &[f64], chosen: &[usize]) -> Option<usize> {
-    let mut best: Option<usize> = None;
-    for i in (0..values.len()).filter(|i| !chosen.contains(i)) {
-        if best.is_none_or(|b| values[i] > values[b] * (1.0 + 1e-10)) {
-            best = Some(i);
+    /// A QR with column pivoting in the first `count` components, step by step.
+    #[must_use]
+    pub fn pivoting(&self, count: usize) -> Pivoting {
+        let k = count.min(self.rank());
+        // Column i holds site i's weights in the first k components.
+        let columns: Vec<f64> = (0..self.sites)
+            .flat_map(|i| (0..k).map(move |c| self.modes[(i, c)]))
+            .collect();
+        Pivoting {
+            norms: columns.chunks_exact(k.max(1)).map(|c| dot(c, c)).collect(),
+            columns,
+            components: k,
+            taken: 0,
         }
     }
-    best.filter(|&b| values[b] > 0.0)
+}
+
+/// The columns of a QR with what was taken projected out.
+pub struct Pivoting {
+    components: usize,
+    /// Site by site.
+    columns: Vec<f64>,
+    norms: Vec<f64>,
+    taken: usize,
+}
+
+impl Pivoting {
+    /// Of some sites the one with the largest worth of its squared norm, if any is left that is not
+    /// rounding; of those equal to rounding the first.
+    pub fn largest(
+        &self,
+        sites: impl IntoIterator<Item = usize>,
+        worth: impl Fn(usize, f64) -> f64,
+    ) -> Option<usize> {
+        /// Squared norms start at most at one.
+        const ROUNDING: f64 = 1e-24;
+        const TIE: f64 = 1e-10;
+        if self.taken == self.components {
+            return None;
+        }
+        let mut best: Option<(usize, f64)> = None;
+        for site in sites {
+            let value = worth(site, self.norms[site]);
+            if self.norms[site] > ROUNDING && best.is_none_or(|(_, b)| value > b * (1.0 + TIE)) {
+                best = Some((site, value));
+            }
+        }
+        best.map(|b| b.0)
+    }
+
+    /// Projects a site's column out of all others.
+    pub fn take(&mut self, site: usize) {
+        let k = self.components;
+        let own = &self.columns[site * k..][..k];
+        let length = dot(own, own).sqrt();
+        self.taken += 1;
+        if length == 0.0 {
+            return;
+        }
+        let direction: Vec<f64> = own.iter().map(|v| v / length).collect();
+        project_out(&mut self.columns, &direction, &mut self.norms);
+        self.columns[site * k..][..k].fill(0.0);
+        self.norms[site] = 0.0;
+    }
+}
+
+wide! {
+    fn project_out<'a>(columns: &'a mut [f64], direction: &'a [f64], norms: &'a mut [f64]) {
+        for (column, norm) in columns.chunks_exact_mut(direction.len()).zip(norms) {
+            let share = lanes_dot(column, direction);
+            for (v, d) in column.iter_mut().zip(direction) {
+                *v -= share * d;
+            }
+            *norm = lanes_dot(column, column);
+        }
+    }
+}
+
+/// Sums in eight lanes.
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "only inlined code gets the instructions of its caller"
+)]
+fn lanes_dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sum = [0.0; 8];
+    let (xs, ys) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest = dot(xs.remainder(), ys.remainder());
+    for (x, y) in xs.zip(ys) {
+        for l in 0..8 {
+            sum[l] += x[l] * y[l];
+        }
+    }
+    rest + sum.iter().sum::<f64>()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Products of all pairs of rows (sites × sites).
+#[must_use]
+pub fn gram(x: &SignalMatrix) -> Mat<f64> {
+    product(MatRef::from_row_major_slice(
+        x.values(),
+        x.rows(),
+        x.columns(),
+    ))
 }
 
 fn product(a: MatRef<f64>) -> Mat<f64> {
@@ -158,13 +241,6 @@ impl Reconstruction {
         let standardizer = Standardizer::of(&known);
         let known = standardizer.apply(&known);
         let unseen = standardizer.apply(&x.select_columns(test));
-        let gram = |m: &SignalMatrix| {
-            product(MatRef::from_row_major_slice(
-                m.values(),
-                m.rows(),
-                m.columns(),
-            ))
-        };
         let held_out = gram(&unseen);
         let total = (0..held_out.nrows()).map(|i| held_out[(i, i)]).sum();
         Self {

@@ -1,14 +1,20 @@
 //! Choosing sites.
 
 pub mod candidates;
+pub mod entropy;
 pub mod greedy_svr;
+pub mod information;
+pub mod mutual_information;
 pub mod pca_qr;
+pub mod wishes;
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::budget::{Achieved, Cancelled, Watch};
 use crate::dataset::SignalMatrix;
 use crate::pca::PcaError;
+pub use wishes::Wishes;
 
 /// The selectors a project can name.
 #[derive(
@@ -19,10 +25,17 @@ pub enum SelectorKind {
     #[default]
     GreedySvr,
     PcaQr,
+    Entropy,
+    MutualInformation,
 }
 
 impl SelectorKind {
-    pub const ALL: [Self; 2] = [Self::GreedySvr, Self::PcaQr];
+    pub const ALL: [Self; 4] = [
+        Self::GreedySvr,
+        Self::PcaQr,
+        Self::Entropy,
+        Self::MutualInformation,
+    ];
 
     /// As in files and on the command line.
     #[must_use]
@@ -30,6 +43,8 @@ impl SelectorKind {
         match self {
             Self::GreedySvr => "greedy-svr",
             Self::PcaQr => "pca-qr",
+            Self::Entropy => "entropy",
+            Self::MutualInformation => "mutual-information",
         }
     }
 
@@ -39,6 +54,8 @@ impl SelectorKind {
         match self {
             Self::GreedySvr => "Greedy SVR",
             Self::PcaQr => "PCA-QR",
+            Self::Entropy => "Entropy",
+            Self::MutualInformation => "Mutual information",
         }
     }
 }
@@ -51,6 +68,16 @@ pub struct Pool<'a> {
     pub targets: &'a [[f64; 3]],
     /// The pool's sites, as numbered in the dataset.
     pub sites: &'a [usize],
+    /// Where they are (m); empty when nobody knows.
+    pub positions: &'a [DVec3],
+}
+
+/// What is asked of a selector.
+pub struct Request<'a> {
+    pub wishes: &'a Wishes,
+    pub watch: Watch<'a>,
+    /// Called with each set as soon as it is known.
+    pub found: &'a (dyn Fn(&SensorSet) + Sync),
 }
 
 /// The sites chosen for one number of gauges.
@@ -60,6 +87,13 @@ pub struct SensorSet {
     pub sites: Vec<usize>,
     /// The selector's own criterion, in its own unit.
     pub criterion: f64,
+    /// Cross-validated error of the regression (mm), where it was computed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub criterion_mm: Option<f64>,
+    /// Share of the criterion by which a better choice of this step may still exist; absent where the
+    /// choice is exact by its nature.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gap: Option<f64>,
 }
 
 /// What a selector chose: one set for each number of gauges from one up.
@@ -94,6 +128,17 @@ pub enum PlacementError {
     TooFewSites { wanted: usize, available: usize },
     #[error("{touches} touches are too few to learn from: ask for at least {least}")]
     TooFewTouches { touches: usize, least: usize },
+    #[error(
+        "the covariance of the sites is singular: raise the noise of the Gaussian process or merge sites that lie together"
+    )]
+    Singular,
+    #[error("{what}")]
+    Wish { what: &'static str },
+    #[error("{selector} cannot take this into account: {why}")]
+    Refused {
+        selector: &'static str,
+        why: &'static str,
+    },
     #[error(transparent)]
     Signals(#[from] PcaError),
     #[error(transparent)]
@@ -107,28 +152,9 @@ pub trait Selector: Sync {
     /// Whether each set contains the one before it.
     fn nested(&self) -> bool;
 
-    /// Sets for 1 … `sensors` gauges.
+    /// Sets for one gauge and more, as many as the wishes allow.
     ///
     /// # Errors
     /// [`PlacementError`] where the pool does not allow it.
-    fn select(
-        &self,
-        pool: &Pool,
-        sensors: usize,
-        watch: Watch,
-    ) -> Result<Selection, PlacementError>;
-}
-
-/// Refuses impossible counts, the same way for every selector.
-fn check_pool(pool: &Pool, sensors: usize) -> Result<(), PlacementError> {
-    if pool.sites.is_empty() {
-        return Err(PlacementError::NoSites);
-    }
-    if sensors > pool.sites.len() {
-        return Err(PlacementError::TooFewSites {
-            wanted: sensors,
-            available: pool.sites.len(),
-        });
-    }
-    Ok(())
+    fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError>;
 }

@@ -11,6 +11,7 @@ use crate::dataset::Signal;
 use crate::elasticity::support::{MOST, Region};
 use crate::elasticity::{Freedoms, Material, Section, Support};
 use crate::feasible::FeasibleRules;
+use crate::gaussian_process::GpKernel;
 use crate::limb::BoxMm;
 use crate::mesh::repair::Repair;
 use crate::mesh::unroll::Axis;
@@ -259,9 +260,56 @@ pub struct SelectionKeys {
     pub c_mm: f64,
     pub epsilon_mm: f64,
     pub gamma: f64,
+    /// Least distance between two gauges.
+    pub spacing_mm: f64,
+    /// Places of gauges that must be there; the nearest site is taken.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub required_mm: Vec<[f64; 3]>,
+    /// Error at which greedy SVR adds no more gauges.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_mm: Option<f64>,
+    /// Probability that one gauge has failed.
+    pub failure: f64,
+    pub gaussian_process: GaussianProcessKeys,
     /// The chosen sites, written by a design.
     #[serde(rename = "site", skip_serializing_if = "Vec::is_empty")]
     pub sites: Vec<ChosenSite>,
+}
+
+/// The kernel of entropy and mutual information.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GaussianProcessKeys {
+    /// Length and power of the kernel; searched by cross-validation when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub power: Option<f64>,
+    pub noise: f64,
+}
+
+impl Default for GaussianProcessKeys {
+    fn default() -> Self {
+        Self {
+            length_mm: None,
+            power: None,
+            noise: GpKernel::default().noise,
+        }
+    }
+}
+
+impl GaussianProcessKeys {
+    /// Length (m) and power, where either is given; the other is then the paper's.
+    #[must_use]
+    pub fn given(&self) -> Option<(f64, f64)> {
+        let paper = GpKernel::default();
+        (self.length_mm.is_some() || self.power.is_some()).then(|| {
+            (
+                self.length_mm.map_or(paper.length_m, |l| l * MM),
+                self.power.unwrap_or(paper.power),
+            )
+        })
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -365,6 +413,11 @@ impl Default for SelectionKeys {
             c_mm: hyper.c,
             epsilon_mm: hyper.epsilon,
             gamma: hyper.gamma,
+            spacing_mm: 0.0,
+            required_mm: Vec::new(),
+            target_mm: None,
+            failure: 0.0,
+            gaussian_process: GaussianProcessKeys::default(),
             sites: Vec::new(),
         }
     }
@@ -479,11 +532,7 @@ impl Project {
         (self.touch.force_n, self.touch.tip_radius_mm * MM)
     }
 
-    /// Checks every number against its range.
-    ///
-    /// # Errors
-    /// [`BadValue`] for the first that cannot be used.
-    pub fn check(&self) -> Result<(), BadValue> {
+    fn check_signs(&self) -> Result<(), BadValue> {
         let above = [
             ("part.thickness_mm", self.part.thickness_mm),
             (
@@ -518,10 +567,47 @@ impl Project {
             ),
             ("feasible.edge_radius_mm", self.feasible.edge_radius_mm),
             ("selection.epsilon_mm", self.selection.epsilon_mm),
+            ("selection.spacing_mm", self.selection.spacing_mm),
+            (
+                "selection.gaussian_process.noise",
+                self.selection.gaussian_process.noise,
+            ),
         ];
         for (key, value) in least_zero {
             check(key, "zero or more", value, value >= 0.0)?;
         }
+        Ok(())
+    }
+
+    fn check_selection(&self) -> Result<(), BadValue> {
+        let failure = self.selection.failure;
+        check(
+            "selection.failure",
+            "between 0 and 1",
+            failure,
+            (0.0..=1.0).contains(&failure),
+        )?;
+        let process = &self.selection.gaussian_process;
+        let optional = [
+            ("selection.target_mm", self.selection.target_mm),
+            ("selection.gaussian_process.length_mm", process.length_mm),
+            ("selection.gaussian_process.power", process.power),
+        ];
+        for (key, value) in optional {
+            if let Some(value) = value {
+                check(key, "a number above zero", value, value > 0.0)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks every number against its range.
+    ///
+    /// # Errors
+    /// [`BadValue`] for the first that cannot be used.
+    pub fn check(&self) -> Result<(), BadValue> {
+        self.check_signs()?;
+        self.check_selection()?;
         let nu = self.material.poissons_ratio;
         check(
             "material.poissons_ratio",

@@ -1,6 +1,10 @@
 //! Learning a position from a few signals: ε-support-vector regression with a Gaussian kernel.
 
+pub mod admm;
 pub mod features;
+pub mod folds;
+pub mod kernel;
+pub mod lowrank;
 pub mod svr;
 pub mod tune;
 

@@ -3,16 +3,17 @@
 use std::path::Path;
 
 /// From the bottom up; a module may use those above it in this list, itself included.
-const ORDER: [&[&str]; 11] = [
-    &["budget"],
+const ORDER: [&[&str]; 12] = [
+    &["budget", "lanes"],
     &["mesh"],
     &["limb", "elasticity"],
     &["dataset"],
     &["feasible", "regression"],
     &["pca"],
+    &["gaussian_process"],
     &["placement", "evaluation"],
     &["project"],
-    &["design"],
+    &["design", "study"],
     &["given"],
     &["io", "job", "document", "render", "cli", "studio"],
 ];

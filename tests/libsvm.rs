@@ -1,7 +1,7 @@
 //! The SVR solver against LIBSVM, on fixtures made by `tests/make_svr_fixtures.py` with scikit-learn.
 
 use hapdef::dataset::SignalMatrix;
-use hapdef::regression::features::{gaussian, squared_distances};
+use hapdef::regression::kernel::{gaussian, squared_distances};
 use hapdef::regression::svr::{self, SvrParams};
 use serde::Deserialize;
 

@@ -17,7 +17,7 @@ use hapdef::elasticity::{Freedoms, ShellModel, Touch};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::locate::SurfaceIndex;
 use hapdef::placement::greedy_svr::GreedySvr;
-use hapdef::placement::{Pool, Selector, SelectorKind};
+use hapdef::placement::{Pool, Request, Selector, SelectorKind, Wishes};
 use hapdef::regression::tune::Effort;
 use hapdef::regression::{Hyper, PositionModel};
 
@@ -405,45 +405,59 @@ fn greedy_svr_is_the_plain_algorithm() {
         folds: 3,
         seed: 4,
         effort,
+        tolerance: 0.0,
     };
     let pool = Pool {
         x: &x,
         targets: &targets,
         sites: &sites,
+        positions: &[],
     };
-    let selection = selector.select(&pool, 3, &unwatched).unwrap();
+    let request = Request {
+        wishes: &Wishes::count(3),
+        watch: &unwatched,
+        found: &|_| (),
+    };
+    let selection = selector.select(&pool, &request).unwrap();
     // The naive way: standardized over all touches as the selector does, folds as it draws them.
     let z = hapdef::regression::Standardizer::of(&x).apply(&x);
-    let folds = hapdef::regression::tune::Fold::all(touches as usize, 3, 4);
+    let folds = hapdef::regression::folds::Folds::draw(touches as usize, 3, 4);
     let score = |rows: &[usize]| {
         let sum: f64 = folds
+            .parts
             .iter()
-            .map(|fold| {
-                let part = |columns: &[usize]| z.select_rows(rows).select_columns(columns);
+            .map(|part| {
+                let test: Vec<usize> = folds.order[part.clone()].to_vec();
+                let train: Vec<usize> = folds
+                    .order
+                    .iter()
+                    .copied()
+                    .filter(|t| !test.contains(t))
+                    .collect();
+                let of = |columns: &[usize]| z.select_rows(rows).select_columns(columns);
                 let kernel = |a: &SignalMatrix, b: &SignalMatrix| {
-                    hapdef::regression::features::gaussian(
-                        &hapdef::regression::features::squared_distances(a, b),
+                    hapdef::regression::kernel::gaussian(
+                        &hapdef::regression::kernel::squared_distances(a, b),
                         hyper.gamma,
                     )
                 };
-                let (train, test) = (part(&fold.train), part(&fold.test));
-                let inner = kernel(&train, &train);
-                let outer = kernel(&test, &train);
+                let inner = kernel(&of(&train), &of(&train));
+                let outer = kernel(&of(&test), &of(&train));
                 let axes = [0, 1, 2].map(|a| {
-                    let y: Vec<f64> = fold.train.iter().map(|&t| targets[t][a]).collect();
+                    let y: Vec<f64> = train.iter().map(|&t| targets[t][a]).collect();
                     let fit = hapdef::regression::svr::fit(&inner, &y, &hyper.params(effort), None);
                     hapdef::regression::svr::predict(&fit, &outer)
                 });
-                let errors = fold.test.iter().enumerate().map(|(k, &t)| {
+                let errors = test.iter().enumerate().map(|(k, &t)| {
                     (0..3)
                         .map(|a| (axes[a][k] - targets[t][a]).powi(2))
                         .sum::<f64>()
                         .sqrt()
                 });
-                errors.sum::<f64>() / fold.test.len() as f64
+                errors.sum::<f64>() / test.len() as f64
             })
             .sum();
-        sum / folds.len() as f64
+        sum / folds.parts.len() as f64
     };
     let mut chosen: Vec<usize> = Vec::new();
     for set in &selection.sets {

@@ -10,6 +10,7 @@ use super::npz::NpzFile;
 use super::{FileError, atomic, project_file, report};
 use crate::dataset::{Dataset, Signal};
 use crate::design::{Design, Inputs};
+use crate::placement::information::Geometry;
 use crate::project::{ChosenSite, Project};
 
 /// Everything that stands beside the numbers: where the project came from and who computed it.
@@ -224,6 +225,8 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         "unexplained_curve": design.reduced.candidates.curve,
         "selections": design.selections,
         "evaluation": design.evaluation.rows,
+        "failures": design.evaluation.failures,
+        "gaussian_process": design.reduced.geometry().map(Geometry::summary),
         "model": {
             "vertices": design.simulated.mesh.positions().len(),
             "unknowns": design.simulated.unknowns,

@@ -103,6 +103,60 @@ pub fn holds(path: &Path, name: &str) -> Result<bool, FileError> {
     Ok(archive.index_for_name(&format!("{name}.npy")).is_some())
 }
 
+/// Reads one array of numbers by name: its shape, and its values by rows whatever their order in the
+/// file.
+///
+/// # Errors
+/// [`FileError`] naming the file and the array.
+pub fn read_numbers(path: &Path, name: &str) -> Result<(Vec<usize>, Vec<f64>), FileError> {
+    let broken = |e: &dyn std::fmt::Display| {
+        FileError::broken(path, format!("the array \"{name}\" cannot be read ({e})"))
+    };
+    if !holds(path, name)? {
+        return Err(FileError::broken(
+            path,
+            format!("there is no array \"{name}\" in it"),
+        ));
+    }
+    let file = std::fs::File::open(path).map_err(|e| FileError::of(path, &e))?;
+    let mut archive = ZipArchive::new(file).map_err(|e| broken(&e))?;
+    let mut bytes = Vec::new();
+    archive
+        .by_name(&format!("{name}.npy"))
+        .map_err(|e| broken(&e))?
+        .read_to_end(&mut bytes)
+        .map_err(|e| broken(&e))?;
+    let header = npyz::NpyFile::new(&bytes[..]).map_err(|e| broken(&e))?;
+    let shape: Vec<usize> = header.shape().iter().map(|&n| n as usize).collect();
+    let fortran = header.order() == npyz::Order::Fortran;
+    let array = || npyz::NpyFile::new(&bytes[..]);
+    let read = || -> std::io::Result<Vec<f64>> {
+        if let Ok(values) = array()?.into_vec::<f64>() {
+            return Ok(values);
+        }
+        if let Ok(values) = array()?.into_vec::<f32>() {
+            return Ok(values.into_iter().map(f64::from).collect());
+        }
+        if let Ok(values) = array()?.into_vec::<i32>() {
+            return Ok(values.into_iter().map(f64::from).collect());
+        }
+        let values = array()?.into_vec::<i64>()?;
+        Ok(values.into_iter().map(|v| v as f64).collect())
+    };
+    let values = read().map_err(|e| broken(&e))?;
+    if values.len() != shape.iter().product::<usize>() {
+        return Err(broken(&"it ends too early"));
+    }
+    let values = match shape[..] {
+        [rows, columns] if fortran => (0..rows)
+            .flat_map(|r| (0..columns).map(move |c| c * rows + r))
+            .map(|k| values[k])
+            .collect(),
+        _ => values,
+    };
+    Ok((shape, values))
+}
+
 /// Reads one array of bytes or booleans by name.
 ///
 /// # Errors

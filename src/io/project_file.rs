@@ -449,7 +449,7 @@ fn selection(t: &mut Text, project: &Project) {
     t.key(
         "selector",
         quoted(selection.selector.name()),
-        "\"greedy-svr\" or \"pca-qr\"",
+        "\"greedy-svr\", \"pca-qr\", \"entropy\" or \"mutual-information\"",
     );
     t.key("sensors", selection.sensors, "gauges to place");
     t.key(
@@ -459,6 +459,44 @@ fn selection(t: &mut Text, project: &Project) {
     );
     t.key("epsilon_mm", float(selection.epsilon_mm), "its ε");
     t.key("gamma", float(selection.gamma), "its γ");
+    t.key(
+        "spacing_mm",
+        float(selection.spacing_mm),
+        "least distance between two gauges",
+    );
+    let required: Vec<String> = selection.required_mm.iter().map(triple).collect();
+    t.maybe(
+        "required_mm",
+        (!required.is_empty()).then(|| format!("[{}]", required.join(", "))),
+        "places of gauges that must be there, [[x, y, z], …]; the nearest site is taken",
+    );
+    t.maybe(
+        "target_mm",
+        selection.target_mm.map(float),
+        "error at which greedy SVR adds no more gauges",
+    );
+    t.key(
+        "failure",
+        float(selection.failure),
+        "probability that one gauge has failed when it is needed (greedy SVR)",
+    );
+    let process = &selection.gaussian_process;
+    t.table("selection.gaussian_process");
+    t.maybe(
+        "length_mm",
+        process.length_mm.map(float),
+        "length of the kernel of entropy and mutual information; searched when left out",
+    );
+    t.maybe(
+        "power",
+        process.power.map(float),
+        "its power, up to 2; searched when left out",
+    );
+    t.key(
+        "noise",
+        float(process.noise),
+        "variance of a measurement's noise over the field's",
+    );
     for site in &selection.sites {
         t.list("selection.site");
         t.key("position_mm", triple(&site.position_mm), "");

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::artifacts::{Provenance, range, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Series, escape};
 use crate::design::{Design, Inputs, Simulated};
+use crate::evaluation::Failures;
 use crate::mesh::unroll::Unrolling;
 use crate::placement::SelectorKind;
 
@@ -40,6 +41,7 @@ pub fn html(inputs: &Inputs, design: &Design, provenance: &Provenance) -> String
     sites(&mut page, inputs, design);
     plots(&mut page, design);
     errors(&mut page, design);
+    failures(&mut page, design);
     settings(&mut page, inputs, design, provenance);
     page.push_str("</body></html>\n");
     page
@@ -253,6 +255,75 @@ pub fn curve(design: &Design, selector: SelectorKind, region: &str) -> Vec<(f64,
         .collect()
 }
 
+/// What the two ways to meet a failure are called.
+#[must_use]
+pub fn failure_title(retrained: bool) -> &'static str {
+    if retrained {
+        "Failed gauges, trained anew without them"
+    } else {
+        "Failed gauges, as trained with all"
+    }
+}
+
+/// The selector of a set with failed gauges, as read by people.
+#[must_use]
+pub fn failure_name(set: &Failures) -> &'static str {
+    SelectorKind::ALL
+        .into_iter()
+        .find(|k| k.name() == set.selector)
+        .map_or("", SelectorKind::title)
+}
+
+/// Error against number of failed gauges.
+#[must_use]
+pub fn failure_curve(set: &Failures, retrained: bool) -> Vec<(f64, f64)> {
+    set.rows
+        .iter()
+        .filter(|r| r.retrained == retrained || r.failed == 0)
+        .map(|r| (r.failed as f64, r.error_mm))
+        .collect()
+}
+
+fn failures(page: &mut String, design: &Design) {
+    page.push_str("<div>");
+    for retrained in [false, true] {
+        let series: Vec<Series> = design
+            .evaluation
+            .failures
+            .iter()
+            .map(|set| Series {
+                name: failure_name(set),
+                points: failure_curve(set, retrained),
+            })
+            .collect();
+        page.push_str(&svg::plot(
+            failure_title(retrained),
+            "failed gauges",
+            "mm",
+            &series,
+            520.0,
+        ));
+    }
+    page.push_str("</div><table><tr><th>Selector</th><th>Gauges</th><th>Failed</th><th>Trained anew</th><th>Mean (mm)</th><th>Worst (mm)</th><th>Subsets</th></tr>");
+    for set in &design.evaluation.failures {
+        for r in &set.rows {
+            let _ = write!(
+                page,
+                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{} of {}</td></tr>",
+                escape(&set.selector),
+                set.sensors,
+                r.failed,
+                if r.retrained { "yes" } else { "no" },
+                r.error_mm,
+                r.worst_mm,
+                r.subsets,
+                r.of
+            );
+        }
+    }
+    page.push_str("</table>");
+}
+
 fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
     let row = design
         .evaluation
@@ -269,7 +340,7 @@ fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
 fn errors(page: &mut String, design: &Design) {
     let _ = write!(
         page,
-        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, drawn off the nodes of a model of half the element size ({:.2} mm).</p><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
+        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, drawn off the nodes of a model of half the element size ({:.2} mm). “As built”: every gauge 1 mm and 3° off and its gain off by 3 %, read with the regression trained for the ideal one.</p><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
         design.simulated.dataset.touches.len(),
         design.simulated.mesh.mean_edge() * 1000.0,
         design.truth.touches.len(),
@@ -278,13 +349,14 @@ fn errors(page: &mut String, design: &Design) {
     for r in &design.evaluation.rows {
         let _ = write!(
             page,
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.3}</td></tr>",
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.3}</td></tr>",
             escape(&r.selector),
             r.sensors,
             escape(&r.region),
             r.error_mm,
             r.median_mm,
             r.p95_mm,
+            r.workshop_mm,
             r.touches,
             r.hyper.c,
             r.hyper.epsilon,

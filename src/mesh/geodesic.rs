@@ -7,6 +7,9 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::budget::{Cancelled, Watch, report};
 
 use super::{SurfacePoint, TriMesh};
 
@@ -35,6 +38,51 @@ pub fn from_point(mesh: &TriMesh, source: SurfacePoint, limit: f64) -> Vec<f64> 
 pub fn from_vertices(mesh: &TriMesh, sources: &[u32], limit: f64) -> Vec<f64> {
     let seeds: Vec<(u32, f64)> = sources.iter().map(|&v| (v, 0.0)).collect();
     march(mesh, &seeds, limit, Front::Straight)
+}
+
+/// Distances (m) from each of some points to each of the others, by rows; infinite between pieces that
+/// do not hang together.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn between(
+    mesh: &TriMesh,
+    points: &[SurfacePoint],
+    watch: Watch,
+) -> Result<Vec<f64>, Cancelled> {
+    let rows: Result<Vec<Vec<f64>>, Cancelled> = points
+        .par_iter()
+        .enumerate()
+        .map(|(k, &source)| {
+            report(watch, "Distances over the surface", k, points.len())?;
+            let field = from_point(mesh, source, f64::INFINITY);
+            Ok(points
+                .iter()
+                .map(|&target| at(mesh, &field, source, target))
+                .collect())
+        })
+        .collect();
+    Ok(rows?.concat())
+}
+
+/// The distance of one point from the source of a field of distances: as a vertex of its own would get
+/// it from the sides of its triangle.
+#[must_use]
+pub fn at(mesh: &TriMesh, field: &[f64], source: SurfacePoint, target: SurfacePoint) -> f64 {
+    let here = mesh.point(target);
+    if source.triangle == target.triangle {
+        return here.distance(mesh.point(source));
+    }
+    let corners = mesh.triangles()[target.triangle as usize];
+    let p = corners.map(|v| mesh.positions()[v as usize]);
+    let d = corners.map(|v| field[v as usize]);
+    let along = (0..3).map(|k| d[k] + here.distance(p[k]));
+    let across = (0..3).filter_map(|k| {
+        let l = (k + 1) % 3;
+        let triangle = Unfolded::new(p[k], p[l], here);
+        triangle.circular(d[k], d[l])
+    });
+    along.chain(across).fold(f64::INFINITY, f64::min)
 }
 
 #[derive(PartialEq)]

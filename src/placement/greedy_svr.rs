@@ -1,21 +1,29 @@
 //! Greedy support-vector regression: the paper's Algorithm 1.
 //!
 //! Each step adds the site with which the cross-validated error of the regression is smallest; the
-//! criterion is the mean over folds of the mean Euclidean error (mm). The algorithm is the plain one:
-//! every candidate is fitted exactly, starting from the coefficients of the set chosen so far; a candidate
-//! is given up as soon as the folds done already make it worse than the best (errors are not negative,
-//! so that this is exact).
+//! criterion is the mean over folds of the mean Euclidean error (mm). Fitting every candidate exactly
+//! would take hours at the paper's size. Instead every candidate gets a cheap score of the same
+//! regression (`screen.rs`), the promising ones dearer ones, and the last few the criterion itself
+//! (`exact.rs`). How many go on depends on how far the scores were seen to depart from each other
+//! (`race.rs`): what cannot win even then is left behind.
 
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+mod exact;
+mod race;
+mod screen;
 
 use rayon::prelude::*;
 
-use super::{PlacementError, Pool, Selection, Selector, SelectorKind, SensorSet, check_pool};
-use crate::budget::{Achieved, Cancelled, StopReason, Watch, Work, report};
+use self::exact::{Judge, Judged};
+use self::race::{Raced, Relation, Rules, Scored, race};
+use self::screen::{Base, LEVELS, Sieve, Stop};
+use super::wishes::{Field, Wishes};
+use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
+use crate::budget::{Achieved, Cancelled, Progress, StopReason, Watch, Work, report};
 use crate::dataset::SignalMatrix;
-use crate::regression::Hyper;
-use crate::regression::features::{Standardizer, gaussian, squared_distances};
-use crate::regression::tune::{Effort, Fold};
+use crate::regression::features::Standardizer;
+use crate::regression::folds::{Folds, evenly};
+use crate::regression::tune::Effort;
+use crate::regression::{Hyper, kernel};
 
 /// Settings of the selector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,13 +32,16 @@ pub struct GreedySvr {
     pub folds: usize,
     pub seed: u64,
     pub effort: Effort,
+    /// A choice may be worse than the best by this share of the criterion.
+    pub tolerance: f64,
 }
 
-/// Two candidates whose criteria differ by less than this share are tied; the lower site wins.
+/// The default of [`GreedySvr::tolerance`].
+pub const TOLERANCE: f64 = 0.002;
+/// Two candidates whose criteria differ by less than this share are tied; the lower place wins.
 pub const TIE: f64 = 1e-9;
-
-/// Candidates scored against the same bound.
-const BATCH: usize = 16;
+/// Departure of a score that has not been compared yet.
+const UNKNOWN: f64 = 0.01;
 
 impl Selector for GreedySvr {
     fn kind(&self) -> SelectorKind {
@@ -41,13 +52,8 @@ impl Selector for GreedySvr {
         true
     }
 
-    fn select(
-        &self,
-        pool: &Pool,
-        sensors: usize,
-        watch: Watch,
-    ) -> Result<Selection, PlacementError> {
-        check_pool(pool, sensors)?;
+    fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
+        let mut field = Field::new(pool, request.wishes)?;
         let least = 2 * self.folds.max(2);
         if pool.targets.len() < least {
             return Err(PlacementError::TooFewTouches {
@@ -55,15 +61,32 @@ impl Selector for GreedySvr {
                 least,
             });
         }
-        let mut search = Search::new(self, pool);
-        let mut sets: Vec<SensorSet> = Vec::with_capacity(sensors);
-        for step in 0..sensors {
-            let (winner, criterion) = search.best_addition(step, sensors, watch)?;
-            search.add(winner);
+        let folds = Folds::draw(pool.targets.len(), self.folds, self.seed);
+        let mut search = Search::new(self, pool, request, &folds);
+        let mut sets: Vec<SensorSet> = Vec::new();
+        let mut stop = StopReason::Converged;
+        while !field.full() {
+            let Some(step) = search.best_addition(&field)? else {
+                stop = StopReason::Exhausted;
+                break;
+            };
+            field.add(step.place);
             sets.push(SensorSet {
-                sites: search.chosen.iter().map(|&i| pool.sites[i]).collect(),
-                criterion,
+                sites: field.sites(),
+                criterion: step.error,
+                criterion_mm: Some(step.error),
+                gap: Some(step.gap),
             });
+            (request.found)(&sets[sets.len() - 1]);
+            if request.wishes.target_mm.is_some_and(|t| step.error <= t) {
+                break;
+            }
+        }
+        if sets.is_empty() {
+            return Err(PlacementError::NoSites);
+        }
+        if !search.converged {
+            stop = StopReason::EffortSpent;
         }
         Ok(Selection {
             selector: SelectorKind::GreedySvr,
@@ -72,158 +95,429 @@ impl Selector for GreedySvr {
             achieved: Achieved {
                 error_estimate: sets.last().map(|s| s.criterion),
                 unit: "mm",
-                effort: search.work(),
-                stop_reason: if search.converged {
-                    StopReason::Converged
-                } else {
-                    StopReason::EffortSpent
-                },
-                notes: search.notes(),
+                effort: search.work,
+                stop_reason: stop,
+                notes: search.notes(&sets, request.wishes),
             },
             sets,
         })
     }
 }
 
+impl GreedySvr {
+    /// The criterion of given sets (places in the pool): mean over folds of the mean Euclidean error
+    /// (mm), fitted to the tolerance. Absent for a set without a signal.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn criteria(
+        &self,
+        pool: &Pool,
+        sets: &[Vec<usize>],
+        watch: Watch,
+    ) -> Result<Vec<f64>, Cancelled> {
+        let folds = Folds::draw(pool.targets.len(), self.folds, self.seed);
+        let features = Standardizer::of(pool.x)
+            .apply(pool.x)
+            .select_columns(&folds.order);
+        let judge = Judge::new(self, pool.targets, &folds);
+        let n = pool.targets.len();
+        // Most sets are the one before with one more site.
+        let (mut known, mut whole) = (Vec::new(), vec![1.0; n * n]);
+        let mut next = vec![0.0; n * n];
+        let mut errors = Vec::with_capacity(sets.len());
+        for (k, set) in sets.iter().enumerate() {
+            if !set.starts_with(&known) {
+                known.clear();
+                whole.fill(1.0);
+            }
+            for &place in &set[known.len()..] {
+                let row = features.row(place);
+                kernel::extend(&whole, row, row, self.hyper.gamma, &mut next);
+                std::mem::swap(&mut whole, &mut next);
+            }
+            known.clone_from(set);
+            let progress = Progress {
+                stage: "Judging the choice",
+                done: k,
+                total: sets.len(),
+            };
+            errors.push(judge.judge(&whole, None, progress, watch)?.error);
+        }
+        Ok(errors)
+    }
+}
+
+/// What one step found.
+struct Step {
+    place: usize,
+    error: f64,
+    /// Share by which a better choice may still exist.
+    gap: f64,
+}
+
 struct Search<'a> {
     settings: &'a GreedySvr,
-    pool: &'a Pool<'a>,
+    request: &'a Request<'a>,
+    /// Standardized signals, places × touches in the order of the folds.
     features: SignalMatrix,
     constant: Vec<usize>,
-    folds: Vec<Fold>,
-    chosen: Vec<usize>,
+    judge: Judge<'a>,
+    sieves: Vec<Sieve>,
+    /// The set chosen so far, and when failures are expected the same without each of its sites.
+    base: Base,
+    without: Vec<Base>,
     /// exp(-γ d²) over the chosen sites, touches × touches.
     kernel: Vec<f64>,
-    /// Coefficients of the chosen set, a fold: where the next step starts from.
-    warm: Vec<Option<[Vec<f64>; 3]>>,
-    /// Whether every winner's fits met their tolerance.
+    /// How each score related to the next in the last step.
+    relations: Vec<Relation>,
+    widest: f64,
+    exactly: usize,
     converged: bool,
-    fits: AtomicU64,
-    kernel_evaluations: AtomicU64,
+    work: Work,
+}
+
+/// A candidate fitted exactly, with the kernel it was fitted on.
+struct Finalist {
+    place: usize,
+    judged: Judged,
 }
 
 impl<'a> Search<'a> {
-    fn new(settings: &'a GreedySvr, pool: &'a Pool<'a>) -> Self {
+    fn new(
+        settings: &'a GreedySvr,
+        pool: &'a Pool<'a>,
+        request: &'a Request<'a>,
+        folds: &'a Folds,
+    ) -> Self {
         let n = pool.targets.len();
         let standardizer = Standardizer::of(pool.x);
-        let folds = Fold::all(n, settings.folds, settings.seed);
+        let features = standardizer.apply(pool.x).select_columns(&folds.order);
+        let targets: Vec<[f64; 3]> = folds.order.iter().map(|&t| pool.targets[t]).collect();
+        let sieves: Vec<Sieve> = LEVELS
+            .iter()
+            .map(|&level| Sieve::new(level, &features, &targets, folds))
+            .collect();
         Self {
             settings,
-            pool,
-            features: standardizer.apply(pool.x),
+            request,
+            features,
             constant: standardizer.constant_rows(),
-            warm: vec![None; folds.len()],
-            folds,
-            chosen: Vec::new(),
+            judge: Judge::new(settings, pool.targets, folds),
+            base: Base::empty(&sieves),
+            without: Vec::new(),
+            sieves,
             kernel: vec![1.0; n * n],
+            relations: Vec::new(),
+            widest: 0.0,
+            exactly: 0,
             converged: true,
-            fits: AtomicU64::new(0),
-            kernel_evaluations: AtomicU64::new(0),
+            work: Work::default(),
         }
     }
 
-    /// The kernel with one more site: a Gaussian kernel over a union is the product of the kernels.
-    fn extended_kernel(&self, candidate: usize) -> Vec<f64> {
-        let row = self.features.select_rows(&[candidate]);
-        let mut kernel = gaussian(&squared_distances(&row, &row), self.settings.hyper.gamma);
-        for (k, old) in kernel.iter_mut().zip(&self.kernel) {
-            *k *= old;
-        }
-        self.kernel_evaluations
-            .fetch_add(kernel.len() as u64, Ordering::Relaxed);
-        kernel
-    }
-
-    /// Scores every site not chosen yet and returns the best with its criterion (mm).
-    fn best_addition(
-        &self,
-        step: usize,
-        steps: usize,
-        watch: Watch,
-    ) -> Result<(usize, f64), PlacementError> {
-        let open: Vec<usize> = (0..self.pool.sites.len())
-            .filter(|i| !self.chosen.contains(i) && !self.constant.contains(i))
+    /// The best place to add, taken; none when nothing may be added any more.
+    fn best_addition(&mut self, field: &Field) -> Result<Option<Step>, PlacementError> {
+        let open: Vec<usize> = field
+            .open()
+            .into_iter()
+            .filter(|p| !self.constant.contains(p))
             .collect();
         if open.is_empty() {
-            return Err(PlacementError::TooFewSites {
-                wanted: steps,
-                available: step,
-            });
+            return Ok(None);
         }
-        let done = AtomicUsize::new(0);
-        let mut bound = f64::INFINITY;
-        let mut scores = Vec::with_capacity(open.len());
-        // The bound moves between batches of fixed size only, so that the work counted does not depend
-        // on which thread was first.
-        for batch in open.chunks(BATCH) {
-            let batch: Result<Vec<f64>, Cancelled> = batch
+        let before = self.base.error;
+        let worth = |s: Scored| field.worth(s.place, before - s.error);
+        let last = LEVELS.len() - 1;
+        let mut left: Vec<(usize, Vec<Scored>)> = Vec::new();
+        let mut scored = self.scores(0, &open, field.chosen.len())?;
+        let mut relations = Vec::new();
+        for level in 1..=last {
+            let rules = self.rules(level - 1, 16 >> level.min(2), level.min(2));
+            let Raced {
+                scored: next,
+                rest,
+                relation,
+            } = race(&scored, &rules, &worth, |places| {
+                self.scores(level, places, field.chosen.len())
+                    .map(|s| s.iter().map(|s| s.error).collect())
+            })?;
+            left.push((level - 1, rest));
+            relations.push(relation);
+            scored = next;
+        }
+        let (winner, raced) = self.final_race(&scored, &worth, field.chosen.len())?;
+        relations.push(raced.relation);
+        left.push((last, raced.rest));
+        let stop = || self.stopped(field.chosen.len());
+        let own = self.expected(last, winner.place, winner.judged.error, &stop);
+        let gap = left
+            .iter()
+            .flat_map(|(level, rest)| rest.iter().map(|s| (*level, *s)))
+            .map(|(level, s)| 1.0 - least_of(&relations[level..], s.error) / own)
+            .fold(0.0, f64::max);
+        self.widest = self.widest.max(raced.relation.deviation);
+        self.exactly += raced.scored.len();
+        self.relations = relations;
+        let place = winner.place;
+        self.take(winner);
+        self.refine(&[&field.chosen[..], &[place]].concat());
+        Ok(Some(Step {
+            place,
+            error: own,
+            gap,
+        }))
+    }
+
+    fn rules(&self, from: usize, batch: usize, audits: usize) -> Rules {
+        let seen = |k: usize| self.relations.get(k).map_or(UNKNOWN, |r| r.deviation);
+        let later: f64 = (from + 1..LEVELS.len()).map(|k| seen(k).powi(2)).sum();
+        Rules {
+            least: batch,
+            batch,
+            audits,
+            least_deviation: self.relations.get(from).map_or(0.0, |r| 0.5 * r.deviation),
+            slack: later.sqrt(),
+        }
+    }
+
+    /// Scores on one level.
+    fn scores(
+        &self,
+        level: usize,
+        places: &[usize],
+        step: usize,
+    ) -> Result<Vec<Scored>, Cancelled> {
+        places
+            .par_iter()
+            .map(|&place| {
+                self.report(step)?;
+                let hyper = &self.settings.hyper;
+                let stop = || self.stopped(step);
+                let error = self.base.score(&self.sieves, level, place, hyper, &stop);
+                let error = self.expected(level, place, error, &stop);
+                // What was given up midway is no score.
+                self.report(step)?;
+                Ok(Scored { place, error })
+            })
+            .collect()
+    }
+
+    /// The criterion when one gauge of the set may have failed: the chance of it weighs the mean over
+    /// the sets without one.
+    fn expected(&self, level: usize, place: usize, error: f64, stop: Stop) -> f64 {
+        let p = self.request.wishes.failure;
+        if p == 0.0 {
+            return error;
+        }
+        let hyper = &self.settings.hyper;
+        let others: f64 = self
+            .without
+            .iter()
+            .map(|base| base.score(&self.sieves, level, place, hyper, stop))
+            .sum();
+        let mean = (others + self.base.error) / (self.without.len() + 1) as f64;
+        (1.0 - p) * error + p * mean
+    }
+
+    /// Exact fits of the most promising until no other can be better by more than the tolerance.
+    fn final_race(
+        &mut self,
+        scored: &[Scored],
+        worth: &dyn Fn(Scored) -> f64,
+        step: usize,
+    ) -> Result<(Finalist, Raced), PlacementError> {
+        let mut rules = self.rules(LEVELS.len() - 1, 1, 0);
+        rules.least = 3;
+        rules.slack = -self.settings.tolerance;
+        let mut best: Option<(f64, Finalist)> = None;
+        let mut extended = vec![0.0; self.kernel.len()];
+        let mut compared = 0;
+        let raced = race(scored, &rules, worth, |places| {
+            let mut errors = Vec::with_capacity(places.len());
+            for &place in places {
+                let finalist = self.finalist(place, step, &mut extended)?;
+                compared += 1;
+                let stop = || self.stopped(step);
+                let exact = finalist.judged.error;
+                let error = self.expected(LEVELS.len() - 1, place, exact, &stop);
+                errors.push(error);
+                let value = worth(Scored { place, error });
+                let wins = best.as_ref().is_none_or(|(b, f)| {
+                    value > b + TIE * b.abs() || (value >= b - TIE * b.abs() && place < f.place)
+                });
+                if wins {
+                    best = Some((value, finalist));
+                }
+            }
+            Ok(errors)
+        })?;
+        self.work += Work {
+            kernel_evaluations: (compared * self.kernel.len()) as u64,
+            fits: (compared * 3 * self.judge.folds.parts.len()) as u64,
+            ..Work::default()
+        };
+        let (_, winner) = best.ok_or(PlacementError::NoSites)?;
+        Ok((winner, raced))
+    }
+
+    fn finalist(
+        &self,
+        place: usize,
+        step: usize,
+        extended: &mut [f64],
+    ) -> Result<Finalist, Cancelled> {
+        self.report(step)?;
+        let hyper = &self.settings.hyper;
+        let row = self.features.row(place);
+        kernel::extend(&self.kernel, row, row, hyper.gamma, extended);
+        let stop = || self.stopped(step);
+        let (_, state) = self.base.nearly(&self.sieves, place, hyper, &stop);
+        let beta = faer::Scale(-self.base.rho(hyper)) * &state.u;
+        let progress = self.progress(step);
+        let judged = self
+            .judge
+            .judge(extended, Some(&beta), progress, self.request.watch)?;
+        Ok(Finalist { place, judged })
+    }
+
+    fn take(&mut self, winner: Finalist) {
+        let Finalist { place, judged } = winner;
+        let hyper = self.settings.hyper;
+        let row = self.features.row(place);
+        let mut extended = vec![0.0; self.kernel.len()];
+        kernel::extend(&self.kernel, row, row, hyper.gamma, &mut extended);
+        self.kernel = extended;
+        self.converged &= judged.converged;
+        let (residuals, beta) = judged.matrices();
+        let grown = self
+            .base
+            .with(&self.sieves, place, &hyper, (judged.error, residuals, beta));
+        let before = std::mem::replace(&mut self.base, grown);
+        if self.request.wishes.failure > 0.0 {
+            self.without = self
+                .without
                 .par_iter()
-                .map(|&candidate| {
-                    let total = self.pool.sites.len();
-                    let so_far = step * total + done.fetch_add(1, Ordering::Relaxed);
-                    report(watch, "Selecting by greedy SVR", so_far, steps * total)?;
-                    Ok(self.score(candidate, bound))
+                .map(|base| {
+                    let (error, state) = base.nearly(&self.sieves, place, &hyper, &|| false);
+                    let beta = faer::Scale(-base.rho(&hyper)) * &state.u;
+                    base.with(&self.sieves, place, &hyper, (error, state.z, beta))
                 })
                 .collect();
-            scores.extend(batch?);
-            bound = scores.iter().copied().fold(f64::INFINITY, f64::min);
+            self.without.push(before);
         }
-        let smallest = scores.iter().copied().fold(f64::INFINITY, f64::min);
-        let winner = scores
-            .iter()
-            .position(|&s| s <= smallest * (1.0 + TIE))
-            .unwrap_or(0);
-        Ok((open[winner], scores[winner]))
     }
 
-    /// Mean error over the folds, or infinity once it cannot win any more.
-    fn score(&self, candidate: usize, bound: f64) -> f64 {
-        let kernel = self.extended_kernel(candidate);
-        let params = self.settings.hyper.params(self.settings.effort);
-        let count = self.folds.len() as f64;
-        let mut sum = 0.0;
-        for (fold, warm) in self.folds.iter().zip(&self.warm) {
-            let mut start = warm.clone();
-            let error = fold.error(&kernel, self.pool.targets, &params, &mut start);
-            sum += error.mm;
-            self.fits.fetch_add(3, Ordering::Relaxed);
-            // A tie must survive.
-            if sum / count > bound * (1.0 + 2.0 * TIE) {
-                return f64::INFINITY;
+    /// Takes more landmarks on the levels whose scores departed too far from the next.
+    fn refine(&mut self, chosen: &[usize]) {
+        let gamma = self.settings.hyper.gamma;
+        for level in 0..LEVELS.len() {
+            let sieve = &mut self.sieves[level];
+            if self.relations[level].deviation <= sieve.level.aim || !sieve.refine() {
+                continue;
+            }
+            self.base.renew(sieve, level, chosen, gamma);
+            for (k, base) in self.without.iter_mut().enumerate() {
+                let mut others = chosen.to_vec();
+                others.remove(k);
+                base.renew(sieve, level, &others, gamma);
             }
         }
-        sum / count
     }
 
-    fn add(&mut self, winner: usize) {
-        self.kernel = self.extended_kernel(winner);
-        let params = self.settings.hyper.params(self.settings.effort);
-        for (fold, warm) in self.folds.iter().zip(&mut self.warm) {
-            // For its coefficients, the next step's start, and to know whether the winner's fits ended.
-            let error = fold.error(&self.kernel, self.pool.targets, &params, warm);
-            self.converged &= error.converged;
-        }
-        self.fits
-            .fetch_add(3 * self.folds.len() as u64, Ordering::Relaxed);
-        self.chosen.push(winner);
-    }
-
-    fn work(&self) -> Work {
-        Work {
-            kernel_evaluations: self.kernel_evaluations.load(Ordering::Relaxed),
-            fits: self.fits.load(Ordering::Relaxed),
-            ..Work::default()
+    fn progress(&self, step: usize) -> Progress {
+        Progress {
+            stage: "Selecting by greedy SVR",
+            done: step,
+            total: self.request.wishes.sensors,
         }
     }
 
-    fn notes(&self) -> Vec<String> {
-        if self.constant.is_empty() {
-            Vec::new()
-        } else {
-            vec![format!(
+    fn report(&self, step: usize) -> Result<(), Cancelled> {
+        let Progress { stage, done, total } = self.progress(step);
+        report(self.request.watch, stage, done, total)
+    }
+
+    fn stopped(&self, step: usize) -> bool {
+        self.report(step).is_err()
+    }
+
+    fn notes(&self, sets: &[SensorSet], wishes: &Wishes) -> Vec<String> {
+        let mut notes = Vec::new();
+        if !self.constant.is_empty() {
+            notes.push(format!(
                 "{} sites report the same under every touch and were left out.",
                 self.constant.len()
-            )]
+            ));
+        }
+        notes.extend(self.degenerate());
+        if !self.converged {
+            notes.push(
+                "Some fits stopped at the effort allowed before they met their tolerance: the criterion is not exact. Allow more steps, or lower C.".into(),
+            );
+        }
+        let gap = sets.iter().filter_map(|s| s.gap).fold(0.0, f64::max);
+        notes.push(format!(
+            "{} sets were fitted exactly; the screens departed from them by at most {:.2} %, so that a better choice of a step could be better by at most {:.2} %.",
+            self.exactly,
+            100.0 * self.widest,
+            100.0 * gap
+        ));
+        let reached = sets.last().map_or(f64::INFINITY, |s| s.criterion);
+        if let Some(target) = wishes.target_mm.filter(|t| reached > *t) {
+            notes.push(format!(
+                "The error asked for, {target} mm, was not reached: {reached:.2} mm with {} gauges.",
+                sets.len()
+            ));
+        }
+        notes
+    }
+}
+
+impl Search<'_> {
+    /// What makes the regression unable to learn anything.
+    fn degenerate(&self) -> Option<String> {
+        /// Off the diagonal all kernel values within this of one, or of zero.
+        const SAME: f64 = 1e-9;
+        /// Rows looked at.
+        const ROWS: usize = 64;
+        let n = self.judge.targets[0].len();
+        let Hyper { gamma, epsilon, .. } = self.settings.hyper;
+        let spread = self.judge.spread();
+        if spread <= epsilon {
+            return Some(format!(
+                "The targets spread over {spread:.1e} mm only and lie inside the tube (ε is {epsilon} mm): nothing is learned. Check the unit of the targets or lower ε."
+            ));
+        }
+        let (mut least, mut most) = (1.0f64, 0.0f64);
+        for &i in &evenly(n, ROWS) {
+            for (j, &k) in self.kernel[i * n..][..n].iter().enumerate() {
+                if i != j {
+                    (least, most) = (least.min(k), most.max(k));
+                }
+            }
+        }
+        if least > 1.0 - SAME {
+            Some(format!(
+                "The kernel is degenerate: at γ = {gamma:.1e} every touch looks like every other, and all predictions are one constant. Raise γ."
+            ))
+        } else if most < SAME {
+            Some(format!(
+                "The kernel is degenerate: at γ = {gamma:.1e} no touch looks like any other, and unseen touches are all predicted at one point. Lower γ."
+            ))
+        } else {
+            None
         }
     }
+}
+
+/// The least that the criterion may be for a score, through all relations from it to the criterion.
+fn least_of(relations: &[Relation], error: f64) -> f64 {
+    let ratio: f64 = relations.iter().map(|r| r.ratio).product();
+    let deviation = relations
+        .iter()
+        .map(|r| r.deviation.powi(2))
+        .sum::<f64>()
+        .sqrt();
+    Relation { ratio, deviation }.least(error)
 }

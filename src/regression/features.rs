@@ -1,4 +1,4 @@
-//! Features and kernels.
+//! Features: standardized signals.
 
 use crate::dataset::SignalMatrix;
 
@@ -61,29 +61,6 @@ impl Standardizer {
             .filter(|&r| self.deviation[r] == 0.0)
             .collect()
     }
-}
-
-/// Squared distances between the columns (touches) of two standardized matrices with the same rows:
-/// `a` columns × `b` columns.
-#[must_use]
-pub fn squared_distances(a: &SignalMatrix, b: &SignalMatrix) -> Vec<f64> {
-    let (n, m) = (a.columns(), b.columns());
-    let mut d = vec![0.0; n * m];
-    for r in 0..a.rows() {
-        let (ra, rb) = (a.row(r), b.row(r));
-        for (out, &p) in d.chunks_exact_mut(m.max(1)).zip(ra) {
-            for (o, &q) in out.iter_mut().zip(rb) {
-                *o += (p - q) * (p - q);
-            }
-        }
-    }
-    d
-}
-
-/// exp(-γ d²), entry by entry.
-#[must_use]
-pub fn gaussian(squared: &[f64], gamma: f64) -> Vec<f64> {
-    squared.iter().map(|d| (-gamma * d).exp()).collect()
 }
 
 #[cfg(test)]

@@ -1,14 +1,13 @@
 //! A model for the three coordinates, and the search for its settings by cross-validation.
 
-use rand::SeedableRng;
-use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::features::{Standardizer, gaussian, squared_distances};
-use super::svr::{self, Fit, SvrParams};
-use crate::budget::{Cancelled, Watch, Work, report};
+use super::features::Standardizer;
+use super::folds::Folds;
+use super::kernel::{gaussian, squared_distances};
+use super::svr::{self, Fit, Problem, Start};
+use crate::budget::{Cancelled, Progress, Watch, Work, report};
 use crate::dataset::SignalMatrix;
 
 /// Settings of the regression; targets are in millimetres, features standardized.
@@ -43,8 +42,8 @@ pub struct Effort {
 
 impl Hyper {
     #[must_use]
-    pub fn params(&self, effort: Effort) -> SvrParams {
-        SvrParams {
+    pub fn params(&self, effort: Effort) -> svr::SvrParams {
+        svr::SvrParams {
             c: self.c,
             epsilon: self.epsilon,
             tolerance: effort.tolerance,
@@ -95,7 +94,13 @@ impl PositionModel {
     /// Predicted positions (mm) for new signals (sites × touches).
     #[must_use]
     pub fn predict(&self, x: &SignalMatrix) -> Vec<[f64; 3]> {
-        let features = self.standardizer.apply(x);
+        self.predict_without(x, &[])
+    }
+
+    /// As [`Self::predict`], with some sites (rows) that have failed and report their mean.
+    #[must_use]
+    pub fn predict_without(&self, x: &SignalMatrix, failed: &[usize]) -> Vec<[f64; 3]> {
+        let features = self.standardizer.apply(x).with_zero_rows(failed);
         let kernel = gaussian(&squared_distances(&features, &self.training), self.gamma);
         let axes = [0, 1, 2].map(|a| svr::predict(&self.fits[a], &kernel));
         (0..x.columns())
@@ -117,87 +122,6 @@ pub fn distances(predicted: &[[f64; 3]], truth: &[[f64; 3]]) -> Vec<f64> {
     let distance =
         |(p, t): (&[f64; 3], &[f64; 3])| (0..3).map(|a| (p[a] - t[a]).powi(2)).sum::<f64>().sqrt();
     predicted.iter().zip(truth).map(distance).collect()
-}
-
-/// Disjoint folds over `count` touches, shuffled by the seed.
-#[must_use]
-pub fn folds(count: usize, folds: usize, seed: u64) -> Vec<Vec<usize>> {
-    let mut order: Vec<usize> = (0..count).collect();
-    order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
-    let k = folds.clamp(2, count.max(2));
-    (0..k)
-        .map(|f| order.iter().copied().skip(f).step_by(k).collect())
-        .collect()
-}
-
-/// Mean Euclidean error on one fold's test touches.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FoldError {
-    pub mm: f64,
-    /// Whether all its fits met their tolerance.
-    pub converged: bool,
-}
-
-/// The split of one fold, with what training on it needs of the whole kernel.
-pub struct Fold {
-    pub train: Vec<usize>,
-    pub test: Vec<usize>,
-}
-
-impl Fold {
-    #[must_use]
-    pub fn all(count: usize, number: usize, seed: u64) -> Vec<Self> {
-        let parts = folds(count, number, seed);
-        (0..parts.len())
-            .map(|f| Self {
-                train: (0..parts.len())
-                    .filter(|&g| g != f)
-                    .flat_map(|g| parts[g].iter().copied())
-                    .collect(),
-                test: parts[f].clone(),
-            })
-            .collect()
-    }
-
-    /// Sub-matrix of a symmetric kernel over all touches (`n` × `n`).
-    #[must_use]
-    pub fn block(kernel: &[f64], n: usize, rows: &[usize], columns: &[usize]) -> Vec<f64> {
-        rows.iter()
-            .flat_map(|&r| columns.iter().map(move |&c| kernel[r * n + c]))
-            .collect()
-    }
-
-    /// Mean Euclidean error (mm) on the fold's test touches of fits on its training touches, starting
-    /// from and leaving behind the coefficients in `warm`.
-    #[must_use]
-    pub fn error(
-        &self,
-        kernel: &[f64],
-        targets: &[[f64; 3]],
-        params: &SvrParams,
-        warm: &mut Option<[Vec<f64>; 3]>,
-    ) -> FoldError {
-        let n = targets.len();
-        let inner = Self::block(kernel, n, &self.train, &self.train);
-        let outer = Self::block(kernel, n, &self.test, &self.train);
-        let fits = [0, 1, 2].map(|axis| {
-            let y: Vec<f64> = self.train.iter().map(|&t| targets[t][axis]).collect();
-            let start = warm.as_ref().map(|w| w[axis].as_slice());
-            svr::fit(&inner, &y, params, start)
-        });
-        let axes = fits.each_ref().map(|f| svr::predict(f, &outer));
-        let predicted: Vec<[f64; 3]> = (0..self.test.len())
-            .map(|t| axes.each_ref().map(|a| a[t]))
-            .collect();
-        let truth: Vec<[f64; 3]> = self.test.iter().map(|&t| targets[t]).collect();
-        let converged = fits.iter().all(|f| f.converged);
-        *warm = Some(fits.map(|f| f.beta));
-        let d = distances(&predicted, &truth);
-        FoldError {
-            mm: d.iter().sum::<f64>() / d.len().max(1) as f64,
-            converged,
-        }
-    }
 }
 
 /// One point of a search: the settings and their cross-validated error (mm).
@@ -275,11 +199,13 @@ pub fn search(
     validation: &CrossValidation,
     watch: Watch,
 ) -> Result<(Search, Work), Cancelled> {
-    let z = Standardizer::of(x).apply(x);
+    let folds = Folds::draw(targets.len(), validation.folds, validation.seed);
+    let z = Standardizer::of(x).apply(x).select_columns(&folds.order);
+    let axis = |a: usize| folds.order.iter().map(|&t| targets[t][a]).collect();
     let bench = Bench {
         squared: squared_distances(&z, &z),
-        targets,
-        folds: Fold::all(targets.len(), validation.folds, validation.seed),
+        targets: [0, 1, 2].map(axis),
+        folds,
         effort: validation.effort,
         watch,
     };
@@ -307,17 +233,17 @@ pub fn search(
     search.trials.extend(more?.into_iter().flatten());
     let work = Work {
         kernel_evaluations: (bench.squared.len() * (grid.gamma.len() + others.len())) as u64,
-        fits: (3 * bench.folds.len() * search.trials.len()) as u64,
+        fits: (3 * bench.folds.parts.len() * search.trials.len()) as u64,
         ..Work::default()
     };
     Ok((search, work))
 }
 
-/// What all trials of one search share.
+/// What all trials of one search share; touches in the order of their folds.
 struct Bench<'a> {
     squared: Vec<f64>,
-    targets: &'a [[f64; 3]],
-    folds: Vec<Fold>,
+    targets: [Vec<f64>; 3],
+    folds: Folds,
     effort: Effort,
     watch: Watch<'a>,
 }
@@ -326,21 +252,66 @@ impl Bench<'_> {
     /// Trials over rising C on one kernel, each starting from the one before.
     fn column(&self, gamma: f64, epsilon: f64, c: &[f64]) -> Result<Vec<Trial>, Cancelled> {
         let kernel = gaussian(&self.squared, gamma);
-        let mut warm: Vec<Option<[Vec<f64>; 3]>> = vec![None; self.folds.len()];
+        let mut warm: Vec<Option<[Vec<f64>; 3]>> = vec![None; self.folds.parts.len()];
         let mut trials = Vec::with_capacity(c.len());
         for (k, &c) in c.iter().enumerate() {
-            report(self.watch, "Tuning the regression", k, 3)?;
+            report(self.watch, STAGE, k, 3)?;
             let hyper = Hyper { c, epsilon, gamma };
-            let params = hyper.params(self.effort);
-            let sum: f64 = self
-                .folds
-                .iter()
-                .zip(&mut warm)
-                .map(|(fold, warm)| fold.error(&kernel, self.targets, &params, warm).mm)
-                .sum();
-            let error_mm = sum / self.folds.len() as f64;
+            let sum = (0..warm.len())
+                .map(|f| self.error(&kernel, f, &hyper, &mut warm[f]))
+                .sum::<f64>();
+            report(self.watch, STAGE, k, 3)?;
+            let error_mm = sum / self.folds.parts.len() as f64;
             trials.push(Trial { hyper, error_mm });
         }
         Ok(trials)
     }
+
+    /// Mean Euclidean error (mm) on a fold's test touches of fits on all others, starting from and
+    /// leaving behind the coefficients in `warm`.
+    fn error(
+        &self,
+        kernel: &[f64],
+        fold: usize,
+        hyper: &Hyper,
+        warm: &mut Option<[Vec<f64>; 3]>,
+    ) -> f64 {
+        let held_out = self.folds.parts[fold].clone();
+        let now = Progress {
+            stage: STAGE,
+            done: 0,
+            total: 3,
+        };
+        let stop = || (self.watch)(now).is_break();
+        let fits = [0, 1, 2].map(|axis| {
+            let problem = Problem {
+                kernel,
+                y: &self.targets[axis],
+                held_out: held_out.clone(),
+            };
+            let start = warm.as_ref().map(|w| Start {
+                beta: &w[axis],
+                f: None,
+            });
+            svr::solve(&problem, &hyper.params(self.effort), start, &stop)
+        });
+        let error = mean_distance(&fits, held_out);
+        *warm = Some(fits.map(|f| f.beta));
+        error
+    }
+}
+
+const STAGE: &str = "Tuning the regression";
+
+/// Mean Euclidean length of the residuals of some fits (one a coordinate) at some points.
+#[must_use]
+pub fn mean_distance(fits: &[Fit], at: std::ops::Range<usize>) -> f64 {
+    let count = at.len().max(1) as f64;
+    let length = |i: usize| {
+        fits.iter()
+            .map(|f| f.residuals[i].powi(2))
+            .sum::<f64>()
+            .sqrt()
+    };
+    at.map(length).sum::<f64>() / count
 }

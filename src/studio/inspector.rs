@@ -488,7 +488,7 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         &mut project.selection.selector,
         &SelectorKind::ALL,
         SelectorKind::title,
-        "Whose sites are shown and reported; both are evaluated",
+        "Whose sites are shown and reported; all are evaluated",
     );
     count(
         ui,

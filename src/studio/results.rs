@@ -1,37 +1,40 @@
-//! The lower side: error against number of gauges, the chosen sites, the reduction.
+//! The lower side: error against number of gauges, with failed gauges, the chosen sites, the reduction.
 
 use egui::{RichText, Role, Ui, WidgetInfo};
 use egui_plot::{Corner, HLine, Legend, Line, Plot, PlotPoints, Points};
 
 use super::Studio;
 use crate::io::artifacts::{as_chosen, range, signal_to_noise, signal_unit};
-use crate::io::report::curve;
+use crate::io::report::{curve, failure_curve, failure_name, failure_title};
 
 /// What is shown below the view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Tab {
     #[default]
     Error,
+    Failures,
     Sites,
     Reduction,
 }
 
 impl Tab {
-    const ALL: [Self; 3] = [Self::Error, Self::Sites, Self::Reduction];
+    const ALL: [Self; 4] = [Self::Error, Self::Failures, Self::Sites, Self::Reduction];
 
     fn name(self) -> &'static str {
         match self {
             Self::Error => "Error",
+            Self::Failures => "Failures",
             Self::Sites => "Sites",
             Self::Reduction => "Reduction",
         }
     }
 }
 
-const COLOURS: [egui::Color32; 3] = [
+const COLOURS: [egui::Color32; 4] = [
     egui::Color32::from_rgb(86, 180, 233),
     egui::Color32::from_rgb(230, 159, 0),
     egui::Color32::from_rgb(0, 158, 115),
+    egui::Color32::from_rgb(204, 121, 167),
 ];
 
 impl Studio {
@@ -61,6 +64,7 @@ impl Studio {
         }
         match self.results {
             Tab::Error => self.error_plots(ui),
+            Tab::Failures => self.failure_plots(ui),
             Tab::Sites => self.site_table(ui),
             Tab::Reduction => self.reduction_plot(ui),
         }
@@ -105,11 +109,13 @@ impl Studio {
                             let title = selection.selector.title();
                             plot.line(
                                 Line::new(title, PlotPoints::from(points.clone()))
-                                    .color(COLOURS[k % 3])
+                                    .color(COLOURS[k % COLOURS.len()])
                                     .width(2.0),
                             );
                             plot.points(
-                                Points::new(title, points).color(COLOURS[k % 3]).radius(3.0),
+                                Points::new(title, points)
+                                    .color(COLOURS[k % COLOURS.len()])
+                                    .radius(3.0),
                             );
                         }
                         if let Some(row) = baseline {
@@ -122,6 +128,48 @@ impl Studio {
                 let label = format!("Error against number of gauges, {region}");
                 plot.response
                     .widget_info(|| WidgetInfo::labeled(Role::Figure, true, &label));
+            }
+        });
+    }
+
+    fn failure_plots(&self, ui: &mut Ui) {
+        let Some(result) = &self.design else {
+            return;
+        };
+        let failures = &result.design.evaluation.failures;
+        let height = ui.available_height() - 26.0;
+        ui.columns(2, |columns| {
+            for (ui, retrained) in columns.iter_mut().zip([false, true]) {
+                let title = failure_title(retrained);
+                ui.label(RichText::new(title).strong());
+                let plot = Plot::new(("failures", retrained))
+                    .height(height)
+                    .legend(Legend::default().position(Corner::LeftTop))
+                    .x_axis_label("failed gauges")
+                    .x_grid_spacer(egui_plot::uniform_grid_spacer(|_| [10.0, 5.0, 1.0]))
+                    .y_axis_label("mean error (mm)")
+                    .include_y(0.0)
+                    .allow_scroll(false)
+                    .allow_drag(false)
+                    .allow_zoom(false)
+                    .show(ui, |plot| {
+                        for (k, set) in failures.iter().enumerate() {
+                            let points: Vec<[f64; 2]> = failure_curve(set, retrained)
+                                .into_iter()
+                                .map(|(x, y)| [x, y])
+                                .collect();
+                            let colour = COLOURS[k % COLOURS.len()];
+                            let name = failure_name(set);
+                            plot.line(
+                                Line::new(name, PlotPoints::from(points.clone()))
+                                    .color(colour)
+                                    .width(2.0),
+                            );
+                            plot.points(Points::new(name, points).color(colour).radius(3.0));
+                        }
+                    });
+                plot.response
+                    .widget_info(|| WidgetInfo::labeled(Role::Figure, true, title));
             }
         });
     }

@@ -130,10 +130,24 @@ impl Studio {
                 rows.filter(|r| r.sensors == chosen && Some(r.selector.as_str()) == first)
                     .map(|r| format!("{:.2} mm, {}", r.error_mm, r.region)),
             );
-            lines.extend(d.design.notes());
             lines
         });
         stage(ui, "Select and evaluate", standing, &lines);
+        if let Some(d) = &self.design {
+            // What the model says of itself stands under “Simulate” already.
+            let known = &d.design.simulated.achieved.notes;
+            let notes: Vec<String> = d.design.notes();
+            let notes: Vec<&String> = notes.iter().filter(|n| !known.contains(n)).collect();
+            if !notes.is_empty() {
+                egui::CollapsingHeader::new(format!("{} notes", notes.len()))
+                    .id_salt("selection notes")
+                    .show(ui, |ui| {
+                        for note in notes {
+                            ui.label(RichText::new(note).small());
+                        }
+                    });
+            }
+        }
         self.button(ui, Command::Select);
         ui.add_space(6.0);
     }

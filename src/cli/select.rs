@@ -1,0 +1,287 @@
+//! `hapdef select`: sites for gauges from a dataset alone.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail, ensure};
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::data::{CriterionArgs, DataArgs, criterion_json, site_json};
+use super::{SelectorArg, progress::Bar};
+use crate::gaussian_process::GpKernel;
+use crate::io::cpu_seconds;
+use crate::placement::{SensorSet, Wishes};
+use crate::study::{self, Choice, Data, Settings};
+
+#[derive(Args, Debug, Clone)]
+pub struct SelectArgs {
+    #[command(flatten)]
+    pub data: DataArgs,
+    #[command(flatten)]
+    pub criterion: CriterionArgs,
+    /// How sites are chosen.
+    #[arg(long, value_enum, default_value = "greedy-svr")]
+    pub selector: SelectorArg,
+    /// Most gauges.
+    #[arg(long, default_value_t = 10)]
+    pub sensors: usize,
+    /// Sites that must be chosen, first (zero-based, with commas).
+    #[arg(long, value_delimiter = ',')]
+    pub require: Vec<usize>,
+    /// Sites that must not be chosen (zero-based, with commas).
+    #[arg(long, value_delimiter = ',')]
+    pub keep_out: Vec<usize>,
+    /// Choose only inside this box: x0,y0,z0,x1,y1,z1 (mm).
+    #[arg(long, value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    pub inside: Vec<f64>,
+    /// Choose only outside this box: x0,y0,z0,x1,y1,z1 (mm).
+    #[arg(long, value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    pub outside: Vec<f64>,
+    /// Least distance between two gauges (mm).
+    #[arg(long, default_value_t = 0.0)]
+    pub spacing_mm: f64,
+    /// What all gauges together may cost (with costs in the dataset; one each otherwise).
+    #[arg(long)]
+    pub cost_budget: Option<f64>,
+    /// Stop at this cross-validated error (mm).
+    #[arg(long)]
+    pub target_mm: Option<f64>,
+    /// Probability that one gauge has failed when it is needed (greedy SVR only).
+    #[arg(long, default_value_t = 0.0)]
+    pub failure: f64,
+    /// Share of the criterion by which a choice of greedy SVR may be worse than the best.
+    #[arg(long, default_value_t = crate::placement::greedy_svr::TOLERANCE)]
+    pub selection_tolerance: f64,
+    /// Length of the kernel of entropy and mutual information (mm); searched when left out.
+    #[arg(long)]
+    pub length_mm: Option<f64>,
+    /// Its power, up to 2; searched when left out.
+    #[arg(long)]
+    pub power: Option<f64>,
+    /// Variance of a measurement's noise over the field's.
+    #[arg(long, default_value_t = GpKernel::default().noise)]
+    pub kernel_noise: f64,
+    /// Do not compute the criterion in mm of what the other selectors choose.
+    #[arg(long)]
+    pub no_criterion: bool,
+    /// Also write the chosen sites (.csv): `x_mm,y_mm,z_mm,index`.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
+    let (data, mut notes) = args.data.load()?;
+    let settings = args.settings()?;
+    let wishes = args.wishes(&data)?;
+    let kept_out = args.kept_out(&data)?;
+    let bar = Bar::default();
+    let result = args.criterion.in_pool(|| {
+        let watch = |p| bar.show(p);
+        let found = |set: &SensorSet| say(set);
+        let mut choice = study::select(
+            &data,
+            &kept_out,
+            &wishes,
+            &settings,
+            &cpu_seconds,
+            &watch,
+            &found,
+        )?;
+        let before = cpu_seconds();
+        if !args.no_criterion {
+            study::add_criteria(&data, &mut choice.selection, &wishes, &settings, &watch)?;
+        }
+        Ok((choice, cpu_seconds() - before))
+    });
+    bar.finish();
+    let (choice, criterion_seconds) = result?;
+    notes.extend(choice.selection.achieved.notes.iter().cloned());
+    for note in &notes {
+        eprintln!("note: {note}");
+    }
+    if let Some(path) = &args.out {
+        write_sites(path, &data, &choice)?;
+    }
+    let summary = summary(&data, &settings, &choice, criterion_seconds, &notes);
+    if args.criterion.json {
+        println!("{summary}");
+    } else {
+        print_table(&choice);
+    }
+    Ok(())
+}
+
+fn say(set: &SensorSet) {
+    let site = set.sites.last().copied().unwrap_or(0);
+    match (set.criterion_mm, set.gap) {
+        (Some(mm), Some(gap)) => eprintln!(
+            "{:>3}: site {site}, {mm:.3} mm (a better one could be better by {:.2} %)",
+            set.sites.len(),
+            100.0 * gap
+        ),
+        _ => eprintln!("{:>3}: site {site}", set.sites.len()),
+    }
+}
+
+impl SelectArgs {
+    fn settings(&self) -> anyhow::Result<Settings> {
+        let mut svr = self.criterion.criterion()?;
+        ensure!(
+            (0.0..1.0).contains(&self.selection_tolerance),
+            "--selection-tolerance is a share of the criterion, between 0 and 1"
+        );
+        svr.tolerance = self.selection_tolerance;
+        for (name, value) in [("--length-mm", self.length_mm), ("--power", self.power)] {
+            ensure!(
+                value.is_none_or(|v| v > 0.0 && v.is_finite()),
+                "{name} must be a number above zero"
+            );
+        }
+        ensure!(
+            self.kernel_noise >= 0.0,
+            "--kernel-noise must be zero or more"
+        );
+        let paper = GpKernel::default();
+        let kernel = (self.length_mm.is_some() || self.power.is_some()).then(|| GpKernel {
+            length_m: self.length_mm.map_or(paper.length_m, |l| l * 1e-3),
+            power: self.power.unwrap_or(paper.power),
+            noise: self.kernel_noise,
+        });
+        Ok(Settings {
+            kind: self.selector.into(),
+            svr,
+            kernel,
+            kernel_noise: self.kernel_noise,
+            noise: self.criterion.noise,
+        })
+    }
+
+    fn wishes(&self, data: &Data) -> anyhow::Result<Wishes> {
+        ensure!(self.sensors > 0, "--sensors must be at least 1");
+        ensure!(
+            self.spacing_mm >= 0.0,
+            "--spacing-mm must be zero or more, but is {}",
+            self.spacing_mm
+        );
+        if let Some(site) = self.require.iter().find(|&&s| s >= data.x.rows()) {
+            bail!("--require {site}: there are only {} sites", data.x.rows());
+        }
+        Ok(Wishes {
+            sensors: self.sensors,
+            required: self.require.clone(),
+            spacing: self.spacing_mm * 1e-3,
+            costs: None,
+            budget: self.cost_budget,
+            target_mm: self.target_mm,
+            failure: self.failure,
+        })
+    }
+
+    fn kept_out(&self, data: &Data) -> anyhow::Result<Vec<usize>> {
+        let mut out = self.keep_out.clone();
+        for (name, given, keep_inside) in [
+            ("--inside", &self.inside, true),
+            ("--outside", &self.outside, false),
+        ] {
+            if given.is_empty() {
+                continue;
+            }
+            let [x0, y0, z0, x1, y1, z1] = given[..] else {
+                bail!("{name} takes six numbers: x0,y0,z0,x1,y1,z1 (mm)");
+            };
+            ensure!(
+                !data.positions.is_empty(),
+                "{name} needs the positions of the sites (site_m)"
+            );
+            let a = glam::DVec3::new(x0, y0, z0) * 1e-3;
+            let b = glam::DVec3::new(x1, y1, z1) * 1e-3;
+            let (lower, upper) = (a.min(b), a.max(b));
+            out.extend((0..data.positions.len()).filter(|&s| {
+                let p = data.positions[s];
+                (p.cmpge(lower).all() && p.cmple(upper).all()) != keep_inside
+            }));
+        }
+        Ok(out)
+    }
+}
+
+fn summary(
+    data: &Data,
+    settings: &Settings,
+    choice: &Choice,
+    criterion_seconds: f64,
+    notes: &[String],
+) -> Value {
+    let selection = &choice.selection;
+    let last = selection.sets.last();
+    let sites: Vec<Value> = last
+        .iter()
+        .flat_map(|s| &s.sites)
+        .map(|&s| site_json(data, s))
+        .collect();
+    let steps: Vec<Value> = selection
+        .sets
+        .iter()
+        .map(|set| {
+            json!({
+                "sensors": set.sites.len(),
+                "sites": set.sites,
+                "criterion": set.criterion,
+                "criterion_mm": set.criterion_mm,
+                "gap": set.gap,
+            })
+        })
+        .collect();
+    let mm: Vec<Option<f64>> = selection.sets.iter().map(|s| s.criterion_mm).collect();
+    json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "selector": settings.kind,
+        "sites": sites,
+        "criterion_mm": mm,
+        "steps": steps,
+        "criterion_unit": selection.criterion_unit,
+        "criterion": criterion_json(&settings.svr),
+        "fold_of_touch": study::folds(data, settings),
+        "counts": { "sites": data.x.rows(), "touches": data.x.columns(), "pool": selection.pool },
+        "geometry": choice.geometry,
+        "cpu_seconds": choice.seconds.selection,
+        "distance_cpu_seconds": choice.seconds.distances,
+        "kernel_search_cpu_seconds": choice.seconds.kernel_search,
+        "criterion_cpu_seconds": criterion_seconds,
+        "achieved": selection.achieved,
+        "notes": notes,
+    })
+}
+
+fn print_table(choice: &Choice) {
+    for set in &choice.selection.sets {
+        let sites: Vec<String> = set.sites.iter().map(ToString::to_string).collect();
+        match set.criterion_mm {
+            Some(mm) => println!(
+                "{} gauges, {mm:.3} mm: {}",
+                set.sites.len(),
+                sites.join(",")
+            ),
+            None => println!("{} gauges: {}", set.sites.len(), sites.join(",")),
+        }
+    }
+}
+
+fn write_sites(path: &std::path::Path, data: &Data, choice: &Choice) -> anyhow::Result<()> {
+    use std::fmt::Write as _;
+    ensure!(
+        !data.positions.is_empty(),
+        "{}: the dataset has no positions of sites (site_m) to write",
+        path.display()
+    );
+    let mut text = String::from("x_mm,y_mm,z_mm,index\n");
+    for &s in choice.selection.sets.last().iter().flat_map(|s| &s.sites) {
+        let p = data.positions[s] * 1e3;
+        let _ = writeln!(text, "{},{},{},{s}", p.x, p.y, p.z);
+    }
+    crate::io::atomic::write(path, text.as_bytes()).context("the sites could not be written")
+}

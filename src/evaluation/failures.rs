@@ -1,0 +1,216 @@
+//! What is left of a set of gauges when some of them have failed.
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::budget::{Cancelled, Watch, report};
+use crate::dataset::SignalMatrix;
+use crate::regression::tune::{Effort, distances};
+use crate::regression::{Hyper, PositionModel};
+
+/// A set with the touches to learn from and those to judge on.
+pub struct FailureTrial<'a> {
+    /// Signals of the set (gauges × touches).
+    pub train: &'a SignalMatrix,
+    pub train_targets: &'a [[f64; 3]],
+    pub test: &'a SignalMatrix,
+    pub test_targets: &'a [[f64; 3]],
+    /// Tuned for the whole set; γ grows as gauges are lost, because distances shrink.
+    pub hyper: Hyper,
+    pub effort: Effort,
+    /// Most failed gauges.
+    pub failed: usize,
+    /// Most subsets of failed gauges that are retrained for; ten times as many are tried without.
+    pub subsets: usize,
+    pub seed: u64,
+}
+
+/// Errors with a number of failed gauges (mm).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FailureRow {
+    pub failed: usize,
+    /// Whether the regression was trained anew without them; otherwise they report their mean.
+    pub retrained: bool,
+    /// Subsets tried, of all there are.
+    pub subsets: usize,
+    pub of: u64,
+    /// Mean over the subsets of the mean error, and the largest.
+    pub error_mm: f64,
+    pub worst_mm: f64,
+}
+
+/// Every subset of one to so many failed gauges: all where they are few, a seeded sample otherwise. The
+/// first row has none failed.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn failures(trial: &FailureTrial, watch: Watch) -> Result<Vec<FailureRow>, Cancelled> {
+    let gauges = trial.train.rows();
+    let whole = PositionModel::train(trial.train, trial.train_targets, &trial.hyper, trial.effort);
+    let mean = |p: &[[f64; 3]]| {
+        let d = distances(p, trial.test_targets);
+        d.iter().sum::<f64>() / d.len().max(1) as f64
+    };
+    let unharmed = mean(&whole.predict(trial.test));
+    let mut rows = vec![FailureRow {
+        failed: 0,
+        retrained: false,
+        subsets: 1,
+        of: 1,
+        error_mm: unharmed,
+        worst_mm: unharmed,
+    }];
+    for failed in 1..=trial.failed.min(gauges.saturating_sub(1)) {
+        for retrained in [false, true] {
+            let most = trial.subsets * if retrained { 1 } else { 10 };
+            let subsets = subsets(gauges, failed, most, trial.seed);
+            let errors: Result<Vec<f64>, Cancelled> = subsets
+                .par_iter()
+                .map(|lost| {
+                    report(watch, "Failing gauges", failed - 1, trial.failed)?;
+                    Ok(mean(&if retrained {
+                        trial.without(lost)
+                    } else {
+                        whole.predict_without(trial.test, lost)
+                    }))
+                })
+                .collect();
+            let errors = errors?;
+            rows.push(FailureRow {
+                failed,
+                retrained,
+                subsets: errors.len(),
+                of: binomial(gauges, failed),
+                error_mm: errors.iter().sum::<f64>() / errors.len() as f64,
+                worst_mm: errors.iter().copied().fold(0.0, f64::max),
+            });
+        }
+    }
+    Ok(rows)
+}
+
+impl FailureTrial<'_> {
+    /// Predictions of a regression that never knew the lost gauges.
+    fn without(&self, lost: &[usize]) -> Vec<[f64; 3]> {
+        let left: Vec<usize> = (0..self.train.rows())
+            .filter(|g| !lost.contains(g))
+            .collect();
+        let hyper = Hyper {
+            gamma: self.hyper.gamma * self.train.rows() as f64 / left.len() as f64,
+            ..self.hyper
+        };
+        let train = self.train.select_rows(&left);
+        let model = PositionModel::train(&train, self.train_targets, &hyper, self.effort);
+        model.predict(&self.test.select_rows(&left))
+    }
+}
+
+/// All subsets of `size` among `count`, in order, or `most` different ones drawn by the seed.
+fn subsets(count: usize, size: usize, most: usize, seed: u64) -> Vec<Vec<usize>> {
+    if binomial(count, size) <= most as u64 {
+        let mut all = vec![Vec::new()];
+        for _ in 0..size {
+            all = all
+                .into_iter()
+                .flat_map(|s: Vec<usize>| {
+                    let from = s.last().map_or(0, |l| l + 1);
+                    (from..count).map(move |next| [&s[..], &[next]].concat())
+                })
+                .collect();
+        }
+        return all;
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(size as u64));
+    let mut drawn: Vec<Vec<usize>> = Vec::new();
+    let mut places: Vec<usize> = (0..count).collect();
+    while drawn.len() < most {
+        places.shuffle(&mut rng);
+        let mut subset = places[..size].to_vec();
+        subset.sort_unstable();
+        if !drawn.contains(&subset) {
+            drawn.push(subset);
+        }
+    }
+    drawn.sort();
+    drawn
+}
+
+/// n over k; the largest number where that would be larger.
+fn binomial(n: usize, k: usize) -> u64 {
+    let mut value = 1u128;
+    for i in 0..k.min(n) {
+        value = value * (n - i) as u128 / (i + 1) as u128;
+    }
+    u64::try_from(value).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+
+    #[test]
+    fn subsets_are_all_or_a_sample_without_repeats() {
+        assert_eq!(subsets(5, 2, 10, 0).len(), 10);
+        assert_eq!(subsets(5, 2, 10, 0)[9], [3, 4]);
+        let few = subsets(10, 5, 20, 3);
+        assert_eq!(few.len(), 20);
+        assert!(few.windows(2).all(|w| w[0] < w[1]));
+        assert_eq!(few, subsets(10, 5, 20, 3));
+        assert_ne!(few, subsets(10, 5, 20, 4));
+        assert_eq!(binomial(10, 5), 252);
+    }
+
+    #[test]
+    fn a_lost_gauge_costs_most_where_nothing_replaces_it() {
+        // Gauges 0 and 1 both report x, gauge 2 alone reports y, gauge 3 alone z.
+        let point = |t: usize| {
+            let t = t as f64;
+            [(0.37 * t).sin(), (0.71 * t + 1.0).sin(), (1.3 * t).cos()]
+        };
+        let matrix = |touches: std::ops::Range<usize>| {
+            let values = [0, 0, 1, 2]
+                .into_iter()
+                .flat_map(|a| touches.clone().map(move |t| point(t)[a]))
+                .collect();
+            SignalMatrix::new(touches.len(), values)
+        };
+        let targets = |touches: std::ops::Range<usize>| -> Vec<[f64; 3]> {
+            touches.map(|t| point(t).map(|v| 10.0 * v)).collect()
+        };
+        let (train, test) = (matrix(0..200), matrix(200..260));
+        let trial = FailureTrial {
+            train: &train,
+            train_targets: &targets(0..200),
+            test: &test,
+            test_targets: &targets(200..260),
+            hyper: Hyper {
+                c: 100.0,
+                epsilon: 0.05,
+                gamma: 0.2,
+            },
+            effort: Effort {
+                tolerance: 0.01,
+                max_steps: 1_000_000,
+            },
+            failed: 2,
+            subsets: 6,
+            seed: 0,
+        };
+        let rows = failures(&trial, &unwatched).unwrap();
+        assert_eq!(rows.len(), 5);
+        assert!(rows[0].error_mm < 0.5, "{rows:?}");
+        let one = rows.iter().find(|r| r.failed == 1 && r.retrained).unwrap();
+        // Losing one of the twins costs nothing, losing y or z costs about its spread.
+        assert_eq!((one.subsets, one.of), (4, 4));
+        assert!(
+            one.worst_mm > 4.0 && one.error_mm < 0.6 * one.worst_mm,
+            "{one:?}"
+        );
+        let silent = rows.iter().find(|r| r.failed == 1 && !r.retrained).unwrap();
+        assert!(silent.error_mm > one.error_mm);
+    }
+}

@@ -1,0 +1,375 @@
+//! The paper's Gaussian process over the surface: what a gauge here says about the deformation there.
+//!
+//! k(x, x') = exp(-(d / l)^p) with the distance d over the surface, and β⁻¹ added to the variance of what
+//! is measured. On a curved or slotted surface, or for p near two, this need not be a covariance: the
+//! spectrum is looked at, and what is negative is clipped and said.
+
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::budget::{Cancelled, Watch, report};
+use crate::dataset::SignalMatrix;
+use crate::pca::gram;
+
+/// Parameters of the kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GpKernel {
+    /// l (m).
+    pub length_m: f64,
+    /// p.
+    pub power: f64,
+    /// β⁻¹, in units of the variance of the field.
+    pub noise: f64,
+}
+
+impl Default for GpKernel {
+    /// The paper's.
+    fn default() -> Self {
+        Self {
+            length_m: 0.033,
+            power: 1.9,
+            noise: 1e-3,
+        }
+    }
+}
+
+impl GpKernel {
+    /// k at a distance (m).
+    #[must_use]
+    pub fn at(&self, distance: f64) -> f64 {
+        if distance.is_finite() {
+            (-(distance / self.length_m).powf(self.power)).exp()
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Symmetric distances between all locations (m), by rows; infinite between separate pieces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distances {
+    count: usize,
+    values: Vec<f64>,
+    /// How they were measured, for people.
+    pub kind: &'static str,
+}
+
+impl Distances {
+    /// From any measure; the two directions are averaged.
+    #[must_use]
+    pub fn new(count: usize, kind: &'static str, measured: &[f64]) -> Self {
+        let mean = |i: usize, j: usize| 0.5 * (measured[i * count + j] + measured[j * count + i]);
+        let values = (0..count)
+            .flat_map(|i| (0..count).map(move |j| (i, j)))
+            .map(|(i, j)| if i == j { 0.0 } else { mean(i, j) })
+            .collect();
+        Self {
+            count,
+            values,
+            kind,
+        }
+    }
+
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    #[must_use]
+    pub fn at(&self, i: usize, j: usize) -> f64 {
+        self.values[i * self.count + j]
+    }
+
+    /// Locations nearer than `within` (m) to one of lower number.
+    #[must_use]
+    pub fn coinciding(&self, within: f64) -> usize {
+        (0..self.count)
+            .filter(|&i| (0..i).any(|j| self.at(i, j) < within))
+            .count()
+    }
+}
+
+/// A covariance between locations that has no negative part.
+#[derive(Clone, Debug)]
+pub struct Covariance {
+    /// Without β⁻¹.
+    pub k: Mat<f64>,
+    pub noise: f64,
+    /// Share of the spectrum that was negative and set to zero.
+    pub clipped: f64,
+}
+
+/// A negative part below this is rounding.
+const ROUNDING: f64 = 1e-9;
+
+impl Covariance {
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn new(distances: &Distances, kernel: &GpKernel, watch: Watch) -> Result<Self, Cancelled> {
+        report(watch, STAGE, 0, 3)?;
+        let n = distances.count();
+        let mut values = vec![0.0; n * n];
+        values
+            .par_chunks_exact_mut(n.max(1))
+            .enumerate()
+            .for_each(|(i, row)| {
+                for (j, v) in row.iter_mut().enumerate() {
+                    *v = kernel.at(distances.at(i, j));
+                }
+            });
+        let k = Mat::from_fn(n, n, |i, j| values[i * n + j]);
+        report(watch, STAGE, 1, 3)?;
+        let noise = kernel.noise.max(0.0);
+        // A factor is thirty times cheaper than a spectrum, and there is one if nothing is negative.
+        let mut shifted = k.clone();
+        for i in 0..n {
+            shifted[(i, i)] += ROUNDING * n as f64;
+        }
+        if shifted.llt(Side::Lower).is_ok() {
+            return Ok(Self {
+                k,
+                noise,
+                clipped: 0.0,
+            });
+        }
+        report(watch, STAGE, 2, 3)?;
+        Ok(Self::clip(k, noise))
+    }
+
+    fn clip(k: Mat<f64>, noise: f64) -> Self {
+        let n = k.nrows();
+        let Ok(eigen) = k.self_adjoint_eigen(Side::Lower) else {
+            return Self {
+                k,
+                noise,
+                clipped: f64::NAN,
+            };
+        };
+        let values: Vec<f64> = (0..n).map(|i| eigen.S().column_vector()[i]).collect();
+        let negative: Vec<usize> = (0..n).filter(|&i| values[i] < 0.0).collect();
+        let all: f64 = values.iter().map(|v| v.abs()).sum();
+        let clipped = negative.iter().map(|&i| -values[i]).sum::<f64>() / all;
+        // Adding back what is negative is cheaper than building the rest anew.
+        let part = Mat::from_fn(n, negative.len(), |i, c| {
+            eigen.U()[(i, negative[c])] * (-values[negative[c]]).sqrt()
+        });
+        let k = &k + &part * part.transpose();
+        Self { k, noise, clipped }
+    }
+
+    /// What must be known before trusting choices made with it.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        if self.clipped > 0.0 || self.clipped.is_nan() {
+            vec![format!(
+                "The kernel is no covariance on this surface: {:.2} % of its spectrum was negative and was set to zero. A smaller power gives a sounder model.",
+                100.0 * self.clipped
+            )]
+        } else {
+            Vec::new()
+        }
+    }
+}
+
+const STAGE: &str = "Covariance of the sites";
+
+/// One point of the search: the kernel and the rms error of predicting sites left out, as a share of the
+/// signals' own rms about their mean over the sites.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GpTrial {
+    pub kernel: GpKernel,
+    pub error: f64,
+}
+
+/// Parameters that the search looks at.
+pub const LENGTHS_M: [f64; 9] = [0.004, 0.007, 0.012, 0.018, 0.025, 0.033, 0.045, 0.065, 0.1];
+pub const POWERS: [f64; 6] = [0.8, 1.0, 1.3, 1.6, 1.9, 2.0];
+/// Most sites that the search uses.
+const SEARCHED: usize = 500;
+
+/// Cross-validated grid search: parts of the sites are left out and predicted from the others under every
+/// touch (signals standardized over all). Returns the map, by rising length and power.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn search(
+    x: &SignalMatrix,
+    distances: &Distances,
+    noise: f64,
+    watch: Watch,
+) -> Result<Vec<GpTrial>, Cancelled> {
+    /// Every how manyth site is left out at once.
+    const FOLDS: usize = 5;
+    let used: Vec<usize> = crate::regression::folds::evenly(x.rows(), SEARCHED);
+    let scale = x.values().iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let signals = x.select_rows(&used);
+    let gram = gram(&signals.scaled(if scale > 0.0 { scale.recip() } else { 1.0 }));
+    let grid: Vec<GpKernel> = LENGTHS_M
+        .iter()
+        .flat_map(|&length_m| {
+            POWERS.map(|power| GpKernel {
+                length_m,
+                power,
+                noise,
+            })
+        })
+        .collect();
+    grid.par_iter()
+        .map(|kernel| {
+            report(watch, "Fitting the Gaussian process", 0, 1)?;
+            let (mut wrong, mut all) = (0.0, 0.0);
+            for fold in 0..FOLDS {
+                let (test, train): (Vec<usize>, Vec<usize>) =
+                    (0..used.len()).partition(|i| i % FOLDS == fold);
+                let (w, a) = prediction_error(&gram, distances, &used, kernel, &train, &test);
+                wrong += w;
+                all += a;
+            }
+            Ok(GpTrial {
+                kernel: *kernel,
+                error: (wrong / all).sqrt(),
+            })
+        })
+        .collect()
+}
+
+/// The kernel with the smallest error.
+#[must_use]
+pub fn best(trials: &[GpTrial]) -> Option<GpKernel> {
+    trials
+        .iter()
+        .filter(|t| t.error.is_finite())
+        .min_by(|a, b| a.error.total_cmp(&b.error))
+        .map(|t| t.kernel)
+}
+
+/// Squared errors of predicting the test sites from the training sites over all touches, and the squares
+/// of the test signals about the training mean. Only products of signals are needed: with weights W
+/// (test × train) the prediction is μ + W (x - μ), μ the mean over the training sites.
+fn prediction_error(
+    gram: &Mat<f64>,
+    distances: &Distances,
+    used: &[usize],
+    kernel: &GpKernel,
+    train: &[usize],
+    test: &[usize],
+) -> (f64, f64) {
+    let (n, m) = (train.len(), test.len());
+    let k = |a: usize, b: usize| kernel.at(distances.at(used[a], used[b]));
+    // Where the kernel is no covariance the noise may be too little: such a kernel has no error.
+    let own = Mat::from_fn(n, n, |i, j| {
+        k(train[i], train[j])
+            + if i == j {
+                kernel.noise.max(ROUNDING)
+            } else {
+                0.0
+            }
+    });
+    let cross = Mat::from_fn(n, m, |i, j| k(train[i], test[j]));
+    let Ok(factor) = own.llt(Side::Lower) else {
+        return (f64::NAN, 1.0);
+    };
+    let weights = factor.solve(&cross);
+    // Prediction as a linear map of the training signals, the mean included.
+    let map = Mat::from_fn(n, m, |i, j| {
+        let rest: f64 = 1.0 - (0..n).map(|r| weights[(r, j)]).sum::<f64>();
+        weights[(i, j)] + rest / n as f64
+    });
+    let inner = Mat::from_fn(n, n, |i, j| gram[(train[i], train[j])]);
+    let outer = Mat::from_fn(n, m, |i, j| gram[(train[i], test[j])]);
+    let spread = &inner * &map;
+    let mean_square = (0..n)
+        .map(|i| (0..n).map(|j| inner[(i, j)]).sum::<f64>())
+        .sum::<f64>()
+        / (n * n) as f64;
+    let (mut wrong, mut all) = (0.0, 0.0);
+    for j in 0..m {
+        let own = gram[(test[j], test[j])];
+        let mut error = own;
+        let mut with_mean = 0.0;
+        for i in 0..n {
+            error += map[(i, j)] * (spread[(i, j)] - 2.0 * outer[(i, j)]);
+            with_mean += outer[(i, j)] / n as f64;
+        }
+        wrong += error.max(0.0);
+        all += own - 2.0 * with_mean + mean_square;
+    }
+    (wrong, all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+
+    fn line(n: usize, step: f64) -> Distances {
+        let d: Vec<f64> = (0..n)
+            .flat_map(|i| (0..n).map(move |j| (i as f64 - j as f64).abs() * step))
+            .collect();
+        Distances::new(n, "along a line", &d)
+    }
+
+    #[test]
+    fn a_covariance_on_a_line_is_left_alone_and_one_on_a_ring_is_clipped() {
+        let kernel = GpKernel::default();
+        let straight = Covariance::new(&line(60, 0.004), &kernel, &unwatched).unwrap();
+        assert_eq!(straight.clipped, 0.0);
+        // Distances around a ring with p = 2 are the known counterexample.
+        let n = 60;
+        let d: Vec<f64> = (0..n)
+            .flat_map(|i: i32| (0..n).map(move |j: i32| (i - j).abs().min(n - (i - j).abs())))
+            .map(|k| f64::from(k) * 0.004)
+            .collect();
+        let wide = GpKernel {
+            length_m: 0.1,
+            power: 2.0,
+            ..kernel
+        };
+        let ring = Distances::new(n as usize, "around a ring", &d);
+        let clipped = Covariance::new(&ring, &wide, &unwatched).unwrap();
+        assert!(
+            clipped.clipped > 1e-4 && clipped.clipped < 0.5,
+            "{}",
+            clipped.clipped
+        );
+        assert!(!clipped.notes().is_empty());
+        let least = clipped.k.self_adjoint_eigen(Side::Lower).unwrap();
+        assert!((0..n as usize).all(|i| least.S().column_vector()[i] > -1e-12));
+    }
+
+    #[test]
+    fn the_search_finds_the_scale_of_the_field() {
+        // Sums of waves whose correlation over the line falls with a length of 12 mm.
+        let n = 80;
+        let field = |i: usize, t: usize| {
+            (0..40)
+                .map(|k| {
+                    let w = f64::from(k) * 4.0;
+                    let amplitude = (-(w * 0.012f64).powi(2) / 8.0).exp();
+                    let phase = (t * 71 + k as usize * 131) as f64;
+                    amplitude * (w * i as f64 * 0.004 + phase).cos()
+                })
+                .sum::<f64>()
+        };
+        let values = (0..n)
+            .flat_map(|i| (0..300).map(move |t| field(i, t)))
+            .collect();
+        let x = SignalMatrix::new(300, values);
+        let map = search(&x, &line(n, 0.004), 1e-6, &unwatched).unwrap();
+        assert_eq!(map.len(), LENGTHS_M.len() * POWERS.len());
+        let found = best(&map).unwrap();
+        assert!(
+            found.power >= 1.9 && (0.007..=0.045).contains(&found.length_m),
+            "{found:?}"
+        );
+        let error = |length: f64| {
+            map.iter()
+                .find(|t| t.kernel.length_m == length && t.kernel.power == 1.9)
+                .unwrap()
+                .error
+        };
+        assert!(error(0.004) > 1.5 * error(found.length_m));
+    }
+}

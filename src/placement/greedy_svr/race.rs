@@ -1,0 +1,182 @@
+//! Which candidates go from a cheap score to a dearer one.
+
+use crate::budget::Cancelled;
+
+/// A candidate with its score (mm, smaller is better).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scored {
+    pub place: usize,
+    pub error: f64,
+}
+
+/// How two scores of the same candidates relate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Relation {
+    /// Median of the dearer over the cheaper.
+    pub ratio: f64,
+    /// Largest departure from that, as a share.
+    pub deviation: f64,
+}
+
+impl Relation {
+    fn of(pairs: &[(f64, f64)]) -> Self {
+        let mut ratios: Vec<f64> = pairs
+            .iter()
+            .map(|(cheap, dear)| dear / cheap)
+            .filter(|r| r.is_finite())
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        let Some(&ratio) = ratios.get(ratios.len() / 2) else {
+            return Self {
+                ratio: 1.0,
+                deviation: 1.0,
+            };
+        };
+        let deviation = ratios
+            .iter()
+            .map(|r| (r / ratio - 1.0).abs())
+            .fold(0.0, f64::max);
+        Self { ratio, deviation }
+    }
+
+    /// The least that the dearer score may be where the cheaper one is `error`.
+    #[must_use]
+    pub fn least(&self, error: f64) -> f64 {
+        /// Those not looked at may depart further than those that were.
+        const WIDEN: f64 = 1.5;
+        error * self.ratio * (1.0 - WIDEN * self.deviation).max(0.0)
+    }
+}
+
+/// How a race between two scores is run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rules {
+    /// The fewest candidates that are scored: a relation known from one candidate is none.
+    pub least: usize,
+    /// Candidates scored at once after those.
+    pub batch: usize,
+    /// Of each batch, how many are taken from the middle of the rest: so that the relation is known for
+    /// others than the best.
+    pub audits: usize,
+    /// The relation departs at least this much: what was seen in the step before, halved.
+    pub least_deviation: f64,
+    /// Candidates within this share of the best go on even if they cannot be better by this score: what
+    /// later scores may still change.
+    pub slack: f64,
+}
+
+/// The outcome of a race.
+pub struct Raced {
+    /// By the dearer score, in the order they were scored.
+    pub scored: Vec<Scored>,
+    /// Those left behind, by the cheaper score.
+    pub rest: Vec<Scored>,
+    pub relation: Relation,
+}
+
+/// Scores candidates again, the most promising first, until none that is left can be among the best:
+/// not even if its cheap score departs from the dear one half as much again as was seen so far.
+/// `worth` says how much a place with a score counts (more is better).
+///
+/// # Errors
+/// [`Cancelled`] from the scores.
+pub fn race(
+    cheap: &[Scored],
+    rules: &Rules,
+    worth: &dyn Fn(Scored) -> f64,
+    mut score: impl FnMut(&[usize]) -> Result<Vec<f64>, Cancelled>,
+) -> Result<Raced, Cancelled> {
+    let mut rest = cheap.to_vec();
+    rest.sort_by(|a, b| worth(*b).total_cmp(&worth(*a)).then(a.place.cmp(&b.place)));
+    let mut scored: Vec<Scored> = Vec::new();
+    let mut pairs = Vec::new();
+    let mut relation = Relation::default();
+    while !rest.is_empty() {
+        let mut batch: Vec<Scored> = Vec::new();
+        let size = if scored.is_empty() {
+            rules.least
+        } else {
+            rules.batch
+        };
+        for k in 0..size.min(rest.len()) {
+            let at = if k < rules.audits { rest.len() / 2 } else { 0 };
+            batch.push(rest.remove(at));
+        }
+        let places: Vec<usize> = batch.iter().map(|b| b.place).collect();
+        for (before, error) in batch.iter().zip(score(&places)?) {
+            pairs.push((before.error, error));
+            scored.push(Scored {
+                place: before.place,
+                error,
+            });
+        }
+        relation = Relation::of(&pairs);
+        relation.deviation = relation.deviation.max(rules.least_deviation);
+        let best = scored
+            .iter()
+            .map(|&s| {
+                worth(Scored {
+                    error: s.error * (1.0 + rules.slack),
+                    ..s
+                })
+            })
+            .fold(f64::NEG_INFINITY, f64::max);
+        let hopeful = |s: &Scored| {
+            worth(Scored {
+                error: relation.least(s.error),
+                ..*s
+            }) > best
+        };
+        if !rest.iter().any(hopeful) {
+            break;
+        }
+    }
+    Ok(Raced {
+        scored,
+        rest,
+        relation,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cheap score that departs by up to `noise` from the true one, the best candidate at its worst.
+    fn run(noise: f64) -> (usize, usize) {
+        let truth = |p: usize| 10.0 + 0.01 * p as f64;
+        let departs = |p: usize| 1.0 + noise * if p == 0 { 1.0 } else { (p as f64 * 1.7).sin() };
+        let cheap: Vec<Scored> = (0..400)
+            .map(|place| Scored {
+                place,
+                error: truth(place) * departs(place),
+            })
+            .collect();
+        let rules = Rules {
+            least: 8,
+            batch: 8,
+            audits: 2,
+            least_deviation: 0.0,
+            slack: 0.0,
+        };
+        let raced = race(&cheap, &rules, &|s| -s.error, |places| {
+            Ok(places.iter().map(|&p| truth(p)).collect())
+        })
+        .unwrap();
+        let best = raced
+            .scored
+            .iter()
+            .min_by(|a, b| a.error.total_cmp(&b.error))
+            .unwrap();
+        (best.place, raced.scored.len())
+    }
+
+    #[test]
+    fn a_race_widens_as_far_as_the_cheap_score_departs() {
+        let (exact, few) = run(0.0);
+        let (near, more) = run(0.01);
+        let (rough, most) = run(0.1);
+        assert_eq!([exact, near, rough], [0, 0, 0]);
+        assert!(few <= 8 && few < more && more < most, "{few} {more} {most}");
+    }
+}

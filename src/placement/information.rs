@@ -1,0 +1,161 @@
+//! What entropy and mutual information share: the geometry they know, and what is uncertain given some
+//! measurements.
+
+use serde::Serialize;
+
+use super::wishes::Field;
+use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet};
+use crate::budget::{Achieved, StopReason, Work};
+use crate::gaussian_process::{Covariance, GpKernel, GpTrial};
+
+/// A Gaussian process over locations on the surface; the pool's sites come first, then those where no
+/// gauge can go.
+pub struct Geometry {
+    pub covariance: Covariance,
+    pub kernel: GpKernel,
+    /// How distances were measured, for people.
+    pub distance: &'static str,
+    /// Locations at the place of another.
+    pub coinciding: usize,
+    /// The search that the kernel came from; empty where it was given.
+    pub map: Vec<GpTrial>,
+}
+
+/// The parts of a geometry that go into reports.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GeometrySummary {
+    pub kernel: GpKernel,
+    pub distance: &'static str,
+    pub clipped: f64,
+    pub map: Vec<GpTrial>,
+}
+
+impl Geometry {
+    #[must_use]
+    pub fn summary(&self) -> GeometrySummary {
+        GeometrySummary {
+            kernel: self.kernel,
+            distance: self.distance,
+            clipped: self.covariance.clipped,
+            map: self.map.clone(),
+        }
+    }
+
+    /// Nothing chosen, with the wishes checked.
+    pub(super) fn field<'a>(
+        &self,
+        pool: &'a Pool<'a>,
+        request: &'a Request<'a>,
+        name: &'static str,
+    ) -> Result<Field<'a>, PlacementError> {
+        if request.wishes.failure > 0.0 {
+            return Err(PlacementError::Refused {
+                selector: name,
+                why: "it knows the geometry only and no error that a lost gauge would raise; use greedy SVR to expect failures",
+            });
+        }
+        if pool.sites.len() > self.covariance.k.nrows() {
+            return Err(PlacementError::Wish {
+                what: "the geometry does not know all sites",
+            });
+        }
+        Field::new(pool, request.wishes)
+    }
+}
+
+/// Variances of all locations given what was measured: a partial Cholesky factor, a column a measurement.
+pub(super) struct Conditional<'a> {
+    covariance: &'a Covariance,
+    columns: Vec<Vec<f64>>,
+    variances: Vec<f64>,
+}
+
+impl<'a> Conditional<'a> {
+    pub fn nothing(covariance: &'a Covariance) -> Self {
+        let n = covariance.k.nrows();
+        Self {
+            covariance,
+            columns: Vec::new(),
+            variances: (0..n).map(|i| covariance.k[(i, i)]).collect(),
+        }
+    }
+
+    /// σ² of the field at a place, without noise.
+    pub fn variance(&self, place: usize) -> f64 {
+        self.variances[place].max(0.0)
+    }
+
+    /// Whether more than rounding is left to learn at a place.
+    pub fn uncertain(&self, place: usize) -> bool {
+        const PIVOT: f64 = 1e-10;
+        self.variances[place] > PIVOT
+    }
+
+    /// Takes a noisy measurement at a place into account.
+    pub fn observe(&mut self, place: usize) {
+        let pivot = (self.variance(place) + self.covariance.noise).sqrt();
+        if pivot == 0.0 {
+            return;
+        }
+        let mut column: Vec<f64> = (0..self.variances.len())
+            .map(|i| self.covariance.k[(i, place)])
+            .collect();
+        for known in &self.columns {
+            let share = known[place];
+            for (c, k) in column.iter_mut().zip(known) {
+                *c -= share * k;
+            }
+        }
+        for (c, v) in column.iter_mut().zip(&mut self.variances) {
+            *c /= pivot;
+            *v -= *c * *c;
+        }
+        self.columns.push(column);
+    }
+}
+
+/// The selection from its sets, with what must be known of it.
+pub(super) fn finish(
+    selector: SelectorKind,
+    criterion_unit: &'static str,
+    pool: &Pool,
+    request: &Request,
+    geometry: &Geometry,
+    sets: Vec<SensorSet>,
+) -> Result<Selection, PlacementError> {
+    if sets.is_empty() {
+        return Err(PlacementError::NoSites);
+    }
+    let wanted = request.wishes.sensors;
+    let short = sets.len() < wanted;
+    let mut notes = geometry.covariance.notes();
+    if geometry.coinciding > 0 {
+        notes.push(format!(
+            "{} sites lie at the place of another: of such sites only one is ever chosen.",
+            geometry.coinciding
+        ));
+    }
+    if short {
+        notes.push(format!(
+            "Only {} of {wanted} gauges: beyond them nothing uncertain is left that wishes allow.",
+            sets.len()
+        ));
+    }
+    Ok(Selection {
+        selector,
+        criterion_unit,
+        pool: pool.sites.len(),
+        achieved: Achieved {
+            error_estimate: None,
+            unit: "",
+            effort: Work::default(),
+            stop_reason: if short {
+                StopReason::Exhausted
+            } else {
+                StopReason::Converged
+            },
+            notes,
+        },
+        sets,
+    })
+}

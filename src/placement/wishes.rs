@@ -1,0 +1,175 @@
+//! What is asked of a choice beside its number of gauges, the same for every selector.
+
+use super::{PlacementError, Pool};
+
+/// Wishes; the default asks for nothing but the count.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wishes {
+    /// Most gauges.
+    pub sensors: usize,
+    /// Places in the pool that must be chosen, before all others: what is glued already.
+    pub required: Vec<usize>,
+    /// Least distance between two gauges (m), as the crow flies. Several gauges at the very same
+    /// position (directions of a rosette) count as one.
+    pub spacing: f64,
+    /// Cost of each place in the pool; all the same when absent.
+    pub costs: Option<Vec<f64>>,
+    /// What all gauges together may cost.
+    pub budget: Option<f64>,
+    /// Cross-validated error (mm) at which no more gauges are added.
+    pub target_mm: Option<f64>,
+    /// Probability that one of the gauges has failed when it is needed.
+    pub failure: f64,
+}
+
+impl Wishes {
+    #[must_use]
+    pub fn count(sensors: usize) -> Self {
+        Self {
+            sensors,
+            ..Self::default()
+        }
+    }
+}
+
+/// Which places may still be chosen, as the choice grows.
+#[derive(Clone)]
+pub struct Field<'a> {
+    pool: &'a Pool<'a>,
+    wishes: &'a Wishes,
+    /// In the order they were chosen.
+    pub chosen: Vec<usize>,
+    open: Vec<bool>,
+    spent: f64,
+}
+
+impl<'a> Field<'a> {
+    /// Nothing chosen yet.
+    ///
+    /// # Errors
+    /// [`PlacementError`] for wishes that cannot be met.
+    pub fn new(pool: &'a Pool<'a>, wishes: &'a Wishes) -> Result<Self, PlacementError> {
+        let available = pool.sites.len();
+        if available == 0 {
+            return Err(PlacementError::NoSites);
+        }
+        let wanted = wishes.sensors.max(wishes.required.len());
+        if wanted > available {
+            return Err(PlacementError::TooFewSites { wanted, available });
+        }
+        let mut field = Self {
+            pool,
+            wishes,
+            chosen: Vec::new(),
+            open: vec![true; available],
+            spent: 0.0,
+        };
+        field.check()?;
+        field.chosen.clear();
+        field.open = vec![true; available];
+        field.spent = 0.0;
+        Ok(field)
+    }
+
+    fn check(&mut self) -> Result<(), PlacementError> {
+        let wishes = self.wishes;
+        let bad = |what: &'static str| Err(PlacementError::Wish { what });
+        if wishes.sensors < wishes.required.len() {
+            return bad(
+                "more gauges must be there than are to be placed in all: raise their number",
+            );
+        }
+        if wishes.costs.as_ref().is_some_and(|c| {
+            c.len() != self.open.len() || c.iter().any(|c| !c.is_finite() || *c <= 0.0)
+        }) {
+            return bad("every site's cost must be a number above zero");
+        }
+        if !(0.0..=1.0).contains(&wishes.failure) {
+            return bad("the probability of a failure must lie between 0 and 1");
+        }
+        if self.pool.positions.is_empty() && wishes.spacing > 0.0 {
+            return bad("a spacing needs the positions of the sites (site_m)");
+        }
+        for &place in &wishes.required {
+            if place >= self.open.len() {
+                return bad("a gauge that must be there is not among the sites");
+            }
+            if !self.open[place] {
+                return bad(
+                    "two gauges that must be there are the same or nearer than the spacing: lower it or drop one",
+                );
+            }
+            if !self.affordable(place) {
+                return bad("the gauges that must be there cost more than the budget");
+            }
+            self.add(place);
+        }
+        Ok(())
+    }
+
+    /// Whether enough was chosen.
+    #[must_use]
+    pub fn full(&self) -> bool {
+        self.chosen.len() >= self.wishes.sensors
+    }
+
+    /// Whether something may be chosen; the next that must be, alone, while there is one.
+    #[must_use]
+    pub fn open(&self) -> Vec<usize> {
+        if let Some(&next) = self.wishes.required.get(self.chosen.len()) {
+            return vec![next];
+        }
+        (0..self.open.len())
+            .filter(|&p| self.open[p] && self.affordable(p))
+            .collect()
+    }
+
+    /// Whether this place is the next that must be chosen.
+    #[must_use]
+    pub fn is_required(&self, place: usize) -> bool {
+        self.wishes.required.get(self.chosen.len()) == Some(&place)
+    }
+
+    fn affordable(&self, place: usize) -> bool {
+        /// Sums of costs round.
+        const ROUNDING: f64 = 1e-12;
+        let budget = self.wishes.budget.unwrap_or(f64::INFINITY);
+        self.spent + self.cost(place) <= budget * (1.0 + ROUNDING)
+    }
+
+    #[must_use]
+    pub fn cost(&self, place: usize) -> f64 {
+        self.wishes.costs.as_ref().map_or(1.0, |c| c[place])
+    }
+
+    /// A gain as it counts: by what it costs.
+    #[must_use]
+    pub fn worth(&self, place: usize, gain: f64) -> f64 {
+        let cost = self.cost(place);
+        if gain >= 0.0 {
+            gain / cost
+        } else {
+            gain * cost
+        }
+    }
+
+    /// Takes a place, and closes those too near to it.
+    pub fn add(&mut self, place: usize) {
+        self.spent += self.cost(place);
+        self.chosen.push(place);
+        self.open[place] = false;
+        if self.wishes.spacing > 0.0 {
+            let here = self.pool.positions[place];
+            for (open, p) in self.open.iter_mut().zip(self.pool.positions) {
+                let apart = p.distance(here);
+                *open &= apart >= self.wishes.spacing || apart == 0.0;
+            }
+        }
+    }
+
+    /// The choice as numbered in the dataset.
+    #[must_use]
+    pub fn sites(&self) -> Vec<usize> {
+        self.chosen.iter().map(|&p| self.pool.sites[p]).collect()
+    }
+}
