@@ -220,7 +220,9 @@ fn trade(text: &mut String) {
         .collect();
     let read = |model: &ShellModel, touches: &[Touch]| {
         Signal::ALL.map(|signal| {
-            dataset::measure(model, touches, &chosen, signal, &unwatched).expect("nobody cancels")
+            dataset::measure(model, touches, &chosen, signal, &unwatched)
+                .expect("nobody cancels")
+                .0
         })
     };
     let truth = ground

@@ -239,7 +239,7 @@ pub fn simulate(
 }
 
 /// Reads the signal of given sites, with their directions as they are, under given touches: what a
-/// finer model says of a design made on a coarser one.
+/// finer model says of a design made on a coarser one. Also how many right-hand sides that took.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
@@ -249,7 +249,7 @@ pub fn measure(
     sites: &[Site],
     signal: Signal,
     watch: Watch,
-) -> Result<SignalMatrix, Cancelled> {
+) -> Result<(SignalMatrix, usize), Cancelled> {
     let points: Vec<SurfacePoint> = sites
         .iter()
         .map(|s| model.index.nearest(s.position).0)
@@ -277,7 +277,7 @@ pub fn measure(
         }
         read_displacement(signal, observer.frames()[i].z_axis, &rows, into);
     }
-    Ok(SignalMatrix::new(touches.len(), values))
+    Ok((SignalMatrix::new(touches.len(), values), responses.solves))
 }
 
 /// The displacement signal from its three components by rows.

@@ -116,14 +116,13 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
 }
 
 fn say(set: &SensorSet) {
-    let site = set.sites.last().copied().unwrap_or(0);
-    match (set.criterion_mm, set.gap) {
-        (Some(mm), Some(gap)) => eprintln!(
+    // The others choose in a blink, and PCA-QR chooses anew for each number.
+    if let (Some(site), Some(mm), Some(gap)) = (set.sites.last(), set.criterion_mm, set.gap) {
+        eprintln!(
             "{:>3}: site {site}, {mm:.3} mm (a better one could be better by {:.2} %)",
             set.sites.len(),
             100.0 * gap
-        ),
-        _ => eprintln!("{:>3}: site {site}", set.sites.len()),
+        );
     }
 }
 
