@@ -573,12 +573,13 @@ pub fn reduce_sites(
         .into());
     }
     let x = simulated.dataset.x.select_rows(&feasible);
-    let pca = Pca::new(&x, watch).map_err(PlacementError::from)?;
+    let scored = budget.selection_candidates.max(sensors);
+    let pca = Pca::new(&x, scored, watch).map_err(PlacementError::from)?;
     let limit = budget.candidates.max(sensors);
     let mut candidates = reduce(&x, inputs.project.reduction(), limit, watch)?;
     if candidates.rows.len() < sensors {
         // The variance asked for needs fewer sites than there are gauges to place.
-        candidates.rows = pca.pivots(sensors.min(pca.rank()));
+        candidates.rows = pca.pivots(sensors.min(pca.reach()));
         candidates.notes.push(format!(
             "Kept {} candidates, one a gauge: the variance asked for needs fewer.",
             candidates.rows.len()

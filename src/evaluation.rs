@@ -2,6 +2,8 @@
 
 pub mod failures;
 
+use std::borrow::Cow;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -171,14 +173,14 @@ fn fail(
 }
 
 /// The trial's signals with noise, the same noise for a site in every set it is part of.
-struct Noisy {
-    train: SignalMatrix,
-    test: SignalMatrix,
-    workshop: SignalMatrix,
+struct Noisy<'a> {
+    train: Cow<'a, SignalMatrix>,
+    test: Cow<'a, SignalMatrix>,
+    workshop: Cow<'a, SignalMatrix>,
 }
 
-impl Noisy {
-    fn new(trial: &Trial) -> Self {
+impl<'a> Noisy<'a> {
+    fn new(trial: &Trial<'a>) -> Self {
         let noise = if trial.signal == Signal::Strain {
             trial.noise
         } else {
@@ -194,9 +196,9 @@ impl Noisy {
 
 /// Adds Gaussian noise of a standard deviation; every site has a stream of its own.
 #[must_use]
-pub fn add_noise(x: &SignalMatrix, deviation: f64, seed: u64) -> SignalMatrix {
+pub fn add_noise(x: &SignalMatrix, deviation: f64, seed: u64) -> Cow<'_, SignalMatrix> {
     if deviation == 0.0 {
-        return x.clone();
+        return Cow::Borrowed(x);
     }
     let values = (0..x.rows())
         .flat_map(|row| {
@@ -208,7 +210,7 @@ pub fn add_noise(x: &SignalMatrix, deviation: f64, seed: u64) -> SignalMatrix {
                 .collect::<Vec<_>>()
         })
         .collect();
-    SignalMatrix::new(x.columns(), values)
+    Cow::Owned(SignalMatrix::new(x.columns(), values))
 }
 
 /// Standard normal, by Box and Muller.

@@ -8,6 +8,7 @@ pub mod cli;
 pub mod dataset;
 pub mod design;
 pub mod document;
+mod eigen;
 pub mod elasticity;
 pub mod evaluation;
 pub mod feasible;

@@ -4,16 +4,15 @@
 //! Algorithm 2: for each number of sensors the QR runs on as many components.
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::Solve;
-use faer::{Accum, Mat, MatRef, Par, Side};
+use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
+use crate::eigen;
 use crate::lanes::wide;
 use crate::regression::Standardizer;
-
-/// Eigenvalues below this share of the largest are rounding: the numerical rank ends there.
-const RANK: f64 = 1e-12;
 
 /// Why there are no components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -28,69 +27,90 @@ pub enum PcaError {
     Cancelled(#[from] Cancelled),
 }
 
+/// Standardized signals and their products: what components are computed from, as many as are asked for.
+pub struct Spectrum {
+    signals: SignalMatrix,
+    /// Sites × sites or touches × touches, whichever is smaller: the two share their eigenvalues.
+    gram: Mat<f64>,
+}
+
+impl Spectrum {
+    /// Of signals (sites × touches), standardized here.
+    ///
+    /// # Errors
+    /// [`PcaError`] for signals without variance.
+    pub fn new(x: &SignalMatrix, watch: Watch) -> Result<Self, PcaError> {
+        report(watch, "Principal components", 0, 2)?;
+        let signals = Standardizer::of(x).apply(x);
+        let (sites, touches) = (signals.rows(), signals.columns());
+        let matrix = MatRef::from_row_major_slice(signals.values(), sites, touches);
+        let gram = if sites <= touches {
+            product(matrix)
+        } else {
+            product(matrix.transpose())
+        };
+        let trace: f64 = (0..gram.nrows()).map(|i| gram[(i, i)]).sum();
+        if trace.is_nan() || trace <= 0.0 {
+            return Err(PcaError::Constant);
+        }
+        Ok(Self { signals, gram })
+    }
+
+    /// The first `count` components, or all up to the numerical rank where there are no more.
+    ///
+    /// # Errors
+    /// [`PcaError`] where they do not converge.
+    pub fn components(&self, count: usize, watch: Watch) -> Result<Pca, PcaError> {
+        report(watch, "Principal components", 1, 2)?;
+        let found = eigen::leading(self.gram.as_ref(), count).ok_or(PcaError::NoConvergence)?;
+        let (sites, touches) = (self.signals.rows(), self.signals.columns());
+        let modes = if sites <= touches {
+            found.vectors
+        } else {
+            let matrix = MatRef::from_row_major_slice(self.signals.values(), sites, touches);
+            let modes = matrix * &found.vectors;
+            Mat::from_fn(sites, found.values.len(), |i, k| {
+                modes[(i, k)] / found.values[k].sqrt()
+            })
+        };
+        report(watch, "Principal components", 2, 2)?;
+        let share = |v: f64| v / touches as f64;
+        Ok(Pca {
+            modes,
+            variances: found.values.into_iter().map(share).collect(),
+            complete: found.complete,
+            total: share((0..self.gram.nrows()).map(|i| self.gram[(i, i)]).sum()),
+            sites,
+        })
+    }
+}
+
 /// Principal components of standardized signals.
 pub struct Pca {
     /// Sites × components, by falling variance.
     modes: Mat<f64>,
     /// Variance of each component, in units of one site's.
     pub variances: Vec<f64>,
+    /// The same of all components together, known or not.
+    pub total: f64,
+    /// No further component carries more than rounding.
+    pub complete: bool,
     sites: usize,
 }
 
 impl Pca {
-    /// Components of signals (sites × touches), standardized here, up to the numerical rank.
+    /// At least the first `count` components of signals (sites × touches), or all up to the numerical
+    /// rank where there are no more.
     ///
     /// # Errors
     /// [`PcaError`] for signals without variance.
-    pub fn new(x: &SignalMatrix, watch: Watch) -> Result<Self, PcaError> {
-        report(watch, "Principal components", 0, 2)?;
-        let z = Standardizer::of(x).apply(x);
-        let (sites, touches) = (z.rows(), z.columns());
-        let matrix = MatRef::from_row_major_slice(z.values(), sites, touches);
-        // The smaller of the two Gram matrices has the same spectrum.
-        let by_sites = sites <= touches;
-        let gram = if by_sites {
-            product(matrix)
-        } else {
-            product(matrix.transpose())
-        };
-        report(watch, "Principal components", 1, 2)?;
-        let eigen = gram
-            .self_adjoint_eigen(Side::Lower)
-            .map_err(|_| PcaError::NoConvergence)?;
-        let n = gram.nrows();
-        let values: Vec<f64> = (0..n).rev().map(|k| eigen.S().column_vector()[k]).collect();
-        let largest = values.first().copied().unwrap_or(0.0);
-        if largest.is_nan() || largest <= 0.0 {
-            return Err(PcaError::Constant);
-        }
-        let rank = values.iter().take_while(|&&v| v > RANK * largest).count();
-        let vectors = Mat::from_fn(n, rank, |i, k| eigen.U()[(i, n - 1 - k)]);
-        let modes = if by_sites {
-            vectors
-        } else {
-            let mut modes = Mat::<f64>::zeros(sites, rank);
-            matmul(
-                modes.as_mut(),
-                Accum::Replace,
-                matrix,
-                vectors.as_ref(),
-                1.0,
-                Par::Seq,
-            );
-            Mat::from_fn(sites, rank, |i, k| modes[(i, k)] / values[k].sqrt())
-        };
-        report(watch, "Principal components", 2, 2)?;
-        Ok(Self {
-            modes,
-            variances: values[..rank].iter().map(|v| v / touches as f64).collect(),
-            sites,
-        })
+    pub fn new(x: &SignalMatrix, count: usize, watch: Watch) -> Result<Self, PcaError> {
+        Spectrum::new(x, watch)?.components(count, watch)
     }
 
-    /// Components that carry more than rounding.
+    /// Components that are known: the numerical rank where that is all of them.
     #[must_use]
-    pub fn rank(&self) -> usize {
+    pub fn reach(&self) -> usize {
         self.variances.len()
     }
 
@@ -113,33 +133,61 @@ impl Pca {
     /// A QR with column pivoting in the first `count` components, step by step.
     #[must_use]
     pub fn pivoting(&self, count: usize) -> Pivoting {
-        let k = count.min(self.rank());
+        let k = count.min(self.reach());
         // Column i holds site i's weights in the first k components.
         let columns: Vec<f64> = (0..self.sites)
             .flat_map(|i| (0..k).map(move |c| self.modes[(i, c)]))
             .collect();
+        let norms: Vec<f64> = columns.chunks_exact(k.max(1)).map(|c| dot(c, c)).collect();
         Pivoting {
-            norms: columns.chunks_exact(k.max(1)).map(|c| dot(c, c)).collect(),
+            began: norms.clone(),
+            norms,
             columns,
             components: k,
+            panel: Vec::new(),
             taken: 0,
         }
     }
 }
 
-/// The columns of a QR with what was taken projected out.
+/// The columns of a QR with column pivoting. Norms are kept as if what was taken were projected out of
+/// all columns; it is, a panel at a time, as in LAPACK's `geqp3` (G. Quintana-Ortí, X. Sun and
+/// C. Bischof, SIAM J. Sci. Comput. 19, 1998).
 pub struct Pivoting {
     components: usize,
-    /// Site by site.
+    /// Site by site, without the directions of earlier panels.
     columns: Vec<f64>,
+    /// Squared norms now, and when the panel began.
     norms: Vec<f64>,
+    began: Vec<f64>,
+    /// Orthonormal directions of this panel, one after the other.
+    panel: Vec<f64>,
     taken: usize,
 }
 
 impl Pivoting {
+    /// Directions in a panel.
+    const PANEL: usize = 32;
+    /// A norm that fell below this share of what it was when the panel began is computed anew.
+    const FELL: f64 = 1e-3;
+
     /// Of some sites the one with the largest worth of its squared norm, if any is left that is not
     /// rounding; of those equal to rounding the first.
     pub fn largest(
+        &mut self,
+        sites: impl IntoIterator<Item = usize> + Clone,
+        worth: impl Fn(usize, f64) -> f64,
+    ) -> Option<usize> {
+        let best = self.best(sites.clone(), &worth);
+        let fell = |site: usize| self.norms[site] < Self::FELL * self.began[site];
+        if self.panel.is_empty() || !best.is_none_or(fell) {
+            return best;
+        }
+        self.flush();
+        self.best(sites, &worth)
+    }
+
+    fn best(
         &self,
         sites: impl IntoIterator<Item = usize>,
         worth: impl Fn(usize, f64) -> f64,
@@ -163,27 +211,60 @@ impl Pivoting {
     /// Projects a site's column out of all others.
     pub fn take(&mut self, site: usize) {
         let k = self.components;
-        let own = &self.columns[site * k..][..k];
-        let length = dot(own, own).sqrt();
         self.taken += 1;
+        let mut own = self.columns[site * k..][..k].to_vec();
+        // Twice, so that rounding does not point back.
+        for _ in 0..2 {
+            for direction in self.panel.chunks_exact(k.max(1)) {
+                let share = dot(&own, direction);
+                for (v, d) in own.iter_mut().zip(direction) {
+                    *v -= share * d;
+                }
+            }
+        }
+        let length = dot(&own, &own).sqrt();
         if length == 0.0 {
             return;
         }
-        let direction: Vec<f64> = own.iter().map(|v| v / length).collect();
-        project_out(&mut self.columns, &direction, &mut self.norms);
+        for v in &mut own {
+            *v /= length;
+        }
+        lower_norms(&self.columns, &own, &mut self.norms);
+        self.panel.extend(own);
         self.columns[site * k..][..k].fill(0.0);
-        self.norms[site] = 0.0;
+        (self.norms[site], self.began[site]) = (0.0, 0.0);
+        if self.panel.len() == Self::PANEL * k {
+            self.flush();
+        }
+    }
+
+    /// Takes the panel out of all columns and computes their norms.
+    fn flush(&mut self) {
+        let (k, sites) = (self.components, self.norms.len());
+        let panel = MatRef::from_column_major_slice(&self.panel, k, self.panel.len() / k);
+        let mut columns = MatMut::from_column_major_slice_mut(&mut self.columns, k, sites);
+        let shares = panel.transpose() * columns.as_ref();
+        matmul(
+            columns.as_mut(),
+            Accum::Add,
+            panel,
+            shares.as_ref(),
+            -1.0,
+            Par::Seq,
+        );
+        for (norm, column) in self.norms.iter_mut().zip(self.columns.chunks_exact(k)) {
+            *norm = dot(column, column);
+        }
+        self.began.copy_from_slice(&self.norms);
+        self.panel.clear();
     }
 }
 
 wide! {
-    fn project_out<'a>(columns: &'a mut [f64], direction: &'a [f64], norms: &'a mut [f64]) {
-        for (column, norm) in columns.chunks_exact_mut(direction.len()).zip(norms) {
+    fn lower_norms<'a>(columns: &'a [f64], direction: &'a [f64], norms: &'a mut [f64]) {
+        for (column, norm) in columns.chunks_exact(direction.len()).zip(norms) {
             let share = lanes_dot(column, direction);
-            for (v, d) in column.iter_mut().zip(direction) {
-                *v -= share * d;
-            }
-            *norm = lanes_dot(column, column);
+            *norm = (*norm - share * share).max(0.0);
         }
     }
 }
@@ -221,8 +302,24 @@ pub fn gram(x: &SignalMatrix) -> Mat<f64> {
 }
 
 fn product(a: MatRef<f64>) -> Mat<f64> {
-    let mut c = Mat::zeros(a.nrows(), a.nrows());
-    matmul(c.as_mut(), Accum::Replace, a, a.transpose(), 1.0, Par::Seq);
+    let n = a.nrows();
+    let mut c = Mat::zeros(n, n);
+    triangular::matmul(
+        c.as_mut(),
+        BlockStructure::TriangularLower,
+        Accum::Replace,
+        a,
+        BlockStructure::Rectangular,
+        a.transpose(),
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+    for j in 1..n {
+        for i in 0..j {
+            c[(i, j)] = c[(j, i)];
+        }
+    }
     c
 }
 
@@ -293,13 +390,46 @@ mod tests {
     #[test]
     fn both_gram_matrices_give_the_same_picks() {
         let (wide, tall) = (signals(40), signals(5));
-        let pca = Pca::new(&wide, &unwatched).unwrap();
-        assert_eq!(pca.rank(), 3);
+        let pca = Pca::new(&wide, 8, &unwatched).unwrap();
+        assert_eq!((pca.reach(), pca.complete), (3, true));
         assert_eq!(pca.pivots(8).len(), 3, "picks end at the numerical rank");
-        assert!(Pca::new(&tall, &unwatched).unwrap().rank() <= 4);
+        assert!(Pca::new(&tall, 8, &unwatched).unwrap().reach() <= 4);
         let mut kinds: Vec<usize> = pca.pivots(3).iter().map(|i| i % 3).collect();
         kinds.sort_unstable();
         assert_eq!(kinds, [0, 1, 2]);
+    }
+
+    /// Pivots that project every direction out of every column at once.
+    fn plain_pivots(pca: &Pca, count: usize) -> Vec<usize> {
+        let mut columns: Vec<Vec<f64>> = (0..pca.sites)
+            .map(|i| (0..count).map(|c| pca.modes[(i, c)]).collect())
+            .collect();
+        let mut chosen = Vec::new();
+        while chosen.len() < count {
+            let norm = |i: usize| dot(&columns[i], &columns[i]);
+            let best = (0..pca.sites).fold(0, |b, i| if norm(i) > norm(b) { i } else { b });
+            let length = norm(best).sqrt();
+            let direction: Vec<f64> = columns[best].iter().map(|v| v / length).collect();
+            for column in &mut columns {
+                let share = dot(column, &direction);
+                for (v, d) in column.iter_mut().zip(&direction) {
+                    *v -= share * d;
+                }
+            }
+            chosen.push(best);
+        }
+        chosen
+    }
+
+    #[test]
+    fn panels_change_no_pivot() {
+        let values = (0..120usize)
+            .flat_map(|i| (0..300usize).map(move |t| ((i * i * 7 + t * (3 + i)) as f64).sin()))
+            .collect();
+        let pca = Pca::new(&SignalMatrix::new(300, values), 100, &unwatched).unwrap();
+        for count in [1, 31, 33, 75, 100] {
+            assert_eq!(pca.pivots(count), plain_pivots(&pca, count), "{count}");
+        }
     }
 
     #[test]
@@ -307,7 +437,7 @@ mod tests {
         let x = signals(40);
         let (train, test): (Vec<usize>, Vec<usize>) = (0..40).partition(|t| t % 4 != 0);
         let judge = Reconstruction::new(&x, &train, &test);
-        let pca = Pca::new(&x, &unwatched).unwrap();
+        let pca = Pca::new(&x, 3, &unwatched).unwrap();
         let curve: Vec<f64> = (1..=3)
             .map(|k| judge.unexplained(&pca.pivots(k)).unwrap())
             .collect();
@@ -319,6 +449,9 @@ mod tests {
     #[test]
     fn constant_signals_are_named() {
         let flat = SignalMatrix::new(3, vec![1.0; 6]);
-        assert_eq!(Pca::new(&flat, &unwatched).err(), Some(PcaError::Constant));
+        assert_eq!(
+            Pca::new(&flat, 3, &unwatched).err(),
+            Some(PcaError::Constant)
+        );
     }
 }

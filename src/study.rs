@@ -1,5 +1,7 @@
 //! Choosing and judging on signals alone, without a part behind them.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 use serde::Serialize;
 
@@ -90,7 +92,11 @@ pub fn select(
         costs: (!data.costs.is_empty()).then(|| open.iter().map(|&s| data.costs[s]).collect()),
         ..wishes.clone()
     };
-    let x = noisy.select_rows(&open);
+    let x = if open.len() == noisy.rows() {
+        noisy
+    } else {
+        Cow::Owned(noisy.select_rows(&open))
+    };
     let positions: Vec<DVec3> = if data.positions.is_empty() {
         Vec::new()
     } else {

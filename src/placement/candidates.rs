@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::PlacementError;
 use crate::budget::{Watch, report};
 use crate::dataset::SignalMatrix;
-use crate::pca::{Pca, Reconstruction};
+use crate::pca::{Pca, PcaError, Reconstruction, Spectrum};
 
 /// When to stop keeping sites.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +35,8 @@ pub struct Candidates {
 
 /// Every how manyth touch is held out.
 const HELD_OUT: usize = 7;
+/// Components that are computed at first where nobody knows how many will be needed.
+const FIRST: usize = 120;
 
 /// Reduces signals (sites × touches). A seventh of the touches is held out: neither the components nor the
 /// linear map that the unexplained share is measured with have seen them.
@@ -54,33 +56,40 @@ pub fn reduce(
         (0..x.columns()).partition(|t| t % HELD_OUT == HELD_OUT / 2);
     report(watch, "Reducing to candidates", 0, 2)?;
     // Neither the picks nor the map have seen the touches they are judged on.
-    let pca = &Pca::new(&x.select_columns(&train), watch)?;
-    let judge = Reconstruction::new(x, &train, &test);
-    report(watch, "Reducing to candidates", 1, 2)?;
-    let mut curve = Curve {
-        pca,
-        judge: &judge,
-        points: Vec::new(),
-    };
+    let spectrum = Spectrum::new(&x.select_columns(&train), watch)?;
     // More sites than touches to learn the map from cannot be judged.
-    let most = pca
-        .rank()
+    let most = x
+        .rows()
         .min(limit)
         .min(train.len().saturating_sub(1))
         .max(1);
+    let first = match reduction {
+        Reduction::Count(count) => count,
+        Reduction::Unexplained(_) => FIRST,
+    };
+    let judge = Reconstruction::new(x, &train, &test);
+    report(watch, "Reducing to candidates", 1, 2)?;
+    let mut curve = Curve {
+        pca: spectrum.components(first.min(most), watch)?,
+        spectrum: &spectrum,
+        judge: &judge,
+        points: Vec::new(),
+        watch,
+    };
     let mut notes = Vec::new();
     let count = match reduction {
         Reduction::Count(count) => {
-            if count > most {
+            let allowed = curve.within(count.min(most))?;
+            if count > allowed {
                 notes.push(format!(
-                    "{count} candidates were asked for; the signals and the budget allow {most}."
+                    "{count} candidates were asked for; the signals and the budget allow {allowed}."
                 ));
             }
-            curve.sample(count.min(most));
-            count.min(most)
+            curve.sample(allowed)?;
+            allowed
         }
         Reduction::Unexplained(target) => {
-            let count = curve.smallest(target, most);
+            let count = curve.smallest(target, most)?;
             if curve.at(count).is_none_or(|u| u > target) {
                 notes.push(format!(
                     "{count} candidates leave {:.2} % unexplained instead of {:.2} %: the budget or the data end there.",
@@ -95,7 +104,7 @@ pub fn reduce(
     let unexplained = curve.at(count);
     curve.points.sort_by_key(|p| p.sites);
     Ok(Candidates {
-        rows: pca.pivots(count),
+        rows: curve.pca.pivots(count),
         curve: curve.points,
         unexplained,
         notes,
@@ -103,9 +112,12 @@ pub fn reduce(
 }
 
 struct Curve<'a> {
-    pca: &'a Pca,
+    spectrum: &'a Spectrum,
+    /// As many components as were needed so far.
+    pca: Pca,
     judge: &'a Reconstruction,
     points: Vec<CurvePoint>,
+    watch: Watch<'a>,
 }
 
 impl Curve<'_> {
@@ -114,6 +126,19 @@ impl Curve<'_> {
             .iter()
             .find(|p| p.sites == sites)
             .map(|p| p.unexplained)
+    }
+
+    /// So many sites, or the numerical rank where that is less.
+    fn within(&mut self, sites: usize) -> Result<usize, PcaError> {
+        if self.pca.reach() < sites && !self.pca.complete {
+            let wanted = sites.max(2 * self.pca.reach());
+            self.pca = self.spectrum.components(wanted, self.watch)?;
+        }
+        Ok(if self.pca.complete {
+            sites.min(self.pca.reach())
+        } else {
+            sites
+        })
     }
 
     /// The unexplained share with so many sites; linear dependence counts as no gain.
@@ -131,18 +156,25 @@ impl Curve<'_> {
     }
 
     /// A geometric ladder of counts up to `last`.
-    fn sample(&mut self, last: usize) {
-        for count in ladder(last) {
+    fn sample(&mut self, last: usize) -> Result<(), PcaError> {
+        let mut count = 1;
+        loop {
+            count = self.within(count)?;
             self.evaluate(count);
+            if count >= last {
+                return Ok(());
+            }
+            count = above(count).min(last);
         }
     }
 
     /// The smallest count that reaches the target: up the ladder, then bisection of the last step.
-    fn smallest(&mut self, target: f64, most: usize) -> usize {
-        let mut below = 0;
-        for count in ladder(most) {
-            if self.evaluate(count) <= target {
-                let (mut low, mut high) = (below, count);
+    fn smallest(&mut self, target: f64, most: usize) -> Result<usize, PcaError> {
+        let (mut below, mut count) = (0, 1);
+        loop {
+            let reached = self.within(count)?;
+            if self.evaluate(reached) <= target {
+                let (mut low, mut high) = (below, reached);
                 while high - low > 1 {
                     let middle = usize::midpoint(low, high);
                     if self.evaluate(middle) <= target {
@@ -151,19 +183,18 @@ impl Curve<'_> {
                         low = middle;
                     }
                 }
-                return high;
+                return Ok(high);
             }
-            below = count;
+            if reached >= most || reached < count {
+                return Ok(reached);
+            }
+            below = reached;
+            count = above(reached).min(most);
         }
-        most
     }
 }
 
-fn ladder(last: usize) -> Vec<usize> {
-    let mut counts = vec![1];
-    while counts[counts.len() - 1] < last {
-        let next = counts[counts.len() - 1];
-        counts.push((next + next.div_ceil(3)).min(last));
-    }
-    counts
+/// The next rung of a ladder of counts.
+fn above(count: usize) -> usize {
+    count + count.div_ceil(3)
 }

@@ -19,12 +19,12 @@ impl Selector for PcaQr {
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
         Field::new(pool, request.wishes)?;
-        let pca = Pca::new(pool.x, request.watch)?;
+        let pca = Pca::new(pool.x, request.wishes.sensors, request.watch)?;
         from_components(&pca, pool, request)
     }
 }
 
-/// As the selector, from components that are there already.
+/// As the selector, from components that are there already, at least one a gauge.
 ///
 /// # Errors
 /// [`PlacementError`] where the pool or the wishes do not allow it.
@@ -41,28 +41,38 @@ pub fn from_components(
         });
     }
     let whole = Field::new(pool, wishes)?;
-    let total: f64 = pca.variances.iter().sum();
     let mut sets: Vec<SensorSet> = Vec::new();
-    for k in 1..=wishes.sensors {
+    for k in counts(wishes.sensors) {
         report(request.watch, "Selecting by PCA-QR", k - 1, wishes.sensors)?;
-        let Some(chosen) = choose(pca, &whole, k) else {
+        let mut chosen = choose(pca, &whole, k).sites();
+        let all = chosen.len() == k;
+        // Where so many cannot be had, as many as can.
+        let mut wanted = k;
+        while chosen.len() < wanted {
+            wanted = chosen.len();
+            chosen = choose(pca, &whole, wanted).sites();
+        }
+        if sets.last().is_none_or(|s| s.sites.len() < chosen.len()) && !chosen.is_empty() {
+            let reach = chosen.len().min(pca.reach());
+            let kept: f64 = pca.variances[..reach].iter().sum();
+            let set = SensorSet {
+                sites: chosen,
+                criterion: (1.0 - kept / pca.total).max(0.0),
+                criterion_mm: None,
+                gap: None,
+            };
+            (request.found)(&set);
+            sets.push(set);
+        }
+        if !all {
             break;
-        };
-        let reach = k.min(pca.rank());
-        let kept: f64 = pca.variances[..reach].iter().sum();
-        let set = SensorSet {
-            sites: chosen.sites(),
-            criterion: 1.0 - kept / total,
-            criterion_mm: None,
-            gap: None,
-        };
-        (request.found)(&set);
-        sets.push(set);
+        }
     }
     if sets.is_empty() {
         return Err(PlacementError::NoSites);
     }
-    let short = sets.len() < wishes.sensors;
+    let reached = sets.last().map_or(0, |s| s.sites.len());
+    let short = reached < wishes.sensors;
     Ok(Selection {
         selector: SelectorKind::PcaQr,
         criterion_unit: "share of variance beyond the components",
@@ -77,7 +87,7 @@ pub fn from_components(
                 StopReason::Converged
             },
             notes: short
-                .then(|| shortage(pca, &sets, wishes.sensors))
+                .then(|| shortage(pca, reached, wishes.sensors))
                 .into_iter()
                 .collect(),
         },
@@ -85,33 +95,46 @@ pub fn from_components(
     })
 }
 
-/// `count` sites by pivoting in as many components; none where not so many can be had.
-fn choose<'a>(pca: &Pca, whole: &Field<'a>, count: usize) -> Option<Field<'a>> {
+/// Every number of gauges has a choice of its own. Beyond what anyone compares one by one, steps are
+/// half as wide again each.
+fn counts(most: usize) -> Vec<usize> {
+    const EACH: usize = 40;
+    let mut counts: Vec<usize> = (1..=most.min(EACH)).collect();
+    while let Some(&last) = counts.last().filter(|&&last| last < most) {
+        counts.push((last + last / 2).min(most));
+    }
+    counts
+}
+
+/// `count` sites by pivoting in as many components; fewer where not so many can be had.
+fn choose<'a>(pca: &Pca, whole: &Field<'a>, count: usize) -> Field<'a> {
     let mut field = whole.clone();
     let mut pivoting = pca.pivoting(count);
     while field.chosen.len() < count {
         let open = field.open();
-        let place = match open[..] {
+        let next = match open[..] {
             // What must be there is taken whatever it adds.
-            [only] if field.is_required(only) => only,
-            _ => pivoting.largest(open, |place, norm| field.worth(place, norm))?,
+            [only] if field.is_required(only) => Some(only),
+            _ => pivoting.largest(open, |place, norm| field.worth(place, norm)),
+        };
+        let Some(place) = next else {
+            break;
         };
         pivoting.take(place);
         field.add(place);
     }
-    Some(field)
+    field
 }
 
-fn shortage(pca: &Pca, sets: &[SensorSet], wanted: usize) -> String {
-    if sets.len() >= pca.rank() {
+fn shortage(pca: &Pca, reached: usize, wanted: usize) -> String {
+    if pca.complete && reached >= pca.reach() {
         format!(
             "The signals carry only {} independent patterns, so there is no choice of {wanted} sites.",
-            pca.rank()
+            pca.reach()
         )
     } else {
         format!(
-            "Only {} gauges can be placed: spacing, cost or what must be there leaves no room for {wanted}.",
-            sets.len()
+            "Only {reached} gauges can be placed: spacing, cost or what must be there leaves no room for {wanted}."
         )
     }
 }
