@@ -787,6 +787,7 @@ fn select_by_svr(
             max_steps: budget.svr_steps,
         },
         tolerance: greedy_svr::TOLERANCE,
+        landmarks: 1.0,
     };
     let request = Request {
         wishes: &wishes,

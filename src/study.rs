@@ -11,7 +11,7 @@ use crate::evaluation::add_noise;
 use crate::evaluation::failures::{FailureRow, FailureTrial, failures};
 use crate::gaussian_process::{self, Covariance, Distances, GpKernel};
 use crate::placement::entropy::Entropy;
-use crate::placement::greedy_svr::GreedySvr;
+use crate::placement::greedy_svr::{Audit, Comparison, GreedySvr};
 use crate::placement::information::{Geometry, GeometrySummary};
 use crate::placement::mutual_information::MutualInformation;
 use crate::placement::pca_qr::PcaQr;
@@ -233,6 +233,41 @@ pub fn add_criteria(
     }
     selection.sets.truncate(keep);
     Ok(())
+}
+
+/// Compares each step of greedy SVR's choice with other sites, by the criterion itself; sites as numbered
+/// in the data.
+///
+/// # Errors
+/// As [`select`].
+pub fn audit(
+    data: &Data,
+    kept_out: &[usize],
+    choice: &Choice,
+    settings: &Settings,
+    audit: Audit,
+    watch: Watch,
+) -> Result<Vec<Comparison>, PlacementError> {
+    let noisy = add_noise(&data.x, settings.noise, settings.svr.seed);
+    let open: Vec<usize> = (0..noisy.rows())
+        .filter(|s| !kept_out.contains(s))
+        .collect();
+    let x = noisy.select_rows(&open);
+    let pool = Pool {
+        x: &x,
+        targets: &data.targets,
+        sites: &open,
+        positions: &[],
+    };
+    let chosen = choice.selection.sets.last();
+    let places: Vec<usize> = (chosen.iter().flat_map(|s| &s.sites))
+        .filter_map(|site| open.binary_search(site).ok())
+        .collect();
+    let mut steps = settings.svr.audit(&pool, &places, audit, watch)?;
+    for step in &mut steps {
+        step.best_other = open[step.best_other];
+    }
+    Ok(steps)
 }
 
 /// The fold that each touch is tested in, so that anyone can compute the criterion again.

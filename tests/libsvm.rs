@@ -8,6 +8,8 @@ use serde::Deserialize;
 #[derive(Deserialize)]
 struct Fixtures {
     problems: Vec<Problem>,
+    /// Optima of problems drawn from the seeds 0, 1, …
+    random: Vec<f64>,
 }
 
 #[derive(Deserialize)]
@@ -62,4 +64,71 @@ fn objective_and_predictions_are_those_of_libsvm() {
             );
         }
     }
+}
+
+/// Splitmix64 (S. Vigna), as in the script.
+struct Draw(u64);
+
+impl Draw {
+    fn word(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.word() >> 11) as f64 * 2f64.powi(-52) - 1.0
+    }
+
+    fn one_of(&mut self, values: &[f64]) -> f64 {
+        values[(self.word() % values.len() as u64) as usize]
+    }
+}
+
+#[test]
+fn two_hundred_random_problems_reach_the_optimum_of_libsvm() {
+    let fixtures: Fixtures = serde_json::from_str(include_str!("fixtures/svr.json")).unwrap();
+    assert_eq!(fixtures.random.len(), 200);
+    let (mut worst, mut agree) = (0.0f64, 0);
+    for (seed, &objective) in fixtures.random.iter().enumerate() {
+        let mut draw = Draw(seed as u64);
+        let touches = 20 + (draw.word() % 120) as usize;
+        let features = 1 + (draw.word() % 12) as usize;
+        let size = draw.one_of(&[0.05, 1.0, 50.0]);
+        let c = size * draw.one_of(&[0.1, 1.0, 20.0, 400.0]);
+        let epsilon = size * draw.one_of(&[0.0, 1e-6, 2e-3, 0.05, 0.3]);
+        let gamma = draw.one_of(&[2e-3, 0.02, 0.1, 0.5, 3.0]);
+        let values: Vec<f64> = (0..features * touches).map(|_| 1.7 * draw.unit()).collect();
+        let x = SignalMatrix::new(touches, values);
+        let weights: Vec<f64> = (0..features).map(|_| draw.unit()).collect();
+        let y: Vec<f64> = (0..touches)
+            .map(|t| {
+                let sum: f64 = (0..features).map(|f| weights[f] * x.row(f)[t]).sum();
+                let y = sum + 0.2 * draw.unit();
+                size * (y + 0.5 * y * y)
+            })
+            .collect();
+        let kernel = gaussian(&squared_distances(&x, &x), gamma);
+        let params = SvrParams {
+            c,
+            epsilon,
+            tolerance: 1e-8 * size,
+            max_steps: 20_000_000,
+        };
+        let fit = svr::fit(&kernel, &y, &params, None);
+        assert!(fit.converged, "seed {seed}: gap {:e}", fit.gap);
+        // Nothing may be learned where all lies inside the tube.
+        let above = (fit.objective - objective) / objective.abs().max(1e-9 * size * size);
+        // Never above. A little below at large C, where LIBSVM's kernel in single precision shows.
+        assert!(
+            above < 1e-6 && above > -1e-5,
+            "seed {seed}: {} against {objective}",
+            fit.objective
+        );
+        agree += usize::from(above.abs() < 1e-6);
+        worst = worst.max(above);
+    }
+    println!("{agree} of 200 agree to 1e-6; the worst is {worst:.1e} above LIBSVM");
+    assert!(agree >= 198);
 }

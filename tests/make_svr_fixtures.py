@@ -47,6 +47,53 @@ for touches, features, c, epsilon, gamma, size in settings:
         }
     )
 
+# Many random problems, of which only the optimum is kept: tests/libsvm.rs draws the same ones.
+MASK = (1 << 64) - 1
+
+
+class Draw:
+    """Splitmix64 (S. Vigna), the same in Rust."""
+
+    def __init__(self, seed):
+        self.state = seed
+
+    def word(self):
+        self.state = (self.state + 0x9E3779B97F4A7C15) & MASK
+        z = self.state
+        z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & MASK
+        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & MASK
+        return z ^ (z >> 31)
+
+    def unit(self):
+        """In [-1, 1)."""
+        return (self.word() >> 11) * 2.0**-52 - 1.0
+
+    def one_of(self, values):
+        return values[self.word() % len(values)]
+
+
+def random_problem(seed):
+    draw = Draw(seed)
+    touches, features = 20 + draw.word() % 120, 1 + draw.word() % 12
+    size = draw.one_of([0.05, 1.0, 50.0])
+    c = size * draw.one_of([0.1, 1.0, 20.0, 400.0])
+    epsilon = size * draw.one_of([0.0, 1e-6, 2e-3, 0.05, 0.3])
+    gamma = draw.one_of([2e-3, 0.02, 0.1, 0.5, 3.0])
+    x = numpy.array([[draw.unit() for _ in range(touches)] for _ in range(features)]) * 1.7
+    weights = [draw.unit() for _ in range(features)]
+    y = numpy.array([sum(w * v for w, v in zip(weights, x[:, t])) + 0.2 * draw.unit() for t in range(touches)])
+    return x, size * (y + 0.5 * y * y), c, epsilon, gamma, size
+
+
+objectives = []
+for seed in range(200):
+    x, y, c, epsilon, gamma, size = random_problem(seed)
+    model = SVR(kernel="rbf", C=c, epsilon=epsilon, gamma=gamma, tol=1e-8 * size, cache_size=200).fit(x.T, y)
+    beta = numpy.zeros(len(y))
+    beta[model.support_] = model.dual_coef_[0]
+    kernel = numpy.exp(-gamma * ((x.T[:, None, :] - x.T[None, :, :]) ** 2).sum(-1))
+    objectives.append(float(0.5 * beta @ kernel @ beta - y @ beta + epsilon * numpy.abs(beta).sum()))
+
 target = pathlib.Path(__file__).parent / "fixtures" / "svr.json"
-target.write_text(json.dumps({"made_with": f"scikit-learn {sklearn.__version__}", "problems": problems}))
+target.write_text(json.dumps({"made_with": f"scikit-learn {sklearn.__version__}", "problems": problems, "random": objectives}))
 print(f"wrote {target} with scikit-learn {sklearn.__version__}")

@@ -95,6 +95,7 @@ fn svr(hyper: Hyper) -> GreedySvr {
             max_steps: 1_000_000,
         },
         tolerance: TOLERANCE,
+        landmarks: 1.0,
     }
 }
 

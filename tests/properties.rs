@@ -16,8 +16,7 @@ use hapdef::elasticity::support::held_freedoms;
 use hapdef::elasticity::{Freedoms, ShellModel, Touch};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::locate::SurfaceIndex;
-use hapdef::placement::greedy_svr::GreedySvr;
-use hapdef::placement::{Pool, Request, Selector, SelectorKind, Wishes};
+use hapdef::placement::SelectorKind;
 use hapdef::regression::tune::Effort;
 use hapdef::regression::{Hyper, PositionModel};
 
@@ -370,112 +369,6 @@ fn the_work_is_counted_and_nothing_is_done_twice() {
     assert!(truth.solves <= 60, "{truth:?}");
     assert_eq!(total.assemblies, work.assemblies + 1);
     assert_eq!(total.solves, work.solves + truth.solves);
-}
-
-/// The greedy selector against a naive one that trains every set from nothing.
-#[test]
-fn greedy_svr_is_the_plain_algorithm() {
-    let touches = 60;
-    let targets: Vec<[f64; 3]> = (0..touches)
-        .map(|t| {
-            let a = f64::from(t) * 0.37;
-            [30.0 * a.cos(), 30.0 * a.sin(), f64::from(t)]
-        })
-        .collect();
-    let wave = |s: usize, p: &[f64; 3]| {
-        let s = s as f64;
-        (0.05 * p[0] * (s + 1.0)).sin() + (0.03 * p[1] * s).cos() + 0.01 * p[2] * (s * 0.7).sin()
-    };
-    let values = (0..8)
-        .flat_map(|s| targets.iter().map(move |p| wave(s, p)))
-        .collect();
-    let x = SignalMatrix::new(touches as usize, values);
-    let sites: Vec<usize> = (100..108).collect();
-    let hyper = Hyper {
-        c: 50.0,
-        epsilon: 0.2,
-        gamma: 0.3,
-    };
-    let effort = Effort {
-        tolerance: 1e-6,
-        max_steps: 1_000_000,
-    };
-    let selector = GreedySvr {
-        hyper,
-        folds: 3,
-        seed: 4,
-        effort,
-        tolerance: 0.0,
-    };
-    let pool = Pool {
-        x: &x,
-        targets: &targets,
-        sites: &sites,
-        positions: &[],
-    };
-    let request = Request {
-        wishes: &Wishes::count(3),
-        watch: &unwatched,
-        found: &|_| (),
-    };
-    let selection = selector.select(&pool, &request).unwrap();
-    // The naive way: standardized over all touches as the selector does, folds as it draws them.
-    let z = hapdef::regression::Standardizer::of(&x).apply(&x);
-    let folds = hapdef::regression::folds::Folds::draw(touches as usize, 3, 4);
-    let score = |rows: &[usize]| {
-        let sum: f64 = folds
-            .parts
-            .iter()
-            .map(|part| {
-                let test: Vec<usize> = folds.order[part.clone()].to_vec();
-                let train: Vec<usize> = folds
-                    .order
-                    .iter()
-                    .copied()
-                    .filter(|t| !test.contains(t))
-                    .collect();
-                let of = |columns: &[usize]| z.select_rows(rows).select_columns(columns);
-                let kernel = |a: &SignalMatrix, b: &SignalMatrix| {
-                    hapdef::regression::kernel::gaussian(
-                        &hapdef::regression::kernel::squared_distances(a, b),
-                        hyper.gamma,
-                    )
-                };
-                let inner = kernel(&of(&train), &of(&train));
-                let outer = kernel(&of(&test), &of(&train));
-                let axes = [0, 1, 2].map(|a| {
-                    let y: Vec<f64> = train.iter().map(|&t| targets[t][a]).collect();
-                    let fit = hapdef::regression::svr::fit(&inner, &y, &hyper.params(effort), None);
-                    hapdef::regression::svr::predict(&fit, &outer)
-                });
-                let errors = test.iter().enumerate().map(|(k, &t)| {
-                    (0..3)
-                        .map(|a| (axes[a][k] - targets[t][a]).powi(2))
-                        .sum::<f64>()
-                        .sqrt()
-                });
-                errors.sum::<f64>() / test.len() as f64
-            })
-            .sum();
-        sum / folds.parts.len() as f64
-    };
-    let mut chosen: Vec<usize> = Vec::new();
-    for set in &selection.sets {
-        let scores: Vec<(usize, f64)> = (0..8)
-            .filter(|s| !chosen.contains(s))
-            .map(|s| (s, score(&[&chosen[..], &[s]].concat())))
-            .collect();
-        let best = scores.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
-        let picked = set.sites[set.sites.len() - 1] - 100;
-        let own = scores.iter().find(|s| s.0 == picked).unwrap().1;
-        assert!(own <= best * 1.0001, "{picked}: {own} against {best}");
-        assert!(
-            (set.criterion / own - 1.0).abs() < 1e-4,
-            "{} against {own}",
-            set.criterion
-        );
-        chosen.push(picked);
-    }
 }
 
 #[test]

@@ -129,6 +129,7 @@ impl CriterionArgs {
                 max_steps: self.max_steps,
             },
             tolerance: TOLERANCE,
+            landmarks: 1.0,
         })
     }
 

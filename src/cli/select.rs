@@ -8,9 +8,11 @@ use serde_json::{Value, json};
 
 use super::data::{CriterionArgs, DataArgs, criterion_json, site_json};
 use super::{SelectorArg, progress::Bar};
+use crate::budget::Watch;
 use crate::gaussian_process::GpKernel;
 use crate::io::cpu_seconds;
-use crate::placement::{SensorSet, Wishes};
+use crate::placement::greedy_svr::{Audit, Comparison};
+use crate::placement::{SelectorKind, SensorSet, Wishes};
 use crate::study::{self, Choice, Data, Settings};
 
 #[derive(Args, Debug, Clone)]
@@ -52,6 +54,14 @@ pub struct SelectArgs {
     /// Share of the criterion by which a choice of greedy SVR may be worse than the best.
     #[arg(long, default_value_t = crate::placement::greedy_svr::TOLERANCE)]
     pub selection_tolerance: f64,
+    /// Landmarks of greedy SVR's screens, relative to the default: fewer are faster and leave more to be
+    /// fitted exactly.
+    #[arg(long, default_value_t = 1.0)]
+    pub landmarks: f64,
+    /// Fit so many of the best and so many random other sites exactly at each step of greedy SVR, and say
+    /// whether one of them would have been better (slow).
+    #[arg(long, default_value_t = 0)]
+    pub audit: usize,
     /// Length of the kernel of entropy and mutual information (mm); searched when left out.
     #[arg(long)]
     pub length_mm: Option<f64>,
@@ -95,10 +105,22 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
         if !args.no_criterion {
             study::add_criteria(&data, &mut choice.selection, &wishes, &settings, &watch)?;
         }
-        Ok((choice, cpu_seconds() - before))
+        let criterion_seconds = cpu_seconds() - before;
+        let audit = args.audited(&data, &kept_out, &choice, &settings, &watch)?;
+        Ok((choice, criterion_seconds, audit))
     });
     bar.finish();
-    let (choice, criterion_seconds) = result?;
+    let (choice, criterion_seconds, audit) = result?;
+    for step in &audit {
+        eprintln!(
+            "{:>3}: {:.3} mm, the best of {} others {:.3} mm ({:+.2} %)",
+            step.sensors,
+            step.chosen_mm,
+            step.compared,
+            step.best_other_mm,
+            100.0 * step.excess()
+        );
+    }
     notes.extend(choice.selection.achieved.notes.iter().cloned());
     for note in &notes {
         eprintln!("note: {note}");
@@ -106,7 +128,10 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.out {
         write_sites(path, &data, &choice)?;
     }
-    let summary = summary(&data, &settings, &choice, criterion_seconds, &notes);
+    let mut summary = summary(&data, &settings, &choice, criterion_seconds, &notes);
+    if !audit.is_empty() {
+        summary["audit"] = json!(audit);
+    }
     if args.criterion.json {
         println!("{summary}");
     } else {
@@ -127,6 +152,31 @@ fn say(set: &SensorSet) {
 }
 
 impl SelectArgs {
+    fn audited(
+        &self,
+        data: &Data,
+        kept_out: &[usize],
+        choice: &Choice,
+        settings: &Settings,
+        watch: Watch,
+    ) -> anyhow::Result<Vec<Comparison>> {
+        if self.audit == 0 {
+            return Ok(Vec::new());
+        }
+        ensure!(
+            settings.kind == SelectorKind::GreedySvr,
+            "--audit compares the steps of greedy-svr; the other selectors choose by another criterion"
+        );
+        let audit = Audit {
+            top: self.audit,
+            random: self.audit,
+            seed: settings.svr.seed,
+        };
+        Ok(study::audit(
+            data, kept_out, choice, settings, audit, watch,
+        )?)
+    }
+
     fn settings(&self) -> anyhow::Result<Settings> {
         let mut svr = self.criterion.criterion()?;
         ensure!(
@@ -134,6 +184,12 @@ impl SelectArgs {
             "--selection-tolerance is a share of the criterion, between 0 and 1"
         );
         svr.tolerance = self.selection_tolerance;
+        ensure!(
+            (0.01..=100.0).contains(&self.landmarks),
+            "--landmarks must lie between 0.01 and 100, but is {}",
+            self.landmarks
+        );
+        svr.landmarks = self.landmarks;
         for (name, value) in [("--length-mm", self.length_mm), ("--power", self.power)] {
             ensure!(
                 value.is_none_or(|v| v > 0.0 && v.is_finite()),

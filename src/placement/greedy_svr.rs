@@ -7,12 +7,14 @@
 //! (`exact.rs`). How many go on depends on how far the scores were seen to depart from each other
 //! (`race.rs`): what cannot win even then is left behind.
 
+mod audit;
 mod exact;
 mod race;
 mod screen;
 
 use rayon::prelude::*;
 
+pub use self::audit::{Audit, Comparison};
 use self::exact::{Judge, Judged};
 use self::race::{Raced, Relation, Rules, Scored, race};
 use self::screen::{Base, LEVELS, Sieve, Stop};
@@ -34,6 +36,9 @@ pub struct GreedySvr {
     pub effort: Effort,
     /// A choice may be worse than the best by this share of the criterion.
     pub tolerance: f64,
+    /// Landmarks of the screens, relative to what suits most data: fewer are faster, and more has to be
+    /// fitted exactly.
+    pub landmarks: f64,
 }
 
 /// The default of [`GreedySvr::tolerance`].
@@ -196,7 +201,7 @@ impl<'a> Search<'a> {
         let targets: Vec<[f64; 3]> = folds.order.iter().map(|&t| pool.targets[t]).collect();
         let sieves: Vec<Sieve> = LEVELS
             .iter()
-            .map(|&level| Sieve::new(level, &features, &targets, folds))
+            .map(|&level| Sieve::new(level.scaled(settings.landmarks), &features, &targets, folds))
             .collect();
         Self {
             settings,

@@ -27,6 +27,19 @@ pub struct Level {
     pub most_landmarks: usize,
 }
 
+impl Level {
+    /// With more or fewer landmarks.
+    #[must_use]
+    pub fn scaled(self, by: f64) -> Self {
+        let scale = |landmarks: usize| ((landmarks as f64 * by) as usize).max(8);
+        Self {
+            landmarks: scale(self.landmarks),
+            most_landmarks: scale(self.most_landmarks),
+            ..self
+        }
+    }
+}
+
 /// From the one that looks at every candidate to the one that is nearly exact.
 pub const LEVELS: [Level; 4] = [
     Level {
