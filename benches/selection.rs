@@ -182,7 +182,8 @@ fn full_size(text: &mut String, both: &[(&str, &Signals)], quick: bool) {
             let (chosen, seconds) = choose(&svr, &part, 10);
             let sets = &chosen.sets;
             let gap = sets.iter().filter_map(|s| s.gap).fold(0.0, f64::max);
-            let checked = if quick {
+            // The tuned fits are dear: one set of signals will do.
+            let checked = if quick || (setting == "tuned" && name != "strain") {
                 "– | –".to_owned()
             } else {
                 let steps = svr
@@ -198,6 +199,7 @@ fn full_size(text: &mut String, both: &[(&str, &Signals)], quick: bool) {
                 chosen.achieved.effort.fits / 15,
                 100.0 * gap
             );
+            eprintln!("{}", text.lines().next_back().unwrap_or_default());
         }
     }
     text.push('\n');

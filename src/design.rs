@@ -24,7 +24,7 @@ use crate::gaussian_process::{self, Covariance, Distances, GpKernel};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::remesh::Remeshed;
 use crate::mesh::unroll::Unrolling;
-use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
+use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample, scatter};
 use crate::pca::Pca;
 use crate::placement::candidates::{Candidates, reduce};
 use crate::placement::entropy::Entropy;
@@ -1012,6 +1012,26 @@ impl Design {
             .first()
             .and_then(|s| s.sets.last())
             .map_or(&[], |set| &set.sites)
+    }
+
+    /// Errors touch by touch (mm) of a selector's set of so many gauges, beside the truth's touches.
+    #[must_use]
+    pub fn touch_errors(&self, kind: SelectorKind, sensors: usize) -> Option<&[f64]> {
+        let mut sets = (self.selections.iter())
+            .flat_map(|s| s.sets.iter().map(|set| (s.selector, set.sites.len())));
+        let k = sets.position(|set| set == (kind, sensors))?;
+        self.evaluation.errors.get(k).map(Vec::as_slice)
+    }
+
+    /// The mean error (mm) around each vertex of a mesh that lies where the part does, for the chosen set.
+    #[must_use]
+    pub fn error_map(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
+        let kind = self.selections.first()?.selector;
+        let errors = self.touch_errors(kind, self.chosen().len())?;
+        let places: Vec<(DVec3, DVec3)> = (self.truth.touches.iter())
+            .map(|t| (t.position, t.normal))
+            .collect();
+        Some(scatter::to_vertices(mesh, &places, errors))
     }
 
     /// All counted work.

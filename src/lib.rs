@@ -5,6 +5,7 @@
 
 pub mod budget;
 pub mod cli;
+pub mod colormap;
 pub mod dataset;
 pub mod design;
 pub mod document;

@@ -8,6 +8,7 @@ pub mod locate;
 pub mod remesh;
 pub mod repair;
 pub mod sample;
+pub mod scatter;
 pub mod surface;
 pub mod unroll;
 

@@ -1,6 +1,5 @@
 //! What the window shows of the limb: camera and colour maps (plain arithmetic) and the wgpu pipeline.
 
 pub mod camera;
-pub mod colormap;
 #[cfg(feature = "studio")]
 pub mod gpu;

@@ -3,9 +3,11 @@
 use std::fmt::Write as _;
 
 use super::artifacts::{Provenance, range, signal_to_noise, signal_unit};
-use super::svg::{self, Marker, Series, escape};
+use super::svg::{self, Marker, Paint, Series, escape};
+use crate::colormap::ColorMap;
 use crate::design::{Design, Inputs, Simulated};
 use crate::evaluation::Failures;
+use crate::gaussian_process::GpTrial;
 use crate::mesh::unroll::Unrolling;
 use crate::placement::SelectorKind;
 
@@ -41,7 +43,9 @@ pub fn html(inputs: &Inputs, design: &Design, provenance: &Provenance) -> String
     sites(&mut page, inputs, design);
     plots(&mut page, design);
     errors(&mut page, design);
+    error_map(&mut page, inputs, design);
     failures(&mut page, design);
+    kernel_search(&mut page, design);
     settings(&mut page, inputs, design, provenance);
     page.push_str("</body></html>\n");
     page
@@ -147,14 +151,14 @@ fn pictures(page: &mut String, inputs: &Inputs, design: &Design) {
         let _ = write!(
             page,
             "<figure>{}<figcaption>{}</figcaption></figure>",
-            svg::limb(mesh, &tint, &markers, &view, 300.0),
+            svg::limb(mesh, Paint::Tint(&tint), &markers, &view, 300.0),
             view.name
         );
     }
     let _ = write!(
         page,
         "</div><figure>{}<figcaption>unrolled, seen from outside</figcaption></figure>",
-        svg::unrolled(mesh, &unrolling, &tint, &markers, 900.0)
+        svg::unrolled(mesh, &unrolling, Paint::Tint(&tint), &markers, 900.0)
     );
 }
 
@@ -241,6 +245,111 @@ fn plots(page: &mut String, design: &Design) {
         520.0,
     ));
     page.push_str("</div>");
+}
+
+/// Where on the part touches are found well and where not.
+fn error_map(page: &mut String, inputs: &Inputs, design: &Design) {
+    let mesh = &design.simulated.mesh;
+    let Some(errors) = design.error_map(mesh) else {
+        return;
+    };
+    let top = robust_top(&errors);
+    let shares: Vec<f64> = errors.iter().map(|e| e / top).collect();
+    let unrolling = Unrolling::of(mesh, inputs.project.part.axis);
+    let map = ColorMap::Viridis;
+    let _ = write!(
+        page,
+        "<h2>Where the error is</h2><p>Mean error around each place, of the chosen gauges on unseen touches.</p>{}<figure>{}<figcaption>unrolled, seen from outside</figcaption></figure>",
+        svg::legend(map, "error (mm)", 0.0, top),
+        svg::unrolled(
+            mesh,
+            &unrolling,
+            Paint::Map(map, &shares),
+            &markers(design),
+            900.0
+        )
+    );
+}
+
+/// A round number not below most of the sizes (99.5 % of them): single peaks do not wash a map out.
+#[must_use]
+pub fn robust_top(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values
+        .iter()
+        .map(|v| v.abs())
+        .filter(|v| v.is_finite())
+        .collect();
+    sizes.sort_by(f64::total_cmp);
+    let last = sizes.len().saturating_sub(1);
+    round_up(sizes.get(last * 995 / 1000).copied().unwrap_or(1.0))
+}
+
+/// The next round number.
+#[must_use]
+pub fn round_up(top: f64) -> f64 {
+    if !(top > 0.0 && top.is_finite()) {
+        return 1.0;
+    }
+    let power = 10f64.powf(top.log10().floor());
+    [1.0, 2.0, 4.0, 5.0, 8.0, 10.0]
+        .map(|m| m * power)
+        .into_iter()
+        .find(|s| *s >= top)
+        .unwrap_or(top)
+}
+
+/// The cross-validated search that the Gaussian process took its kernel from.
+fn kernel_search(page: &mut String, design: &Design) {
+    let Some(geometry) = design.reduced.geometry().filter(|g| !g.map.is_empty()) else {
+        return;
+    };
+    let of = |f: fn(&GpTrial) -> f64| {
+        let mut all: Vec<f64> = geometry.map.iter().map(f).collect();
+        all.retain(|v| v.is_finite());
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
+    };
+    let (lengths, powers) = (of(|t| t.kernel.length_m), of(|t| t.kernel.power));
+    let scores = of(|t| t.error);
+    let (Some(&low), Some(&high)) = (scores.first(), scores.last()) else {
+        return;
+    };
+    page.push_str("<h2>The kernel of the Gaussian process</h2><p>Rms error of predicting sites that were left out, as a share of the signals, for every length and power that was tried; entropy and mutual information use the outlined one. A dash: no covariance.</p><table class=\"map\"><tr><th>Power \\ length (mm)</th>");
+    for length in &lengths {
+        let _ = write!(page, "<th>{:.1}</th>", length * 1e3);
+    }
+    page.push_str("</tr>");
+    for power in &powers {
+        let _ = write!(page, "<tr><th>{power}</th>");
+        for length in &lengths {
+            let found = (geometry.map.iter())
+                .find(|t| t.kernel.length_m == *length && t.kernel.power == *power)
+                .filter(|t| t.error.is_finite());
+            let Some(trial) = found else {
+                page.push_str("<td>–</td>");
+                continue;
+            };
+            let used = trial.kernel == geometry.kernel;
+            let [r, g, b] = ColorMap::Viridis
+                .at((trial.error - low) / (high - low).max(f64::MIN_POSITIVE))
+                .map(|c| (255.0 * c).round() as u8);
+            let dark = f64::from(r) * 0.3 + f64::from(g) * 0.6 + f64::from(b) * 0.1 < 130.0;
+            let _ = write!(
+                page,
+                "<td style=\"background:#{r:02x}{g:02x}{b:02x};color:{}{}\">{:.3}</td>",
+                if dark { "#fff" } else { "#111" },
+                if used {
+                    ";outline:3px solid #d55e00;outline-offset:-3px;font-weight:700"
+                } else {
+                    ""
+                },
+                trial.error
+            );
+        }
+        page.push_str("</tr>");
+    }
+    page.push_str("</table>");
 }
 
 /// Error against number of gauges for one selector and region.

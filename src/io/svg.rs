@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use glam::{DMat3, DVec2, DVec3};
 
+use crate::colormap::ColorMap;
 use crate::mesh::TriMesh;
 use crate::mesh::unroll::Unrolling;
 
@@ -44,10 +45,10 @@ pub fn standard_views(axis: DVec3, zero: DVec3) -> Vec<View> {
 
 const ACCENT: &str = "#d55e00";
 
-/// The limb from one side: facets painted from the back, tinted by `tint` (0–1 a vertex), the gauges
+/// The limb from one side: facets painted from the back, coloured by `paint`, the gauges
 /// numbered. Gauges on the far side are drawn hollow.
 #[must_use]
-pub fn limb(mesh: &TriMesh, tint: &[f64], markers: &[Marker], view: &View, width: f64) -> String {
+pub fn limb(mesh: &TriMesh, paint: Paint, markers: &[Marker], view: &View, width: f64) -> String {
     let right = view.up.cross(view.toward).normalize();
     let frame = DMat3::from_cols(right, view.toward.cross(right), view.toward).transpose();
     let seen: Vec<DVec3> = mesh.positions().iter().map(|&p| frame * p).collect();
@@ -65,13 +66,12 @@ pub fn limb(mesh: &TriMesh, tint: &[f64], markers: &[Marker], view: &View, width
     for t in order {
         let tri = mesh.triangles()[t];
         let facing = mesh.facet_normal(t as u32).dot(view.toward);
-        let level = tri.iter().map(|&v| tint[v as usize]).sum::<f64>() / 3.0;
         let points = tri.map(|v| canvas.place(seen[v as usize].truncate()));
         let _ = write!(
             svg,
             "<path d=\"{}\" fill=\"{}\"/>",
             path(&points),
-            shade(facing, level)
+            paint.facet(tri, facing)
         );
     }
     for marker in markers {
@@ -89,7 +89,7 @@ pub fn limb(mesh: &TriMesh, tint: &[f64], markers: &[Marker], view: &View, width
 pub fn unrolled(
     mesh: &TriMesh,
     unrolling: &Unrolling,
-    tint: &[f64],
+    paint: Paint,
     markers: &[Marker],
     width: f64,
 ) -> String {
@@ -103,13 +103,12 @@ pub fn unrolled(
         for k in 1..3 {
             flat[k].x -= ((flat[k].x - flat[0].x) / around).round() * around;
         }
-        let level = tri.iter().map(|&v| tint[v as usize]).sum::<f64>() / 3.0;
         let points = flat.map(|p| canvas.place(p));
         let _ = write!(
             svg,
             "<path d=\"{}\" fill=\"{}\"/>",
             path(&points),
-            shade(0.85, level)
+            paint.facet(*tri, 0.85)
         );
     }
     for marker in markers {
@@ -295,6 +294,59 @@ fn path(points: &[DVec2; 3]) -> String {
     )
 }
 
+/// What colours the facets: one value a vertex, 0–1.
+#[derive(Clone, Copy)]
+pub enum Paint<'a> {
+    /// Grey to blue-green, browner on the inside.
+    Tint(&'a [f64]),
+    Map(ColorMap, &'a [f64]),
+}
+
+impl Paint<'_> {
+    /// Fill and stroke of a facet, darker when turned away.
+    fn facet(self, tri: [u32; 3], facing: f64) -> String {
+        let level = |values: &[f64]| tri.iter().map(|&v| values[v as usize]).sum::<f64>() / 3.0;
+        match self {
+            Self::Tint(values) => shade(facing, level(values)),
+            Self::Map(map, values) => {
+                let light = 0.6 + 0.4 * facing.abs();
+                stroked(map.at(level(values)).map(|c| 255.0 * c * light))
+            }
+        }
+    }
+}
+
+/// A bar of a colour map with its ends, for beside a picture.
+#[must_use]
+pub fn legend(map: ColorMap, title: &str, low: f64, high: f64) -> String {
+    const STEPS: usize = 64;
+    let mut svg = format!(
+        "<svg viewBox=\"0 0 420 44\" style=\"max-width:420px\" role=\"img\" aria-label=\"{}\">",
+        escape(title)
+    );
+    for k in 0..STEPS {
+        let [r, g, b] = (map.at(k as f64 / (STEPS - 1) as f64)).map(|c| (255.0 * c).round() as u8);
+        let _ = write!(
+            svg,
+            "<rect x=\"{}\" y=\"22\" width=\"4.2\" height=\"12\" fill=\"#{r:02x}{g:02x}{b:02x}\"/>",
+            70 + 4 * k
+        );
+    }
+    let _ = write!(
+        svg,
+        "<text x=\"198\" y=\"14\" text-anchor=\"middle\">{}</text><text x=\"64\" y=\"33\" text-anchor=\"end\">{low}</text><text x=\"332\" y=\"33\">{high}</text></svg>",
+        escape(title)
+    );
+    svg
+}
+
+/// A stroke of the same colour closes the hairlines between facets.
+fn stroked(rgb: [f64; 3]) -> String {
+    let [r, g, b] = rgb.map(|c| c.round() as u8);
+    let colour = format!("#{r:02x}{g:02x}{b:02x}");
+    format!("{colour}\" stroke=\"{colour}")
+}
+
 /// Grey to blue-green by tint, darker when turned away, browner on the inside.
 fn shade(facing: f64, tint: f64) -> String {
     let light = 0.45 + 0.55 * facing.abs();
@@ -308,11 +360,8 @@ fn shade(facing: f64, tint: f64) -> String {
     } else {
         [96.0, 150.0, 140.0]
     };
-    let mix =
-        |k: usize| (light * (base[k] + (tinted[k] - base[k]) * tint.clamp(0.0, 1.0))).round() as u8;
-    // A stroke of the same colour closes the hairlines between facets.
-    let colour = format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2));
-    format!("{colour}\" stroke=\"{colour}")
+    let mix = |k: usize| light * (base[k] + (tinted[k] - base[k]) * tint.clamp(0.0, 1.0));
+    stroked([mix(0), mix(1), mix(2)])
 }
 
 fn draw_marker(svg: &mut String, at: DVec2, direction: DVec2, number: usize, near: bool) {

@@ -1,12 +1,12 @@
 //! The wgpu side: draws the limb into a target of its own (4× anti-aliased, with depth), which the window
 //! then copies. Nothing is uploaded or drawn again that has not changed.
 
+use crate::colormap::{ColorMap, TABLE};
 use std::sync::Arc;
 
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
 use eframe::wgpu::{self, util::DeviceExt};
 
-use super::colormap::{ColorMap, TABLE};
 use crate::mesh::TriMesh;
 
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

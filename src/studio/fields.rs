@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::Studio;
 use super::viewport::Tool;
-use crate::render::colormap::ColorMap;
+use crate::colormap::ColorMap;
+use crate::io::report::{robust_top, round_up};
 use crate::render::gpu::Shown;
 
 /// What colours the limb.
@@ -15,14 +16,16 @@ pub enum Field {
     Strain,
     Displacement,
     SignalToNoise,
+    Error,
 }
 
 impl Field {
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 5] = [
         Self::Region,
         Self::Strain,
         Self::Displacement,
         Self::SignalToNoise,
+        Self::Error,
     ];
 
     #[must_use]
@@ -32,6 +35,7 @@ impl Field {
             Self::Strain => "Strain, inside",
             Self::Displacement => "Displacement",
             Self::SignalToNoise => "Signal to noise",
+            Self::Error => "Localization error",
         }
     }
 }
@@ -58,7 +62,7 @@ impl Studio {
     /// Builds what is shown a vertex, when anything it depends on has changed.
     pub(super) fn build_field(&mut self) {
         let signature = format!(
-            "{:?} {} {:?} {:?} {:?}",
+            "{:?} {} {:?} {:?} {:?} {:?}",
             self.view.field,
             self.touching.version,
             self.feasibility
@@ -66,6 +70,7 @@ impl Studio {
                 .filter(|f| !self.view.is_stroking() && f.0 == self.document.feasible_key())
                 .map(|f| Arc::as_ptr(&f.1)),
             self.simulation.as_ref().map(|s| Arc::as_ptr(&s.simulated)),
+            self.design.as_ref().map(|d| Arc::as_ptr(&d.design)),
             self.document.state.painted.as_ref().map(|m| {
                 use std::hash::{DefaultHasher, Hash, Hasher};
                 let mut hasher = DefaultHasher::new();
@@ -135,6 +140,25 @@ impl Studio {
                     }),
                 )
             }),
+            Field::Error => {
+                let vertices = self.document.part.positions().len();
+                let errors = (self.design.as_ref())
+                    .filter(|d| d.inputs.part.positions().len() == vertices)
+                    .and_then(|d| d.design.error_map(&d.inputs.part));
+                let Some(errors) = errors else {
+                    return (None, None);
+                };
+                let top = robust_top(&errors);
+                (
+                    Some(errors.iter().map(|e| e / top).collect()),
+                    Some(Legend {
+                        title: "error on unseen touches (mm)",
+                        low: 0.0,
+                        high: top,
+                        map: ColorMap::Viridis,
+                    }),
+                )
+            }
             Field::SignalToNoise => {
                 let noise = self.document.state.project.gauge.noise_microstrain * 1e-6;
                 let Some(simulation) = self.simulation.as_ref().filter(|_| noise > 0.0) else {
@@ -244,28 +268,4 @@ impl Studio {
             .into_iter()
             .find(|s| *s <= wanted)
     }
-}
-
-/// A round number not below most of the values (99.5 % of them): single peaks do not wash the map out.
-fn robust_top(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = values
-        .iter()
-        .map(|v| v.abs())
-        .filter(|v| v.is_finite())
-        .collect();
-    sizes.sort_by(f64::total_cmp);
-    let last = sizes.len().saturating_sub(1);
-    round_up(sizes.get(last * 995 / 1000).copied().unwrap_or(1.0))
-}
-
-fn round_up(top: f64) -> f64 {
-    if !(top > 0.0 && top.is_finite()) {
-        return 1.0;
-    }
-    let power = 10f64.powf(top.log10().floor());
-    [1.0, 2.0, 4.0, 5.0, 8.0, 10.0]
-        .map(|m| m * power)
-        .into_iter()
-        .find(|s| *s >= top)
-        .unwrap_or(top)
 }

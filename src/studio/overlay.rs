@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::fields::Field;
 use super::viewport::Tool;
 use super::{Studio, theme};
-use crate::render::colormap::ColorMap;
+use crate::colormap::ColorMap;
 use crate::render::gpu::{Frame3d, Uniforms};
 
 impl Studio {
@@ -187,6 +187,9 @@ impl Studio {
             }
             Tool::Touch if self.view.field == Field::SignalToNoise && self.simulation.is_none() => {
                 "Press “Simulate” to see the signal at each site"
+            }
+            Tool::Touch if self.view.field == Field::Error && self.design.is_none() => {
+                "Press “Select gauges” to see where touches are found well and where not"
             }
             Tool::Touch => {
                 "Click: press the limb   ·   drag: look around   ·   Shift-drag: shift   ·   wheel: zoom"
