@@ -114,7 +114,8 @@ pub struct Site {
     pub position: DVec3,
     /// Outward unit normal.
     pub normal: DVec3,
-    /// Unit direction in the surface in which the strain is largest over the touches (rms).
+    /// Unit direction in the surface in which the gauge measures: where there is one a place, that with
+    /// the largest strain over the touches (rms).
     pub direction: DVec3,
     /// Rms over the touches of the strain along `direction`, inside face.
     pub rms_strain: f64,
@@ -181,7 +182,8 @@ pub fn spread_touches(
 }
 
 /// Simulates all touches and reads the signal at all sites. Gauge directions follow the strain over
-/// these very touches.
+/// these very touches: of `directions` sites one after the other at the same point, the first lies along
+/// the largest and the others are evenly turned from it.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
@@ -190,6 +192,7 @@ pub fn simulate(
     touches: Vec<Touch>,
     points: &[SurfacePoint],
     signal: Signal,
+    directions: usize,
     watch: Watch,
 ) -> Result<Dataset, Cancelled> {
     let observer = Observer::new(model, points, Face::Inside);
@@ -210,7 +213,8 @@ pub fn simulate(
                     responses.row_into(3 * i + k, row);
                 }
                 let moments = Moments::of(&rows[0], &rows[1], &rows[2]);
-                let angle = moments.dominant_angle();
+                let turned = (i % directions) as f64 * PI / directions as f64;
+                let angle = (moments.dominant_angle() + turned) % PI;
                 let frame = observer.frames()[i];
                 if signal == Signal::Strain {
                     let w = along(angle);

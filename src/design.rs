@@ -2,6 +2,7 @@
 //!
 //! Each stage is a pure function of the ones before it, so that a caller can keep what has not changed.
 
+use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
@@ -10,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
-use crate::dataset::{self, Dataset, SignalMatrix, Site};
+use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::grade::{Graded, Ground};
 use crate::elasticity::linearity::Linearity;
@@ -34,7 +35,7 @@ use crate::placement::mutual_information::MutualInformation;
 use crate::placement::{
     PlacementError, Pool, Request, Selection, Selector, SelectorKind, Wishes, pca_qr,
 };
-use crate::project::{BadValue, Elements, Lattice, Masks, Project};
+use crate::project::{BadValue, CostKeys, Elements, Lattice, Masks, Project};
 use crate::regression::folds::evenly;
 use crate::regression::tune::Effort;
 
@@ -119,6 +120,7 @@ pub const LAYOUT: usize = 3500;
 /// Seeds of the independent draws, apart from each other.
 const TEST_SEED: u64 = 0x7e57;
 const NOISE_SEED: u64 = 0x0153;
+const HEARD_SEED: u64 = 0x4ea8d;
 const WORKSHOP_SEED: u64 = 0x30b0;
 
 /// What a design starts from.
@@ -191,8 +193,9 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     } = graded;
     let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
     let unknowns = model.unknowns();
-    let signal = project.gauge.signal;
-    let mut dataset = dataset::simulate(&model, touches, &points, signal, watch)?;
+    let gauge = &project.gauge;
+    let (signal, directions) = (gauge.signal, gauge.directions);
+    let mut dataset = dataset::simulate(&model, touches, &points, signal, directions, watch)?;
     dataset.work.assemblies += models - 1;
     dataset.work.factorizations += models - 1;
     dataset.work.solves += solves;
@@ -388,9 +391,10 @@ fn size_mm(mesh: &TriMesh) -> f64 {
 pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoint>, DesignError> {
     let spacing = project.sites.spacing_mm * 1e-3;
     let estimate = mesh.area() / (spacing * spacing);
-    if estimate > MOST_SITES as f64 {
+    let directions = project.gauge.directions;
+    if estimate * directions as f64 > MOST_SITES as f64 {
         return Err(DesignError::TooManySites {
-            count: estimate as usize,
+            count: estimate as usize * directions,
             limit: MOST_SITES,
             spacing_mm: project.sites.spacing_mm,
             size_mm: size_mm(mesh),
@@ -409,7 +413,11 @@ pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoi
             size_mm: size_mm(mesh),
         });
     }
-    Ok(points)
+    // A place with several directions is as many sites.
+    Ok(points
+        .into_iter()
+        .flat_map(|at| std::iter::repeat_n(at, directions))
+        .collect())
 }
 
 fn lay_out_touches(
@@ -465,7 +473,8 @@ fn check_memory(sites: usize, touches: usize) -> Result<(), DesignError> {
 #[must_use]
 pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
     let spacing = inputs.project.sites.spacing_mm * 1e-3;
-    let sites = (inputs.part.area() / (spacing * spacing)).round() as usize;
+    let places = (inputs.part.area() / (spacing * spacing)).round() as usize;
+    let sites = places * inputs.project.gauge.directions;
     let touches = inputs.project.touch.count.min(budget.touches);
     let bytes = 4.0 * sites as f64 * touches as f64 * size_of::<f64>() as f64;
     (sites, touches, bytes / 1e9)
@@ -633,7 +642,7 @@ pub fn geometry(
         };
         (kernel, Vec::new())
     } else {
-        let x = reduced.x.select_rows(&rows);
+        let x = heard(inputs, reduced).select_rows(&rows);
         let map = gaussian_process::search(&x, &distances, noise, watch)?;
         (gaussian_process::best(&map).unwrap_or_default(), map)
     };
@@ -664,11 +673,32 @@ fn wishes(inputs: &Inputs, positions: &[DVec3]) -> Result<Wishes, DesignError> {
         sensors: keys.sensors,
         required: required?,
         spacing: keys.spacing_mm / 1000.0,
-        costs: None,
-        budget: None,
+        costs: (!keys.costs.is_empty()).then(|| costs(&keys.costs, positions)),
+        budget: keys.cost_budget,
         target_mm: keys.target_mm,
         failure: keys.failure,
     })
+}
+
+/// What a gauge costs at each position (m).
+fn costs(boxes: &[CostKeys], positions: &[DVec3]) -> Vec<f64> {
+    let cost = |p: &DVec3| {
+        let inside = boxes.iter().rev().find(|b| b.contains(*p * 1000.0));
+        inside.map_or(1.0, |b| b.cost)
+    };
+    positions.iter().map(cost).collect()
+}
+
+/// The signals of the feasible sites that selectors choose from, with noise where that is asked for.
+fn heard<'a>(inputs: &Inputs, reduced: &'a Reduced) -> Cow<'a, SignalMatrix> {
+    let project = &inputs.project;
+    let noise = if project.selection.with_noise && project.gauge.signal == Signal::Strain {
+        project.gauge.noise_microstrain * 1e-6
+    } else {
+        0.0
+    };
+    let seed = project.budget.seed.wrapping_add(HEARD_SEED);
+    evaluation::add_noise(&reduced.x, noise, seed)
 }
 
 /// Runs one selector.
@@ -694,8 +724,9 @@ pub fn select(
         return select_by_svr(inputs, simulated, reduced, budget, watch);
     }
     let places = positions(&reduced.feasible);
+    let x = heard(inputs, reduced);
     let pool = Pool {
-        x: &reduced.x,
+        x: &x,
         targets: &targets,
         sites: &reduced.feasible,
         positions: &places,
@@ -706,6 +737,9 @@ pub fn select(
         watch,
         found: &|_| (),
     };
+    if kind == SelectorKind::PcaQr && inputs.project.selection.with_noise {
+        return Ok(pca_qr::PcaQr.select(&pool, &request)?);
+    }
     if kind == SelectorKind::PcaQr {
         return Ok(pca_qr::from_components(&reduced.pca, &pool, &request)?);
     }
@@ -754,18 +788,15 @@ fn select_by_svr(
     let all = simulated.dataset.targets_mm();
     let sensors = inputs.project.selection.sensors;
     let limit = budget.selection_candidates.max(sensors);
-    let sites = if reduced.sites.len() > limit {
-        let rows = reduced.pca.pivots(limit);
-        rows.iter().map(|&r| reduced.feasible[r]).collect()
+    let rows = if reduced.sites.len() > limit {
+        reduced.pca.pivots(limit)
     } else {
-        reduced.sites.clone()
+        reduced.candidates.rows.clone()
     };
+    let sites: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
     let touches = evenly(all.len(), budget.selection_touches);
-    let x = simulated
-        .dataset
-        .x
-        .select_rows(&sites)
-        .select_columns(&touches);
+    let heard = heard(inputs, reduced);
+    let x = heard.select_rows(&rows).select_columns(&touches);
     let targets: Vec<[f64; 3]> = touches.iter().map(|&t| all[t]).collect();
     let positions: Vec<DVec3> = sites
         .iter()

@@ -8,7 +8,7 @@ use crate::io::project_file::LoadedProject;
 use crate::mesh::repair::Repair;
 use crate::mesh::unroll::Axis;
 use crate::mesh::{RepairReport, SurfacePoint, TriMesh, geodesic};
-use crate::project::{Masks, Project, SupportKeys, SupportKind};
+use crate::project::{Masks, Project, SelectionKeys, SupportKeys, SupportKind};
 
 /// What undo brings back. The mesh is not part of it: opening a file begins a new history.
 #[derive(Clone, PartialEq)]
@@ -239,7 +239,7 @@ impl Document {
             self.supports_key(),
             p.touch,
             p.sites,
-            p.gauge.signal,
+            (p.gauge.signal, p.gauge.directions),
             p.budget
         )
     }
@@ -274,16 +274,15 @@ impl Document {
     #[must_use]
     pub fn selection_key(&self) -> String {
         let p = &self.state.project;
-        let s = &p.selection;
+        // Everything that is asked for, but not the answer.
+        let asked = SelectionKeys {
+            sites: Vec::new(),
+            ..p.selection.clone()
+        };
         format!(
-            "{} {:?} {:?} {} {} {} {} {:?}",
+            "{} {:?} {asked:?} {:?}",
             self.feasible_key(),
             p.candidates,
-            s.selector,
-            s.sensors,
-            s.c_mm,
-            s.epsilon_mm,
-            s.gamma,
             p.evaluation
         )
     }

@@ -224,6 +224,9 @@ pub struct SiteKeys {
 #[serde(default, deny_unknown_fields)]
 pub struct GaugeKeys {
     pub signal: Signal,
+    /// Directions that a gauge may have at one place: the one with the largest strain, and others evenly
+    /// turned from it.
+    pub directions: usize,
     pub noise_microstrain: f64,
     pub range_microstrain: f64,
     pub least_signal_to_noise: f64,
@@ -268,9 +271,17 @@ pub struct SelectionKeys {
     /// Error at which greedy SVR adds no more gauges.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_mm: Option<f64>,
+    /// What all gauges together may cost.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cost_budget: Option<f64>,
+    /// Whether the gauge's noise is added to the signals that sites are chosen from.
+    pub with_noise: bool,
     /// Probability that one gauge has failed.
     pub failure: f64,
     pub gaussian_process: GaussianProcessKeys,
+    /// What a gauge costs inside a box, the last box counting; 1 elsewhere.
+    #[serde(rename = "cost", skip_serializing_if = "Vec::is_empty")]
+    pub costs: Vec<CostKeys>,
     /// The chosen sites, written by a design.
     #[serde(rename = "site", skip_serializing_if = "Vec::is_empty")]
     pub sites: Vec<ChosenSite>,
@@ -335,6 +346,21 @@ pub struct RegionKeys {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CostKeys {
+    pub box_mm: BoxMm,
+    pub cost: f64,
+}
+
+impl CostKeys {
+    #[must_use]
+    pub fn contains(&self, at_mm: DVec3) -> bool {
+        let [a, b] = self.box_mm.map(DVec3::from_array);
+        at_mm.cmpge(a.min(b)).all() && at_mm.cmple(a.max(b)).all()
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BudgetKeys {
     pub quality: Quality,
@@ -377,6 +403,7 @@ impl Default for GaugeKeys {
     fn default() -> Self {
         Self {
             signal: Signal::Strain,
+            directions: 1,
             noise_microstrain: 1.0,
             range_microstrain: 30_000.0,
             least_signal_to_noise: 3.0,
@@ -416,8 +443,11 @@ impl Default for SelectionKeys {
             spacing_mm: 0.0,
             required_mm: Vec::new(),
             target_mm: None,
+            cost_budget: None,
+            with_noise: false,
             failure: 0.0,
             gaussian_process: GaussianProcessKeys::default(),
+            costs: Vec::new(),
             sites: Vec::new(),
         }
     }
@@ -498,7 +528,8 @@ impl Project {
     pub fn feasible_rules(&self) -> FeasibleRules {
         FeasibleRules {
             support_clearance: self.feasible.support_clearance_mm * MM,
-            edge_neighbours: self.feasible.edge_neighbours,
+            // Sites at one place are neighbours of each other, which move no centre of mass.
+            edge_neighbours: (self.feasible.edge_neighbours + 1) * self.gauge.directions - 1,
             edge_radius: self.feasible.edge_radius_mm * MM,
             grid_length: self.gauge.grid_length_mm * MM,
             grid_width: self.gauge.grid_width_mm * MM,
@@ -587,9 +618,32 @@ impl Project {
             failure,
             (0.0..=1.0).contains(&failure),
         )?;
+        let directions = self.gauge.directions;
+        check(
+            "gauge.directions",
+            "between 1 and 4",
+            directions as f64,
+            (1..=4).contains(&directions),
+        )?;
+        check(
+            "gauge.directions",
+            "1 for displacements, which have no direction of a gauge",
+            directions as f64,
+            directions == 1 || self.gauge.signal == Signal::Strain,
+        )?;
+        for keys in &self.selection.costs {
+            let cost = keys.cost;
+            check(
+                "selection.cost.cost",
+                "a number above zero",
+                cost,
+                cost > 0.0,
+            )?;
+        }
         let process = &self.selection.gaussian_process;
         let optional = [
             ("selection.target_mm", self.selection.target_mm),
+            ("selection.cost_budget", self.selection.cost_budget),
             ("selection.gaussian_process.length_mm", process.length_mm),
             ("selection.gaussian_process.power", process.power),
         ];

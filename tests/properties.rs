@@ -387,3 +387,58 @@ fn training_knows_nothing_of_the_test_touches() {
     let alone = SignalMatrix::new(1, vec![0.1, 0.2]);
     assert_eq!(model.predict(&asked)[0], model.predict(&alone)[0]);
 }
+
+#[test]
+fn what_the_project_asks_of_a_choice_is_kept() {
+    let (mut inputs, budget) = small(Signal::Strain);
+    inputs.project.gauge.directions = 2;
+    let selection = &mut inputs.project.selection;
+    selection.spacing_mm = 15.0;
+    selection.cost_budget = Some(4.0);
+    // The lower half is dear.
+    selection.costs.push(hapdef::project::CostKeys {
+        box_mm: [[-1e3, -1e3, -1e3], [1e3, 1e3, 60.0]],
+        cost: 3.5,
+    });
+    let simulated = Arc::new(design::simulate(&inputs, &budget, &unwatched).unwrap());
+    let sites = &simulated.dataset.sites;
+    for pair in sites.chunks_exact(2) {
+        assert_eq!(pair[0].position, pair[1].position);
+        assert!(pair[0].direction.dot(pair[1].direction).abs() < 1e-9);
+        assert!(pair[0].rms_strain >= pair[1].rms_strain);
+    }
+    let feasibility = design::filter(&inputs, &simulated);
+    let reduced =
+        design::reduce_sites(&inputs, &simulated, &feasibility, &budget, &unwatched).unwrap();
+    for kind in SelectorKind::ALL {
+        let chosen =
+            design::select(&inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap();
+        let set = &chosen.sets.last().unwrap().sites;
+        let cost = |s: &usize| {
+            if sites[*s].position.z <= 0.06 {
+                3.5
+            } else {
+                1.0
+            }
+        };
+        assert!(set.iter().map(cost).sum::<f64>() <= 4.0, "{kind:?}");
+        for (k, a) in set.iter().enumerate() {
+            for b in &set[..k] {
+                let apart = sites[*a].position.distance(sites[*b].position);
+                assert!(apart == 0.0 || apart >= 0.015, "{kind:?}: {apart}");
+            }
+        }
+    }
+    let choose = |inputs: &Inputs, kind| {
+        design::select(inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap()
+    };
+    let clean = choose(&inputs, SelectorKind::GreedySvr);
+    inputs.project.gauge.noise_microstrain = 50.0;
+    assert_eq!(choose(&inputs, SelectorKind::GreedySvr).sets, clean.sets);
+    inputs.project.selection.with_noise = true;
+    let noisy = choose(&inputs, SelectorKind::GreedySvr);
+    assert!(noisy.sets[2].criterion > 1.05 * clean.sets[2].criterion);
+    inputs.project.gauge.directions = 2;
+    inputs.project.gauge.signal = Signal::Displacement;
+    assert!(design::simulate(&inputs, &budget, &unwatched).is_err());
+}

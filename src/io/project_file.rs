@@ -416,6 +416,11 @@ fn gauge(t: &mut Text, project: &Project) {
         "\"strain\", \"displacement\" or \"normal-displacement\"",
     );
     t.key(
+        "directions",
+        gauge.directions,
+        "a place may take a gauge in: 1 along the largest strain, 2 also across, up to 4",
+    );
+    t.key(
         "noise_microstrain",
         float(gauge.noise_microstrain),
         "standard deviation of a reading",
@@ -475,6 +480,16 @@ fn selection(t: &mut Text, project: &Project) {
         selection.target_mm.map(float),
         "error at which greedy SVR adds no more gauges",
     );
+    t.maybe(
+        "cost_budget",
+        selection.cost_budget.map(float),
+        "what all gauges together may cost: 1 each, or as in [[selection.cost]]",
+    );
+    t.key(
+        "with_noise",
+        selection.with_noise,
+        "choose from signals with the gauge's noise added",
+    );
     t.key(
         "failure",
         float(selection.failure),
@@ -497,6 +512,11 @@ fn selection(t: &mut Text, project: &Project) {
         float(process.noise),
         "variance of a measurement's noise over the field's",
     );
+    for cost in &selection.costs {
+        t.list("selection.cost");
+        t.key("box_mm", corners(&cost.box_mm), "a gauge in here costs");
+        t.key("cost", float(cost.cost), "");
+    }
     for site in &selection.sites {
         t.list("selection.site");
         t.key("position_mm", triple(&site.position_mm), "");
@@ -559,7 +579,7 @@ fn serialized(value: &impl serde::Serialize) -> String {
 mod tests {
     use super::*;
     use crate::mesh::unroll::Axis;
-    use crate::project::{ChosenSite, RegionKeys, SupportKeys, SupportKind, Unit};
+    use crate::project::{ChosenSite, CostKeys, RegionKeys, SupportKeys, SupportKind, Unit};
 
     fn full() -> Project {
         let mut p = Project::around("a \"part\".stl", Some(Unit::Inch));
@@ -580,6 +600,12 @@ mod tests {
         p.selection.sites.push(ChosenSite {
             position_mm: [0.1, 1.0 / 3.0, -7e-17],
             direction: [0.0, 0.0, 1.0],
+        });
+        p.selection.with_noise = true;
+        p.selection.cost_budget = Some(12.5);
+        p.selection.costs.push(CostKeys {
+            box_mm: [[0.0; 3], [1.0; 3]],
+            cost: 2.5,
         });
         p.evaluation.regions.push(RegionKeys {
             name: "middle".into(),

@@ -137,6 +137,23 @@ fn number(
     ui.end_row();
 }
 
+/// One row: a label and a share, shown in percent.
+fn percentage(
+    ui: &mut Ui,
+    label: &str,
+    share: &mut f64,
+    range: std::ops::RangeInclusive<f64>,
+    help: &str,
+) {
+    let mut percent = 100.0 * *share;
+    number(ui, label, &mut percent, range, 0.05, " %", help);
+    // Not every frame: a hundredfold and back is not always the same number.
+    if (percent - 100.0 * *share).abs() > 0.0 {
+        *share = percent / 100.0;
+    }
+}
+
+/// One row: a label and a count.
 fn count(
     ui: &mut Ui,
     label: &str,
@@ -368,6 +385,17 @@ fn gauge(ui: &mut Ui, project: &mut Project) {
         signal_name,
         "What a site reports: strain is what a gauge measures, displacement what the paper used",
     );
+    if gauge.signal == Signal::Strain {
+        count(
+            ui,
+            "Directions",
+            &mut gauge.directions,
+            1..=4,
+            "That a gauge may have at one place: 1 along the largest strain, 2 also across it",
+        );
+    } else {
+        gauge.directions = 1;
+    }
     number(
         ui,
         "Noise",
@@ -497,20 +525,35 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         1..=200,
         "How many gauges to place",
     );
-    let mut percent = 100.0 * project.candidates.unexplained;
     number(
         ui,
+        "Least spacing",
+        &mut project.selection.spacing_mm,
+        0.0..=1e4,
+        0.1,
+        " mm",
+        "Between any two gauges",
+    );
+    percentage(
+        ui,
+        "Chance of failure",
+        &mut project.selection.failure,
+        0.0..=100.0,
+        "That one gauge has failed when it is needed: greedy SVR then chooses sites that can do without each other",
+    );
+    let name = ui.label("With noise");
+    ui.checkbox(&mut project.selection.with_noise, "")
+        .on_hover_text("Choose from signals with the gauge's noise added")
+        .labelled_by(name.id)
+        .accessible_name("With noise");
+    ui.end_row();
+    percentage(
+        ui,
         "Unexplained",
-        &mut percent,
+        &mut project.candidates.unexplained,
         0.01..=99.0,
-        0.05,
-        " %",
         "Share of the held-out variance that the candidates may leave unexplained",
     );
-    // Not every frame: a hundredfold and back is not always the same number.
-    if (percent - 100.0 * project.candidates.unexplained).abs() > 0.0 {
-        project.candidates.unexplained = percent / 100.0;
-    }
     number(
         ui,
         "C",
