@@ -20,7 +20,7 @@ use timing::{cpu_seconds, reference_seconds};
 fn main() {
     let draft_only = std::env::args().any(|a| a == "draft");
     let mut text = String::from(
-        "# Results\n\nRemade by `cargo bench --bench results` (about 15 minutes on two cores); the build times by `benches/build-times.sh`. \
+        "# Results\n\nRemade by `cargo bench --bench results` (about 20 minutes on two cores); the build times by `benches/build-times.sh`. \
 Times are processor seconds of the whole process, on a shared and noisy machine: compare them with the reference line, not with a stopwatch. \
 Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the element size, touches drawn uniformly at random off its nodes, never seen in training or selection.\n\n",
     );
@@ -43,10 +43,15 @@ Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the eleme
         }
     }
     errors(&mut text, &designs);
+    curves(&mut text, &designs);
+    failures(&mut text, &designs);
     reduction(&mut text, &designs);
     times(&mut text, &designs, reference);
     if let Ok(elastic) = std::fs::read_to_string("benches/elastic.md") {
         let _ = writeln!(text, "{elastic}");
+    }
+    if let Ok(selection) = std::fs::read_to_string("benches/selection.md") {
+        let _ = writeln!(text, "{selection}");
     }
     if let Ok(build) = std::fs::read_to_string("benches/build-times.txt") {
         let _ = writeln!(text, "## Build times\n\n{build}");
@@ -246,11 +251,81 @@ fn errors(text: &mut String, designs: &[(Quality, Signal, Design)]) {
                 find(false)
             );
         };
-        for selector in ["greedy-svr", "pca-qr"] {
+        for selector in SelectorKind::ALL.map(SelectorKind::name) {
             line(selector, 5);
             line(selector, 10);
         }
         line("all-candidates", design.reduced.sites.len());
+    }
+    text.push('\n');
+}
+
+/// Error against number of gauges, for all selectors: the paper's first figure.
+fn curves(text: &mut String, designs: &[(Quality, Signal, Design)]) {
+    let kinds = SelectorKind::ALL;
+    for (quality, signal, design) in designs {
+        let names: Vec<&str> = kinds.iter().map(|k| k.title()).collect();
+        let _ = writeln!(
+            text,
+            "### Error against number of gauges: {}, {}\n\nAll touches: mean / median / 95th percentile, then the mean as a workshop would build it (each gauge 1 mm and 3° off, gains 3 % off), in mm.\n\n| gauges | {} |\n|---|{}",
+            quality.name(),
+            signal.name(),
+            names.join(" | "),
+            "---|".repeat(names.len())
+        );
+        for sensors in 1..=10 {
+            let cells: Vec<String> = kinds
+                .iter()
+                .map(|kind| {
+                    let row = design.evaluation.rows.iter().find(|r| {
+                        r.selector == kind.name()
+                            && r.sensors == sensors
+                            && r.region == "all touches"
+                    });
+                    row.map_or("–".into(), |r| {
+                        format!(
+                            "{:.2} / {:.2} / {:.1}; {:.1}",
+                            r.error_mm, r.median_mm, r.p95_mm, r.workshop_mm
+                        )
+                    })
+                })
+                .collect();
+            let _ = writeln!(text, "| {sensors} | {} |", cells.join(" | "));
+        }
+        text.push('\n');
+    }
+}
+
+/// What failed gauges cost: the paper's second figure.
+fn failures(text: &mut String, designs: &[(Quality, Signal, Design)]) {
+    let _ = writeln!(
+        text,
+        "## Failed gauges\n\nMean error over subsets of so many failed of ten (all subsets where they are few, a seeded sample otherwise; in brackets the worst), trained anew without them, and not (a failed gauge then reports its mean). The paper reports about 5 mm more with three of ten failed (greedy SVR, trained anew).\n\n| quality | signal | selector | trained anew | 0 | 1 | 2 | 3 | 4 | 5 |\n|---|---|---|---|---|---|---|---|---|---|"
+    );
+    for (quality, signal, design) in designs {
+        for set in &design.evaluation.failures {
+            for retrained in [true, false] {
+                let cells: Vec<String> = (0..=5)
+                    .map(|failed| {
+                        let row = (set.rows.iter()).find(|r| {
+                            r.failed == failed && (r.retrained == retrained || failed == 0)
+                        });
+                        row.map_or("–".into(), |r| {
+                            format!("{:.1} ({:.1})", r.error_mm, r.worst_mm)
+                        })
+                    })
+                    .collect();
+                let _ = writeln!(
+                    text,
+                    "| {} | {} | {} | {} | {} |",
+                    quality.name(),
+                    signal.name(),
+                    set.selector,
+                    if retrained { "yes" } else { "no" },
+                    cells.join(" | ")
+                );
+            }
+        }
     }
     text.push('\n');
 }

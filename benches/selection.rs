@@ -1,9 +1,11 @@
 //! The selectors measured: `cargo bench --bench selection` writes `benches/selection.md`, which
-//! `RESULTS.md` takes in. With the word `quick` it leaves out the long comparisons and only prints.
+//! `RESULTS.md` takes in. With names of sections behind `--` it makes only those anew.
 
 mod timing;
 
 use std::fmt::Write as _;
+use std::ops::ControlFlow;
+use std::time::Instant;
 
 use hapdef::budget::{Quality, unwatched};
 use hapdef::dataset::{Signal, SignalMatrix};
@@ -22,6 +24,8 @@ use hapdef::regression::folds::evenly;
 use hapdef::regression::tune::Effort;
 use timing::{cpu_seconds, reference_seconds};
 
+const FILE: &str = "benches/selection.md";
+
 /// Targets in metres, C 20, ε 1e-6, γ 2e-3.
 const PAPER: Hyper = Hyper {
     c: 20_000.0,
@@ -34,23 +38,40 @@ const TUNED: Hyper = Hyper {
     gamma: 0.1,
 };
 
+type Both<'a> = [(&'a str, &'a Signals); 2];
+/// A word to ask for it by, and what it measures.
+type Section = (&'static str, fn(&mut String, &Both));
+
+const SECTIONS: [Section; 5] = [
+    ("full-size", full_size),
+    ("exhaustive", exhaustive),
+    ("others", others),
+    ("cancel", cancel),
+    ("trade", trade),
+];
+
 fn main() {
-    let quick = std::env::args().any(|a| a == "quick");
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let named = |word: &str| asked.iter().any(|a| a == word);
+    let every = !SECTIONS.iter().any(|s| named(s.0));
     let reference = reference_seconds();
-    let mut text = format!(
-        "The figures of the selectors are remade by `cargo bench --bench selection` (about an hour on two cores, nearly all of it the exact fits of what was *not* chosen). Processor seconds of one core; a 4000 × 4000 matrix product on one core took {reference:.1} s beside them. Data: the bundled limb at Standard, seed 0.\n\n"
-    );
     let strain = Signals::new(Signal::Strain);
     let displacement = Signals::new(Signal::Displacement);
     let both = [("strain", &strain), ("displacement", &displacement)];
-    full_size(&mut text, &both, quick);
-    exhaustive(&mut text, &both);
-    others(&mut text, &both);
-    trade(&mut text, &strain);
-    println!("{text}");
-    if !quick {
-        std::fs::write("benches/selection.md", text).expect("benches/selection.md can be written");
+    let old = std::fs::read_to_string(FILE).unwrap_or_default();
+    let mut text = format!(
+        "The figures of the selectors are remade by `cargo bench --bench selection` (about an hour on two cores, nearly all of it the exact fits of what was *not* chosen). Processor seconds of one core; a 4000 × 4000 matrix product on one core took {reference:.1} s beside them. Data: the bundled limb at Standard, seed 0.\n\n"
+    );
+    for (k, (word, measure)) in SECTIONS.iter().enumerate() {
+        if every || named(word) {
+            eprintln!("{word}");
+            measure(&mut text, &both);
+        } else if let Some(kept) = old.split("\n## ").nth(k + 1) {
+            let _ = write!(text, "## {}\n\n", kept.trim_end());
+        }
     }
+    println!("{text}");
+    std::fs::write(FILE, text).expect("the figures can be written");
 }
 
 /// A simulated limb with its targets.
@@ -164,7 +185,7 @@ fn worst(steps: &[Comparison]) -> String {
     )
 }
 
-fn full_size(text: &mut String, both: &[(&str, &Signals)], quick: bool) {
+fn full_size(text: &mut String, both: &Both) {
     let _ = writeln!(
         text,
         "## Greedy SVR at full size\n\n407 candidates × 4000 touches, 10 gauges, 5 folds, 3 outputs. The paper's setting: targets in metres, C 20, ε 1e-6, γ 2e-3 (limit 60 s); the tuned one: targets in mm, C 200, ε 0.1, γ 0.1 (limit 300 s). Gap: by how much a step could have been better by the screens' own account. Then, at every step, the 20 most promising and 20 random sites that were not chosen, fitted exactly: a minus says that the choice was the best of all.\n\n| signals | setting | seconds | criterion at 5, 10 (mm) | fitted exactly | largest gap | check | last screen departs |\n|---|---|---|---|---|---|---|---|"
@@ -183,7 +204,7 @@ fn full_size(text: &mut String, both: &[(&str, &Signals)], quick: bool) {
             let sets = &chosen.sets;
             let gap = sets.iter().filter_map(|s| s.gap).fold(0.0, f64::max);
             // The tuned fits are dear: one set of signals will do.
-            let checked = if quick || (setting == "tuned" && name != "strain") {
+            let checked = if setting == "tuned" && name != "strain" {
                 "– | –".to_owned()
             } else {
                 let steps = svr
@@ -205,7 +226,7 @@ fn full_size(text: &mut String, both: &[(&str, &Signals)], quick: bool) {
     text.push('\n');
 }
 
-fn exhaustive(text: &mut String, both: &[(&str, &Signals)]) {
+fn exhaustive(text: &mut String, both: &Both) {
     let _ = writeln!(
         text,
         "## Greedy SVR against the plain algorithm\n\n60 candidates × 800 touches, 10 gauges: at every step *every* other site fitted exactly. `benches/sklearn_criterion.py` does the same with scikit-learn on any dataset.\n\n| signals | setting | seconds | largest gap | check | last screen departs |\n|---|---|---|---|---|---|"
@@ -236,7 +257,7 @@ fn exhaustive(text: &mut String, both: &[(&str, &Signals)]) {
     text.push('\n');
 }
 
-fn others(text: &mut String, both: &[(&str, &Signals)]) {
+fn others(text: &mut String, both: &Both) {
     let _ = writeln!(
         text,
         "## The other selectors\n\n| selector | size | seconds | limit |\n|---|---|---|---|"
@@ -328,8 +349,39 @@ fn informed(text: &mut String, signals: &Signals) -> (Part, Geometry) {
     (part, geometry)
 }
 
-fn trade(text: &mut String, signals: &Signals) {
+/// How long a stop takes to be heard.
+fn cancel(text: &mut String, both: &Both) {
+    let part = both[0].1.part(407, 4000);
+    let svr = svr(TUNED);
+    let mut waits = Vec::new();
+    for after in [0.05, 0.4, 2.0, 6.0, 15.0, 30.0, 45.0] {
+        let started = Instant::now();
+        let watch = |_| {
+            if started.elapsed().as_secs_f64() < after {
+                return ControlFlow::Continue(());
+            }
+            ControlFlow::Break(())
+        };
+        let request = Request {
+            wishes: &Wishes::count(10),
+            watch: &watch,
+            found: &|_| (),
+        };
+        if svr.select(&part.pool(), &request).is_err() {
+            waits.push(1e3 * (started.elapsed().as_secs_f64() - after));
+        }
+    }
+    let cells: Vec<String> = waits.iter().map(|w| format!("{w:.0}")).collect();
+    let _ = writeln!(
+        text,
+        "## Cancelling\n\nGreedy SVR at full size, the tuned setting, told to stop after 0.05 to 45 s: it had ended {} ms later (by the clock, on all cores; limit 100).\n",
+        cells.join(", ")
+    );
+}
+
+fn trade(text: &mut String, both: &Both) {
     const SENSORS: usize = 6;
+    let signals = both[0].1;
     let _ = writeln!(
         text,
         "## The trade of this stage\n\nGreedy SVR on strain, {SENSORS} gauges, the tuned setting. Each line changes one thing of the first. The error is always the same one: cross-validated in five folds over 4000 touches, fitted exactly. Landmarks are the rank of the screens' features; a choice may be worse than the best by the tolerance.\n\n| changed | seconds | error (mm) | fitted exactly |\n|---|---|---|---|"

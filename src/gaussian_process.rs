@@ -162,7 +162,9 @@ impl Covariance {
     /// What must be known before trusting choices made with it.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
-        if self.clipped > 0.0 || self.clipped.is_nan() {
+        /// Below this share it is rounding and the last digits of distances.
+        const NEGLIGIBLE: f64 = 5e-5;
+        if self.clipped > NEGLIGIBLE || self.clipped.is_nan() {
             vec![format!(
                 "The kernel is no covariance on this surface: {:.2} % of its spectrum was negative and was set to zero. A smaller power gives a sounder model.",
                 100.0 * self.clipped

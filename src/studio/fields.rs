@@ -152,7 +152,7 @@ impl Studio {
                 (
                     Some(errors.iter().map(|e| e / top).collect()),
                     Some(Legend {
-                        title: "error on unseen touches (mm)",
+                        title: "error (mm)",
                         low: 0.0,
                         high: top,
                         map: ColorMap::Viridis,

@@ -144,7 +144,7 @@ impl Studio {
                 ui.label(RichText::new(title).strong());
                 let plot = Plot::new(("failures", retrained))
                     .height(height)
-                    .legend(Legend::default().position(Corner::LeftTop))
+                    .legend(Legend::default().position(Corner::RightBottom))
                     .x_axis_label("failed gauges")
                     .x_grid_spacer(egui_plot::uniform_grid_spacer(|_| [10.0, 5.0, 1.0]))
                     .y_axis_label("mean error (mm)")
