@@ -15,19 +15,22 @@ mod touching;
 mod viewport;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use egui::{CentralPanel, Panel};
 
 use crate::budget::Quality;
 use crate::cli;
-use crate::design::{self, Design, DesignError, Simulated};
+use crate::dataset::Site;
+use crate::design::{self, Design, DesignError, Simulated, StageTime};
 use crate::document::Document;
 use crate::feasible::Feasibility;
+use crate::io::artifacts::as_chosen;
 use crate::io::project_file::{self, LoadedProject};
 use crate::job::{Job, Outcome, Reporter, Stop};
-use crate::placement::SelectorKind;
+use crate::placement::{SelectorKind, SensorSet};
+use crate::project::ChosenSite;
 
 pub use commands::Command;
 pub use fields::Field;
@@ -75,6 +78,8 @@ pub struct Studio {
     touching: touching::Touching,
     dialog: Option<dialogs::Dialog>,
     job: Option<Job<Finished>>,
+    /// What the running selection has chosen so far.
+    making: Arc<Mutex<Vec<ChosenSite>>>,
     results: results::Tab,
     ask_quit: bool,
     quit: bool,
@@ -108,11 +113,21 @@ impl Studio {
             touching: touching::Touching::default(),
             dialog: None,
             job: None,
+            making: Arc::default(),
             results: results::Tab::default(),
             ask_quit: false,
             quit: false,
             title: String::new(),
         })
+    }
+
+    /// The gauges to draw: those of the running selection as far as it has come, else the project's.
+    pub(super) fn gauges(&self) -> Vec<ChosenSite> {
+        let making = (self.job.as_ref())
+            .and_then(|_| self.making.lock().ok())
+            .map(|making| making.clone())
+            .filter(|making| !making.is_empty());
+        making.unwrap_or_else(|| self.document.state.project.selection.sites.clone())
     }
 
     /// Whether a job is running.
@@ -183,6 +198,8 @@ impl Studio {
             .as_ref()
             .filter(|s| s.key == self.document.simulation_key())
             .map(|s| Arc::clone(&s.simulated));
+        let making = Arc::new(Mutex::new(Vec::new()));
+        self.making = Arc::clone(&making);
         self.start(
             ctx,
             "Select gauges",
@@ -195,13 +212,32 @@ impl Studio {
                 let kinds: Vec<SelectorKind> = std::iter::once(first)
                     .chain(SelectorKind::ALL.into_iter().filter(|&k| k != first))
                     .collect();
-                let design = match current {
-                    Some(simulated) => {
-                        design::run_from(&inputs, simulated, &kinds, &budget, &clock, &watch)
+                let anew = current.is_none();
+                let simulated = match current {
+                    Some(simulated) => simulated,
+                    None => {
+                        Arc::new(design::simulate(&inputs, &budget, &watch).map_err(|e| stop(&e))?)
                     }
-                    None => design::run(&inputs, &kinds, &budget, &clock, &watch),
                 };
-                let design = design.map_err(|e| stop(&e))?;
+                let found = |kind, set: &SensorSet, sites: &[Site]| {
+                    if kind == first
+                        && let Ok(mut making) = making.lock()
+                    {
+                        *making = as_chosen(sites, &set.sites);
+                    }
+                };
+                let simulate_seconds = clock();
+                let mut design = design::run_step_by_step(
+                    &inputs, simulated, &kinds, &budget, &clock, &watch, &found,
+                )
+                .map_err(|e| stop(&e))?;
+                if anew {
+                    let stage = StageTime {
+                        stage: "simulate",
+                        seconds: simulate_seconds,
+                    };
+                    design.seconds.insert(0, stage);
+                }
                 Ok(Finished::Design(
                     Arc::new(design),
                     start.elapsed().as_secs_f64(),
@@ -252,6 +288,7 @@ impl Studio {
     fn collect(&mut self, ctx: &egui::Context) {
         if let Some(outcome) = self.job.as_ref().and_then(Job::poll) {
             let job = self.job.take();
+            self.making = Arc::default();
             let (name, key) = job.map(|j| (j.name, j.key)).unwrap_or_default();
             match outcome {
                 Outcome::Done(finished) => self.finished(ctx, finished, key),
@@ -310,7 +347,7 @@ impl Studio {
                 ),
         });
         self.document.state.project.selection.sites =
-            crate::io::artifacts::as_chosen(&design.simulated.dataset, design.chosen());
+            as_chosen(&design.simulated.dataset.sites, design.chosen());
         self.document.settle();
         self.results = results::Tab::Error;
         self.design = Some(DesignResult {

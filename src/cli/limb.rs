@@ -191,5 +191,8 @@ fn choose_sites(
         &unwatched,
     )?;
     let sites = selection.sets.last().map_or(&[][..], |s| &s.sites);
-    Ok(crate::io::artifacts::as_chosen(&simulated.dataset, sites))
+    Ok(crate::io::artifacts::as_chosen(
+        &simulated.dataset.sites,
+        sites,
+    ))
 }

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::npz::NpzFile;
 use super::{FileError, atomic, project_file, report};
-use crate::dataset::{Dataset, Signal};
+use crate::dataset::{Dataset, Signal, Site};
 use crate::design::{Design, Inputs};
 use crate::placement::information::Geometry;
 use crate::project::{ChosenSite, Project};
@@ -59,18 +59,18 @@ pub fn with_result(project: &Project, design: &Design, at: &Path, mesh: &Path) -
     let mut project = project.clone();
     project.part.mesh = project_file::relative_to(at, mesh);
     project.budget.quality = design.budget.quality;
-    project.selection.sites = as_chosen(&design.simulated.dataset, design.chosen());
+    project.selection.sites = as_chosen(&design.simulated.dataset.sites, design.chosen());
     project
 }
 
 /// The chosen sites as a project keeps them: to the micrometre and the ten-thousandth.
 #[must_use]
-pub fn as_chosen(dataset: &Dataset, sites: &[usize]) -> Vec<ChosenSite> {
+pub fn as_chosen(all: &[Site], sites: &[usize]) -> Vec<ChosenSite> {
     let round = |x: f64, unit: f64| (x * unit).round() / unit + 0.0;
     sites
         .iter()
         .map(|&s| {
-            let site = &dataset.sites[s];
+            let site = &all[s];
             ChosenSite {
                 position_mm: (site.position * 1000.0).to_array().map(|x| round(x, 1e3)),
                 direction: site.direction.to_array().map(|x| round(x, 1e4)),

@@ -72,7 +72,7 @@ impl Studio {
     pub(super) fn paint_gauges(&self, painter: &egui::Painter) {
         let toward = self.view.camera.toward_eye();
         let deformation = self.exaggeration().unwrap_or(0.0);
-        for (number, site) in (1..).zip(&self.document.state.project.selection.sites) {
+        for (number, site) in (1..).zip(self.gauges()) {
             let position = DVec3::from_array(site.position_mm) / 1000.0;
             let direction = DVec3::from_array(site.direction);
             let (at, _) = self.view.index.nearest(position);

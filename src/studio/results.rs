@@ -221,7 +221,7 @@ impl Studio {
         let design = self
             .design
             .as_ref()
-            .filter(|d| as_chosen(&d.design.simulated.dataset, d.design.chosen()) == *sites);
+            .filter(|d| as_chosen(&d.design.simulated.dataset.sites, d.design.chosen()) == *sites);
         egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
             egui::Grid::new("sites")
                 .num_columns(10)

@@ -1,0 +1,391 @@
+//! Which sites gauges may have, and which they get.
+
+use std::borrow::Cow;
+use std::sync::OnceLock;
+
+use glam::DVec3;
+
+use super::{DesignError, HEARD_SEED, Inputs, LEAST_TOUCHES, Simulated};
+use crate::budget::{Budget, Cancelled, Watch};
+use crate::dataset::{Dataset, Signal, SignalMatrix, Site};
+use crate::elasticity::support::supported_vertices;
+use crate::evaluation;
+use crate::feasible::{Feasibility, FeasibleInput, feasible};
+use crate::gaussian_process::{self, Covariance, Distances, GpKernel};
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::{SurfacePoint, TriMesh, geodesic};
+use crate::pca::Pca;
+use crate::placement::candidates::{Candidates, reduce};
+use crate::placement::entropy::Entropy;
+use crate::placement::greedy_svr::{self, GreedySvr};
+use crate::placement::information::Geometry;
+use crate::placement::mutual_information::MutualInformation;
+use crate::placement::{
+    PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes, pca_qr,
+};
+use crate::project::CostKeys;
+use crate::regression::folds::evenly;
+use crate::regression::tune::Effort;
+
+/// Filters the sites.
+#[must_use]
+pub fn filter(inputs: &Inputs, simulated: &Simulated) -> Feasibility {
+    let mesh = &simulated.mesh;
+    let painted = inputs
+        .painted
+        .as_ref()
+        .map(|mask| painted_sites(&inputs.part, mask, &simulated.dataset));
+    feasible(
+        &FeasibleInput {
+            mesh,
+            index: &SurfaceIndex::new(mesh),
+            supported: &supported_vertices(&simulated.held),
+            points: &simulated.points,
+            sites: &simulated.dataset.sites,
+            painted: painted.as_deref(),
+        },
+        &inputs.project.feasible_rules(),
+    )
+}
+
+/// Whether each site lies where the mask (one value a vertex of the part) is mostly set.
+fn painted_sites(part: &TriMesh, mask: &[bool], dataset: &Dataset) -> Vec<bool> {
+    let index = SurfaceIndex::new(part);
+    let values: Vec<f64> = mask.iter().map(|&m| f64::from(u8::from(m))).collect();
+    dataset
+        .sites
+        .iter()
+        .map(|site| part.interpolate(&values, index.nearest(site.position).0) >= 0.5)
+        .collect()
+}
+
+/// The reduction stage: candidates among the feasible sites, and the components they came from.
+pub struct Reduced {
+    pub feasible: Vec<usize>,
+    /// Signals of the feasible sites.
+    pub x: SignalMatrix,
+    pub pca: Pca,
+    pub candidates: Candidates,
+    /// Made when a selector first asks for it.
+    geometry: OnceLock<(Geometry, Vec<usize>)>,
+    /// Candidates as numbered in the dataset, in the order of the pivots.
+    pub sites: Vec<usize>,
+}
+
+impl Reduced {
+    /// The Gaussian process, where a selector asked for it.
+    #[must_use]
+    pub fn geometry(&self) -> Option<&Geometry> {
+        self.geometry.get().map(|g| &g.0)
+    }
+}
+
+/// Reduces the feasible sites to candidates.
+///
+/// # Errors
+/// [`DesignError`] where nothing is feasible.
+pub fn reduce_sites(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    feasibility: &Feasibility,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Reduced, DesignError> {
+    let feasible = feasibility.sites();
+    let sensors = inputs.project.selection.sensors;
+    if feasible.is_empty() {
+        return Err(PlacementError::NoSites.into());
+    }
+    if sensors > feasible.len() {
+        return Err(PlacementError::TooFewSites {
+            wanted: sensors,
+            available: feasible.len(),
+        }
+        .into());
+    }
+    let touches = simulated.dataset.touches.len();
+    if touches < LEAST_TOUCHES {
+        return Err(PlacementError::TooFewTouches {
+            touches,
+            least: LEAST_TOUCHES,
+        }
+        .into());
+    }
+    let x = simulated.dataset.x.select_rows(&feasible);
+    let scored = budget.selection_candidates.max(sensors);
+    let pca = Pca::new(&x, scored, watch).map_err(PlacementError::from)?;
+    let limit = budget.candidates.max(sensors);
+    let mut candidates = reduce(&x, inputs.project.reduction(), limit, watch)?;
+    if candidates.rows.len() < sensors {
+        // The variance asked for needs fewer sites than there are gauges to place.
+        candidates.rows = pca.pivots(sensors.min(pca.reach()));
+        candidates.notes.push(format!(
+            "Kept {} candidates, one a gauge: the variance asked for needs fewer.",
+            candidates.rows.len()
+        ));
+    }
+    let sites = candidates.rows.iter().map(|&r| feasible[r]).collect();
+    Ok(Reduced {
+        feasible,
+        x,
+        pca,
+        candidates,
+        geometry: OnceLock::new(),
+        sites,
+    })
+}
+
+/// The Gaussian process over the feasible sites (first) and all others, and how many of the feasible
+/// ones it knows: rows of the reduced signals.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn geometry(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<(Geometry, Vec<usize>), Cancelled> {
+    /// Locations nearer than this are one (m).
+    const SAME: f64 = 1e-6;
+    let mut feasible = vec![false; simulated.points.len()];
+    for &site in &reduced.feasible {
+        feasible[site] = true;
+    }
+    let others: Vec<usize> = (0..feasible.len()).filter(|&s| !feasible[s]).collect();
+    let rows = evenly(reduced.feasible.len(), budget.locations);
+    let mut order: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
+    let elsewhere = evenly(others.len(), budget.locations / 2);
+    order.extend(elsewhere.iter().map(|&k| others[k]));
+    let count = order.len();
+    let places: Vec<SurfacePoint> = order.iter().map(|&s| simulated.points[s]).collect();
+    let measured = geodesic::between(&simulated.mesh, &places, watch)?;
+    let distances = Distances::new(count, "over the surface (fast marching)", &measured);
+    let keys = &inputs.project.selection.gaussian_process;
+    let noise = keys.noise;
+    let (kernel, map) = if let Some((length_m, power)) = keys.given() {
+        let kernel = GpKernel {
+            length_m,
+            power,
+            noise,
+        };
+        (kernel, Vec::new())
+    } else {
+        let x = heard(inputs, reduced).select_rows(&rows);
+        let map = gaussian_process::search(&x, &distances, noise, watch)?;
+        (gaussian_process::best(&map).unwrap_or_default(), map)
+    };
+    let geometry = Geometry {
+        covariance: Covariance::new(&distances, &kernel, watch)?,
+        kernel,
+        distance: distances.kind,
+        coinciding: distances.coinciding(SAME),
+        map,
+    };
+    Ok((geometry, rows))
+}
+
+/// What is asked of a selector beside the count: the project's wishes, by places in a pool of sites.
+fn wishes(inputs: &Inputs, positions: &[DVec3]) -> Result<Wishes, DesignError> {
+    let keys = &inputs.project.selection;
+    let nearest = |at: &[f64; 3]| {
+        let at = DVec3::from_array(*at) / 1000.0;
+        (0..positions.len())
+            .min_by(|&a, &b| {
+                (positions[a].distance_squared(at)).total_cmp(&positions[b].distance_squared(at))
+            })
+            .ok_or(PlacementError::NoSites)
+    };
+    let required: Result<Vec<usize>, PlacementError> =
+        keys.required_mm.iter().map(nearest).collect();
+    Ok(Wishes {
+        sensors: keys.sensors,
+        required: required?,
+        spacing: keys.spacing_mm / 1000.0,
+        costs: (!keys.costs.is_empty()).then(|| costs(&keys.costs, positions)),
+        budget: keys.cost_budget,
+        target_mm: keys.target_mm,
+        failure: keys.failure,
+    })
+}
+
+/// What a gauge costs at each position (m).
+fn costs(boxes: &[CostKeys], positions: &[DVec3]) -> Vec<f64> {
+    let cost = |p: &DVec3| {
+        let inside = boxes.iter().rev().find(|b| b.contains(*p * 1000.0));
+        inside.map_or(1.0, |b| b.cost)
+    };
+    positions.iter().map(cost).collect()
+}
+
+/// The signals of the feasible sites that selectors choose from, with noise where that is asked for.
+fn heard<'a>(inputs: &Inputs, reduced: &'a Reduced) -> Cow<'a, SignalMatrix> {
+    let project = &inputs.project;
+    let noise = if project.selection.with_noise && project.gauge.signal == Signal::Strain {
+        project.gauge.noise_microstrain * 1e-6
+    } else {
+        0.0
+    };
+    let seed = project.budget.seed.wrapping_add(HEARD_SEED);
+    evaluation::add_noise(&reduced.x, noise, seed)
+}
+
+/// Told of every set as soon as it is found, with the sites it counts in.
+pub type Found<'a> = &'a (dyn Fn(SelectorKind, &SensorSet, &[Site]) + Sync);
+
+/// Runs one selector.
+///
+/// # Errors
+/// [`DesignError`] where the pool does not allow it.
+pub fn select(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    kind: SelectorKind,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Selection, DesignError> {
+    let unheard: Found = &|_, _, _| ();
+    select_step_by_step(inputs, simulated, reduced, kind, budget, watch, unheard)
+}
+
+/// As [`select`], telling of every step.
+///
+/// # Errors
+/// As [`select`].
+pub fn select_step_by_step(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    kind: SelectorKind,
+    budget: &Budget,
+    watch: Watch,
+    found: Found,
+) -> Result<Selection, DesignError> {
+    let found = |set: &SensorSet| found(kind, set, &simulated.dataset.sites);
+    let targets = simulated.dataset.targets_mm();
+    let positions = |sites: &[usize]| -> Vec<DVec3> {
+        sites
+            .iter()
+            .map(|&s| simulated.dataset.sites[s].position)
+            .collect()
+    };
+    if kind == SelectorKind::GreedySvr {
+        return select_by_svr(inputs, simulated, reduced, budget, watch, &found);
+    }
+    let places = positions(&reduced.feasible);
+    let x = heard(inputs, reduced);
+    let pool = Pool {
+        x: &x,
+        targets: &targets,
+        sites: &reduced.feasible,
+        positions: &places,
+    };
+    let wishes = wishes(inputs, &places)?;
+    let request = Request {
+        wishes: &wishes,
+        watch,
+        found: &found,
+    };
+    if kind == SelectorKind::PcaQr && inputs.project.selection.with_noise {
+        return Ok(pca_qr::PcaQr.select(&pool, &request)?);
+    }
+    if kind == SelectorKind::PcaQr {
+        return Ok(pca_qr::from_components(&reduced.pca, &pool, &request)?);
+    }
+    let (geometry, rows) = if let Some(known) = reduced.geometry.get() {
+        known
+    } else {
+        let made = geometry(inputs, simulated, reduced, budget, watch)?;
+        reduced.geometry.get_or_init(|| made)
+    };
+    let x = reduced.x.select_rows(rows);
+    let known: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
+    let places = positions(&known);
+    let wishes = self::wishes(inputs, &places)?;
+    let pool = Pool {
+        x: &x,
+        targets: &targets,
+        sites: &known,
+        positions: &places,
+    };
+    let request = Request {
+        wishes: &wishes,
+        ..request
+    };
+    let mut selection = if kind == SelectorKind::Entropy {
+        Entropy { geometry }.select(&pool, &request)?
+    } else {
+        MutualInformation { geometry }.select(&pool, &request)?
+    };
+    if known.len() < reduced.feasible.len() {
+        selection.achieved.notes.push(format!(
+            "Chosen from {} of {} feasible sites, evenly taken.",
+            known.len(),
+            reduced.feasible.len()
+        ));
+    }
+    Ok(selection)
+}
+
+fn select_by_svr(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    budget: &Budget,
+    watch: Watch,
+    found: &(dyn Fn(&SensorSet) + Sync),
+) -> Result<Selection, DesignError> {
+    let all = simulated.dataset.targets_mm();
+    let sensors = inputs.project.selection.sensors;
+    let limit = budget.selection_candidates.max(sensors);
+    let rows = if reduced.sites.len() > limit {
+        reduced.pca.pivots(limit)
+    } else {
+        reduced.candidates.rows.clone()
+    };
+    let sites: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
+    let touches = evenly(all.len(), budget.selection_touches);
+    let heard = heard(inputs, reduced);
+    let x = heard.select_rows(&rows).select_columns(&touches);
+    let targets: Vec<[f64; 3]> = touches.iter().map(|&t| all[t]).collect();
+    let positions: Vec<DVec3> = sites
+        .iter()
+        .map(|&s| simulated.dataset.sites[s].position)
+        .collect();
+    let pool = Pool {
+        x: &x,
+        targets: &targets,
+        sites: &sites,
+        positions: &positions,
+    };
+    let wishes = wishes(inputs, &positions)?;
+    let selector = GreedySvr {
+        hyper: inputs.project.hyper(),
+        folds: budget.folds,
+        seed: inputs.project.budget.seed,
+        effort: Effort {
+            tolerance: budget.svr_tolerance_mm,
+            max_steps: budget.svr_steps,
+        },
+        tolerance: greedy_svr::TOLERANCE,
+        landmarks: 1.0,
+    };
+    let request = Request {
+        wishes: &wishes,
+        watch,
+        found,
+    };
+    let mut selection = selector.select(&pool, &request)?;
+    if touches.len() < all.len() || sites.len() < reduced.sites.len() {
+        selection.achieved.notes.push(format!(
+            "Scored on {} of {} touches and {} of {} candidates.",
+            touches.len(),
+            all.len(),
+            sites.len(),
+            reduced.sites.len()
+        ));
+    }
+    Ok(selection)
+}

@@ -1,0 +1,191 @@
+//! The judge: a finer model, touches of its own, and gauges as a workshop glues them.
+
+use glam::DVec3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::layout::touches_on;
+use super::{DesignError, Inputs, NOISE_SEED, Reduced, Simulated, TEST_SEED, WORKSHOP_SEED};
+use crate::budget::{Budget, Cancelled, Watch, Work};
+use crate::dataset::{self, SignalMatrix, Site};
+use crate::elasticity::load::Touch;
+use crate::evaluation::{self, Candidate, Evaluation, Region, Trial};
+use crate::placement::Selection;
+use crate::project::Project;
+
+/// The judge: a model of half the element size, with touches of its own.
+pub struct Truth {
+    pub touches: Vec<Touch>,
+    pub regions: Vec<Region>,
+    /// Element size of the truth (mm).
+    pub element_mm: f64,
+    pub work: Work,
+    /// Dataset sites that were measured, rising, and their signals.
+    pub sites: Vec<usize>,
+    pub x: SignalMatrix,
+    /// The same sites as a workshop would build them.
+    pub workshop: SignalMatrix,
+}
+
+/// Measures sites on the truth: a mesh of half the element size, test touches drawn uniformly at random
+/// with a seed of their own, so that they lie off any node and are nobody's training touches.
+///
+/// # Errors
+/// [`DesignError`] as for [`simulate`].
+pub fn truth(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    sites: &[usize],
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Truth, DesignError> {
+    let project = &inputs.project;
+    let laid = simulated.ground.halved(&simulated.laid);
+    let mesh = &laid.mesh;
+    let seed = project.budget.seed.wrapping_add(TEST_SEED);
+    let touches = touches_on(mesh, project, budget.test_touches, seed, false)?;
+    let model = simulated.ground.model(&laid, watch)?;
+    let mut rows = sites.to_vec();
+    rows.sort_unstable();
+    rows.dedup();
+    // Both kinds of gauges in one measurement: the loads are solved for once.
+    let drawn = rows.iter().map(|&s| simulated.dataset.sites[s]);
+    let built =
+        (rows.iter().zip(drawn.clone())).map(|(&s, site)| as_built(&site, project.budget.seed, s));
+    let gauges: Vec<Site> = drawn.clone().chain(built).collect();
+    let (signals, solves) =
+        dataset::measure(&model, &touches, &gauges, project.gauge.signal, watch)?;
+    let half =
+        |k: usize| signals.select_rows(&(k * rows.len()..(k + 1) * rows.len()).collect::<Vec<_>>());
+    let (x, workshop) = (half(0), half(1));
+    let gains = (rows.iter()).map(|&s| workshop_draw(project.budget.seed, s).gain);
+    let workshop = workshop.scaled_rows(gains);
+    let mut work = model.work();
+    work.solves += solves as u64;
+    Ok(Truth {
+        regions: regions(project, &touches),
+        element_mm: mesh.mean_edge() * 1000.0,
+        touches,
+        work,
+        sites: rows,
+        x,
+        workshop,
+    })
+}
+
+/// What a workshop does to one gauge: where it is moved to and how far it is turned (radians), and its
+/// gain.
+struct WorkshopDraw {
+    toward: f64,
+    turned: f64,
+    gain: f64,
+}
+
+/// Off by 1 mm in any direction, by 3° either way, and by 3 % either way: the same for a site in whatever
+/// set it is.
+fn workshop_draw(seed: u64, site: usize) -> WorkshopDraw {
+    const TURN: f64 = 3.0 * std::f64::consts::PI / 180.0;
+    const GAIN: f64 = 0.03;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(WORKSHOP_SEED));
+    rng.set_stream(site as u64);
+    let mut sign = || if rng.random::<bool>() { 1.0 } else { -1.0 };
+    let (turned, gain) = (TURN * sign(), 1.0 + GAIN * sign());
+    WorkshopDraw {
+        toward: std::f64::consts::TAU * rng.random::<f64>(),
+        turned,
+        gain,
+    }
+}
+
+fn as_built(site: &Site, seed: u64, number: usize) -> Site {
+    const OFF: f64 = 1e-3;
+    let draw = workshop_draw(seed, number);
+    let across = site.normal.cross(site.direction);
+    let along = |angle: f64| site.direction * angle.cos() + across * angle.sin();
+    Site {
+        position: site.position + along(draw.toward) * OFF,
+        direction: along(draw.turned),
+        ..*site
+    }
+}
+
+fn regions(project: &Project, touches: &[Touch]) -> Vec<Region> {
+    project
+        .evaluation
+        .regions
+        .iter()
+        .map(|region| {
+            let [a, b] = region.box_mm.map(DVec3::from_array);
+            let (lower, upper) = (a.min(b), a.max(b));
+            let inside = |t: &Touch| {
+                let p = t.position * 1000.0;
+                p.cmpge(lower).all() && p.cmple(upper).all()
+            };
+            Region {
+                name: region.name.clone(),
+                contains: touches.iter().map(inside).collect(),
+            }
+        })
+        .collect()
+}
+
+/// Judges selections, with all candidates as the baseline, on the truth.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn evaluate(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    selections: &[Selection],
+    truth: &Truth,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Evaluation, Cancelled> {
+    let row_of = |site: &usize| truth.sites.binary_search(site).ok();
+    let mut sets = Vec::new();
+    for selection in selections {
+        for set in &selection.sets {
+            sets.push(Candidate {
+                selector: selection.selector.name().to_owned(),
+                rows: set.sites.iter().filter_map(row_of).collect(),
+            });
+        }
+    }
+    sets.push(Candidate {
+        selector: "all-candidates".to_owned(),
+        rows: reduced.sites.iter().filter_map(row_of).collect(),
+    });
+    let train = simulated.dataset.x.select_rows(&truth.sites);
+    let test_targets: Vec<[f64; 3]> = truth
+        .touches
+        .iter()
+        .map(|t| (t.position * 1000.0).to_array())
+        .collect();
+    evaluation::evaluate(
+        &Trial {
+            signal: simulated.dataset.signal,
+            train: &train,
+            train_targets: &simulated.dataset.targets_mm(),
+            test: &truth.x,
+            workshop: &truth.workshop,
+            test_targets: &test_targets,
+            regions: &truth.regions,
+            noise: inputs.project.gauge.noise_microstrain * 1e-6,
+            seed: inputs.project.budget.seed.wrapping_add(NOISE_SEED),
+        },
+        &sets,
+        budget,
+        watch,
+    )
+}
+
+/// Every site that the evaluation of some selections looks at.
+#[must_use]
+pub fn sites_to_judge(reduced: &Reduced, selections: &[Selection]) -> Vec<usize> {
+    let chosen = selections
+        .iter()
+        .flat_map(|s| &s.sets)
+        .flat_map(|s| &s.sites);
+    reduced.sites.iter().chain(chosen).copied().collect()
+}

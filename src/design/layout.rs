@@ -1,0 +1,128 @@
+//! Where sites and touches lie on the part, and whether all of it fits into memory.
+
+use super::{DesignError, Inputs, MOST_GB, MOST_SITES};
+use crate::budget::Budget;
+use crate::dataset::{self};
+use crate::elasticity::load::Touch;
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::unroll::Unrolling;
+use crate::mesh::{SurfacePoint, TriMesh, sample};
+use crate::project::{Lattice, Project};
+
+pub(super) fn size_mm(mesh: &TriMesh) -> f64 {
+    let (lower, upper) = mesh.bounds();
+    (upper - lower).length() * 1000.0
+}
+
+/// The sites of a project on a mesh.
+///
+/// # Errors
+/// [`DesignError`] where there would be none or far too many.
+pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoint>, DesignError> {
+    let spacing = project.sites.spacing_mm * 1e-3;
+    let estimate = mesh.area() / (spacing * spacing);
+    let directions = project.gauge.directions;
+    if estimate * directions as f64 > MOST_SITES as f64 {
+        return Err(DesignError::TooManySites {
+            count: estimate as usize * directions,
+            limit: MOST_SITES,
+            spacing_mm: project.sites.spacing_mm,
+            size_mm: size_mm(mesh),
+        });
+    }
+    let points = match project.sites.lattice {
+        Lattice::Even => sample::even(mesh, estimate.round() as usize, project.budget.seed, |_| {
+            true
+        }),
+        Lattice::Unrolled => {
+            Unrolling::of(mesh, project.part.axis).lattice(&SurfaceIndex::new(mesh), spacing)
+        }
+    };
+    if points.is_empty() {
+        return Err(DesignError::NoRoom {
+            size_mm: size_mm(mesh),
+        });
+    }
+    // A place with several directions is as many sites.
+    Ok(points
+        .into_iter()
+        .flat_map(|at| std::iter::repeat_n(at, directions))
+        .collect())
+}
+
+pub(super) fn lay_out_touches(
+    mesh: &TriMesh,
+    project: &Project,
+    budget: &Budget,
+) -> Result<Vec<Touch>, DesignError> {
+    let count = project.touch.count.min(budget.touches);
+    touches_on(mesh, project, count, project.budget.seed, true)
+}
+
+pub(super) fn touches_on(
+    mesh: &TriMesh,
+    project: &Project,
+    count: usize,
+    seed: u64,
+    even: bool,
+) -> Result<Vec<Touch>, DesignError> {
+    let margin = project.touch.edge_margin_mm * 1e-3;
+    let touches = dataset::spread_touches(mesh, count, seed, margin, even, project.tip());
+    if touches.is_empty() {
+        return Err(DesignError::NoTouches {
+            margin_mm: project.touch.edge_margin_mm,
+            size_mm: size_mm(mesh),
+        });
+    }
+    Ok(touches)
+}
+
+pub(super) fn check_memory(sites: usize, touches: usize) -> Result<(), DesignError> {
+    // The signal itself beside three strain components a site and touch; then the kernel of the
+    // evaluation and its distances, on every thread.
+    let kernels = 2 * touches * touches * rayon::current_num_threads();
+    check_room(4 * sites, touches)?;
+    check_room(kernels.div_ceil(touches.max(1)), touches).map_err(|error| match error {
+        DesignError::TooLarge {
+            needed_gb,
+            limit_gb,
+            touches,
+            ..
+        } => DesignError::TooLarge {
+            needed_gb,
+            limit_gb,
+            sites,
+            touches,
+        },
+        other => other,
+    })
+}
+
+/// What a simulation will hold at its largest: about how many sites, how many touches, and the memory of
+/// its strains and signals (GB), known before anything is allocated.
+#[must_use]
+pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
+    let spacing = inputs.project.sites.spacing_mm * 1e-3;
+    let places = (inputs.part.area() / (spacing * spacing)).round() as usize;
+    let sites = places * inputs.project.gauge.directions;
+    let touches = inputs.project.touch.count.min(budget.touches);
+    let bytes = 4.0 * sites as f64 * touches as f64 * size_of::<f64>() as f64;
+    (sites, touches, bytes / 1e9)
+}
+
+/// Refuses a dense result of `rows` × `columns` that cannot be held, before it is allocated.
+///
+/// # Errors
+/// [`DesignError::TooLarge`].
+pub fn check_room(rows: usize, columns: usize) -> Result<(), DesignError> {
+    let needed_gb = rows as f64 * columns as f64 * size_of::<f64>() as f64 / 1e9;
+    if needed_gb > MOST_GB {
+        return Err(DesignError::TooLarge {
+            needed_gb,
+            limit_gb: MOST_GB,
+            sites: rows / 4,
+            touches: columns,
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,218 @@
+//! The whole road in one go, and what comes out of it.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::{
+    DesignError, Found, Inputs, Reduced, Simulated, Truth, evaluate, filter, reduce_sites,
+    select_step_by_step, simulate, sites_to_judge, truth,
+};
+use crate::budget::{Budget, Watch, Work};
+use crate::evaluation::Evaluation;
+use crate::feasible::Feasibility;
+use crate::mesh::{TriMesh, scatter};
+use crate::placement::{Selection, SelectorKind};
+
+/// Everything a design produced.
+pub struct Design {
+    pub budget: Budget,
+    pub simulated: Arc<Simulated>,
+    pub feasibility: Feasibility,
+    pub reduced: Reduced,
+    /// The project's selector first.
+    pub selections: Vec<Selection>,
+    pub truth: Truth,
+    pub evaluation: Evaluation,
+    pub seconds: Vec<StageTime>,
+}
+
+/// Seconds by the clock of one stage.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StageTime {
+    pub stage: &'static str,
+    pub seconds: f64,
+}
+
+impl Design {
+    /// The chosen set: the project's selector at its number of gauges.
+    #[must_use]
+    pub fn chosen(&self) -> &[usize] {
+        self.selections
+            .first()
+            .and_then(|s| s.sets.last())
+            .map_or(&[], |set| &set.sites)
+    }
+
+    /// Errors touch by touch (mm) of a selector's set of so many gauges, beside the truth's touches.
+    #[must_use]
+    pub fn touch_errors(&self, kind: SelectorKind, sensors: usize) -> Option<&[f64]> {
+        let mut sets = (self.selections.iter())
+            .flat_map(|s| s.sets.iter().map(|set| (s.selector, set.sites.len())));
+        let k = sets.position(|set| set == (kind, sensors))?;
+        self.evaluation.errors.get(k).map(Vec::as_slice)
+    }
+
+    /// The mean error (mm) around each vertex of a mesh that lies where the part does, for the chosen set.
+    #[must_use]
+    pub fn error_map(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
+        let kind = self.selections.first()?.selector;
+        let errors = self.touch_errors(kind, self.chosen().len())?;
+        let places: Vec<(DVec3, DVec3)> = (self.truth.touches.iter())
+            .map(|t| (t.position, t.normal))
+            .collect();
+        Some(scatter::to_vertices(mesh, &places, errors))
+    }
+
+    /// All counted work.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        let mut work = self.simulated.dataset.work;
+        for selection in &self.selections {
+            work += selection.achieved.effort;
+        }
+        work += self.truth.work;
+        work += self.evaluation.work;
+        work
+    }
+
+    /// What the reader of any figure must know.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = self.simulated.achieved.notes.clone();
+        notes.extend(self.reduced.candidates.notes.iter().cloned());
+        for selection in &self.selections {
+            let title = selection.selector.title();
+            notes.extend(
+                selection
+                    .achieved
+                    .notes
+                    .iter()
+                    .map(|n| format!("{title}: {n}")),
+            );
+        }
+        if self.evaluation.rows.iter().any(|r| !r.converged) {
+            notes.push(
+                "Some regressions stopped at the effort allowed before they met their tolerance."
+                    .into(),
+            );
+        }
+        notes
+    }
+}
+
+/// Runs the whole road. `clock` gives seconds since any fixed moment: the core has no clock of its own.
+///
+/// # Errors
+/// [`DesignError`] from the stage that could not end.
+pub fn run(
+    inputs: &Inputs,
+    kinds: &[SelectorKind],
+    budget: &Budget,
+    clock: &dyn Fn() -> f64,
+    watch: Watch,
+) -> Result<Design, DesignError> {
+    let mut times = Stopwatch::new(clock);
+    let simulated = Arc::new(simulate(inputs, budget, watch)?);
+    times.lap("simulate");
+    let mut design = run_from(inputs, simulated, kinds, budget, clock, watch)?;
+    design.seconds.splice(0..0, times.stages);
+    Ok(design)
+}
+
+/// Runs the road from a simulation that is there already.
+///
+/// # Errors
+/// [`DesignError`] from the stage that could not end.
+pub fn run_from(
+    inputs: &Inputs,
+    simulated: Arc<Simulated>,
+    kinds: &[SelectorKind],
+    budget: &Budget,
+    clock: &dyn Fn() -> f64,
+    watch: Watch,
+) -> Result<Design, DesignError> {
+    let unheard: Found = &|_, _, _| ();
+    run_step_by_step(inputs, simulated, kinds, budget, clock, watch, unheard)
+}
+
+/// As [`run_from`], telling of every step of the selectors.
+///
+/// # Errors
+/// As [`run_from`].
+pub fn run_step_by_step(
+    inputs: &Inputs,
+    simulated: Arc<Simulated>,
+    kinds: &[SelectorKind],
+    budget: &Budget,
+    clock: &dyn Fn() -> f64,
+    watch: Watch,
+    found: Found,
+) -> Result<Design, DesignError> {
+    let mut times = Stopwatch::new(clock);
+    let feasibility = filter(inputs, &simulated);
+    times.lap("filter");
+    let reduced = reduce_sites(inputs, &simulated, &feasibility, budget, watch)?;
+    times.lap("reduce");
+    let mut selections = Vec::new();
+    for &kind in kinds {
+        selections.push(select_step_by_step(
+            inputs, &simulated, &reduced, kind, budget, watch, found,
+        )?);
+        times.lap(match kind {
+            SelectorKind::GreedySvr => "select greedy-svr",
+            SelectorKind::PcaQr => "select pca-qr",
+            SelectorKind::Entropy => "select entropy",
+            SelectorKind::MutualInformation => "select mutual-information",
+        });
+    }
+    let judged = sites_to_judge(&reduced, &selections);
+    let truth = truth(inputs, &simulated, &judged, budget, watch)?;
+    times.lap("truth");
+    let evaluation = evaluate(
+        inputs,
+        &simulated,
+        &reduced,
+        &selections,
+        &truth,
+        budget,
+        watch,
+    )?;
+    times.lap("evaluate");
+    Ok(Design {
+        budget: *budget,
+        simulated,
+        feasibility,
+        reduced,
+        selections,
+        truth,
+        evaluation,
+        seconds: times.stages,
+    })
+}
+
+struct Stopwatch<'a> {
+    clock: &'a dyn Fn() -> f64,
+    last: f64,
+    stages: Vec<StageTime>,
+}
+
+impl<'a> Stopwatch<'a> {
+    fn new(clock: &'a dyn Fn() -> f64) -> Self {
+        Self {
+            clock,
+            last: clock(),
+            stages: Vec::new(),
+        }
+    }
+
+    fn lap(&mut self, stage: &'static str) {
+        let now = (self.clock)();
+        self.stages.push(StageTime {
+            stage,
+            seconds: now - self.last,
+        });
+        self.last = now;
+    }
+}

@@ -1,0 +1,264 @@
+//! From a project to the signals of its sites: the elastic model laid, checked and asked.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::layout::{check_memory, lay_out_sites, lay_out_touches, size_mm};
+use super::{DesignError, Inputs, LAYOUT};
+use crate::budget::{Achieved, Budget, Quality, StopReason, Watch};
+use crate::dataset::{self, Dataset};
+use crate::elasticity::estimate::Discretization;
+use crate::elasticity::grade::{Graded, Ground};
+use crate::elasticity::linearity::Linearity;
+use crate::elasticity::model::{check_held, check_section};
+use crate::elasticity::{Freedoms, ShellModel};
+use crate::mesh::remesh::Remeshed;
+use crate::mesh::{SurfacePoint, TriMesh};
+use crate::project::Elements;
+
+/// The elastic stage: the mesh that was computed on, the sites on it and the dataset.
+pub struct Simulated {
+    pub mesh: Arc<TriMesh>,
+    /// What it was laid on, and where.
+    pub(super) ground: Ground,
+    pub(super) laid: Remeshed,
+    /// What is held at its vertices.
+    pub held: Vec<Freedoms>,
+    /// Where the vertices of the part that is shown lie on it.
+    pub carried: Vec<SurfacePoint>,
+    pub discretization: Discretization,
+    pub points: Vec<SurfacePoint>,
+    pub dataset: Dataset,
+    pub unknowns: usize,
+    pub linearity: Linearity,
+    pub checks: Checks,
+    pub achieved: Achieved,
+}
+
+impl Simulated {
+    /// The model, built anew: it is large and nobody keeps it.
+    ///
+    /// # Errors
+    /// [`DesignError`] as when it was built first.
+    pub fn model(&self) -> Result<ShellModel, DesignError> {
+        Ok(self.ground.model(&self.laid, &crate::budget::unwatched)?)
+    }
+}
+
+/// Lays out sites and touches and simulates them.
+///
+/// # Errors
+/// [`DesignError`] for values out of range and for parts that cannot be computed.
+pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simulated, DesignError> {
+    let project = &inputs.project;
+    project.check()?;
+    let ground = ground(inputs)?;
+    let layout = layout(inputs, &ground);
+    // First what cannot be computed at all: a part that nothing holds is the likeliest mistake.
+    check_section(&project.section())?;
+    check_held(&ground.held.mesh, &ground.held.held)?;
+    let sites = lay_out_sites(&layout, project)?;
+    check_memory(sites.len(), project.touch.count.min(budget.touches))?;
+    let touches = lay_out_touches(&layout, project, budget)?;
+    let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
+    let graded = ground.grade(&touches, &places, &budget.elements, watch)?;
+    let checks = Checks::of(&graded);
+    let Graded {
+        laid,
+        held,
+        model,
+        estimate,
+        linearity,
+        models,
+        solves,
+        ..
+    } = graded;
+    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
+    let unknowns = model.unknowns();
+    let gauge = &project.gauge;
+    let (signal, directions) = (gauge.signal, gauge.directions);
+    let mut dataset = dataset::simulate(&model, touches, &points, signal, directions, watch)?;
+    dataset.work.assemblies += models - 1;
+    dataset.work.factorizations += models - 1;
+    dataset.work.solves += solves;
+    let mut notes = if dataset.touches.len() < project.touch.count {
+        vec![format!(
+            "{} touches instead of the project's {}: the budget of this quality.",
+            dataset.touches.len(),
+            project.touch.count
+        )]
+    } else {
+        Vec::new()
+    };
+    notes.extend(checks.distrust());
+    notes.extend(cautions(&estimate, &linearity, &budget.elements));
+    notes.extend(ground.cautions(project.tip().1));
+    let carried = carry(&model, &inputs.part);
+    drop(model);
+    Ok(Simulated {
+        achieved: Achieved {
+            error_estimate: Some(estimate.strain_percent),
+            unit: "% of a load's largest strain",
+            effort: dataset.work,
+            stop_reason: if estimate.meets(&budget.elements) {
+                StopReason::Converged
+            } else {
+                StopReason::EffortSpent
+            },
+            notes,
+        },
+        mesh: Arc::clone(&laid.mesh),
+        ground,
+        laid,
+        held,
+        carried,
+        discretization: estimate,
+        points,
+        dataset,
+        unknowns,
+        linearity,
+        checks,
+    })
+}
+
+/// What the solution was checked for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Checks {
+    /// Worst over the sample of the loads: |sum of reactions + load| over the load, and
+    /// |½ u·f - strain energy| over the energy.
+    pub reaction_error: f64,
+    pub energy_error: f64,
+    /// Of the stiffness scaled to a unit diagonal; one over it bounds the condition from below.
+    pub smallest_pivot: f64,
+    /// Connected pieces of the model, each of them held against all six rigid motions.
+    pub pieces_held: usize,
+}
+
+impl Checks {
+    #[must_use]
+    pub fn of(graded: &Graded) -> Self {
+        Self {
+            reaction_error: graded.balance.reaction_error,
+            energy_error: graded.balance.energy_error,
+            smallest_pivot: graded.model.smallest_pivot(),
+            pieces_held: graded.model.pieces(),
+        }
+    }
+
+    /// What makes the solution untrustworthy, in plain words.
+    #[must_use]
+    pub fn distrust(&self) -> Vec<String> {
+        /// Beyond these, fewer than about five digits of a displacement can be right.
+        const BALANCE: f64 = 1e-5;
+        const PIVOT: f64 = 1e-11;
+        let mut notes = Vec::new();
+        let worst = self.reaction_error.max(self.energy_error);
+        if worst.is_nan() || worst > BALANCE {
+            notes.push(format!(
+                "The solution is out of balance by {worst:.0e} of the load: do not trust it. Check thickness, unit and supports."
+            ));
+        }
+        if self.smallest_pivot < PIVOT {
+            notes.push(format!(
+                "The model is nearly singular (smallest scaled pivot {:.0e}): the shell is very thin for its elements or barely held.",
+                self.smallest_pivot
+            ));
+        }
+        notes
+    }
+}
+
+/// What the estimates of the model's own error ask to be said.
+#[must_use]
+pub fn cautions(
+    discretization: &Discretization,
+    linearity: &Linearity,
+    aim: &crate::budget::Elements,
+) -> Vec<String> {
+    /// Beyond this change a linear answer is the wrong kind of answer (%).
+    const NONLINEAR: f64 = 10.0;
+    let mut notes = Vec::new();
+    if discretization.strain_percent.is_nan() {
+        notes.push(
+            "No gauge lies farther than two tip radii from a touch: the mesh's error in strain could not be judged.".into(),
+        );
+    }
+    if !discretization.meets(aim) {
+        notes.push(format!(
+            "The mesh leaves about {:.1} % error in displacement (asked: {:.0} %) and {:.1} % in strain (asked: {:.0} %): {}.",
+            discretization.displacement_percent,
+            aim.displacement_percent,
+            discretization.strain_percent,
+            aim.strain_percent,
+            if *aim == Quality::Reference.budget().elements {
+                "more vertices than this quality allows for so many touches would be needed"
+            } else {
+                "choose a higher quality, fewer touches, or part.elements = \"graded\""
+            }
+        ));
+    }
+    if linearity.beyond > 0 {
+        notes.push(format!(
+            "At {:.1} N the shell may snap or fold under {} of {} sampled touches: the linear answer says nothing there. Lower the force.",
+            linearity.force_n, linearity.beyond, linearity.loads
+        ));
+    }
+    if linearity.largest_percent.abs() > NONLINEAR {
+        notes.push(format!(
+            "At {:.1} N large displacements would change the answer by up to {:.0} % (half of the touches: less than {:.0} %): the model is linear.",
+            linearity.force_n,
+            linearity.largest_percent.abs(),
+            linearity.median_percent
+        ));
+    }
+    notes
+}
+
+/// The part with its supports, ready to have elements laid on it.
+///
+/// # Errors
+/// [`DesignError`] for supports without a region.
+pub fn ground(inputs: &Inputs) -> Result<Ground, DesignError> {
+    let project = &inputs.project;
+    if project.part.thickness_mm > size_mm(&inputs.part) {
+        return Err(DesignError::ThickerThanWide {
+            size_mm: size_mm(&inputs.part),
+            thickness_mm: project.part.thickness_mm,
+        });
+    }
+    let supports = project.supports(&inputs.masks)?;
+    let as_given = project.part.elements == Elements::AsGiven;
+    Ok(Ground::new(
+        &inputs.part,
+        project.section(),
+        &supports,
+        as_given,
+    ))
+}
+
+/// The mesh that sites and touches are laid out on, the same for every quality: the part, or where its
+/// triangles are too thin to measure distances on, even ones on its surface.
+fn layout(inputs: &Inputs, ground: &Ground) -> Arc<TriMesh> {
+    /// Height over length of a triangle, and the share of the area that may be thinner.
+    const THIN: f64 = 0.1;
+    const SHARE: f64 = 0.02;
+    let part = &inputs.part;
+    let thin: f64 = (0..part.triangles().len() as u32)
+        .filter(|&t| part.thinness(t) < THIN)
+        .map(|t| part.facet_area(t))
+        .sum();
+    if thin < SHARE * part.area() {
+        Arc::clone(part)
+    } else {
+        ground.even(LAYOUT).mesh
+    }
+}
+
+/// Where the vertices of the part that is shown lie on the mesh that was computed on.
+#[must_use]
+pub fn carry(model: &ShellModel, part: &TriMesh) -> Vec<SurfacePoint> {
+    let nearest = |&p: &DVec3| model.index.nearest(p).0;
+    part.positions().iter().map(nearest).collect()
+}
