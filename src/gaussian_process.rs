@@ -115,11 +115,11 @@ impl Covariance {
             .par_chunks_exact_mut(n.max(1))
             .enumerate()
             .for_each(|(i, row)| {
-                for (j, v) in row.iter_mut().enumerate() {
+                for (j, v) in row[..=i].iter_mut().enumerate() {
                     *v = kernel.at(distances.at(i, j));
                 }
             });
-        let k = Mat::from_fn(n, n, |i, j| values[i * n + j]);
+        let k = Mat::from_fn(n, n, |i, j| values[i.max(j) * n + i.min(j)]);
         report(watch, STAGE, 1, 3)?;
         let noise = kernel.noise.max(0.0);
         // A factor is thirty times cheaper than a spectrum, and there is one if nothing is negative.

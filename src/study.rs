@@ -136,7 +136,8 @@ pub fn select(
         (SelectorKind::PcaQr, _) => PcaQr.select(&pool, &request),
         _ => settings.svr.select(&pool, &request),
     }?;
-    seconds.selection = clock() - before;
+    // The covariance is part of the choice.
+    seconds.selection += clock() - before;
     Ok(Choice {
         selection,
         geometry: geometry.map(Geometry::summary),

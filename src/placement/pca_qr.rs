@@ -42,7 +42,7 @@ pub fn from_components(
     }
     let whole = Field::new(pool, wishes)?;
     let mut sets: Vec<SensorSet> = Vec::new();
-    for k in counts(wishes.sensors) {
+    for k in counts(wishes.sensors, wishes.target_mm.is_some()) {
         report(request.watch, "Selecting by PCA-QR", k - 1, wishes.sensors)?;
         let mut chosen = choose(pca, &whole, k).sites();
         let all = chosen.len() == k;
@@ -95,13 +95,14 @@ pub fn from_components(
     })
 }
 
-/// Every number of gauges has a choice of its own. Beyond what anyone compares one by one, steps are
-/// half as wide again each.
-fn counts(most: usize) -> Vec<usize> {
+/// Every number of gauges has a choice of its own. Beyond what anyone compares one by one there is only
+/// the number asked for; on the way to an error, numbers half as large again each.
+fn counts(most: usize, on_the_way: bool) -> Vec<usize> {
     const EACH: usize = 40;
     let mut counts: Vec<usize> = (1..=most.min(EACH)).collect();
     while let Some(&last) = counts.last().filter(|&&last| last < most) {
-        counts.push((last + last / 2).min(most));
+        let next = if on_the_way { last + last / 2 } else { most };
+        counts.push(next.min(most));
     }
     counts
 }
