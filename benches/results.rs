@@ -53,6 +53,12 @@ Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the eleme
     if let Ok(selection) = std::fs::read_to_string("benches/selection.md") {
         let _ = writeln!(text, "{selection}");
     }
+    if let Ok(sklearn) = std::fs::read_to_string("benches/sklearn.txt") {
+        let _ = writeln!(
+            text,
+            "### The criterion by scikit-learn\n\n60 sites × 800 touches, every step and every other site, by `benches/sklearn_criterion.py` (its commands are in the file); fits to a tolerance of 0.001 mm.\n\n```\n{sklearn}```\n"
+        );
+    }
     if let Ok(build) = std::fs::read_to_string("benches/build-times.txt") {
         let _ = writeln!(text, "## Build times\n\n{build}");
     }

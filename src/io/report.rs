@@ -21,6 +21,7 @@ svg{width:100%;height:auto;display:block}svg text{font:12px system-ui,sans-serif
 svg.limb path{stroke-width:.4}.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:18px}
 ul.notes{background:#fff7e6;border-left:4px solid #d9a441;padding:10px 28px;margin:12px 0}
 .numbers{display:flex;flex-wrap:wrap;gap:10px 34px;margin:14px 0}.numbers b{display:block;font-size:21px}.numbers span{color:#4a5568;font-size:13px}
+details{overflow-x:auto;margin:10px 0}summary{cursor:pointer;color:#0072b2}table.map td{text-align:center}
 @media print{body{margin:0;max-width:none}h2{break-after:avoid}figure{break-inside:avoid}}
 ";
 
@@ -394,7 +395,7 @@ pub fn failure_curve(set: &Failures, retrained: bool) -> Vec<(f64, f64)> {
 }
 
 fn failures(page: &mut String, design: &Design) {
-    page.push_str("<div>");
+    page.push_str("<h2>When gauges fail</h2><div class=\"plots\">");
     for retrained in [false, true] {
         let series: Vec<Series> = design
             .evaluation
@@ -413,7 +414,7 @@ fn failures(page: &mut String, design: &Design) {
             520.0,
         ));
     }
-    page.push_str("</div><table><tr><th>Selector</th><th>Gauges</th><th>Failed</th><th>Trained anew</th><th>Mean (mm)</th><th>Worst (mm)</th><th>Subsets</th></tr>");
+    page.push_str("</div><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Failed</th><th>Trained anew</th><th>Mean (mm)</th><th>Worst (mm)</th><th>Subsets</th></tr>");
     for set in &design.evaluation.failures {
         for r in &set.rows {
             let _ = write!(
@@ -430,7 +431,7 @@ fn failures(page: &mut String, design: &Design) {
             );
         }
     }
-    page.push_str("</table>");
+    page.push_str("</table></details>");
 }
 
 fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
@@ -449,7 +450,7 @@ fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
 fn errors(page: &mut String, design: &Design) {
     let _ = write!(
         page,
-        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, drawn off the nodes of a model of half the element size ({:.2} mm). “As built”: every gauge 1 mm and 3° off and its gain off by 3 %, read with the regression trained for the ideal one.</p><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
+        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, drawn off the nodes of a model of half the element size ({:.2} mm). “As built”: every gauge 1 mm and 3° off and its gain off by 3 %, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
         design.simulated.dataset.touches.len(),
         design.simulated.mesh.mean_edge() * 1000.0,
         design.truth.touches.len(),
@@ -472,7 +473,7 @@ fn errors(page: &mut String, design: &Design) {
             r.hyper.gamma
         );
     }
-    page.push_str("</table>");
+    page.push_str("</table></details>");
 }
 
 /// What the elastic model says of its own error, and what it was checked for.

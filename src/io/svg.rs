@@ -199,6 +199,17 @@ pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series], width:
         height / 2.0,
         escape(y_label)
     );
+    // The legend stands on the right, where the lines are not.
+    let right: Vec<f64> = all()
+        .filter(|p| p.0 > f64::midpoint(x_min, x_max))
+        .map(|p| p.1)
+        .collect();
+    let high = right.iter().sum::<f64>() > 0.5 * y_top * right.len() as f64;
+    let legend = if high {
+        height - bottom - 18.0 * series.len() as f64
+    } else {
+        40.0
+    };
     for (k, line) in series.iter().enumerate() {
         let colour = PALETTE[k % PALETTE.len()];
         let mut d = String::new();
@@ -221,7 +232,7 @@ pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series], width:
             svg,
             "<path d=\"{d}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>"
         );
-        let ly = 40.0 + 18.0 * k as f64;
+        let ly = legend + 18.0 * k as f64;
         let _ = write!(
             svg,
             "<path d=\"M{0:.1} {1:.1}h20\" stroke=\"{colour}\" stroke-width=\"2\"/><text x=\"{2:.1}\" y=\"{3:.1}\">{4}</text>",
