@@ -5,6 +5,7 @@ pub mod design;
 pub mod evaluate;
 pub mod limb;
 pub mod progress;
+pub mod render;
 pub mod select;
 pub mod simulate;
 
@@ -48,6 +49,8 @@ pub enum Command {
     Select(select::SelectArgs),
     /// How well given sites find touches, from a dataset alone.
     Evaluate(evaluate::EvaluateArgs),
+    /// A picture of the limb with its gauges.
+    Render(render::RenderArgs),
     /// Writes the bundled limb, or another of its family.
     Limb(limb::LimbArgs),
 }

@@ -12,6 +12,7 @@ fn main() -> ExitCode {
         Some(Command::Simulate(args)) => cli::simulate::run(args),
         Some(Command::Select(args)) => cli::select::run(args),
         Some(Command::Evaluate(args)) => cli::evaluate::run(args),
+        Some(Command::Render(args)) => render(args),
         Some(Command::Limb(args)) => cli::limb::run(args),
         None => open_studio(&cli),
     };
@@ -27,6 +28,16 @@ fn main() -> ExitCode {
 #[cfg(feature = "studio")]
 fn open_studio(cli: &Cli) -> anyhow::Result<()> {
     hapdef::studio::run(cli.file.as_deref(), cli.unit.map(Into::into))
+}
+
+#[cfg(feature = "studio")]
+fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
+    hapdef::studio::picture::run(args)
+}
+
+#[cfg(not(feature = "studio"))]
+fn render(_args: &cli::render::RenderArgs) -> anyhow::Result<()> {
+    anyhow::bail!("this build draws no pictures (feature \"studio\")")
 }
 
 #[cfg(not(feature = "studio"))]

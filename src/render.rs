@@ -3,3 +3,5 @@
 pub mod camera;
 #[cfg(feature = "studio")]
 pub mod gpu;
+#[cfg(feature = "studio")]
+pub mod offscreen;

@@ -8,6 +8,7 @@ mod dialogs;
 mod fields;
 mod inspector;
 mod overlay;
+pub mod picture;
 mod results;
 mod stages;
 mod theme;
@@ -18,6 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
+use eframe::egui_wgpu::RenderState;
 use egui::{CentralPanel, Panel};
 
 use crate::budget::Quality;
@@ -99,11 +101,21 @@ impl Studio {
         let Some(state) = &cc.wgpu_render_state else {
             return Err("no graphics adapter was found. Install a Vulkan driver (Debian: mesa-vulkan-drivers), or run `hapdef design --out DIR`, which needs none".into());
         };
+        Ok(Self::on(state, &cc.egui_ctx, loaded, path))
+    }
+
+    /// The same on an adapter and a context of any kind.
+    pub(crate) fn on(
+        state: &RenderState,
+        ctx: &egui::Context,
+        loaded: LoadedProject,
+        path: Option<PathBuf>,
+    ) -> Self {
         crate::render::gpu::install(state);
-        theme::apply(&cc.egui_ctx);
+        theme::apply(ctx);
         let document = Document::new(loaded, path);
         let view = viewport::Viewport::new(&document);
-        Ok(Self {
+        Self {
             document,
             simulation: None,
             feasibility: None,
@@ -118,7 +130,7 @@ impl Studio {
             ask_quit: false,
             quit: false,
             title: String::new(),
-        })
+        }
     }
 
     /// The gauges to draw: those of the running selection as far as it has come, else the project's.

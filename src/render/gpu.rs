@@ -48,7 +48,8 @@ pub struct Frame3d {
     pub shown: Arc<Vec<Shown>>,
     pub map: ColorMap,
     pub uniforms: Uniforms,
-    pub background: [f64; 3],
+    /// Red, green, blue, alpha, 0–1.
+    pub background: [f64; 4],
     /// In pixels.
     pub size: [u32; 2],
 }
@@ -218,7 +219,7 @@ impl SceneGpu {
         self.maps = Some((map, bind));
     }
 
-    fn pass(&self, encoder: &mut wgpu::CommandEncoder, [r, g, b]: [f64; 3]) {
+    fn pass(&self, encoder: &mut wgpu::CommandEncoder, [r, g, b, a]: [f64; 4]) {
         let (Some(targets), Some(mesh), Some((_, bind))) = (&self.targets, &self.mesh, &self.maps)
         else {
             return;
@@ -230,7 +231,7 @@ impl SceneGpu {
                 depth_slice: None,
                 resolve_target: Some(&targets.resolved),
                 ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
+                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
                     store: wgpu::StoreOp::Discard,
                 },
             })],

@@ -13,7 +13,17 @@ use crate::colormap::ColorMap;
 use crate::render::gpu::{Frame3d, Uniforms};
 
 impl Studio {
-    pub(super) fn paint_limb(&self, ui: &Ui, rect: Rect) {
+    /// The limb with all that belongs to it, for a picture.
+    pub(super) fn scene(&mut self, ui: &Ui, rect: Rect, transparent: bool) {
+        self.view.rect = rect;
+        self.build_field();
+        self.paint_limb(ui, rect, transparent);
+        let painter = ui.painter_at(rect);
+        self.paint_gauges(&painter);
+        self.paint_legend(&painter, rect);
+    }
+
+    pub(super) fn paint_limb(&self, ui: &Ui, rect: Rect, transparent: bool) {
         let Some(built) = &self.view.built else {
             return;
         };
@@ -35,13 +45,17 @@ impl Studio {
             ],
         };
         let pixels = rect.size() * ui.pixels_per_point();
-        let back = theme::backdrop(ui.ctx().theme());
+        let back = if transparent {
+            Color32::TRANSPARENT
+        } else {
+            theme::backdrop(ui.ctx().theme())
+        };
         let frame = Frame3d {
             mesh: Arc::clone(&self.document.part),
             shown: Arc::clone(&built.shown),
             map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
             uniforms,
-            background: [back.r(), back.g(), back.b()].map(|c| f64::from(c) / 255.0),
+            background: back.to_array().map(|c| f64::from(c) / 255.0),
             size: [
                 pixels.x.round().max(1.0) as u32,
                 pixels.y.round().max(1.0) as u32,

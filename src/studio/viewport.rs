@@ -116,7 +116,7 @@ impl Studio {
         self.navigate(ui, &response);
         self.use_tool(ui, &response);
         self.build_field();
-        self.paint_limb(ui, rect);
+        self.paint_limb(ui, rect, false);
         let painter = ui.painter_at(rect);
         self.paint_touch(&painter);
         self.paint_gauges(&painter);

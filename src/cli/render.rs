@@ -1,0 +1,73 @@
+//! `hapdef render`: what is asked of a picture of the limb. The studio draws it.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, ValueEnum};
+
+use super::{Common, UnitArg};
+
+#[derive(Args, Debug, Clone)]
+pub struct RenderArgs {
+    /// Project or mesh; the bundled limb when left out.
+    pub project: Option<PathBuf>,
+    /// The side to look from.
+    #[arg(long, value_enum, default_value_t)]
+    pub view: ViewArg,
+    /// Width and height in pixels, such as 3840x2160.
+    #[arg(long, default_value = "1920x1080")]
+    pub size: Size,
+    /// Leave the background transparent.
+    #[arg(long)]
+    pub transparent: bool,
+    /// Unit of a mesh file that does not say its own.
+    #[arg(long)]
+    pub unit: Option<UnitArg>,
+    /// The picture (.png).
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy, Default)]
+pub enum ViewArg {
+    /// Three-quarters, from above.
+    #[default]
+    Oblique,
+    Front,
+    Back,
+    Left,
+    Right,
+    Top,
+    Bottom,
+}
+
+/// Width and height in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size(pub [u32; 2]);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || format!("“{text}” is no size in pixels: give WIDTHxHEIGHT, such as 1920x1080");
+        let (width, height) = text.split_once(['x', '×']).ok_or_else(wrong)?;
+        let pixels = |side: &str| side.trim().parse().ok().filter(|&p| p > 0);
+        match (pixels(width), pixels(height)) {
+            (Some(width), Some(height)) => Ok(Self([width, height])),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+impl RenderArgs {
+    /// What it shares with other commands.
+    #[must_use]
+    pub fn common(&self) -> Common {
+        Common {
+            project: self.project.clone(),
+            unit: self.unit,
+            ..Common::default()
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Pictures of the limb at any size, without a window.
+
+use anyhow::Context as _;
+use egui::{Context, Pos2, RawInput, Rect, vec2};
+
+use super::Studio;
+use crate::cli::render::{RenderArgs, ViewArg};
+use crate::io::atomic;
+use crate::io::project_file::LoadedProject;
+use crate::render::camera::Preset;
+use crate::render::offscreen;
+
+/// What is asked of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Picture {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// The side to look from; three-quarters from above where there is none.
+    pub view: Option<Preset>,
+    /// Leave out what is behind the limb.
+    pub transparent: bool,
+}
+
+/// Height of the window, in points, that a picture is drawn like: gauges and letters grow with the pixels.
+const POINTS: f32 = 720.0;
+
+/// `hapdef render`.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
+    let picture = Picture {
+        size: args.size.0,
+        view: match args.view {
+            ViewArg::Oblique => None,
+            ViewArg::Front => Some(Preset::Front),
+            ViewArg::Back => Some(Preset::Back),
+            ViewArg::Left => Some(Preset::Left),
+            ViewArg::Right => Some(Preset::Right),
+            ViewArg::Top => Some(Preset::Top),
+            ViewArg::Bottom => Some(Preset::Bottom),
+        },
+        transparent: args.transparent,
+    };
+    let png = png(args.common().load()?, &picture).map_err(anyhow::Error::msg)?;
+    atomic::write(&args.out, &png).context("the picture could not be written")
+}
+
+/// A picture of a project with its gauges, as a PNG file.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn png(loaded: LoadedProject, picture: &Picture) -> Result<Vec<u8>, String> {
+    let state = offscreen::adapter()?;
+    let ctx = Context::default();
+    let mut studio = Studio::on(&state, &ctx, loaded, None);
+    if let Some(preset) = picture.view {
+        studio.view.camera.look_from(preset);
+    }
+    let [width, height] = picture.size.map(|s| s as f32);
+    fit(&mut studio, width / height);
+    let points = vec2(width, height) * (POINTS / height.max(1.0));
+    let mut input = RawInput {
+        screen_rect: Some(Rect::from_min_size(Pos2::ZERO, points)),
+        ..RawInput::default()
+    };
+    for viewport in input.viewports.values_mut() {
+        viewport.native_pixels_per_point = Some(height / POINTS);
+    }
+    let output = ctx.run_ui(input, |ui| {
+        let rect = ui.ctx().content_rect();
+        studio.scene(ui, rect, picture.transparent);
+    });
+    let mut pixels = offscreen::draw(&state, &ctx, output, picture.size)?;
+    straighten(&mut pixels);
+    encode(pixels, picture.size)
+}
+
+/// Comes as near as shows all of the limb.
+fn fit(studio: &mut Studio, aspect: f32) {
+    /// Of half the picture.
+    const FILLED: f64 = 0.9;
+    // Perspective: what is nearer grows more, so the second time corrects the first.
+    for _ in 0..4 {
+        let camera = studio.view.camera;
+        let reach = (studio.document.part.positions().iter())
+            .filter_map(|&p| camera.project(p, aspect))
+            .map(|(at, _)| 2.0 * (at - 0.5).abs().max_element())
+            .fold(0.0, f64::max);
+        if reach > 0.0 {
+            studio.view.camera.distance *= reach / FILLED;
+        }
+    }
+}
+
+/// From premultiplied colours to those that PNG keeps.
+fn straighten(pixels: &mut [u8]) {
+    for pixel in pixels.chunks_exact_mut(4) {
+        let alpha = u32::from(pixel[3]);
+        if alpha != 0 && alpha != 255 {
+            for c in &mut pixel[..3] {
+                *c = ((u32::from(*c) * 255 + alpha / 2) / alpha).min(255) as u8;
+            }
+        }
+    }
+}
+
+fn encode(pixels: Vec<u8>, [width, height]: [u32; 2]) -> Result<Vec<u8>, String> {
+    let image = image::RgbaImage::from_raw(width, height, pixels)
+        .ok_or("the picture came back with another size")?;
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image
+        .write_to(&mut bytes, image::ImageFormat::Png)
+        .map_err(|e| format!("the picture could not be written as PNG: {e}"))?;
+    Ok(bytes.into_inner())
+}

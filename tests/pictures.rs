@@ -1,0 +1,75 @@
+//! Pictures from the command line, on a real adapter.
+
+use std::process::{Command, Output};
+
+fn render(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hapdef"))
+        .arg("render")
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn a_picture_has_the_size_the_limb_and_its_gauges() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("limb.png");
+    let path = out.to_str().unwrap();
+    let drawn = render(&[
+        "--view",
+        "front",
+        "--size",
+        "320x480",
+        "--transparent",
+        "--out",
+        path,
+    ]);
+    assert!(
+        drawn.status.success(),
+        "{}",
+        String::from_utf8_lossy(&drawn.stderr)
+    );
+    let picture = image::open(&out).unwrap().to_rgba8();
+    assert_eq!(picture.dimensions(), (320, 480));
+    let count = |is: &dyn Fn([u8; 4]) -> bool| picture.pixels().filter(|p| is(p.0)).count();
+    let all = 320 * 480;
+    let empty = count(&|p| p[3] == 0);
+    let limb = count(&|p| p[3] == 255 && p[0].abs_diff(p[2]) < 60);
+    let gauges = count(&|p| p[3] == 255 && p[0] > 200 && p[2] < 80);
+    assert!(
+        empty > all / 5 && limb > all / 5,
+        "{empty} empty, {limb} limb"
+    );
+    assert!(gauges > 60, "{gauges} pixels of gauges");
+    // It fills the height.
+    let row = |y: u32| (0..320).any(|x| picture.get_pixel(x, y).0[3] == 255);
+    assert!(row(40) && row(440) && !row(2) && !row(477));
+    let opaque = folder.path().join("opaque.png");
+    assert!(
+        render(&["--size", "64x64", "--out", opaque.to_str().unwrap()])
+            .status
+            .success()
+    );
+    let picture = image::open(&opaque).unwrap().to_rgba8();
+    assert!(picture.pixels().all(|p| p.0[3] == 255));
+}
+
+#[test]
+fn what_cannot_be_drawn_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("limb.png");
+    let path = out.to_str().unwrap();
+    for (size, code, word) in [
+        ("99999x3", 1, "between 1 and"),
+        ("0x3", 2, "pixels"),
+        ("wide", 2, "1920x1080"),
+    ] {
+        let refused = render(&["--size", size, "--out", path]);
+        let said = String::from_utf8_lossy(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(code), "{said}");
+        assert!(said.contains(word) && !said.contains("panicked"), "{said}");
+    }
+    assert!(!out.exists());
+    let nowhere = render(&["--size", "64x64", "--out", "/nowhere/limb.png"]);
+    assert_eq!(nowhere.status.code(), Some(1));
+}
