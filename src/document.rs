@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use crate::design::Inputs;
 use crate::io::project_file::LoadedProject;
+use crate::mesh::geodesic::March;
 use crate::mesh::repair::Repair;
 use crate::mesh::unroll::Axis;
-use crate::mesh::{RepairReport, SurfacePoint, TriMesh, geodesic};
+use crate::mesh::{RepairReport, SurfacePoint, TriMesh};
 use crate::project::{Masks, Project, SelectionKeys, SupportKeys, SupportKind};
 
 /// What undo brings back. The mesh is not part of it: opening a file begins a new history.
@@ -29,6 +30,8 @@ pub struct Document {
     pub mesh_path: PathBuf,
     /// The mesh is the one inside the program and lies in no file yet.
     pub bundled: bool,
+    /// The ways over the part: a brush asks for them many times a second.
+    march: March,
     /// Body and repairs that the part was taken in with.
     taken_in: (usize, Repair),
     saved: State,
@@ -59,6 +62,7 @@ impl Document {
         let part = &state.project.part;
         Self {
             taken_in: (part.body, part.repair()),
+            march: March::over(&loaded.inputs.part),
             part: loaded.inputs.part,
             repairs: loaded.repairs,
             path,
@@ -185,7 +189,7 @@ impl Document {
     /// One dab of the brush: every vertex within `radius` (m) over the surface. The first dab of paint on
     /// an unpainted part begins from nothing painted, the first erasing dab from everything.
     pub fn dab(&mut self, brush: Brush, at: SurfacePoint, radius: f64) {
-        let reached = geodesic::from_point(&self.part, at, radius);
+        let reached = self.march.distances(&self.part, at, radius);
         let vertices = self.part.positions().len();
         let mask = self
             .state
@@ -202,6 +206,59 @@ impl Document {
         if let Some(corner) = nearest {
             let vertex = self.part.triangles()[at.triangle as usize][corner];
             mask[vertex as usize] = brush == Brush::Paint;
+        }
+    }
+
+    /// Every vertex is painted.
+    pub fn fill_paint(&mut self) {
+        self.repaint(|_, mask| mask.fill(true));
+    }
+
+    /// What was painted is not, and what was not is; without a painted region everything counts as it.
+    pub fn invert_paint(&mut self) {
+        self.repaint(|_, mask| mask.iter_mut().for_each(|m| *m = !*m));
+    }
+
+    /// The painted region grows by a distance over the surface (m), by one vertex at least.
+    pub fn grow_paint(&mut self, by: f64) {
+        self.repaint(|document, mask| document.spread(mask, true, by));
+    }
+
+    /// The painted region shrinks by a distance over the surface (m), by one vertex at least.
+    pub fn shrink_paint(&mut self, by: f64) {
+        self.repaint(|document, mask| document.spread(mask, false, by));
+    }
+
+    /// One step of undo that changes the painted region.
+    fn repaint(&mut self, change: impl FnOnce(&Self, &mut Vec<bool>)) {
+        let vertices = self.part.positions().len();
+        let mut mask = match &self.state.painted {
+            Some(mask) => mask.as_ref().clone(),
+            None => vec![true; vertices],
+        };
+        change(self, &mut mask);
+        self.state.painted = Some(Arc::new(mask));
+        self.settle();
+    }
+
+    /// Vertices near those that are `painted` become so too.
+    fn spread(&self, mask: &mut [bool], painted: bool, by: f64) {
+        let from: Vec<u32> = (0..)
+            .zip(&*mask)
+            .filter_map(|(v, &m)| (m == painted).then_some(v))
+            .collect();
+        let beside: Vec<u32> = (self.part.edges().iter())
+            .filter(|e| mask[e.a as usize] != mask[e.b as usize])
+            .flat_map(|e| [e.a, e.b])
+            .collect();
+        let reached = self.march.from_set(&from, by);
+        for (m, d) in mask.iter_mut().zip(reached) {
+            if d <= by {
+                *m = painted;
+            }
+        }
+        for v in beside {
+            mask[v as usize] = painted;
         }
     }
 
@@ -308,6 +365,38 @@ mod tests {
             triangle: (document.part.triangles().len() / 2) as u32,
             barycentric: [1.0 / 3.0; 3],
         }
+    }
+
+    #[test]
+    fn a_painted_region_grows_shrinks_and_turns_over() {
+        let mut d = document();
+        let place = at(&d);
+        let count = |d: &Document| {
+            let mask = d.state.painted.as_ref();
+            mask.map_or(0, |m| m.iter().filter(|&&m| m).count())
+        };
+        d.dab(Brush::Paint, place, 9e-3);
+        d.settle();
+        let dab = count(&d);
+        d.grow_paint(6e-3);
+        let grown = count(&d);
+        d.shrink_paint(6e-3);
+        let back = count(&d);
+        assert!(
+            grown > dab + 20 && back.abs_diff(dab) <= dab / 4,
+            "{dab} {grown} {back}"
+        );
+        d.invert_paint();
+        assert_eq!(count(&d), d.part.positions().len() - back);
+        d.fill_paint();
+        assert_eq!(count(&d), d.part.positions().len());
+        for expected in [d.part.positions().len() - back, back, grown, dab] {
+            d.undo();
+            assert_eq!(count(&d), expected);
+        }
+        // Less than an element still moves the rim by one vertex.
+        d.grow_paint(1e-6);
+        assert!(count(&d) > dab);
     }
 
     #[test]

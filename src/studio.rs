@@ -8,6 +8,7 @@ mod dialogs;
 mod fields;
 mod inspector;
 mod overlay;
+mod palette;
 pub mod picture;
 mod results;
 mod stages;
@@ -79,6 +80,7 @@ pub struct Studio {
     pub view: viewport::Viewport,
     touching: touching::Touching,
     dialog: Option<dialogs::Dialog>,
+    palette: Option<palette::Palette>,
     job: Option<Job<Finished>>,
     /// What the running selection has chosen so far.
     making: Arc<Mutex<Vec<ChosenSite>>>,
@@ -124,6 +126,7 @@ impl Studio {
             view,
             touching: touching::Touching::default(),
             dialog: None,
+            palette: None,
             job: None,
             making: Arc::default(),
             results: results::Tab::default(),
@@ -471,6 +474,7 @@ impl eframe::App for Studio {
             .show(ui, |ui| self.results(ui));
         CentralPanel::no_frame().show(ui, |ui| self.viewport(ui));
         self.dialogs(&ctx);
+        self.palette(&ctx);
         // A gesture has ended when nothing is held down any more.
         if !ctx.input(|i| i.pointer.any_down()) && !ctx.egui_wants_keyboard_input() {
             self.document.settle();

@@ -523,3 +523,40 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
     w.harness.state_mut().document.undo();
     assert!(w.harness.state().document.state.project.supports.is_empty());
 }
+
+#[test]
+fn the_palette_reaches_every_command() {
+    let Some(mut window) = Window::open() else {
+        return;
+    };
+    let painted = |w: &Window| {
+        let mask = w.harness.state().document.state.painted.clone();
+        mask.map(|m| m.iter().filter(|&&m| m).count())
+    };
+    let vertices = window.harness.state().document.part.positions().len();
+    for (letters, expected) in [
+        ("invert", Some(0)),
+        ("paint every", Some(vertices)),
+        ("undo", Some(0)),
+        ("clrpnt", None),
+    ] {
+        window
+            .harness
+            .key_press_modifiers(Modifiers::COMMAND, egui::Key::K);
+        window.harness.run_ok();
+        window
+            .harness
+            .get_by_label("Find a command")
+            .type_text(letters);
+        window.harness.run_ok();
+        window.harness.key_press(egui::Key::Enter);
+        window.harness.run_ok();
+        assert_eq!(painted(&window), expected, "{letters}");
+        assert!(window.harness.query_by_label("Find a command").is_none());
+    }
+    // Keys of single letters and brackets are the window's again.
+    let brush = window.harness.state().view.brush;
+    window.harness.key_press(egui::Key::CloseBracket);
+    window.harness.run_ok();
+    assert!(window.harness.state().view.brush > 1.2 * brush);
+}

@@ -30,16 +30,13 @@ enum Front {
 /// Distance from a point of the surface to every vertex within `limit` (m); infinity beyond.
 #[must_use]
 pub fn from_point(mesh: &TriMesh, source: SurfacePoint, limit: f64) -> Vec<f64> {
-    March::new(mesh).circles(source, limit).distance
+    March::over(mesh).distances(mesh, source, limit)
 }
 
 /// Distance from the nearest of some vertices to every vertex within `limit` (m); infinity beyond.
 #[must_use]
 pub fn from_vertices(mesh: &TriMesh, sources: &[u32], limit: f64) -> Vec<f64> {
-    let seeds: Vec<(u32, f64)> = sources.iter().map(|&v| (v, 0.0)).collect();
-    March::new(mesh)
-        .run(&seeds, limit, Front::Straight)
-        .distance
+    March::over(mesh).from_set(sources, limit)
 }
 
 /// Distances (m) from each of some points to each of the others, by rows; infinite between pieces that
@@ -52,13 +49,13 @@ pub fn between(
     points: &[SurfacePoint],
     watch: Watch,
 ) -> Result<Vec<f64>, Cancelled> {
-    let march = March::new(mesh);
+    let march = March::over(mesh);
     let rows: Result<Vec<Vec<f64>>, Cancelled> = points
         .par_iter()
         .enumerate()
         .map(|(k, &source)| {
             report(watch, "Distances over the surface", k, points.len())?;
-            let field = march.circles(source, f64::INFINITY);
+            let field = march.circles(mesh, source, f64::INFINITY);
             Ok(points
                 .iter()
                 .map(|&target| field.at(mesh, source, target))
@@ -130,29 +127,41 @@ impl PartialOrd for Entry {
     }
 }
 
-/// Waves over one mesh.
-struct March<'a> {
-    mesh: &'a TriMesh,
+/// How waves go over one mesh: made once, for many sources.
+pub struct March {
     helps: Vec<Vec<Help>>,
     /// Vertices that a shortest way may bend around: at a rim, or with more than a full turn around them.
     bends: Vec<bool>,
 }
 
-impl<'a> March<'a> {
-    fn new(mesh: &'a TriMesh) -> Self {
+impl March {
+    #[must_use]
+    pub fn over(mesh: &TriMesh) -> Self {
         Self {
-            mesh,
             helps: wave::helps(mesh),
             bends: wave::bends(mesh),
         }
     }
 
+    /// As [`from_point`], on the mesh it was made for.
+    #[must_use]
+    pub fn distances(&self, mesh: &TriMesh, source: SurfacePoint, limit: f64) -> Vec<f64> {
+        self.circles(mesh, source, limit).distance
+    }
+
+    /// As [`from_vertices`], on the mesh it was made for.
+    #[must_use]
+    pub fn from_set(&self, sources: &[u32], limit: f64) -> Vec<f64> {
+        let seeds: Vec<(u32, f64)> = sources.iter().map(|&v| (v, 0.0)).collect();
+        self.run(&seeds, limit, Front::Straight).distance
+    }
+
     /// From one point.
-    fn circles(&self, source: SurfacePoint, limit: f64) -> Waves {
-        let origin = self.mesh.point(source);
-        let seeds: Vec<(u32, f64)> = self.mesh.triangles()[source.triangle as usize]
+    fn circles(&self, mesh: &TriMesh, source: SurfacePoint, limit: f64) -> Waves {
+        let origin = mesh.point(source);
+        let seeds: Vec<(u32, f64)> = mesh.triangles()[source.triangle as usize]
             .iter()
-            .map(|&v| (v, origin.distance(self.mesh.positions()[v as usize])))
+            .map(|&v| (v, origin.distance(mesh.positions()[v as usize])))
             .collect();
         self.run(&seeds, limit, Front::Circular)
     }

@@ -4,8 +4,12 @@ use egui::{Context, Key, KeyboardShortcut, Modifiers};
 
 use super::Studio;
 use super::dialogs::Dialog;
+use super::palette::Palette;
 use super::viewport::Tool;
 use crate::render::camera::Preset;
+
+/// By how much a key makes the brush wider.
+const BRUSH_STEP: f64 = 1.25;
 
 /// Everything that can be commanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +22,13 @@ pub enum Command {
     Undo,
     Redo,
     ClearPaint,
+    FillPaint,
+    InvertPaint,
+    GrowPaint,
+    ShrinkPaint,
+    WiderBrush,
+    NarrowerBrush,
+    Palette,
     Simulate,
     Select,
     Cancel,
@@ -39,6 +50,13 @@ impl Command {
             Self::Undo => "Undo",
             Self::Redo => "Redo",
             Self::ClearPaint => "Clear painted region",
+            Self::FillPaint => "Paint everything",
+            Self::InvertPaint => "Invert painted region",
+            Self::GrowPaint => "Grow painted region",
+            Self::ShrinkPaint => "Shrink painted region",
+            Self::WiderBrush => "Wider brush",
+            Self::NarrowerBrush => "Narrower brush",
+            Self::Palette => "Find a command…",
             Self::Simulate => "Simulate",
             Self::Select => "Select gauges",
             Self::Cancel => "Cancel job",
@@ -61,6 +79,13 @@ impl Command {
             Self::Undo => "Take back the last change",
             Self::Redo => "Make the change again",
             Self::ClearPaint => "Every site that passes the filters may carry a gauge again",
+            Self::FillPaint => "Gauges may go anywhere; erase from there",
+            Self::InvertPaint => "What was painted is not, and what was not is",
+            Self::GrowPaint | Self::ShrinkPaint => {
+                "By a quarter of the brush's radius over the surface"
+            }
+            Self::WiderBrush | Self::NarrowerBrush => "The radius of the brush over the surface",
+            Self::Palette => "Reach every command by a few letters of its name",
             Self::Simulate => "Compute how the limb deforms under all touches",
             Self::Select => "Filter, reduce, choose the gauges and judge them on unseen touches",
             Self::Cancel => "Stop the running job",
@@ -96,7 +121,15 @@ impl Command {
             Self::Tool(Tool::Touch) => plain(Key::T),
             Self::Tool(Tool::Paint) => plain(Key::B),
             Self::Tool(Tool::Erase) => plain(Key::X),
-            Self::Look(_) | Self::ClearPaint => None,
+            Self::InvertPaint => ctrl(Key::I),
+            Self::Palette => ctrl(Key::K),
+            Self::NarrowerBrush => plain(Key::OpenBracket),
+            Self::WiderBrush => plain(Key::CloseBracket),
+            Self::Look(_)
+            | Self::ClearPaint
+            | Self::FillPaint
+            | Self::GrowPaint
+            | Self::ShrinkPaint => None,
         }
     }
 
@@ -112,6 +145,13 @@ impl Command {
             Self::Redo,
             Self::Undo,
             Self::ClearPaint,
+            Self::FillPaint,
+            Self::InvertPaint,
+            Self::GrowPaint,
+            Self::ShrinkPaint,
+            Self::WiderBrush,
+            Self::NarrowerBrush,
+            Self::Palette,
             Self::Simulate,
             Self::Select,
             Self::Cancel,
@@ -130,7 +170,9 @@ impl Studio {
         match command {
             Command::Undo => self.document.can_undo(),
             Command::Redo => self.document.can_redo(),
-            Command::ClearPaint => self.document.state.painted.is_some(),
+            Command::ClearPaint | Command::GrowPaint | Command::ShrinkPaint => {
+                self.document.state.painted.is_some()
+            }
             Command::Simulate | Command::Select => !self.busy(),
             Command::Cancel => self.busy(),
             Command::Export => self.design.is_some() && !self.busy(),
@@ -165,6 +207,13 @@ impl Studio {
             Command::Undo => self.document.undo(),
             Command::Redo => self.document.redo(),
             Command::ClearPaint => self.document.clear_paint(),
+            Command::FillPaint => self.document.fill_paint(),
+            Command::InvertPaint => self.document.invert_paint(),
+            Command::GrowPaint => self.document.grow_paint(self.view.brush / 4.0),
+            Command::ShrinkPaint => self.document.shrink_paint(self.view.brush / 4.0),
+            Command::WiderBrush => self.view.brush *= BRUSH_STEP,
+            Command::NarrowerBrush => self.view.brush /= BRUSH_STEP,
+            Command::Palette => self.palette = Some(Palette::default()),
             Command::Simulate => self.simulate(ctx),
             Command::Select => self.select(ctx),
             Command::Cancel => self.cancel(),
@@ -175,7 +224,7 @@ impl Studio {
     }
 
     pub(super) fn shortcuts(&mut self, ctx: &Context) {
-        if self.dialog.is_some() || self.ask_quit {
+        if self.dialog.is_some() || self.ask_quit || self.palette.is_some() {
             return;
         }
         let typing = ctx.egui_wants_keyboard_input();
@@ -226,7 +275,18 @@ impl Studio {
                 for tool in Tool::ALL {
                     self.button(ui, Command::Tool(tool));
                 }
-                self.button(ui, Command::ClearPaint);
+                ui.separator();
+                for command in [
+                    Command::ClearPaint,
+                    Command::FillPaint,
+                    Command::InvertPaint,
+                    Command::GrowPaint,
+                    Command::ShrinkPaint,
+                ] {
+                    self.button(ui, command);
+                }
+                ui.separator();
+                self.button(ui, Command::Palette);
             });
             ui.menu_button("View", |ui| {
                 self.button(ui, Command::Frame);
