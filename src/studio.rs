@@ -10,6 +10,7 @@ mod inspector;
 mod overlay;
 mod palette;
 pub mod picture;
+mod recovery;
 mod results;
 mod stages;
 mod theme;
@@ -81,6 +82,7 @@ pub struct Studio {
     touching: touching::Touching,
     dialog: Option<dialogs::Dialog>,
     palette: Option<palette::Palette>,
+    recovery: Option<recovery::Recovery>,
     job: Option<Job<Finished>>,
     /// What the running selection has chosen so far.
     making: Arc<Mutex<Vec<ChosenSite>>>,
@@ -127,6 +129,7 @@ impl Studio {
             touching: touching::Touching::default(),
             dialog: None,
             palette: None,
+            recovery: None,
             job: None,
             making: Arc::default(),
             results: results::Tab::default(),
@@ -475,12 +478,21 @@ impl eframe::App for Studio {
         CentralPanel::no_frame().show(ui, |ui| self.viewport(ui));
         self.dialogs(&ctx);
         self.palette(&ctx);
+        self.recovery_dialog(&ctx);
         // A gesture has ended when nothing is held down any more.
         if !ctx.input(|i| i.pointer.any_down()) && !ctx.egui_wants_keyboard_input() {
             self.document.settle();
         }
         self.update_title(&ctx);
+        self.keep_unsaved(&ctx);
         self.guard_close(&ctx);
+    }
+
+    fn on_exit(&mut self) {
+        // Whoever closes the window has saved, or said that it need not be.
+        if let Some(recovery) = &mut self.recovery {
+            recovery.close();
+        }
     }
 
     fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
@@ -512,7 +524,11 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
         ..Default::default()
     };
     let open = |cc: &eframe::CreationContext<'_>| -> Result<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>> {
-        Ok(Box::new(Studio::new(cc, loaded, path)?))
+        let mut studio = Studio::new(cc, loaded, path)?;
+        if let Some(home) = eframe::storage_dir("hapdef-studio") {
+            studio.keep_unsaved_in(&home.join("unsaved"));
+        }
+        Ok(Box::new(studio))
     };
     eframe::run_native("hapdef-studio", options, Box::new(open)).map_err(|error| {
         anyhow::anyhow!(

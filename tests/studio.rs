@@ -560,3 +560,49 @@ fn the_palette_reaches_every_command() {
     window.harness.run_ok();
     assert!(window.harness.state().view.brush > 1.2 * brush);
 }
+
+#[test]
+fn what_was_not_saved_is_offered_again() {
+    let home = tempfile::tempdir().unwrap();
+    let Some(mut window) = Window::open() else {
+        return;
+    };
+    window.harness.state_mut().keep_unsaved_in(home.path());
+    window.harness.run_ok();
+    assert!(!asks(&window), "nothing was left yet");
+    {
+        let document = &mut window.harness.state_mut().document;
+        document.state.project.selection.sensors = 7;
+        document.invert_paint();
+        document.shrink_paint(0.0);
+        document.fill_paint();
+    }
+    let kept = || {
+        let folders = std::fs::read_dir(home.path()).unwrap();
+        folders
+            .filter_map(|f| Some(f.ok()?.path().join("origin.json")))
+            .any(|f| f.exists())
+    };
+    window.wait("changes to be kept", 30, |_| kept());
+    // Killed: nobody says goodbye.
+    drop(window);
+    let mut window = Window::open().unwrap();
+    window.harness.state_mut().keep_unsaved_in(home.path());
+    window.harness.run_ok();
+    assert!(asks(&window));
+    window.press("Recover changes");
+    let document = &window.harness.state().document;
+    assert_eq!(document.state.project.selection.sensors, 7);
+    assert!(document.state.painted.as_ref().unwrap().iter().all(|&m| m));
+    assert!(document.is_dirty() && document.bundled && document.path.is_none());
+    // It is kept again, since it is not saved yet; and gone when the window is closed.
+    window.wait("changes to be kept again", 30, |_| kept());
+    eframe::App::on_exit(window.harness.state_mut());
+    drop(window);
+    assert_eq!(std::fs::read_dir(home.path()).unwrap().count(), 0);
+}
+
+fn asks(window: &Window) -> bool {
+    let dialog = window.harness.query_by_label("Recover unsaved changes?");
+    dialog.is_some()
+}

@@ -1,0 +1,277 @@
+//! Changes that are not saved are kept aside, and offered again when the program ended without them
+//! being saved.
+//!
+//! Every window has a folder of its own, locked while it lives: what lies in a folder whose lock can be
+//! had was left behind.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use egui::{Context, Id, Modal};
+use serde::{Deserialize, Serialize};
+
+use super::Studio;
+use crate::document::{Document, State};
+use crate::io::{atomic, project_file};
+
+/// How long a change may go unkept.
+const EVERY: Duration = Duration::from_secs(3);
+const PROJECT: &str = "project.hapdef.toml";
+const ORIGIN: &str = "origin.json";
+const LOCK: &str = "lock";
+
+/// Where a project that was kept aside came from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Origin {
+    name: String,
+    /// The file it was opened from, if there was one.
+    path: Option<PathBuf>,
+}
+
+/// What was left behind by a program that ended.
+struct Left {
+    folder: PathBuf,
+    origin: Origin,
+    /// Ours as long as the offer stands.
+    _lock: File,
+}
+
+/// What this window keeps aside.
+pub(super) struct Recovery {
+    folder: PathBuf,
+    _lock: Option<File>,
+    kept: Option<State>,
+    written: Instant,
+    writing: Option<Receiver<Result<(), String>>>,
+    left: Vec<Left>,
+}
+
+impl Recovery {
+    /// In a folder of its own under `home`; looks for what others left there.
+    pub fn new(home: &Path) -> Self {
+        // Numbers of processes come around again.
+        let now = SystemTime::now().duration_since(UNIX_EPOCH);
+        let now = now.map_or(0, |d| d.as_nanos());
+        let folder = home.join(format!("window-{now}-{}", std::process::id()));
+        let left = left_behind(home, &folder);
+        let lock = fs::create_dir_all(&folder)
+            .and_then(|()| File::create(folder.join(LOCK)))
+            .ok()
+            .filter(|lock| lock.try_lock().is_ok());
+        Self {
+            folder,
+            _lock: lock,
+            kept: None,
+            written: Instant::now(),
+            writing: None,
+            left,
+        }
+    }
+
+    /// Nothing unsaved is left of this window.
+    pub fn forget(&mut self) {
+        // What is being written must not come back after it was removed.
+        if let Some(writing) = self.writing.take() {
+            let _ = writing.recv();
+        }
+        for name in [PROJECT, ORIGIN] {
+            let _ = fs::remove_file(self.folder.join(name));
+        }
+        self.kept = None;
+    }
+
+    /// The end of the window: its folder goes with it.
+    pub fn close(&mut self) {
+        self.forget();
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+
+    fn write(&mut self, document: &Document) {
+        let folder = self.folder.clone();
+        let state = document.state.clone();
+        let origin = Origin {
+            name: document.name(),
+            path: document.path.as_deref().map(absolute),
+        };
+        let mesh = (!document.bundled).then(|| absolute(&document.mesh_path));
+        self.kept = Some(state.clone());
+        self.written = Instant::now();
+        let (sender, receiver) = channel();
+        std::thread::spawn(move || {
+            let _ = sender.send(keep(&folder, state, &origin, mesh));
+        });
+        self.writing = Some(receiver);
+    }
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+}
+
+fn keep(
+    folder: &Path,
+    mut state: State,
+    origin: &Origin,
+    mesh: Option<PathBuf>,
+) -> Result<(), String> {
+    let mesh = match mesh {
+        Some(mesh) => mesh,
+        None => crate::cli::write_bundled_mesh(folder).map_err(|e| format!("{e:#}"))?,
+    };
+    let path = folder.join(PROJECT);
+    state.project.part.mesh = project_file::relative_to(&path, &mesh);
+    let painted = state.painted.as_ref().map(|m| m.as_slice());
+    project_file::save(&path, &state.project, painted, &state.masks).map_err(|e| e.to_string())?;
+    let text = serde_json::to_vec(origin).map_err(|e| e.to_string())?;
+    atomic::write(&folder.join(ORIGIN), &text).map_err(|e| e.to_string())
+}
+
+/// What lies in folders whose windows have ended.
+fn left_behind(home: &Path, own: &Path) -> Vec<Left> {
+    let Ok(entries) = fs::read_dir(home) else {
+        return Vec::new();
+    };
+    let mut left: Vec<Left> = entries
+        .filter_map(|entry| {
+            let folder = entry.ok()?.path();
+            let lock = File::open(folder.join(LOCK))
+                .ok()
+                .filter(|_| folder != own)?;
+            lock.try_lock().ok()?;
+            let origin = fs::read(folder.join(ORIGIN))
+                .ok()
+                .and_then(|bytes| serde_json::from_slice(&bytes).ok());
+            let Some(origin) = origin.filter(|_| folder.join(PROJECT).exists()) else {
+                // Its window ended with everything saved, or before anything was kept.
+                let _ = fs::remove_dir_all(&folder);
+                return None;
+            };
+            Some(Left {
+                folder,
+                origin,
+                _lock: lock,
+            })
+        })
+        .collect();
+    left.sort_by(|a, b| a.folder.cmp(&b.folder));
+    left
+}
+
+impl Studio {
+    /// Keeps unsaved changes in a folder from now on, and offers what was left there.
+    pub fn keep_unsaved_in(&mut self, home: &Path) {
+        self.recovery = Some(Recovery::new(home));
+    }
+
+    /// Keeps what has changed, when it is time.
+    pub(super) fn keep_unsaved(&mut self, ctx: &Context) {
+        let Some(recovery) = &mut self.recovery else {
+            return;
+        };
+        let failed = match recovery.writing.as_ref().map(Receiver::try_recv) {
+            Some(Err(TryRecvError::Empty)) => return,
+            Some(Ok(Err(message))) => Some(message),
+            _ => None,
+        };
+        recovery.writing = None;
+        if !self.document.is_dirty() {
+            if recovery.kept.is_some() {
+                recovery.forget();
+            }
+        } else if recovery.kept.as_ref() != Some(&self.document.state) {
+            let since = recovery.written.elapsed();
+            if since >= EVERY {
+                recovery.write(&self.document);
+            } else {
+                ctx.request_repaint_after(EVERY.saturating_sub(since));
+            }
+        }
+        if let Some(message) = failed {
+            self.complain(format!(
+                "Unsaved changes could not be kept aside: {message}"
+            ));
+        }
+    }
+
+    /// Offers what was left behind, one project at a time.
+    pub(super) fn recovery_dialog(&mut self, ctx: &Context) {
+        let Some(left) = self.recovery.as_ref().and_then(|r| r.left.first()) else {
+            return;
+        };
+        let (mut recover, mut discard) = (false, false);
+        let modal = Modal::new(Id::unique("recovery dialog"));
+        modal.show(ctx, |ui| {
+            ui.set_width(420.0);
+            ui.heading("Recover unsaved changes?");
+            ui.label(format!(
+                "The studio ended before the changes of {} were saved. They were kept aside.",
+                left.origin.name
+            ));
+            ui.add_space(6.0);
+            ui.horizontal(|ui| {
+                recover = ui.button("Recover changes").clicked();
+                discard = ui.button("Discard them").clicked();
+            });
+        });
+        if recover {
+            self.recover();
+        } else if discard {
+            self.drop_left();
+        }
+    }
+
+    fn recover(&mut self) {
+        let Some(recovery) = &mut self.recovery else {
+            return;
+        };
+        let Some(left) = recovery.left.first() else {
+            return;
+        };
+        match project_file::load(&left.folder.join(PROJECT)) {
+            Ok(mut loaded) => {
+                let path = left.origin.path.clone();
+                let saved = path.as_ref().and_then(|p| project_file::load(p).ok());
+                // The mesh lies where it lay; only the bundled one lies in the folder that goes.
+                loaded.bundled = loaded.mesh_path.parent() == Some(left.folder.as_path());
+                if loaded.bundled {
+                    loaded.mesh_path = "limb.glb".into();
+                    loaded.inputs.project.part.mesh = "limb.glb".into();
+                } else if let Some(path) = &path {
+                    loaded.inputs.project.part.mesh =
+                        project_file::relative_to(path, &loaded.mesh_path);
+                }
+                self.replace(loaded, path.clone());
+                let before = match saved {
+                    Some(saved) => Document::new(saved, path).state,
+                    None => State {
+                        // Nothing on disk is this.
+                        painted: None,
+                        masks: crate::project::Masks::new(),
+                        project: crate::project::Project::around("", None),
+                    },
+                };
+                self.document.compare_with(before);
+                self.drop_left();
+                self.tell("The unsaved changes were recovered. Save them to keep them");
+            }
+            Err(error) => {
+                if let Some(recovery) = &mut self.recovery {
+                    recovery.left.remove(0);
+                }
+                self.complain(format!("The unsaved changes could not be read: {error}"));
+            }
+        }
+    }
+
+    /// The first that was left is not needed any more.
+    fn drop_left(&mut self) {
+        if let Some(recovery) = &mut self.recovery
+            && !recovery.left.is_empty()
+        {
+            let left = recovery.left.remove(0);
+            let _ = fs::remove_dir_all(&left.folder);
+        }
+    }
+}
