@@ -67,7 +67,8 @@ impl Studio {
         if input.changed() {
             palette.marked = 0;
         }
-        let all = found(&palette.query);
+        let mut all = found(&palette.query);
+        all.sort_by_key(|c| !self.enabled(*c));
         let (down, up, enter) = ui.input(|i| {
             (
                 i.key_pressed(Key::ArrowDown),
