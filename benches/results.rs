@@ -1,5 +1,5 @@
-//! Remakes `RESULTS.md`: `cargo bench --bench results`. With a word as argument (`draft`) it runs only the
-//! Draft designs and prints without writing.
+//! Remakes `RESULTS.md`: `cargo bench --bench results`. With `-- draft` it runs only the Draft designs and
+//! prints without writing; with `-- assemble` it only puts together what the benchmarks have left.
 
 mod timing;
 
@@ -17,10 +17,27 @@ use hapdef::mesh::remesh::Remeshed;
 use hapdef::placement::SelectorKind;
 use timing::{cpu_seconds, reference_seconds};
 
+/// What the designs take most of an hour of, kept for when only the other figures were made anew.
+const DESIGNS: &str = "benches/designs.md";
+
 fn main() {
-    let draft_only = std::env::args().any(|a| a == "draft");
+    let asked = |word: &str| std::env::args().any(|a| a == word);
+    let draft_only = asked("draft");
+    if !asked("assemble") {
+        let text = designs(draft_only);
+        println!("{text}");
+        if draft_only {
+            return;
+        }
+        std::fs::write(DESIGNS, text).expect("the figures can be written");
+    }
+    std::fs::write("RESULTS.md", assembled()).expect("RESULTS.md can be written");
+}
+
+/// The figures of the designs.
+fn designs(draft_only: bool) -> String {
     let mut text = String::from(
-        "# Results\n\nRemade by `cargo bench --bench results` (about 20 minutes on two cores); the build times by `benches/build-times.sh`. \
+        "# Results\n\nRemade by `cargo bench --bench results` (about 25 minutes on two cores); the build times by `benches/build-times.sh`. \
 Times are processor seconds of the whole process, on a shared and noisy machine: compare them with the reference line, not with a stopwatch. \
 Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the element size, touches drawn uniformly at random off its nodes, never seen in training or selection.\n\n",
     );
@@ -47,25 +64,27 @@ Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the eleme
     failures(&mut text, &designs);
     reduction(&mut text, &designs);
     times(&mut text, &designs, reference);
-    if let Ok(elastic) = std::fs::read_to_string("benches/elastic.md") {
-        let _ = writeln!(text, "{elastic}");
+    text
+}
+
+/// All figures, as the benchmarks left them.
+fn assembled() -> String {
+    let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
+    let mut text = read(DESIGNS);
+    for path in ["benches/elastic.md", "benches/selection.md"] {
+        let _ = writeln!(text, "{}", read(path));
     }
-    if let Ok(selection) = std::fs::read_to_string("benches/selection.md") {
-        let _ = writeln!(text, "{selection}");
-    }
-    if let Ok(sklearn) = std::fs::read_to_string("benches/sklearn.txt") {
-        let _ = writeln!(
-            text,
-            "### The criterion by scikit-learn\n\n60 sites × 800 touches, every step and every other site, by `benches/sklearn_criterion.py` (its commands are in the file); fits to a tolerance of 0.001 mm.\n\n```\n{sklearn}```\n"
-        );
-    }
-    if let Ok(build) = std::fs::read_to_string("benches/build-times.txt") {
-        let _ = writeln!(text, "## Build times\n\n{build}");
-    }
-    println!("{text}");
-    if !draft_only {
-        std::fs::write("RESULTS.md", text).expect("RESULTS.md can be written");
-    }
+    let _ = writeln!(
+        text,
+        "### The criterion by scikit-learn\n\n60 sites × 800 touches of the bundled limb on strain, every step and every other site, by `benches/sklearn_criterion.py` (its commands are in the file); fits to a tolerance of 0.001 mm.\n\n```\n{}```\n",
+        read("benches/sklearn.txt")
+    );
+    let _ = writeln!(
+        text,
+        "## Build times\n\n{}",
+        read("benches/build-times.txt")
+    );
+    text
 }
 
 fn inputs(signal: Signal) -> Inputs {

@@ -13,11 +13,22 @@ use super::FileError;
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     let aside = beside(path, "part");
     let attempt = || -> std::io::Result<()> {
+        step();
         let mut file = File::create(&aside)?;
-        file.write_all(bytes)?;
+        step();
+        // In two parts, so that a test can end the program in the middle of it.
+        let (first, second) = bytes.split_at(bytes.len() / 2);
+        file.write_all(first)?;
+        step();
+        file.write_all(second)?;
+        step();
         file.sync_all()?;
+        step();
         fs::rename(&aside, path)?;
-        sync_folder(path)
+        step();
+        sync_folder(path)?;
+        step();
+        Ok(())
     };
     attempt().map_err(|e| {
         // Best effort: the error that matters is the one above.
@@ -44,6 +55,13 @@ pub fn write_with_backup(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     write(path, bytes)
 }
 
+/// A moment at which a test may kill the program.
+#[cfg(not(test))]
+fn step() {}
+
+#[cfg(test)]
+use tests::step;
+
 fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".");
@@ -59,7 +77,60 @@ fn sync_folder(path: &Path) -> std::io::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+    use std::process::Command;
+
     use super::*;
+
+    /// Set for a program that is to die: at which step, and while writing where.
+    const DIE_AT: &str = "HAPDEF_TEST_DIE_AT";
+    const DIE_WRITING: &str = "HAPDEF_TEST_DIE_WRITING";
+    const STEPS: u32 = 7;
+
+    thread_local! {
+        static STEP: Cell<u32> = const { Cell::new(0) };
+    }
+
+    pub fn step() {
+        STEP.set(STEP.get() + 1);
+        if std::env::var(DIE_AT).is_ok_and(|at| at == STEP.get().to_string()) {
+            std::process::abort();
+        }
+    }
+
+    /// What the program that is killed does; nothing in an ordinary run of the tests.
+    #[test]
+    fn written_until_killed() {
+        if let Some(path) = std::env::var_os(DIE_WRITING) {
+            write(Path::new(&path), &b"new".repeat(100_000)).unwrap();
+        }
+    }
+
+    #[test]
+    fn killed_at_any_step_the_file_is_the_old_one_or_the_new_one() {
+        let (old, new) = (b"old".repeat(7), b"new".repeat(100_000));
+        let mut seen = Vec::new();
+        for at in 1..=STEPS {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("a.toml");
+            fs::write(&path, &old).unwrap();
+            let died = Command::new(std::env::current_exe().unwrap())
+                .args(["--exact", "io::atomic::tests::written_until_killed"])
+                .env(DIE_AT, at.to_string())
+                .env(DIE_WRITING, &path)
+                .output()
+                .unwrap();
+            assert!(!died.status.success(), "step {at} was not reached");
+            let found = fs::read(&path).unwrap();
+            assert!(found == old || found == new, "step {at}: {}", found.len());
+            seen.push(found == new);
+            // What the dead left behind is in nobody's way.
+            write(&path, b"next").unwrap();
+            assert_eq!(fs::read(&path).unwrap(), b"next");
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        }
+        assert_eq!(seen, [false, false, false, false, false, true, true]);
+    }
 
     #[test]
     fn the_old_file_stays_as_backup() {
