@@ -10,6 +10,7 @@ mod inspector;
 mod overlay;
 mod palette;
 pub mod picture;
+mod recent;
 mod recovery;
 mod results;
 mod stages;
@@ -83,6 +84,7 @@ pub struct Studio {
     dialog: Option<dialogs::Dialog>,
     palette: Option<palette::Palette>,
     recovery: Option<recovery::Recovery>,
+    recent: recent::Recent,
     job: Option<Job<Finished>>,
     /// What the running selection has chosen so far.
     making: Arc<Mutex<Vec<ChosenSite>>>,
@@ -130,6 +132,7 @@ impl Studio {
             dialog: None,
             palette: None,
             recovery: None,
+            recent: recent::Recent::default(),
             job: None,
             making: Arc::default(),
             results: results::Tab::default(),
@@ -433,12 +436,7 @@ impl Studio {
     fn accept_drops(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|i| i.raw.dropped_files.first().map(|f| f.path().to_owned()));
         if let Some(path) = dropped {
-            let dialog = dialogs::Dialog::open_dropped(&path);
-            if dialog.needs_unit() || self.document.is_dirty() {
-                self.dialog = Some(dialog);
-            } else {
-                self.open_path(&path, None);
-            }
+            self.open_or_ask(&path);
         }
     }
 }
@@ -527,6 +525,10 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
         let mut studio = Studio::new(cc, loaded, path)?;
         if let Some(home) = eframe::storage_dir("hapdef-studio") {
             studio.keep_unsaved_in(&home.join("unsaved"));
+            studio.keep_recent_in(&home);
+            if let Some(path) = file {
+                studio.recent.push(path);
+            }
         }
         Ok(Box::new(studio))
     };

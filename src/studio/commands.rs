@@ -259,7 +259,10 @@ impl Studio {
     pub(super) fn menu(&mut self, ui: &mut egui::Ui) {
         egui::MenuBar::new().ui(ui, |ui| {
             ui.menu_button("File", |ui| {
-                for command in [Command::Open, Command::Save, Command::SaveAs] {
+                self.button(ui, Command::Open);
+                self.recent_menu(ui);
+                ui.separator();
+                for command in [Command::Save, Command::SaveAs] {
                     self.button(ui, command);
                 }
                 ui.separator();

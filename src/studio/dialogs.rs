@@ -236,6 +236,7 @@ impl Studio {
             Ok(loaded) => {
                 let is_project = project_file::is_project(path);
                 self.replace(loaded, is_project.then(|| path.to_owned()));
+                self.recent.push(path);
             }
             Err(error) => self.complain(format!("{error:#}")),
         }
@@ -312,6 +313,7 @@ impl Studio {
                 self.document.bundled = false;
                 self.document.settle();
                 self.document.mark_saved(path.to_owned());
+                self.recent.push(path);
             }
             Err(message) => self.complain(message),
         }
