@@ -39,15 +39,19 @@ const TUNED: Hyper = Hyper {
 };
 
 type Both<'a> = [(&'a str, &'a Signals); 2];
-/// A word to ask for it by, and what it measures.
-type Section = (&'static str, fn(&mut String, &Both));
+/// A word to ask for it by, its heading, and what it measures.
+type Section = (&'static str, &'static str, fn(&mut String, &Both));
 
 const SECTIONS: [Section; 5] = [
-    ("full-size", full_size),
-    ("exhaustive", exhaustive),
-    ("others", others),
-    ("cancel", cancel),
-    ("trade", trade),
+    ("full-size", "Greedy SVR at full size", full_size),
+    (
+        "exhaustive",
+        "Greedy SVR against the plain algorithm",
+        exhaustive,
+    ),
+    ("others", "The other selectors", others),
+    ("cancel", "Cancelling", cancel),
+    ("trade", "The trade of selecting", trade),
 ];
 
 fn main() {
@@ -62,12 +66,17 @@ fn main() {
     let mut text = format!(
         "The figures of the selectors are remade by `cargo bench --bench selection` (about an hour on two cores, nearly all of it the exact fits of what was *not* chosen). Processor seconds of one core; a 4000 × 4000 matrix product on one core took {reference:.1} s beside them. Data: the bundled limb at Standard, seed 0.\n\n"
     );
-    for (k, (word, measure)) in SECTIONS.iter().enumerate() {
-        if every || named(word) {
-            eprintln!("{word}");
-            measure(&mut text, &both);
-        } else if let Some(kept) = old.split("\n## ").nth(k + 1) {
-            let _ = write!(text, "## {}\n\n", kept.trim_end());
+    for (word, heading, measure) in SECTIONS {
+        let kept = old.split("\n## ").find(|part| part.starts_with(heading));
+        match kept {
+            Some(kept) if !every && !named(word) => {
+                let _ = write!(text, "## {}\n\n", kept.trim_end());
+            }
+            _ => {
+                eprintln!("{word}");
+                let _ = write!(text, "## {heading}\n\n");
+                measure(&mut text, &both);
+            }
         }
     }
     println!("{text}");
@@ -188,7 +197,7 @@ fn worst(steps: &[Comparison]) -> String {
 fn full_size(text: &mut String, both: &Both) {
     let _ = writeln!(
         text,
-        "## Greedy SVR at full size\n\n407 candidates × 4000 touches, 10 gauges, 5 folds, 3 outputs. The paper's setting: targets in metres, C 20, ε 1e-6, γ 2e-3 (limit 60 s); the tuned one: targets in mm, C 200, ε 0.1, γ 0.1 (limit 300 s). Gap: by how much a step could have been better by the screens' own account. Then, at every step, the 20 most promising and 20 random sites that were not chosen, fitted exactly: a minus says that the choice was the best of all. The last screen is quoted with the landmarks it begins with; a run gives it more where it departs.\n\n| signals | setting | seconds | criterion at 5, 10 (mm) | fitted exactly | largest gap | check | last screen departs |\n|---|---|---|---|---|---|---|---|"
+        "407 candidates × 4000 touches, 10 gauges, 5 folds, 3 outputs. The paper's setting: targets in metres, C 20, ε 1e-6, γ 2e-3 (limit 60 s); the tuned one: targets in mm, C 200, ε 0.1, γ 0.1 (limit 300 s). Gap: by how much a step could have been better by the screens' own account. Then, at every step, the 20 most promising and 20 random sites that were not chosen, fitted exactly: a minus says that the choice was the best of all. The last screen is quoted with the landmarks it begins with; a run gives it more where it departs.\n\n| signals | setting | seconds | criterion at 5, 10 (mm) | fitted exactly | largest gap | check | last screen departs |\n|---|---|---|---|---|---|---|---|"
     );
     let audit = Audit {
         top: 20,
@@ -229,7 +238,7 @@ fn full_size(text: &mut String, both: &Both) {
 fn exhaustive(text: &mut String, both: &Both) {
     let _ = writeln!(
         text,
-        "## Greedy SVR against the plain algorithm\n\n60 candidates × 800 touches, 10 gauges: at every step *every* other site fitted exactly. `benches/sklearn_criterion.py` does the same with scikit-learn on any dataset.\n\n| signals | setting | seconds | largest gap | check | last screen departs |\n|---|---|---|---|---|---|"
+        "60 candidates × 800 touches, 10 gauges: at every step *every* other site fitted exactly. `benches/sklearn_criterion.py` does the same with scikit-learn on any dataset.\n\n| signals | setting | seconds | largest gap | check | last screen departs |\n|---|---|---|---|---|---|"
     );
     let all = Audit {
         top: 60,
@@ -260,7 +269,7 @@ fn exhaustive(text: &mut String, both: &Both) {
 fn others(text: &mut String, both: &Both) {
     let _ = writeln!(
         text,
-        "## The other selectors\n\n| selector | size | seconds | limit |\n|---|---|---|---|"
+        "| selector | size | seconds | limit |\n|---|---|---|---|"
     );
     for &(name, signals) in both {
         let rows = evenly(signals.simulated.dataset.x.rows(), 2162);
@@ -374,7 +383,7 @@ fn cancel(text: &mut String, both: &Both) {
     let cells: Vec<String> = waits.iter().map(|w| format!("{w:.0}")).collect();
     let _ = writeln!(
         text,
-        "## Cancelling\n\nGreedy SVR at full size, the tuned setting, told to stop after 0.05 to 45 s: it had ended {} ms later (by the clock, on all cores; limit 100).\n",
+        "Greedy SVR at full size, the tuned setting, told to stop after 0.05 to 45 s: it had ended {} ms later (by the clock, on all cores; limit 100).\n",
         cells.join(", ")
     );
 }
@@ -384,7 +393,7 @@ fn trade(text: &mut String, both: &Both) {
     let signals = both[0].1;
     let _ = writeln!(
         text,
-        "## The trade of this stage\n\nGreedy SVR on strain, {SENSORS} gauges, the tuned setting. Each line changes one thing of the first. The error is always the same one: cross-validated in five folds over 4000 touches, fitted exactly. Landmarks are the rank of the screens' features; a choice may be worse than the best by the tolerance.\n\n| changed | seconds | error (mm) | fitted exactly |\n|---|---|---|---|"
+        "Greedy SVR on strain, {SENSORS} gauges, the tuned setting. Each line changes one thing of the first. The error is always the same one: cross-validated in five folds over 4000 touches, fitted exactly. Landmarks are the rank of the screens' features; a choice may be worse than the best by the tolerance.\n\n| changed | seconds | error (mm) | fitted exactly |\n|---|---|---|---|"
     );
     let judge = svr(TUNED);
     let kept = |count: usize| signals.part(count, 4000);
