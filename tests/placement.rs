@@ -5,7 +5,7 @@ use hapdef::budget::{StopReason, unwatched};
 use hapdef::dataset::SignalMatrix;
 use hapdef::gaussian_process::{Covariance, Distances, GpKernel};
 use hapdef::placement::entropy::Entropy;
-use hapdef::placement::greedy_svr::{GreedySvr, TOLERANCE};
+use hapdef::placement::greedy_svr::{Audit, GreedySvr, TOLERANCE};
 use hapdef::placement::information::Geometry;
 use hapdef::placement::mutual_information::MutualInformation;
 use hapdef::placement::pca_qr::PcaQr;
@@ -149,6 +149,36 @@ fn greedy_svr_chooses_as_the_plain_algorithm() {
             chosen.push(picked);
         }
         assert_eq!(selection.achieved.stop_reason, StopReason::Converged);
+    }
+}
+
+#[test]
+fn poor_screens_cost_time_and_not_the_choice() {
+    let strip = Strip::new(60, 300);
+    let all = Audit {
+        top: 60,
+        random: 0,
+        seed: 0,
+    };
+    for landmarks in [1.0, 0.25, 0.1] {
+        let selector = GreedySvr {
+            landmarks,
+            ..svr(TUNED)
+        };
+        let selection = choose(&selector, &strip, &Wishes::count(5)).unwrap();
+        let set = selection.sets.last().unwrap();
+        let steps = selector
+            .audit(&strip.pool(), &set.sites, all, &unwatched)
+            .unwrap();
+        for (step, set) in steps.iter().zip(&selection.sets) {
+            assert_eq!(step.compared, 60 - step.sensors);
+            assert!(step.excess() < 0.005, "{landmarks}: {step:?}");
+            assert!(
+                set.gap.unwrap() <= TOLERANCE + 1e-9,
+                "{landmarks}: {:?}",
+                set.gap
+            );
+        }
     }
 }
 

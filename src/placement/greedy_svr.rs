@@ -45,6 +45,9 @@ pub struct GreedySvr {
 pub const TOLERANCE: f64 = 0.002;
 /// Two candidates whose criteria differ by less than this share are tied; the lower place wins.
 pub const TIE: f64 = 1e-9;
+/// Candidates that go to each further score at once, and how many of them only to see how far the scores
+/// depart: the cheapest score departs most.
+const BATCHES: [(usize, usize); 3] = [(12, 4), (6, 2), (4, 2)];
 /// Departure of a score that has not been compared yet.
 const UNKNOWN: f64 = 0.01;
 
@@ -238,7 +241,8 @@ impl<'a> Search<'a> {
         let mut scored = self.scores(0, &open, field.chosen.len())?;
         let mut relations = Vec::new();
         for level in 1..=last {
-            let rules = self.rules(level - 1, 16 >> level.min(2), level.min(2));
+            let (batch, audits) = BATCHES[level - 1];
+            let rules = self.rules(level - 1, batch, audits);
             let Raced {
                 scored: next,
                 rest,
@@ -254,14 +258,19 @@ impl<'a> Search<'a> {
         let (winner, raced) = self.final_race(&scored, &worth, field.chosen.len())?;
         relations.push(raced.relation);
         left.push((last, raced.rest));
+        let mut waiting: Vec<(usize, Scored)> = left
+            .into_iter()
+            .flat_map(|(level, rest)| rest.into_iter().map(move |s| (level, s)))
+            .collect();
+        let step = field.chosen.len();
+        let winner = self.second_look(winner, &mut waiting, &mut relations, &worth, step)?;
         let stop = || self.stopped(field.chosen.len());
         let own = self.expected(last, winner.place, winner.judged.error, &stop);
-        let gap = left
+        let gap = waiting
             .iter()
-            .flat_map(|(level, rest)| rest.iter().map(|s| (*level, *s)))
-            .map(|(level, s)| 1.0 - least_of(&relations[level..], s.error) / own)
+            .map(|(level, s)| 1.0 - least_of(&relations[*level..], s.error) / own)
             .fold(0.0, f64::max);
-        self.widest = self.widest.max(raced.relation.deviation);
+        self.widest = self.widest.max(relations[last].deviation);
         self.exactly += raced.scored.len();
         self.relations = relations;
         let place = winner.place;
@@ -357,13 +366,82 @@ impl<'a> Search<'a> {
             }
             Ok(errors)
         })?;
-        self.work += Work {
-            kernel_evaluations: (compared * self.kernel.len()) as u64,
-            fits: (compared * 3 * self.judge.folds.parts.len()) as u64,
-            ..Work::default()
-        };
+        self.work += self.fitted(compared);
         let (_, winner) = best.ok_or(PlacementError::NoSites)?;
         Ok((winner, raced))
+    }
+
+    /// Looks again at what was left behind, now that it is known how far all scores depart, until nothing
+    /// of it can be better than the winner by more than the tolerance.
+    fn second_look(
+        &mut self,
+        mut winner: Finalist,
+        waiting: &mut Vec<(usize, Scored)>,
+        relations: &mut [Relation],
+        worth: &dyn Fn(Scored) -> f64,
+        step: usize,
+    ) -> Result<Finalist, PlacementError> {
+        /// Looks, and places scored at once.
+        const MOST: usize = 32;
+        const BATCH: usize = 8;
+        let last = LEVELS.len() - 1;
+        let mut extended = vec![0.0; self.kernel.len()];
+        for _ in 0..MOST {
+            let stop = || self.stopped(step);
+            let own = self.expected(last, winner.place, winner.judged.error, &stop);
+            let bar = worth(Scored {
+                place: winner.place,
+                error: own * (1.0 - self.settings.tolerance),
+            });
+            let hope = |(level, s): &(usize, Scored)| {
+                let error = least_of(&relations[*level..], s.error);
+                let value = worth(Scored { error, ..*s });
+                if value.is_nan() {
+                    f64::NEG_INFINITY
+                } else {
+                    value
+                }
+            };
+            waiting.sort_by(|a, b| hope(b).total_cmp(&hope(a)).then(a.1.place.cmp(&b.1.place)));
+            let hopeful = waiting.iter().take_while(|w| hope(w) > bar).count();
+            if hopeful == 0 {
+                break;
+            }
+            if waiting[0].0 < last {
+                let far: Vec<usize> = (0..hopeful)
+                    .filter(|&k| waiting[k].0 < last)
+                    .take(BATCH)
+                    .collect();
+                let places: Vec<usize> = far.iter().map(|&k| waiting[k].1.place).collect();
+                for (k, scored) in far.into_iter().zip(self.scores(last, &places, step)?) {
+                    waiting[k] = (last, scored);
+                }
+                continue;
+            }
+            let (_, scored) = waiting.remove(0);
+            let finalist = self.finalist(scored.place, step, &mut extended)?;
+            let stop = || self.stopped(step);
+            let error = self.expected(last, scored.place, finalist.judged.error, &stop);
+            let relation = &mut relations[last];
+            let departed = (error / (scored.error * relation.ratio) - 1.0).abs();
+            relation.deviation = relation.deviation.max(departed);
+            self.exactly += 1;
+            self.work += self.fitted(1);
+            let value = |place, error| worth(Scored { place, error });
+            if value(scored.place, error) > value(winner.place, own) {
+                winner = finalist;
+            }
+        }
+        Ok(winner)
+    }
+
+    /// The work of so many exact fits.
+    fn fitted(&self, sets: usize) -> Work {
+        Work {
+            kernel_evaluations: (sets * self.kernel.len()) as u64,
+            fits: (sets * 3 * self.judge.folds.parts.len()) as u64,
+            ..Work::default()
+        }
     }
 
     fn finalist(

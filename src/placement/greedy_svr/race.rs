@@ -55,7 +55,7 @@ pub struct Rules {
     pub least: usize,
     /// Candidates scored at once after those.
     pub batch: usize,
-    /// Of each batch, how many are taken from the middle of the rest: so that the relation is known for
+    /// Of each batch, how many are taken from all over the rest: so that the relation is known for
     /// others than the best.
     pub audits: usize,
     /// The relation departs at least this much: what was seen in the step before, halved.
@@ -99,7 +99,11 @@ pub fn race(
             rules.batch
         };
         for k in 0..size.min(rest.len()) {
-            let at = if k < rules.audits { rest.len() / 2 } else { 0 };
+            let at = if k < rules.audits {
+                (k + 1) * rest.len() / (rules.audits + 1)
+            } else {
+                0
+            };
             batch.push(rest.remove(at));
         }
         let places: Vec<usize> = batch.iter().map(|b| b.place).collect();
@@ -153,9 +157,9 @@ mod tests {
             })
             .collect();
         let rules = Rules {
-            least: 8,
-            batch: 8,
-            audits: 2,
+            least: 12,
+            batch: 12,
+            audits: 4,
             least_deviation: 0.0,
             slack: 0.0,
         };
@@ -177,6 +181,9 @@ mod tests {
         let (near, more) = run(0.01);
         let (rough, most) = run(0.1);
         assert_eq!([exact, near, rough], [0, 0, 0]);
-        assert!(few <= 8 && few < more && more < most, "{few} {more} {most}");
+        assert!(
+            few <= 12 && few < more && more < most,
+            "{few} {more} {most}"
+        );
     }
 }
