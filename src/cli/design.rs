@@ -20,7 +20,7 @@ pub struct DesignArgs {
     /// Gauges to place.
     #[arg(long)]
     pub sensors: Option<usize>,
-    /// The selector whose sites are reported; both are evaluated.
+    /// The selector whose sites are reported; all are evaluated.
     #[arg(long)]
     pub selector: Option<SelectorArg>,
     /// Keep this many candidates instead of as many as the project's variance needs.

@@ -118,14 +118,7 @@ pub fn read_numbers(path: &Path, name: &str) -> Result<(Vec<usize>, Vec<f64>), F
             format!("there is no array \"{name}\" in it"),
         ));
     }
-    let file = std::fs::File::open(path).map_err(|e| FileError::of(path, &e))?;
-    let mut archive = ZipArchive::new(file).map_err(|e| broken(&e))?;
-    let mut bytes = Vec::new();
-    archive
-        .by_name(&format!("{name}.npy"))
-        .map_err(|e| broken(&e))?
-        .read_to_end(&mut bytes)
-        .map_err(|e| broken(&e))?;
+    let bytes = entry(path, name, &broken)?;
     let header = npyz::NpyFile::new(&bytes[..]).map_err(|e| broken(&e))?;
     let shape: Vec<usize> = header.shape().iter().map(|&n| n as usize).collect();
     let fortran = header.order() == npyz::Order::Fortran;
@@ -162,13 +155,24 @@ pub fn read_numbers(path: &Path, name: &str) -> Result<(Vec<usize>, Vec<f64>), F
 /// # Errors
 /// [`FileError`] naming the file and the array.
 pub fn read_mask(path: &Path, name: &str) -> Result<Vec<bool>, FileError> {
-    let file = std::fs::File::open(path).map_err(|e| FileError::of(path, &e))?;
     let broken = |e: &dyn std::fmt::Display| {
         FileError::broken(
             path,
             format!("the mask \"{name}\" cannot be read ({e}). Paint it again"),
         )
     };
+    let bytes = entry(path, name, &broken)?;
+    let array = npyz::NpyFile::new(&bytes[..]).map_err(|e| broken(&e))?;
+    array.into_vec::<bool>().map_err(|e| broken(&e))
+}
+
+/// The bytes of one array, as NPY; `broken` says what it means that they cannot be read.
+fn entry(
+    path: &Path,
+    name: &str,
+    broken: &dyn Fn(&dyn std::fmt::Display) -> FileError,
+) -> Result<Vec<u8>, FileError> {
+    let file = std::fs::File::open(path).map_err(|e| FileError::of(path, &e))?;
     let mut archive = ZipArchive::new(file).map_err(|e| broken(&e))?;
     let mut bytes = Vec::new();
     archive
@@ -176,8 +180,7 @@ pub fn read_mask(path: &Path, name: &str) -> Result<Vec<bool>, FileError> {
         .map_err(|e| broken(&e))?
         .read_to_end(&mut bytes)
         .map_err(|e| broken(&e))?;
-    let array = npyz::NpyFile::new(&bytes[..]).map_err(|e| broken(&e))?;
-    array.into_vec::<bool>().map_err(|e| broken(&e))
+    Ok(bytes)
 }
 
 #[cfg(test)]

@@ -141,13 +141,19 @@ impl Studio {
                 )
             }),
             Field::Error => {
+                // On the mesh that was computed on, whose size has a limit, and carried from there.
                 let vertices = self.document.part.positions().len();
-                let errors = (self.design.as_ref())
-                    .filter(|d| d.inputs.part.positions().len() == vertices)
-                    .and_then(|d| d.design.error_map(&d.inputs.part));
-                let Some(errors) = errors else {
+                let simulated = (self.design.as_ref())
+                    .map(|d| (&d.design, &d.design.simulated))
+                    .filter(|(_, simulated)| simulated.carried.len() == vertices);
+                let Some((simulated, map)) =
+                    simulated.and_then(|(design, s)| Some((s, design.error_map(&s.mesh)?)))
+                else {
                     return (None, None);
                 };
+                let errors: Vec<f64> = (simulated.carried.iter())
+                    .map(|&at| simulated.mesh.interpolate(&map, at))
+                    .collect();
                 let top = robust_top(&errors);
                 (
                     Some(errors.iter().map(|e| e / top).collect()),
