@@ -94,7 +94,9 @@ pub struct Achieved {
 }
 
 /// The three named trades; each only builds an explicit [`Budget`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, serde::Deserialize,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quality {
     Draft,

@@ -1,14 +1,17 @@
 //! The open project as the window edits it: plain data, with undo and redo.
 
+use std::cell::RefCell;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
+use crate::budget::Quality;
 use crate::design::Inputs;
 use crate::io::project_file::LoadedProject;
 use crate::mesh::geodesic::March;
 use crate::mesh::repair::Repair;
 use crate::mesh::unroll::Axis;
 use crate::mesh::{RepairReport, SurfacePoint, TriMesh};
+use crate::placement::SelectorKind;
 use crate::project::{Masks, Project, SelectionKeys, SupportKeys, SupportKind};
 
 /// What undo brings back. The mesh is not part of it: opening a file begins a new history.
@@ -34,6 +37,7 @@ pub struct Document {
     march: March,
     /// Body and repairs that the part was taken in with.
     taken_in: (usize, Repair),
+    fingerprints: Fingerprints,
     saved: State,
     /// The state at the last finished gesture.
     settled: State,
@@ -68,6 +72,7 @@ impl Document {
             path,
             mesh_path: loaded.mesh_path,
             bundled: loaded.bundled,
+            fingerprints: Fingerprints::default(),
             saved: state.clone(),
             settled: state.clone(),
             state,
@@ -279,25 +284,33 @@ impl Document {
 
     /// The supports with what the masks they name hold.
     fn supports_key(&self) -> Vec<(SupportKeys, Option<u64>)> {
-        let mask = |s: &SupportKeys| self.state.masks.get(s.vertices.as_ref()?).map(|m| hash(m));
+        let mask = |s: &SupportKeys| self.mask_key(s.vertices.as_ref()?);
         let supports = &self.state.project.supports;
         supports.iter().map(|s| (s.clone(), mask(s))).collect()
+    }
+
+    fn mask_key(&self, name: &str) -> Option<u64> {
+        let mask = self.state.masks.get(name)?;
+        Some(self.fingerprints.of(mask))
     }
 
     /// What the simulation depends on, as a key.
     #[must_use]
     pub fn simulation_key(&self) -> String {
+        self.simulation_key_at(self.state.project.budget.quality)
+    }
+
+    /// As [`Self::simulation_key`], of a quality that need not be the project's.
+    #[must_use]
+    pub fn simulation_key_at(&self, quality: Quality) -> String {
         let p = &self.state.project;
         format!(
-            "{:p} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
-            Arc::as_ptr(&self.part),
-            self.part_key(),
-            p.material,
-            self.supports_key(),
+            "{} {:?} {:?} {:?} {:?}",
+            self.model_key(),
             p.touch,
             p.sites,
             (p.gauge.signal, p.gauge.directions),
-            p.budget
+            (quality, p.budget.seed)
         )
     }
 
@@ -314,34 +327,86 @@ impl Document {
         )
     }
 
-    /// What the feasible region depends on.
+    /// What the feasible region depends on, beside the simulation.
     #[must_use]
     pub fn feasible_key(&self) -> String {
+        self.feasible_key_at(self.state.project.budget.quality)
+    }
+
+    /// As [`Self::feasible_key`], of a quality that need not be the project's.
+    #[must_use]
+    pub fn feasible_key_at(&self, quality: Quality) -> String {
         let p = &self.state.project;
-        let painted = self.state.painted.as_ref().map(|m| hash(m));
+        let painted = self.state.painted.as_ref().map(|m| self.fingerprints.of(m));
         format!(
             "{} {:?} {:?} {painted:?}",
-            self.simulation_key(),
+            self.simulation_key_at(quality),
             p.gauge,
             p.feasible
         )
     }
 
-    /// What the selection and its evaluation depend on.
+    /// What the candidates depend on, and the Gaussian process over them.
     #[must_use]
-    pub fn selection_key(&self) -> String {
+    pub fn candidates_key_at(&self, quality: Quality) -> String {
         let p = &self.state.project;
-        // Everything that is asked for, but not the answer.
+        let selection = &p.selection;
+        format!(
+            "{} {:?} {:?}",
+            self.feasible_key_at(quality),
+            p.candidates,
+            (
+                selection.sensors,
+                selection.with_noise,
+                &selection.gaussian_process
+            )
+        )
+    }
+
+    /// What the selections depend on: everything that is asked for, but neither the answer nor which
+    /// selector's answer is shown.
+    #[must_use]
+    pub fn selection_key_at(&self, quality: Quality) -> String {
         let asked = SelectionKeys {
             sites: Vec::new(),
-            ..p.selection.clone()
+            selector: SelectorKind::default(),
+            ..self.state.project.selection.clone()
         };
-        format!(
-            "{} {:?} {asked:?} {:?}",
-            self.feasible_key(),
-            p.candidates,
-            p.evaluation
-        )
+        format!("{} {asked:?}", self.candidates_key_at(quality))
+    }
+
+    /// What a whole design depends on.
+    #[must_use]
+    pub fn design_key(&self) -> String {
+        self.design_key_at(self.state.project.budget.quality)
+    }
+
+    /// As [`Self::design_key`], of a quality that need not be the project's.
+    #[must_use]
+    pub fn design_key_at(&self, quality: Quality) -> String {
+        let evaluation = &self.state.project.evaluation;
+        format!("{} {evaluation:?}", self.selection_key_at(quality))
+    }
+}
+
+/// Hashes of masks that are asked for many times a frame.
+///
+/// A mask that is known here has a weak reference, so that whoever changes it in place is given a new
+/// allocation: the same place in memory means the same values.
+#[derive(Default)]
+struct Fingerprints(RefCell<Vec<(Weak<Vec<bool>>, u64)>>);
+
+impl Fingerprints {
+    fn of(&self, mask: &Arc<Vec<bool>>) -> u64 {
+        let mut known = self.0.borrow_mut();
+        known.retain(|(weak, _)| weak.strong_count() > 0);
+        let place = Arc::as_ptr(mask);
+        if let Some((_, hash)) = known.iter().find(|(weak, _)| weak.as_ptr() == place) {
+            return *hash;
+        }
+        let value = hash(mask);
+        known.push((Arc::downgrade(mask), value));
+        value
     }
 }
 
@@ -456,7 +521,7 @@ mod tests {
                 d.model_key(),
                 d.simulation_key(),
                 d.feasible_key(),
-                d.selection_key(),
+                d.design_key(),
             ]
         };
         let before = keys(&d);

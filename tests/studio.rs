@@ -64,10 +64,23 @@ impl Window {
         self.harness.run_ok();
     }
 
+    /// Looks at a stage.
+    fn stage(&mut self, name: &str) {
+        let label = format!("Stage: {name}");
+        self.harness.get_by_label_contains(&label).click();
+        self.harness.run_ok();
+    }
+
+    /// Opens a file and waits until it is there, or was refused.
+    fn open_file(&mut self, path: &Path, unit: Option<hapdef::project::Unit>) {
+        let ctx = self.harness.ctx.clone();
+        self.harness.state_mut().open_path(&ctx, path, unit);
+        self.wait("the file", 60, |s| !s.busy());
+    }
+
     /// Replaces the path in the open dialog.
     fn type_path(&mut self, path: &Path) {
         self.harness.get_by_label("Path").focus();
-        self.harness.run_ok();
         self.harness
             .key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
         self.harness
@@ -333,22 +346,16 @@ fn a_job_can_be_cancelled_and_bad_files_change_nothing() {
     w.harness.run_ok();
     w.press("Simulate");
     w.wait("the job to report", 30, hapdef::studio::Studio::busy);
-    w.press("Cancel job");
+    w.press("Cancel: Simulate (draft)");
     w.wait("the cancelled job", 60, |s| !s.busy());
     assert!(w.harness.state().simulation.is_none());
-    assert!(
-        w.harness
-            .state()
-            .messages
-            .iter()
-            .any(|m| m.text.contains("cancelled"))
-    );
+    let ended = w.harness.state().ended_jobs();
+    assert!(ended.iter().any(|e| e.how == "cancelled"), "{ended:?}");
     let folder = tempfile::tempdir().unwrap();
     let bad = folder.path().join("bad.glb");
     std::fs::write(&bad, b"glTF nonsense").unwrap();
     let before = w.harness.state().document.inputs();
-    w.harness.state_mut().open_path(&bad, None);
-    w.harness.run_ok();
+    w.open_file(&bad, None);
     let error = w
         .harness
         .state()
@@ -432,8 +439,7 @@ fn a_saved_project_opens_again() {
         w.harness.state().messages
     );
     w.harness.state_mut().document.clear_paint();
-    w.harness.state_mut().open_path(&path, None);
-    w.harness.run_ok();
+    w.open_file(&path, None);
     assert_eq!(
         w.painted(),
         Some(painted),
@@ -474,10 +480,7 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
     }
     let path = folder.path().join("two.obj");
     std::fs::write(&path, obj).unwrap();
-    w.harness
-        .state_mut()
-        .open_path(&path, Some(hapdef::project::Unit::Millimetre));
-    w.harness.run_ok();
+    w.open_file(&path, Some(hapdef::project::Unit::Millimetre));
     let said = &w.harness.state().messages[0].text;
     assert!(said.contains("body 0 of 2"), "{said}");
     let triangles = |w: &Window| w.harness.state().document.part.triangles().len();
@@ -490,7 +493,9 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
     w.press("Simulate");
     let state = w.harness.state();
     assert!(!state.busy() && state.messages.last().unwrap().text.contains("read again"));
+    w.stage("Part");
     w.press("Read the mesh again");
+    w.wait("the mesh", 60, |s| !s.busy());
     assert!(w.harness.state().document.is_dirty());
     assert_eq!(triangles(&w), 128, "126 and the two that fill the hole");
     let document = &w.harness.state().document;
@@ -506,8 +511,7 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
     document.dab(hapdef::document::Brush::Paint, at, 0.02);
     document.settle();
     w.harness.run_ok();
-    w.harness.get_by_label("Supports").click();
-    w.harness.run_ok();
+    w.stage("Supports and material");
     w.press("Hold what is painted");
     let state = &w.harness.state().document.state;
     assert_eq!(
@@ -591,6 +595,7 @@ fn what_was_not_saved_is_offered_again() {
     window.harness.run_ok();
     assert!(asks(&window));
     window.press("Recover changes");
+    window.wait("the changes", 60, |s| !s.busy());
     let document = &window.harness.state().document;
     assert_eq!(document.state.project.selection.sensors, 7);
     assert!(document.state.painted.as_ref().unwrap().iter().all(|&m| m));

@@ -14,6 +14,7 @@ use crate::placement::Selection;
 use crate::project::Project;
 
 /// The judge: a model of half the element size, with touches of its own.
+#[derive(Clone)]
 pub struct Truth {
     pub touches: Vec<Touch>,
     pub regions: Vec<Region>,
@@ -25,6 +26,26 @@ pub struct Truth {
     pub x: SignalMatrix,
     /// The same sites as a workshop would build them.
     pub workshop: SignalMatrix,
+}
+
+impl Truth {
+    /// Whether it measures exactly these sites, in any order.
+    #[must_use]
+    pub fn measures(&self, sites: &[usize]) -> bool {
+        let mut rows = sites.to_vec();
+        rows.sort_unstable();
+        rows.dedup();
+        rows == self.sites
+    }
+
+    /// The same, judged in the regions that a project asks for.
+    #[must_use]
+    pub fn in_regions_of(&self, project: &Project) -> Self {
+        Self {
+            regions: regions(project, &self.touches),
+            ..self.clone()
+        }
+    }
 }
 
 /// Measures sites on the truth: a mesh of half the element size, test touches drawn uniformly at random

@@ -15,17 +15,47 @@ use crate::feasible::Feasibility;
 use crate::mesh::{TriMesh, scatter};
 use crate::placement::{Selection, SelectorKind};
 
-/// Everything a design produced.
+/// Everything a design produced; what it shares with another costs nothing.
+#[derive(Clone)]
 pub struct Design {
     pub budget: Budget,
     pub simulated: Arc<Simulated>,
-    pub feasibility: Feasibility,
-    pub reduced: Reduced,
-    /// The project's selector first.
-    pub selections: Vec<Selection>,
-    pub truth: Truth,
-    pub evaluation: Evaluation,
+    pub feasibility: Arc<Feasibility>,
+    pub reduced: Arc<Reduced>,
+    pub selections: Arc<Vec<Selection>>,
+    /// Whose sites are shown and reported.
+    pub lead: SelectorKind,
+    pub truth: Arc<Truth>,
+    pub evaluation: Arc<Evaluation>,
     pub seconds: Vec<StageTime>,
+}
+
+/// What is there already of a design: each as its stage would bring it anew from the same inputs.
+#[derive(Clone, Default)]
+pub struct Known {
+    pub reduced: Option<(Arc<Feasibility>, Arc<Reduced>)>,
+    /// By the same selectors in the same order.
+    pub selections: Option<Arc<Vec<Selection>>>,
+    /// Of the same simulation.
+    pub truth: Option<Arc<Truth>>,
+}
+
+/// The steps of a design after its simulation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    Reduce,
+    Select,
+    Evaluate,
+}
+
+/// What a design tells while it is made. `clock` gives seconds since any fixed moment: the core has no
+/// clock of its own.
+#[derive(Clone, Copy)]
+pub struct Hooks<'a> {
+    pub clock: &'a dyn Fn() -> f64,
+    pub watch: Watch<'a>,
+    pub found: Found<'a>,
+    pub entered: &'a dyn Fn(Step),
 }
 
 /// Seconds by the clock of one stage.
@@ -36,11 +66,16 @@ pub struct StageTime {
 }
 
 impl Design {
+    /// The selection that is shown and reported.
+    #[must_use]
+    pub fn led(&self) -> Option<&Selection> {
+        self.selections.iter().find(|s| s.selector == self.lead)
+    }
+
     /// The chosen set: the project's selector at its number of gauges.
     #[must_use]
     pub fn chosen(&self) -> &[usize] {
-        self.selections
-            .first()
+        self.led()
             .and_then(|s| s.sets.last())
             .map_or(&[], |set| &set.sites)
     }
@@ -57,8 +92,7 @@ impl Design {
     /// The mean error (mm) around each vertex of a mesh that lies where the part does, for the chosen set.
     #[must_use]
     pub fn error_map(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
-        let kind = self.selections.first()?.selector;
-        let errors = self.touch_errors(kind, self.chosen().len())?;
+        let errors = self.touch_errors(self.lead, self.chosen().len())?;
         let places: Vec<(DVec3, DVec3)> = (self.truth.touches.iter())
             .map(|t| (t.position, t.normal))
             .collect();
@@ -69,7 +103,7 @@ impl Design {
     #[must_use]
     pub fn work(&self) -> Work {
         let mut work = self.simulated.dataset.work;
-        for selection in &self.selections {
+        for selection in self.selections.iter() {
             work += selection.achieved.effort;
         }
         work += self.truth.work;
@@ -82,7 +116,7 @@ impl Design {
     pub fn notes(&self) -> Vec<String> {
         let mut notes = self.simulated.achieved.notes.clone();
         notes.extend(self.reduced.candidates.notes.iter().cloned());
-        for selection in &self.selections {
+        for selection in self.selections.iter() {
             let title = selection.selector.title();
             notes.extend(
                 selection
@@ -133,11 +167,16 @@ pub fn run_from(
     clock: &dyn Fn() -> f64,
     watch: Watch,
 ) -> Result<Design, DesignError> {
-    let unheard: Found = &|_, _, _| ();
-    run_step_by_step(inputs, simulated, kinds, budget, clock, watch, unheard)
+    let hooks = Hooks {
+        clock,
+        watch,
+        found: &|_, _, _| (),
+        entered: &|_| (),
+    };
+    run_step_by_step(inputs, simulated, kinds, budget, Known::default(), &hooks)
 }
 
-/// As [`run_from`], telling of every step of the selectors.
+/// As [`run_from`], from what is known already, telling of every step.
 ///
 /// # Errors
 /// As [`run_from`].
@@ -146,29 +185,40 @@ pub fn run_step_by_step(
     simulated: Arc<Simulated>,
     kinds: &[SelectorKind],
     budget: &Budget,
-    clock: &dyn Fn() -> f64,
-    watch: Watch,
-    found: Found,
+    known: Known,
+    hooks: &Hooks,
 ) -> Result<Design, DesignError> {
-    let mut times = Stopwatch::new(clock);
-    let feasibility = filter(inputs, &simulated);
-    times.lap("filter");
-    let reduced = reduce_sites(inputs, &simulated, &feasibility, budget, watch)?;
-    times.lap("reduce");
-    let mut selections = Vec::new();
-    for &kind in kinds {
-        selections.push(select_step_by_step(
-            inputs, &simulated, &reduced, kind, budget, watch, found,
-        )?);
-        times.lap(match kind {
-            SelectorKind::GreedySvr => "select greedy-svr",
-            SelectorKind::PcaQr => "select pca-qr",
-            SelectorKind::Entropy => "select entropy",
-            SelectorKind::MutualInformation => "select mutual-information",
-        });
-    }
+    let watch = hooks.watch;
+    let asked = inputs.project.selection.selector;
+    let lead = *kinds
+        .iter()
+        .find(|k| **k == asked)
+        .or(kinds.first())
+        .unwrap_or(&asked);
+    let mut times = Stopwatch::new(hooks.clock);
+    (hooks.entered)(Step::Reduce);
+    let (feasibility, reduced) = if let Some(known) = known.reduced {
+        known
+    } else {
+        let feasibility = filter(inputs, &simulated);
+        times.lap("filter");
+        let reduced = reduce_sites(inputs, &simulated, &feasibility, budget, watch)?;
+        times.lap("reduce");
+        (Arc::new(feasibility), Arc::new(reduced))
+    };
+    (hooks.entered)(Step::Select);
+    let selections = match known.selections {
+        Some(known) => known,
+        None => Arc::new(select_all(
+            inputs, &simulated, &reduced, kinds, budget, &mut times, hooks,
+        )?),
+    };
+    (hooks.entered)(Step::Evaluate);
     let judged = sites_to_judge(&reduced, &selections);
-    let truth = truth(inputs, &simulated, &judged, budget, watch)?;
+    let truth = match known.truth.filter(|t| t.measures(&judged)) {
+        Some(known) => Arc::new(known.in_regions_of(&inputs.project)),
+        None => Arc::new(truth(inputs, &simulated, &judged, budget, watch)?),
+    };
     times.lap("truth");
     let evaluation = evaluate(
         inputs,
@@ -185,11 +235,37 @@ pub fn run_step_by_step(
         simulated,
         feasibility,
         reduced,
+        lead,
         selections,
         truth,
-        evaluation,
+        evaluation: Arc::new(evaluation),
         seconds: times.stages,
     })
+}
+
+fn select_all(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    kinds: &[SelectorKind],
+    budget: &Budget,
+    times: &mut Stopwatch,
+    hooks: &Hooks,
+) -> Result<Vec<Selection>, DesignError> {
+    let mut selections = Vec::new();
+    for &kind in kinds {
+        let (watch, found) = (hooks.watch, hooks.found);
+        selections.push(select_step_by_step(
+            inputs, simulated, reduced, kind, budget, watch, found,
+        )?);
+        times.lap(match kind {
+            SelectorKind::GreedySvr => "select greedy-svr",
+            SelectorKind::PcaQr => "select pca-qr",
+            SelectorKind::Entropy => "select entropy",
+            SelectorKind::MutualInformation => "select mutual-information",
+        });
+    }
+    Ok(selections)
 }
 
 struct Stopwatch<'a> {

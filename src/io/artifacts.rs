@@ -223,7 +223,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         "filters_took": taken,
         "unexplained": design.reduced.candidates.unexplained,
         "unexplained_curve": design.reduced.candidates.curve,
-        "selections": design.selections,
+        "selections": *design.selections,
         "evaluation": design.evaluation.rows,
         "failures": design.evaluation.failures,
         "gaussian_process": design.reduced.geometry().map(Geometry::summary),
@@ -240,7 +240,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         "seconds": seconds,
         "achieved": {
             "work": design.work(),
-            "selection": design.selections.first().map(|s| &s.achieved),
+            "selection": design.led().map(|s| &s.achieved),
             "notes": design.notes(),
         },
     })

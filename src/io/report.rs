@@ -60,16 +60,17 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
         page,
         "<p class=\"lead\">{chosen} strain gauges, chosen by {} on {}, to find where a touch of {} N lands.</p><div class=\"numbers\">",
         design
-            .selections
-            .first()
+            .led()
             .map_or(selector.title(), |s| s.selector.title()),
         dataset.signal.name(),
         inputs.project.touch.force_n
     );
-    for row in design.evaluation.rows.iter().filter(|r| {
-        r.sensors == chosen
-            && Some(r.selector.as_str()) == design.selections.first().map(|s| s.selector.name())
-    }) {
+    for row in design
+        .evaluation
+        .rows
+        .iter()
+        .filter(|r| r.sensors == chosen && r.selector == design.lead.name())
+    {
         number(
             page,
             &format!("{:.2} mm", row.error_mm),

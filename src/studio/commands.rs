@@ -32,6 +32,7 @@ pub enum Command {
     Simulate,
     Select,
     Cancel,
+    Follow,
     Frame,
     Look(Preset),
     Tool(Tool),
@@ -59,7 +60,8 @@ impl Command {
             Self::Palette => "Find a command…",
             Self::Simulate => "Simulate",
             Self::Select => "Select gauges",
-            Self::Cancel => "Cancel job",
+            Self::Cancel => "Cancel all jobs",
+            Self::Follow => "Follow changes",
             Self::Frame => "Frame the limb",
             Self::Look(preset) => preset.name(),
             Self::Tool(tool) => tool.name(),
@@ -88,7 +90,8 @@ impl Command {
             Self::Palette => "Reach every command by a few letters of its name",
             Self::Simulate => "Compute how the limb deforms under all touches",
             Self::Select => "Filter, reduce, choose the gauges and judge them on unseen touches",
-            Self::Cancel => "Stop the running job",
+            Self::Cancel => "Stop whatever is being computed",
+            Self::Follow => "Compute anew what a change has made stale, a draft first; on or off",
             Self::Frame => "Show the whole limb",
             Self::Look(_) => "Look from this side",
             Self::Tool(Tool::Touch) => "Click on the limb to press it there; drag to look around",
@@ -129,7 +132,8 @@ impl Command {
             | Self::ClearPaint
             | Self::FillPaint
             | Self::GrowPaint
-            | Self::ShrinkPaint => None,
+            | Self::ShrinkPaint
+            | Self::Follow => None,
         }
     }
 
@@ -155,6 +159,7 @@ impl Command {
             Self::Simulate,
             Self::Select,
             Self::Cancel,
+            Self::Follow,
             Self::Frame,
         ];
         all.extend(Preset::ALL.map(Self::Look));
@@ -173,10 +178,17 @@ impl Studio {
             Command::ClearPaint | Command::GrowPaint | Command::ShrinkPaint => {
                 self.document.state.painted.is_some()
             }
-            Command::Simulate | Command::Select => !self.busy(),
             Command::Cancel => self.busy(),
-            Command::Export => self.design.is_some() && !self.busy(),
+            Command::Export => self.design.is_some(),
             _ => true,
+        }
+    }
+
+    /// Whether a command that turns something on or off has it on.
+    fn is_on(&self, command: Command) -> bool {
+        match command {
+            Command::Follow => self.drive.follow,
+            _ => false,
         }
     }
 
@@ -217,6 +229,7 @@ impl Studio {
             Command::Simulate => self.simulate(ctx),
             Command::Select => self.select(ctx),
             Command::Cancel => self.cancel(),
+            Command::Follow => self.drive.follow = !self.drive.follow,
             Command::Frame => self.view.frame(&self.document),
             Command::Look(preset) => self.view.camera.look_from(preset),
             Command::Tool(tool) => self.view.take(tool),
@@ -242,7 +255,7 @@ impl Studio {
 
     /// A button or menu entry for a command.
     pub(super) fn button(&mut self, ui: &mut egui::Ui, command: Command) {
-        let mut button = egui::Button::new(command.name());
+        let mut button = egui::Button::new(command.name()).selected(self.is_on(command));
         if let Some(shortcut) = command.shortcut() {
             button = button.shortcut_text(ui.ctx().format_shortcut(&shortcut));
         }
@@ -303,6 +316,8 @@ impl Studio {
                 for command in [Command::Simulate, Command::Select, Command::Cancel] {
                     self.button(ui, command);
                 }
+                ui.separator();
+                self.button(ui, Command::Follow);
             });
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 let state = if self.document.is_dirty() {

@@ -1,16 +1,13 @@
 //! Opening, saving and exporting: a typed path always works; "Browse…" asks the desktop for a dialog.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
 use egui::Context;
 
 use super::Studio;
-use crate::cli;
-use crate::design::Inputs;
 use crate::document::Document;
-use crate::io::mesh_file::{ENDINGS, needs_unit, read_mesh};
+use crate::io::mesh_file::{ENDINGS, needs_unit};
 use crate::io::project_file;
 use crate::project::Unit;
 
@@ -223,74 +220,10 @@ impl Studio {
         match dialog.purpose {
             Purpose::Open => {
                 let unit = dialog.needs_unit().then_some(dialog.unit);
-                self.open_path(&path, unit);
+                self.open_path(ctx, &path, unit);
             }
             Purpose::SaveAs => self.save_to(&path),
             Purpose::Export => self.export(ctx, path),
-        }
-    }
-
-    /// Opens a project or mesh; on an error what is open stays open.
-    pub fn open_path(&mut self, path: &Path, unit: Option<Unit>) {
-        match cli::open(path, unit) {
-            Ok(loaded) => {
-                let is_project = project_file::is_project(path);
-                self.replace(loaded, is_project.then(|| path.to_owned()));
-                self.recent.push(path);
-            }
-            Err(error) => self.complain(format!("{error:#}")),
-        }
-    }
-
-    /// Takes the open mesh in again, with the body and the repairs the project now asks for. What was
-    /// painted on other vertices is gone with them; on an error everything stays as it is.
-    pub(super) fn take_in_again(&mut self) {
-        let part = &self.document.state.project.part;
-        let read = read_mesh(
-            &self.document.mesh_path,
-            part.unit,
-            part.body,
-            part.repair(),
-        );
-        match read {
-            Ok(mesh) => {
-                let same = mesh.mesh.positions() == self.document.part.positions();
-                let mut masks = mesh.groups;
-                if same {
-                    masks.extend(self.document.state.masks.clone());
-                }
-                let mut project = self.document.state.project.clone();
-                let before = project.supports.len();
-                project.supports.retain(|s| {
-                    s.vertices
-                        .as_ref()
-                        .is_none_or(|name| masks.contains_key(name))
-                });
-                let lost = before - project.supports.len();
-                let inputs = Inputs {
-                    project,
-                    part: Arc::new(mesh.mesh),
-                    painted: self.document.state.painted.clone().filter(|_| same),
-                    masks,
-                };
-                let loaded = project_file::LoadedProject {
-                    inputs,
-                    repairs: mesh.repairs,
-                    path: self.document.path.clone().unwrap_or_default(),
-                    mesh_path: self.document.mesh_path.clone(),
-                    bundled: false,
-                };
-                let path = self.document.path.clone();
-                let saved = self.document.saved().clone();
-                self.replace(loaded, path);
-                self.document.compare_with(saved);
-                if lost > 0 {
-                    self.tell(format!(
-                        "{lost} supports were on painted vertices that this mesh does not have: they are gone. Hold the part anew"
-                    ));
-                }
-            }
-            Err(error) => self.complain(error.to_string()),
         }
     }
 

@@ -1,61 +1,111 @@
-//! The right side: the project's settings, in the units of its file.
+//! The right side: the settings of a stage, in the units of the project's file.
 
-use egui::{CollapsingHeader, ComboBox, DragValue, Grid, Ui};
+use egui::{DragValue, Ui};
 
-use super::{Studio, quality_name};
+use super::form::{choice, count, number, percentage, rows};
+use super::{Stage, Studio, quality_name};
 use crate::budget::Quality;
 use crate::dataset::Signal;
 use crate::limb::BoxMm;
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
-use crate::project::{Lattice, Project, SupportKeys, SupportKind};
+use crate::project::{Lattice, Project, RegionKeys, SupportKeys, SupportKind};
 
 impl Studio {
+    /// The settings of the stage that is looked at.
     pub(super) fn inspector(&mut self, ui: &mut Ui) {
-        let bounds = self.document.part.bounds();
-        let bounds = [bounds.0, bounds.1].map(|p| (p * 1000.0).to_array());
-        let from_file = !self.document.bundled;
-        let bodies = self.document.repairs.bodies;
-        let again = from_file && self.document.asks_for_another_part();
-        let mask = self.document.state.painted.as_ref();
-        let painted = mask.is_some_and(|m| m.iter().any(|&set| set));
-        let mut asked = Asked::default();
-        let project = &mut self.document.state.project;
         egui::ScrollArea::vertical()
             .auto_shrink(false)
             .show(ui, |ui| {
                 ui.add_space(6.0);
-                quality(ui, project);
-                section(ui, "Part and material", true, |ui| {
-                    part(ui, project);
-                    if from_file {
-                        asked.take_in_again = taking_in(ui, project, bodies, again);
+                ui.heading(self.stage.name());
+                ui.add(egui::Label::new(purpose(self.stage)).wrap());
+                ui.add_space(4.0);
+                match self.stage {
+                    Stage::Part => self.part_form(ui),
+                    Stage::Supports => self.supports_form(ui),
+                    Stage::Simulation => {
+                        let project = &mut self.document.state.project;
+                        quality(ui, project);
+                        rows(ui, "Touch", |ui| touch(ui, project));
+                        rows(ui, "Signal and sites", |ui| sites(ui, project));
                     }
-                });
-                section(ui, "Supports", false, |ui| {
-                    asked.hold_painted = supports(ui, project, bounds, painted);
-                });
-                section(ui, "Touch", true, |ui| touch(ui, project));
-                section(ui, "Gauge", true, |ui| gauge(ui, project));
-                section(ui, "Feasible region and sites", false, |ui| {
-                    feasible(ui, project);
-                });
-                section(ui, "Selection", true, |ui| selection(ui, project));
+                    Stage::Feasible => {
+                        let project = &mut self.document.state.project;
+                        rows(ui, "Gauge", |ui| gauge(ui, project));
+                        rows(ui, "Room", |ui| feasible(ui, project));
+                    }
+                    Stage::Candidates => {
+                        let project = &mut self.document.state.project;
+                        rows(ui, "Reduction", |ui| candidates(ui, project));
+                    }
+                    Stage::Selection => {
+                        let project = &mut self.document.state.project;
+                        rows(ui, "Gauges", |ui| selection(ui, project));
+                        rows(ui, "Regression of greedy SVR", |ui| regression(ui, project));
+                    }
+                    Stage::Evaluation => self.evaluation_form(ui),
+                    Stage::Report => self.button(ui, super::Command::Export),
+                }
             });
-        if asked.hold_painted {
+    }
+
+    fn part_form(&mut self, ui: &mut Ui) {
+        let from_file = !self.document.bundled;
+        let bodies = self.document.repairs.bodies;
+        let again = from_file && self.document.asks_for_another_part();
+        let file = self.document.mesh_path.display().to_string();
+        ui.weak(if from_file { &file } else { "The bundled limb" });
+        let project = &mut self.document.state.project;
+        let mut pressed = false;
+        rows(ui, "Shell", |ui| part(ui, project));
+        if from_file {
+            rows(ui, "Taking the mesh in", |ui| {
+                pressed = taking_in(ui, project, bodies, again);
+            });
+        }
+        if pressed {
+            let ctx = ui.ctx().clone();
+            self.take_in_again(&ctx);
+        }
+    }
+
+    fn supports_form(&mut self, ui: &mut Ui) {
+        let bounds = self.document.part.bounds();
+        let bounds = [bounds.0, bounds.1].map(|p| (p * 1000.0).to_array());
+        let mask = self.document.state.painted.as_ref();
+        let painted = mask.is_some_and(|m| m.iter().any(|&set| set));
+        let project = &mut self.document.state.project;
+        rows(ui, "Material", |ui| material(ui, project));
+        let mut hold = false;
+        rows(ui, "Supports", |ui| {
+            hold = supports(ui, project, bounds, painted);
+        });
+        if hold {
             self.document.hold_painted();
         }
-        if asked.take_in_again {
-            self.take_in_again();
-        }
+    }
+
+    fn evaluation_form(&mut self, ui: &mut Ui) {
+        let (low, high) = self.document.part.bounds();
+        let bounds = [low, high].map(|p| (p * 1000.0).to_array());
+        let regions = &mut self.document.state.project.evaluation.regions;
+        rows(ui, "Regions", |ui| regions_form(ui, regions, bounds));
     }
 }
 
-/// What was pressed that concerns more than the settings.
-#[derive(Default)]
-struct Asked {
-    hold_painted: bool,
-    take_in_again: bool,
+/// What a stage is for, in a sentence.
+fn purpose(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Part => "The shell that gauges go into",
+        Stage::Supports => "What the shell is made of and where it is held",
+        Stage::Simulation => "How the shell deforms under every touch",
+        Stage::Feasible => "Where a gauge can physically go",
+        Stage::Candidates => "The few places that tell what all others would",
+        Stage::Selection => "Which of the candidates get a gauge",
+        Stage::Evaluation => "How well touches that nobody trained on are found",
+        Stage::Report => "What a workshop needs to build it",
+    }
 }
 
 /// How the mesh file is taken in; whether it is to be read again.
@@ -101,102 +151,6 @@ fn taking_in(ui: &mut Ui, project: &mut Project, bodies: usize, again: bool) -> 
     pressed
 }
 
-fn section(ui: &mut Ui, title: &str, open: bool, content: impl FnOnce(&mut Ui)) {
-    CollapsingHeader::new(title)
-        .default_open(open)
-        .show(ui, |ui| {
-            Grid::new(title)
-                .num_columns(2)
-                .spacing([10.0, 5.0])
-                .min_col_width(96.0)
-                .show(ui, content);
-        });
-}
-
-/// One row: a label and a number.
-fn number(
-    ui: &mut Ui,
-    label: &str,
-    value: &mut f64,
-    range: std::ops::RangeInclusive<f64>,
-    speed: f64,
-    suffix: &str,
-    help: &str,
-) {
-    let name = ui.label(label);
-    ui.add(
-        DragValue::new(value)
-            .range(range)
-            .clamp_existing_to_range(false)
-            .speed(speed)
-            .max_decimals(4)
-            .suffix(suffix),
-    )
-    .labelled_by(name.id)
-    .on_hover_text(help);
-    ui.end_row();
-}
-
-/// One row: a label and a share, shown in percent.
-fn percentage(
-    ui: &mut Ui,
-    label: &str,
-    share: &mut f64,
-    range: std::ops::RangeInclusive<f64>,
-    help: &str,
-) {
-    let mut percent = 100.0 * *share;
-    number(ui, label, &mut percent, range, 0.05, " %", help);
-    // Not every frame: a hundredfold and back is not always the same number.
-    if (percent - 100.0 * *share).abs() > 0.0 {
-        *share = percent / 100.0;
-    }
-}
-
-/// One row: a label and a count.
-fn count(
-    ui: &mut Ui,
-    label: &str,
-    value: &mut usize,
-    range: std::ops::RangeInclusive<usize>,
-    help: &str,
-) {
-    let name = ui.label(label);
-    ui.add(
-        DragValue::new(value)
-            .range(range)
-            .clamp_existing_to_range(false)
-            .speed(1.0),
-    )
-    .labelled_by(name.id)
-    .on_hover_text(help);
-    ui.end_row();
-}
-
-/// One row: a label and a choice.
-fn choice<T: PartialEq + Copy>(
-    ui: &mut Ui,
-    label: &str,
-    value: &mut T,
-    all: &[T],
-    name: impl Fn(T) -> &'static str,
-    help: &str,
-) {
-    ui.label(label);
-    ComboBox::new(label, "")
-        .selected_text(name(*value))
-        .width(120.0)
-        .show_ui(ui, |ui| {
-            for &option in all {
-                ui.selectable_value(value, option, name(option));
-            }
-        })
-        .response
-        .accessible_name(label)
-        .on_hover_text(help);
-    ui.end_row();
-}
-
 fn quality(ui: &mut Ui, project: &mut Project) {
     ui.horizontal(|ui| {
         ui.label("Quality");
@@ -229,6 +183,17 @@ fn part(ui: &mut Ui, project: &mut Project) {
         " mm",
         "Of the shell; the mesh is its mid-surface",
     );
+    choice(
+        ui,
+        "Axis",
+        &mut project.part.axis,
+        &AXES,
+        axis_name,
+        "The axis the part is unrolled about",
+    );
+}
+
+fn material(ui: &mut Ui, project: &mut Project) {
     number(
         ui,
         "Young's modulus",
@@ -246,14 +211,6 @@ fn part(ui: &mut Ui, project: &mut Project) {
         0.005,
         "",
         "Printed nylon: 0.35",
-    );
-    choice(
-        ui,
-        "Axis",
-        &mut project.part.axis,
-        &AXES,
-        axis_name,
-        "The axis the part is unrolled about",
     );
 }
 
@@ -281,16 +238,8 @@ fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm, painted: bool) ->
             ui.label(name);
             ui.end_row();
         }
-        let corners = support.box_mm.iter_mut().flatten();
-        for (end, corner) in ["from", "to"].into_iter().zip(corners) {
-            ui.label(format!("{end} (mm)"));
-            ui.horizontal(|ui| {
-                for (axis, value) in ["x", "y", "z"].into_iter().zip(corner) {
-                    ui.add(DragValue::new(value).speed(0.1).max_decimals(2))
-                        .accessible_name(format!("Support {number} {end} {axis}"));
-                }
-            });
-            ui.end_row();
+        if let Some(held) = &mut support.box_mm {
+            corners(ui, &format!("Support {number}"), held);
         }
         ui.label("");
         if ui
@@ -327,6 +276,54 @@ fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm, painted: bool) ->
         .clicked();
     ui.end_row();
     pressed
+}
+
+fn regions_form(ui: &mut Ui, regions: &mut Vec<RegionKeys>, bounds: BoxMm) {
+    let mut removed = None;
+    for (k, region) in regions.iter_mut().enumerate() {
+        let number = k + 1;
+        let name = ui.label(format!("Region {number}"));
+        ui.text_edit_singleline(&mut region.name)
+            .labelled_by(name.id);
+        ui.end_row();
+        corners(ui, &format!("Region {number}"), &mut region.box_mm);
+        ui.label("");
+        let button = ui.button("Remove");
+        if button
+            .accessible_name(format!("Remove region {number}"))
+            .clicked()
+        {
+            removed = Some(k);
+        }
+        ui.end_row();
+    }
+    if let Some(k) = removed {
+        regions.remove(k);
+    }
+    let button = ui
+        .button("Add region")
+        .on_hover_text("Errors are quoted for it beside all touches");
+    if button.clicked() {
+        regions.push(RegionKeys {
+            name: format!("region {}", regions.len() + 1),
+            box_mm: bounds,
+        });
+    }
+    ui.end_row();
+}
+
+/// Two opposite corners of a box (mm).
+fn corners(ui: &mut Ui, of: &str, corners: &mut BoxMm) {
+    for (end, corner) in ["from", "to"].into_iter().zip(corners) {
+        ui.label(format!("{end} (mm)"));
+        ui.horizontal(|ui| {
+            for (axis, value) in ["x", "y", "z"].into_iter().zip(corner) {
+                ui.add(DragValue::new(value).speed(0.1).max_decimals(2))
+                    .accessible_name(format!("{of} {end} {axis}"));
+            }
+        });
+        ui.end_row();
+    }
 }
 
 fn kind_name(kind: SupportKind) -> &'static str {
@@ -375,7 +372,7 @@ fn touch(ui: &mut Ui, project: &mut Project) {
     );
 }
 
-fn gauge(ui: &mut Ui, project: &mut Project) {
+fn sites(ui: &mut Ui, project: &mut Project) {
     let gauge = &mut project.gauge;
     choice(
         ui,
@@ -396,6 +393,43 @@ fn gauge(ui: &mut Ui, project: &mut Project) {
     } else {
         gauge.directions = 1;
     }
+    number(
+        ui,
+        "Site spacing",
+        &mut project.sites.spacing_mm,
+        0.01..=1e4,
+        0.05,
+        " mm",
+        "Of the possible gauge positions on the inside",
+    );
+    let name = |l| match l {
+        Lattice::Even => "Even",
+        Lattice::Unrolled => "Rows and columns",
+    };
+    choice(
+        ui,
+        "Lattice",
+        &mut project.sites.lattice,
+        &[Lattice::Even, Lattice::Unrolled],
+        name,
+        "Even suits any surface; rows and columns suit tubes",
+    );
+    let mut seed = project.budget.seed as usize;
+    let before = seed;
+    count(
+        ui,
+        "Seed",
+        &mut seed,
+        0..=usize::MAX >> 12,
+        "Of every random draw: the same seed gives the same design",
+    );
+    if seed != before {
+        project.budget.seed = seed as u64;
+    }
+}
+
+fn gauge(ui: &mut Ui, project: &mut Project) {
+    let gauge = &mut project.gauge;
     number(
         ui,
         "Noise",
@@ -486,27 +520,36 @@ fn feasible(ui: &mut Ui, project: &mut Project) {
         " mm",
         "How far the centre of mass of the neighbours may lie from a site",
     );
-    number(
+}
+
+fn candidates(ui: &mut Ui, project: &mut Project) {
+    percentage(
         ui,
-        "Site spacing",
-        &mut project.sites.spacing_mm,
-        0.01..=1e4,
-        0.05,
-        " mm",
-        "Of the possible gauge positions on the inside",
+        "Unexplained",
+        &mut project.candidates.unexplained,
+        0.01..=99.0,
+        "Share of the held-out variance that the candidates may leave unexplained",
     );
-    let name = |l| match l {
-        Lattice::Even => "Even",
-        Lattice::Unrolled => "Rows and columns",
-    };
-    choice(
-        ui,
-        "Lattice",
-        &mut project.sites.lattice,
-        &[Lattice::Even, Lattice::Unrolled],
-        name,
-        "Even suits any surface; rows and columns suit tubes",
-    );
+    let mut fixed = project.candidates.count.is_some();
+    let name = ui.label("Fixed number");
+    let tick = ui
+        .checkbox(&mut fixed, "")
+        .on_hover_text("Keep so many candidates, whatever they leave unexplained")
+        .labelled_by(name.id)
+        .accessible_name("Fixed number");
+    ui.end_row();
+    if tick.changed() {
+        project.candidates.count = fixed.then_some(160);
+    }
+    if let Some(kept) = &mut project.candidates.count {
+        count(
+            ui,
+            "Candidates",
+            kept,
+            1..=100_000,
+            "How many of the feasible sites are kept",
+        );
+    }
 }
 
 fn selection(ui: &mut Ui, project: &mut Project) {
@@ -547,13 +590,9 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         .labelled_by(name.id)
         .accessible_name("With noise");
     ui.end_row();
-    percentage(
-        ui,
-        "Unexplained",
-        &mut project.candidates.unexplained,
-        0.01..=99.0,
-        "Share of the held-out variance that the candidates may leave unexplained",
-    );
+}
+
+fn regression(ui: &mut Ui, project: &mut Project) {
     number(
         ui,
         "C",
@@ -581,16 +620,4 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         "",
         "Of the Gaussian kernel on standardized signals",
     );
-    let mut seed = project.budget.seed as usize;
-    let before = seed;
-    count(
-        ui,
-        "Seed",
-        &mut seed,
-        0..=usize::MAX >> 12,
-        "Of every random draw: the same seed gives the same design",
-    );
-    if seed != before {
-        project.budget.seed = seed as u64;
-    }
 }

@@ -74,17 +74,18 @@ impl Studio {
             }
         });
         if let Some(path) = chosen {
-            self.open_or_ask(&path);
+            let ctx = ui.ctx().clone();
+            self.open_or_ask(&ctx, &path);
         }
     }
 
     /// Opens a file, or asks where something would be lost or is not known.
-    pub(super) fn open_or_ask(&mut self, path: &Path) {
+    pub(super) fn open_or_ask(&mut self, ctx: &egui::Context, path: &Path) {
         let dialog = Dialog::open_dropped(path);
         if dialog.needs_unit() || self.document.is_dirty() {
             self.dialog = Some(dialog);
         } else {
-            self.open_path(path, None);
+            self.open_path(ctx, path, None);
         }
     }
 }

@@ -46,6 +46,8 @@ pub(super) struct Recovery {
     written: Instant,
     writing: Option<Receiver<Result<(), String>>>,
     left: Vec<Left>,
+    /// The first of them is being opened, or could not be.
+    asked: bool,
 }
 
 impl Recovery {
@@ -67,6 +69,7 @@ impl Recovery {
             written: Instant::now(),
             writing: None,
             left,
+            asked: false,
         }
     }
 
@@ -197,7 +200,8 @@ impl Studio {
 
     /// Offers what was left behind, one project at a time.
     pub(super) fn recovery_dialog(&mut self, ctx: &Context) {
-        let Some(left) = self.recovery.as_ref().and_then(|r| r.left.first()) else {
+        let open = self.recovery.as_ref().filter(|r| !r.asked);
+        let Some(left) = open.and_then(|r| r.left.first()) else {
             return;
         };
         let (mut recover, mut discard) = (false, false);
@@ -216,61 +220,32 @@ impl Studio {
             });
         });
         if recover {
-            self.recover();
+            self.recover(ctx);
         } else if discard {
             self.drop_left();
         }
     }
 
-    fn recover(&mut self) {
+    fn recover(&mut self, ctx: &Context) {
         let Some(recovery) = &mut self.recovery else {
             return;
         };
-        let Some(left) = recovery.left.first() else {
-            return;
-        };
-        match project_file::load(&left.folder.join(PROJECT)) {
-            Ok(mut loaded) => {
-                let path = left.origin.path.clone();
-                let saved = path.as_ref().and_then(|p| project_file::load(p).ok());
-                // The mesh lies where it lay; only the bundled one lies in the folder that goes.
-                loaded.bundled = loaded.mesh_path.parent() == Some(left.folder.as_path());
-                if loaded.bundled {
-                    loaded.mesh_path = "limb.glb".into();
-                    loaded.inputs.project.part.mesh = "limb.glb".into();
-                } else if let Some(path) = &path {
-                    loaded.inputs.project.part.mesh =
-                        project_file::relative_to(path, &loaded.mesh_path);
-                }
-                self.replace(loaded, path.clone());
-                let before = match saved {
-                    Some(saved) => Document::new(saved, path).state,
-                    None => State {
-                        // Nothing on disk is this.
-                        painted: None,
-                        masks: crate::project::Masks::new(),
-                        project: crate::project::Project::around("", None),
-                    },
-                };
-                self.document.compare_with(before);
-                self.drop_left();
-                self.tell("The unsaved changes were recovered. Save them to keep them");
-            }
-            Err(error) => {
-                if let Some(recovery) = &mut self.recovery {
-                    recovery.left.remove(0);
-                }
-                self.complain(format!("The unsaved changes could not be read: {error}"));
-            }
+        // Whether or not it can be read: it is offered once.
+        recovery.asked = true;
+        if let Some(left) = recovery.left.first() {
+            let (folder, path) = (left.folder.clone(), left.origin.path.clone());
+            let project = folder.join(PROJECT);
+            self.open_kept(ctx, folder, project, path);
         }
     }
 
     /// The first that was left is not needed any more.
-    fn drop_left(&mut self) {
+    pub(super) fn drop_left(&mut self) {
         if let Some(recovery) = &mut self.recovery
             && !recovery.left.is_empty()
         {
             let left = recovery.left.remove(0);
+            recovery.asked = false;
             let _ = fs::remove_dir_all(&left.folder);
         }
     }

@@ -15,10 +15,17 @@ pub(super) enum Tab {
     Failures,
     Sites,
     Reduction,
+    Jobs,
 }
 
 impl Tab {
-    const ALL: [Self; 4] = [Self::Error, Self::Failures, Self::Sites, Self::Reduction];
+    const ALL: [Self; 5] = [
+        Self::Error,
+        Self::Failures,
+        Self::Sites,
+        Self::Reduction,
+        Self::Jobs,
+    ];
 
     fn name(self) -> &'static str {
         match self {
@@ -26,6 +33,7 @@ impl Tab {
             Self::Failures => "Failures",
             Self::Sites => "Sites",
             Self::Reduction => "Reduction",
+            Self::Jobs => "Jobs",
         }
     }
 }
@@ -46,16 +54,13 @@ impl Studio {
             for tab in Tab::ALL {
                 ui.selectable_value(&mut self.results, tab, tab.name());
             }
-            let stale = self
-                .design
-                .as_ref()
-                .is_some_and(|d| d.key != self.document.selection_key());
-            if stale && self.results != Tab::Sites {
+            let stale = self.design_holds() == Some(false);
+            if stale && !matches!(self.results, Tab::Sites | Tab::Jobs) {
                 ui.colored_label(super::theme::STALE, "of settings that have changed since");
             }
         });
         ui.separator();
-        if self.design.is_none() && self.results != Tab::Sites {
+        if self.design.is_none() && !matches!(self.results, Tab::Sites | Tab::Jobs) {
             empty(
                 ui,
                 "Nothing selected yet. Press “Select gauges” to choose the sites and judge them on unseen touches",
@@ -67,6 +72,7 @@ impl Studio {
             Tab::Failures => self.failure_plots(ui),
             Tab::Sites => self.site_table(ui),
             Tab::Reduction => self.reduction_plot(ui),
+            Tab::Jobs => self.jobs_tab(ui),
         }
     }
 
@@ -269,7 +275,7 @@ impl Studio {
     }
 }
 
-fn empty(ui: &mut Ui, text: &str) {
+pub(super) fn empty(ui: &mut Ui, text: &str) {
     ui.add_space(12.0);
     ui.vertical_centered(|ui| ui.weak(text));
 }

@@ -1,35 +1,84 @@
-//! The left side: the stages of the road, what each last achieved, and what to press next.
+//! The left side: the stages of the road, how each stands, what it last achieved, and what to press next.
 
 use egui::{RichText, Ui};
 
-use super::{Command, Studio, theme};
-use crate::design::Simulated;
+use super::jobs::Task;
+use super::{Command, Studio, quality_name, theme};
+use crate::design::{Simulated, Step};
+
+/// The stages, in the order of the road.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stage {
+    Part,
+    Supports,
+    #[default]
+    Simulation,
+    Feasible,
+    Candidates,
+    Selection,
+    Evaluation,
+    Report,
+}
+
+impl Stage {
+    pub const ALL: [Self; 8] = [
+        Self::Part,
+        Self::Supports,
+        Self::Simulation,
+        Self::Feasible,
+        Self::Candidates,
+        Self::Selection,
+        Self::Evaluation,
+        Self::Report,
+    ];
+
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Part => "Part",
+            Self::Supports => "Supports and material",
+            Self::Simulation => "Simulation",
+            Self::Feasible => "Feasible region",
+            Self::Candidates => "Candidates",
+            Self::Selection => "Selection",
+            Self::Evaluation => "Evaluation",
+            Self::Report => "Report",
+        }
+    }
+}
 
 /// How a stage stands.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Standing {
-    Current,
-    Stale,
-    Running,
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Standing {
     Open,
+    Running,
+    Current,
+    /// Holds, and a finer one is asked for.
+    Draft,
+    Stale,
+    Failed(String),
 }
 
 impl Standing {
-    fn mark(self) -> (&'static str, egui::Color32) {
+    fn mark(&self) -> (&'static str, egui::Color32) {
         match self {
             Self::Current => ("✔", egui::Color32::from_rgb(110, 190, 130)),
+            Self::Draft => ("◐", egui::Color32::from_rgb(110, 190, 130)),
             Self::Stale => ("~", theme::STALE),
             Self::Running => ("…", theme::TOUCHED),
             Self::Open => ("○", egui::Color32::from_gray(130)),
+            Self::Failed(_) => ("✖", theme::ERROR),
         }
     }
 
-    fn word(self) -> &'static str {
+    fn word(&self) -> &'static str {
         match self {
             Self::Current => "current",
+            Self::Draft => "draft",
             Self::Stale => "stale",
             Self::Running => "running",
             Self::Open => "not done",
+            Self::Failed(_) => "failed",
         }
     }
 }
@@ -40,157 +89,289 @@ impl Studio {
             .auto_shrink(false)
             .show(ui, |ui| {
                 ui.add_space(6.0);
-                self.part_stage(ui);
-                self.simulate_stage(ui);
-                self.feasible_stage(ui);
-                self.select_stage(ui);
-                self.report_stage(ui);
+                for stage in Stage::ALL {
+                    self.stage_row(ui, stage);
+                }
             });
     }
 
-    fn part_stage(&mut self, ui: &mut Ui) {
+    fn stage_row(&mut self, ui: &mut Ui, stage: Stage) {
+        let standing = self.standing(stage);
+        ui.add_space(2.0);
+        let (mark, colour) = standing.mark();
+        ui.horizontal(|ui| {
+            ui.add_sized(
+                [14.0, ui.spacing().interact_size.y],
+                egui::Label::new(RichText::new(mark).color(colour).monospace()),
+            )
+            .on_hover_text(standing.word());
+            let title = RichText::new(stage.name()).strong();
+            let chosen = self.stage == stage;
+            let button = ui
+                .add(egui::Button::selectable(chosen, title))
+                .on_hover_text("Show the settings of this stage")
+                .accessible_name(format!("Stage: {}, {}", stage.name(), standing.word()));
+            if button.clicked() {
+                self.stage = stage;
+            }
+            if !matches!(standing, Standing::Current | Standing::Open) {
+                ui.label(RichText::new(standing.word()).small().color(colour));
+            }
+        });
+        ui.indent(stage.name(), |ui| {
+            if let Standing::Failed(message) = &standing {
+                let text = RichText::new(message).size(11.5).color(theme::ERROR);
+                ui.add(egui::Label::new(text).wrap());
+            }
+            for line in self.achieved(stage) {
+                ui.add(egui::Label::new(RichText::new(line).size(11.5).weak()).wrap());
+            }
+            self.notes_of(ui, stage);
+            if let Some(command) = next_command(stage) {
+                self.button(ui, command);
+            }
+        });
+    }
+
+    /// How a stage stands.
+    #[must_use]
+    pub fn standing(&self, stage: Stage) -> Standing {
+        match stage {
+            Stage::Part if self.document.asks_for_another_part() => Standing::Stale,
+            Stage::Supports if self.document.state.project.supports.is_empty() => Standing::Open,
+            Stage::Part | Stage::Supports => Standing::Current,
+            Stage::Simulation => {
+                let held = (self.simulation.as_ref()).map(|s| s.quality);
+                self.standing_of(&Task::Simulate, self.simulation_holds(), held, None)
+            }
+            Stage::Feasible => self.feasible_standing(),
+            Stage::Candidates => self.design_standing(Step::Reduce),
+            Stage::Selection => self.design_standing(Step::Select),
+            Stage::Evaluation => self.design_standing(Step::Evaluate),
+            Stage::Report if self.design.is_none() => Standing::Open,
+            Stage::Report => match self.design_standing(Step::Evaluate) {
+                Standing::Failed(_) | Standing::Running => Standing::Stale,
+                other => other,
+            },
+        }
+    }
+
+    fn feasible_standing(&self) -> Standing {
+        let running = self.jobs.runs(Task::Filter);
+        match (&self.feasibility, self.shown_feasible_key()) {
+            _ if running => Standing::Running,
+            (None, _) => Standing::Open,
+            (Some((key, _)), Some(now)) if *key == now => {
+                let draft = (self.simulation.as_ref()).is_some_and(|s| s.quality < self.quality());
+                if draft {
+                    Standing::Draft
+                } else {
+                    Standing::Current
+                }
+            }
+            _ => Standing::Stale,
+        }
+    }
+
+    fn design_standing(&self, step: Step) -> Standing {
+        let held = self.design.as_ref().map(|d| d.quality);
+        self.standing_of(&Task::Design, self.design_holds(), held, Some(step))
+    }
+
+    /// `holds` says whether there is a result and whether it is of the project as it is; `step` which step
+    /// of the job is meant.
+    fn standing_of(
+        &self,
+        task: &dyn Fn(crate::budget::Quality) -> Task,
+        holds: Option<bool>,
+        held: Option<crate::budget::Quality>,
+        step: Option<Step>,
+    ) -> Standing {
+        let qualities = crate::budget::Quality::ALL;
+        let running = qualities.iter().any(|&q| self.jobs.runs(task(q)));
+        let at = (self.drive.making.lock().ok()).and_then(|making| making.step);
+        if running && (step.is_none() || step == at) {
+            return Standing::Running;
+        }
+        let failed = qualities.iter().find_map(|&q| {
+            let key = match task(q) {
+                Task::Simulate(_) => self.document.simulation_key_at(q),
+                _ => self.document.design_key_at(q),
+            };
+            self.drive.failure(task(q), &key)
+        });
+        if let Some(message) = failed.filter(|_| step.is_none() || step == at) {
+            return Standing::Failed(message.to_owned());
+        }
+        match holds {
+            None => Standing::Open,
+            Some(false) => Standing::Stale,
+            Some(true) if held < Some(self.quality()) => Standing::Draft,
+            Some(true) => Standing::Current,
+        }
+    }
+
+    /// What a stage last achieved.
+    fn achieved(&self, stage: Stage) -> Vec<String> {
+        match stage {
+            Stage::Part => self.part_lines(),
+            Stage::Supports => {
+                let project = &self.document.state.project;
+                vec![
+                    match project.supports.len() {
+                        0 => "nothing is held yet".into(),
+                        1 => "1 support".into(),
+                        n => format!("{n} supports"),
+                    },
+                    format!(
+                        "{} mm thick, {} GPa",
+                        project.part.thickness_mm, project.material.youngs_modulus_gpa
+                    ),
+                ]
+            }
+            Stage::Simulation => self.simulation_lines(),
+            Stage::Feasible => self.feasibility.as_ref().map_or_else(Vec::new, |(_, f)| {
+                let taken = f.taken().into_iter().filter(|(_, n)| *n > 0);
+                std::iter::once(format!("{} of {} sites", f.sites().len(), f.verdicts.len()))
+                    .chain(taken.map(|(by, n)| format!("− {n}  {}", by.label().to_lowercase())))
+                    .collect()
+            }),
+            Stage::Candidates => self.design.as_ref().map_or_else(Vec::new, |d| {
+                let reduced = &d.design.reduced;
+                let left = reduced.candidates.unexplained;
+                let left = left.map(|u| format!("{:.2} % of the variance unexplained", 100.0 * u));
+                std::iter::once(format!(
+                    "{} of {} sites{}",
+                    reduced.sites.len(),
+                    reduced.feasible.len(),
+                    self.took("reduce")
+                ))
+                .chain(left)
+                .collect()
+            }),
+            Stage::Selection => self.selection_lines(),
+            Stage::Evaluation => self.evaluation_lines(),
+            Stage::Report => Vec::new(),
+        }
+    }
+
+    fn part_lines(&self) -> Vec<String> {
         let part = &self.document.part;
         let (lower, upper) = part.bounds();
         let size = (upper - lower) * 1000.0;
-        let lines = vec![
-            format!(
-                "{} vertices, {} triangles",
-                part.positions().len(),
-                part.triangles().len()
-            ),
+        vec![
+            format!("{} triangles", part.triangles().len()),
             format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z),
-            format!("mean element {:.2} mm", part.mean_edge() * 1000.0),
-            format!("{} supports", self.document.state.project.supports.len()),
-        ];
-        let standing = if self.document.state.project.supports.is_empty() {
-            Standing::Open
-        } else {
-            Standing::Current
-        };
-        stage(ui, "Part and supports", standing, &lines);
+        ]
     }
 
-    fn simulate_stage(&mut self, ui: &mut Ui) {
-        let key = self.document.simulation_key();
-        let running = self.job.as_ref().is_some_and(|j| j.name == "Simulate");
-        let standing = standing(self.simulation.as_ref().map(|s| s.key == key), running);
-        let expected = || {
-            let budget = self.document.state.project.budget.quality.budget();
+    fn simulation_lines(&self) -> Vec<String> {
+        let Some(s) = &self.simulation else {
+            let budget = self.quality().budget();
             let (sites, touches, gigabytes) =
                 crate::design::expected_size(&self.document.inputs(), &budget);
-            vec![format!(
+            return vec![format!(
                 "about {sites} sites × {touches} touches, {gigabytes:.2} GB"
-            )]
+            )];
         };
-        let lines = self.simulation.as_ref().map_or_else(expected, |s| {
-            let dataset = &s.simulated.dataset;
-            let mut lines = vec![
-                format!(
-                    "{} sites × {} touches",
-                    dataset.sites.len(),
-                    dataset.touches.len()
-                ),
-                format!("{} unknowns, {:.1} s", s.simulated.unknowns, s.seconds),
-            ];
-            lines.extend(trust(&s.simulated));
-            lines
-        });
-        stage(ui, "Simulate", standing, &lines);
-        self.button(ui, Command::Simulate);
-        ui.add_space(6.0);
+        let dataset = &s.simulated.dataset;
+        let quality = quality_name(s.quality);
+        let mut lines = vec![
+            format!(
+                "{} sites × {} touches",
+                dataset.sites.len(),
+                dataset.touches.len()
+            ),
+            format!(
+                "{quality}: {} unknowns, {:.1} s",
+                s.simulated.unknowns, s.seconds
+            ),
+        ];
+        lines.extend(trust(&s.simulated));
+        lines
     }
 
-    fn feasible_stage(&mut self, ui: &mut Ui) {
-        let key = self.document.feasible_key();
-        let standing = standing(self.feasibility.as_ref().map(|f| f.0 == key), false);
-        let lines = self.feasibility.as_ref().map_or_else(Vec::new, |(_, f)| {
-            let mut lines = vec![format!("{} of {} sites", f.sites().len(), f.verdicts.len())];
-            let taken = f.taken().into_iter().filter(|(_, n)| *n > 0);
-            lines.extend(
-                taken.map(|(filter, n)| format!("− {n}  {}", filter.label().to_lowercase())),
-            );
-            lines
-        });
-        stage(ui, "Feasible region", standing, &lines);
-    }
-
-    fn select_stage(&mut self, ui: &mut Ui) {
-        let key = self.document.selection_key();
-        let running = self.job.as_ref().is_some_and(|j| j.name == "Select gauges");
-        let standing = standing(self.design.as_ref().map(|d| d.key == key), running);
-        let lines = self.design.as_ref().map_or_else(Vec::new, |d| {
-            let chosen = d.design.chosen().len();
-            let first = d.design.selections.first().map(|s| s.selector.name());
-            let rows = d.design.evaluation.rows.iter();
-            let mut lines = vec![
-                format!("{} candidates", d.design.reduced.sites.len()),
-                format!("{chosen} gauges, {:.1} s", d.seconds),
-            ];
-            lines.extend(
-                rows.filter(|r| r.sensors == chosen && Some(r.selector.as_str()) == first)
-                    .map(|r| format!("{:.2} mm, {}", r.error_mm, r.region)),
-            );
-            lines
-        });
-        stage(ui, "Select and evaluate", standing, &lines);
-        if let Some(d) = &self.design {
-            // What the model says of itself stands under “Simulate” already.
-            let known = &d.design.simulated.achieved.notes;
-            let notes: Vec<String> = d.design.notes();
-            let notes: Vec<&String> = notes.iter().filter(|n| !known.contains(n)).collect();
-            if !notes.is_empty() {
-                egui::CollapsingHeader::new(format!("{} notes", notes.len()))
-                    .id_salt("selection notes")
-                    .show(ui, |ui| {
-                        for note in notes {
-                            ui.label(RichText::new(note).small());
-                        }
-                    });
-            }
+    fn selection_lines(&self) -> Vec<String> {
+        let Some(d) = &self.design else {
+            return Vec::new();
+        };
+        let seconds: f64 = (d.design.seconds.iter())
+            .filter(|s| s.stage.starts_with("select"))
+            .map(|s| s.seconds)
+            .sum();
+        let mut lines = vec![format!(
+            "{}: {} gauges by {}, {seconds:.1} s for all four",
+            quality_name(d.quality),
+            d.design.chosen().len(),
+            d.design.lead.title(),
+        )];
+        if !self.drive.take && self.design_holds() == Some(true) {
+            lines.push("Gauges were moved by hand".into());
         }
-        self.button(ui, Command::Select);
-        ui.add_space(6.0);
+        lines
     }
 
-    fn report_stage(&mut self, ui: &mut Ui) {
-        let key = self.document.selection_key();
-        let standing = standing(self.design.as_ref().map(|d| d.key == key), false);
-        stage(ui, "Report", standing, &[]);
-        self.button(ui, Command::Export);
+    fn evaluation_lines(&self) -> Vec<String> {
+        let Some(d) = &self.design else {
+            return Vec::new();
+        };
+        let (lead, chosen) = (d.design.lead.name(), d.design.chosen().len());
+        let rows = d.design.evaluation.rows.iter();
+        let mut lines: Vec<String> = rows
+            .filter(|r| r.sensors == chosen && r.selector == lead)
+            .map(|r| format!("{:.2} mm, {}", r.error_mm, r.region))
+            .collect();
+        lines.push(format!(
+            "{} unseen touches{}",
+            d.design.truth.touches.len(),
+            self.took("evaluate")
+        ));
+        lines
     }
 
-    /// The bar at the bottom: the running job, and messages until they are read.
+    /// ", 1.2 s" of a stage of the last design, where it was run for it.
+    fn took(&self, stage: &str) -> String {
+        let stages = self.design.iter().flat_map(|d| &d.design.seconds);
+        let found = { stages }.find(|s| s.stage == stage);
+        found.map_or_else(String::new, |s| format!(", {:.1} s", s.seconds))
+    }
+
+    /// What a reader must know before a result is believed, folded up.
+    fn notes_of(&self, ui: &mut Ui, stage: Stage) {
+        let known = self
+            .simulation
+            .as_ref()
+            .map(|s| &s.simulated.achieved.notes);
+        let notes: Vec<String> = match (stage, &self.design) {
+            (Stage::Simulation, _) => known.cloned().unwrap_or_default(),
+            (Stage::Evaluation, Some(d)) => {
+                let of_model = &d.design.simulated.achieved.notes;
+                let notes = d.design.notes().into_iter();
+                notes.filter(|n| !of_model.contains(n)).collect()
+            }
+            _ => return,
+        };
+        if notes.is_empty() {
+            return;
+        }
+        let title = match notes.len() {
+            1 => "1 note".to_owned(),
+            n => format!("{n} notes"),
+        };
+        egui::CollapsingHeader::new(RichText::new(title).size(11.5))
+            .id_salt((stage.name(), "notes"))
+            .show(ui, |ui| {
+                for note in notes {
+                    ui.add(egui::Label::new(RichText::new(note).size(11.5)).wrap());
+                }
+            });
+    }
+
+    /// The bar at the bottom: running jobs, and messages until they are read.
     pub(super) fn status(&mut self, ui: &mut Ui) {
         // As tall with a job as without one: nothing above it jumps.
         ui.set_min_height(ui.spacing().interact_size.y + 6.0);
-        if let Some(job) = &self.job {
-            let progress = job.progress();
-            let (stage, share) = progress.map_or(("Starting", 0.0), |p| {
-                (p.stage, p.done as f32 / p.total.max(1) as f32)
-            });
-            let elapsed = job.elapsed().as_secs();
-            let mut cancel = false;
-            ui.horizontal(|ui| {
-                let text = if job.is_cancelling() {
-                    "Cancelling …".to_owned()
-                } else {
-                    format!("{stage}  {:.0} %  ·  {elapsed} s", 100.0 * share)
-                };
-                ui.add(
-                    egui::ProgressBar::new(share)
-                        .text(text)
-                        .desired_width((ui.available_width() - 110.0).max(80.0)),
-                );
-                cancel = ui
-                    .add_enabled(!job.is_cancelling(), egui::Button::new("Cancel job"))
-                    .clicked();
-            });
-            if cancel {
-                self.cancel();
-            }
-            ui.ctx()
-                .request_repaint_after(std::time::Duration::from_millis(100));
-        }
+        self.running_jobs(ui);
         let mut read = None;
         for (k, message) in self.messages.iter().enumerate().rev().take(4) {
             ui.horizontal(|ui| {
@@ -214,17 +395,27 @@ impl Studio {
         if let Some(k) = read {
             self.messages.remove(k);
         }
-        if self.job.is_none() && self.messages.is_empty() {
+        if self.jobs.running.is_empty() && self.messages.is_empty() {
             ui.weak("Ready");
         }
     }
 }
 
-/// What the elastic model says of its own error, and what must be known before it is believed.
+/// What to press at a stage.
+fn next_command(stage: Stage) -> Option<Command> {
+    match stage {
+        Stage::Simulation => Some(Command::Simulate),
+        Stage::Selection => Some(Command::Select),
+        Stage::Report => Some(Command::Export),
+        _ => None,
+    }
+}
+
+/// What the elastic model says of its own error.
 fn trust(simulated: &Simulated) -> Vec<String> {
     let d = &simulated.discretization;
     let l = &simulated.linearity;
-    let mut lines = vec![
+    vec![
         format!(
             "mesh: about {:.1} % ({:.3} mm) under a touch, strain {:.1} %",
             d.displacement_percent, d.displacement_mm, d.strain_percent
@@ -234,33 +425,5 @@ fn trust(simulated: &Simulated) -> Vec<String> {
             l.largest_percent.abs(),
             l.force_n
         ),
-    ];
-    lines.extend(simulated.achieved.notes.iter().cloned());
-    lines
-}
-
-/// `current` says whether there is a result and whether it still holds.
-fn standing(current: Option<bool>, running: bool) -> Standing {
-    match current {
-        _ if running => Standing::Running,
-        Some(true) => Standing::Current,
-        Some(false) => Standing::Stale,
-        None => Standing::Open,
-    }
-}
-
-fn stage(ui: &mut Ui, title: &str, standing: Standing, lines: &[String]) {
-    ui.add_space(4.0);
-    ui.horizontal(|ui| {
-        let (mark, colour) = standing.mark();
-        ui.label(RichText::new(mark).color(colour).monospace())
-            .on_hover_text(standing.word());
-        ui.label(RichText::new(title).strong());
-        if standing == Standing::Stale {
-            ui.weak("stale");
-        }
-    });
-    for line in lines {
-        ui.add(egui::Label::new(RichText::new(line).size(11.5).weak()).wrap());
-    }
+    ]
 }

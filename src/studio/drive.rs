@@ -1,0 +1,558 @@
+//! What is kept computed: a goal, and the jobs that lead there. Draft answers come first, finer ones
+//! follow while nothing moves; what no longer holds is ended, and only that is computed again.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use egui::Context;
+
+use super::jobs::{Shared, Task};
+use super::{DesignResult, SimulationResult, Studio, opening};
+use crate::budget::{Progress, Quality};
+use crate::cli;
+use crate::dataset::Site;
+use crate::design::{self, Design, DesignError, Hooks, Inputs, Known, Simulated, StageTime, Step};
+use crate::feasible::Feasibility;
+use crate::io::artifacts::{self, as_chosen};
+use crate::job::{Outcome, Reporter, Stop};
+use crate::placement::{SelectorKind, SensorSet};
+use crate::project::ChosenSite;
+
+/// How long settings rest before what depends on them is computed again.
+const STILL: Duration = Duration::from_millis(400);
+
+/// What a job brings back.
+pub(super) enum Finished {
+    Simulation(Arc<Simulated>, Quality, f64),
+    Filtered(Arc<Feasibility>),
+    Design(Arc<Design>, Box<Inputs>, Quality, f64),
+    Exported(PathBuf),
+    Opened(Box<opening::Opened>),
+}
+
+/// How far the road is to be kept computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Goal {
+    Simulation,
+    Design,
+}
+
+/// The running design's state, as its job shares it.
+#[derive(Default)]
+pub(super) struct Making {
+    /// What the selector in the lead has chosen so far.
+    pub sites: Vec<ChosenSite>,
+    pub step: Option<Step>,
+}
+
+pub(super) struct Drive {
+    goal: Option<Goal>,
+    /// Whether a change starts what depends on it anew.
+    pub follow: bool,
+    /// Whether what a selection finds becomes the project's gauges: until one is moved by hand.
+    pub take: bool,
+    /// What cannot be computed, from which inputs, and why.
+    failed: Vec<(Task, String, String)>,
+    seen: String,
+    still_since: Option<Instant>,
+    pub making: Shared<Making>,
+}
+
+impl Drive {
+    /// Nothing asked for yet.
+    pub fn following(follow: bool) -> Self {
+        Self {
+            goal: None,
+            follow,
+            take: false,
+            failed: Vec::new(),
+            seen: String::new(),
+            still_since: None,
+            making: Arc::default(),
+        }
+    }
+
+    /// Nothing is to be computed until somebody asks again.
+    pub fn rest(&mut self) {
+        self.goal = None;
+    }
+
+    /// Why a task cannot be done from these inputs.
+    pub fn failure(&self, task: Task, key: &str) -> Option<&str> {
+        let failed = self.failed.iter().find(|(t, k, _)| *t == task && k == key);
+        failed.map(|f| f.2.as_str())
+    }
+
+    fn fail(&mut self, task: Task, key: String, message: String) {
+        self.failed.retain(|(t, _, _)| *t != task);
+        self.failed.push((task, key, message));
+    }
+}
+
+impl Studio {
+    /// Simulates the project as it is now.
+    pub fn simulate(&mut self, ctx: &Context) {
+        self.ask(ctx, Goal::Simulation);
+    }
+
+    /// Selects and evaluates, simulating first where that is stale.
+    pub fn select(&mut self, ctx: &Context) {
+        self.drive.take = true;
+        self.ask(ctx, Goal::Design);
+        // Where nothing is left to do, the gauges are at least those that were selected.
+        if self.design_stands(self.quality()) {
+            self.take_sites();
+        }
+    }
+
+    fn ask(&mut self, ctx: &Context, goal: Goal) {
+        self.document.settle();
+        self.drive.goal = self.drive.goal.max(Some(goal));
+        self.drive.failed.clear();
+        self.drive.seen = self.document.design_key();
+        self.drive.still_since = None;
+        self.advance(ctx);
+    }
+
+    pub(super) fn quality(&self) -> Quality {
+        self.document.state.project.budget.quality
+    }
+
+    /// The simulation of a quality, where it holds for the project as it is.
+    fn simulation_at(&self, quality: Quality) -> Option<Arc<Simulated>> {
+        let key = self.document.simulation_key_at(quality);
+        [&self.simulation, &self.drafts.0]
+            .into_iter()
+            .flatten()
+            .find(|s| s.quality == quality && s.key == key)
+            .map(|s| Arc::clone(&s.simulated))
+    }
+
+    /// Whether the shown simulation holds for the project as it is, in whatever quality it has.
+    pub(super) fn simulation_holds(&self) -> Option<bool> {
+        let s = self.simulation.as_ref()?;
+        Some(s.key == self.document.simulation_key_at(s.quality))
+    }
+
+    /// As [`Self::simulation_holds`], of the design.
+    pub(super) fn design_holds(&self) -> Option<bool> {
+        let d = self.design.as_ref()?;
+        Some(d.key == self.document.design_key_at(d.quality))
+    }
+
+    /// Whether there is a design of this quality or a better one that holds.
+    fn design_stands(&self, quality: Quality) -> bool {
+        self.design_holds() == Some(true)
+            && self.design.as_ref().is_some_and(|d| d.quality >= quality)
+    }
+
+    /// Starts what is next on the way to the goal, when nothing moves.
+    pub(super) fn advance(&mut self, ctx: &Context) {
+        let Some(goal) = self.drive.goal else {
+            return;
+        };
+        if self.document.asks_for_another_part() {
+            return;
+        }
+        let key = self.document.design_key();
+        if key != self.drive.seen {
+            if !self.drive.follow {
+                self.drive.rest();
+                return;
+            }
+            self.drive.seen = key;
+            self.drive.still_since = Some(Instant::now());
+            self.end_outdated();
+        }
+        if let Some(since) = self.drive.still_since {
+            let rest = STILL.saturating_sub(since.elapsed());
+            if !rest.is_zero() || is_moving(ctx) {
+                ctx.request_repaint_after(rest.max(Duration::from_millis(50)));
+                return;
+            }
+            self.drive.still_since = None;
+        }
+        match self.next_task(goal) {
+            Some(task) if self.jobs.runs(task) => {}
+            Some(Task::Simulate(quality)) => self.start_simulation(ctx, quality),
+            Some(Task::Design(quality)) => self.start_design(ctx, quality),
+            _ if self.drive.follow => {}
+            _ => self.drive.rest(),
+        }
+    }
+
+    fn next_task(&self, goal: Goal) -> Option<Task> {
+        let asked = self.quality();
+        let reached = match goal {
+            Goal::Simulation => self.simulation_at(asked).is_some(),
+            Goal::Design => self.design_stands(asked),
+        };
+        if reached {
+            return None;
+        }
+        let next = |quality: Quality| {
+            if self.simulation_at(quality).is_none() {
+                let key = self.document.simulation_key_at(quality);
+                return Some((Task::Simulate(quality), key));
+            }
+            let design = goal == Goal::Design && !self.design_stands(quality);
+            design.then(|| (Task::Design(quality), self.document.design_key_at(quality)))
+        };
+        let draft = Some(Quality::Draft).filter(|q| *q < asked).and_then(next);
+        let (task, key) = draft.or_else(|| next(asked))?;
+        self.drive.failure(task, &key).is_none().then_some(task)
+    }
+
+    /// Ends what runs for settings that have changed.
+    fn end_outdated(&mut self) {
+        let document = &self.document;
+        let outdated: Vec<Task> = (self.jobs.running.iter())
+            .filter(|r| match r.task {
+                Task::Simulate(q) => r.job.key != document.simulation_key_at(q),
+                Task::Design(q) => r.job.key != document.design_key_at(q),
+                _ => false,
+            })
+            .map(|r| r.task)
+            .collect();
+        self.jobs.cancel(|t| outdated.contains(&t));
+    }
+
+    fn start_simulation(&mut self, ctx: &Context, quality: Quality) {
+        let inputs = self.document.inputs();
+        let key = self.document.simulation_key_at(quality);
+        self.jobs
+            .start(ctx, Task::Simulate(quality), key, move |r| {
+                let start = Instant::now();
+                let budget = quality.budget();
+                let simulated =
+                    design::simulate(&inputs, &budget, &|p| r.report(p)).map_err(|e| stop(&e))?;
+                let seconds = start.elapsed().as_secs_f64();
+                Ok(Finished::Simulation(Arc::new(simulated), quality, seconds))
+            });
+    }
+
+    fn start_design(&mut self, ctx: &Context, quality: Quality) {
+        let Some(simulated) = self.simulation_at(quality) else {
+            return;
+        };
+        let inputs = self.document.inputs();
+        let key = self.document.design_key_at(quality);
+        let known = self.known(quality, &simulated);
+        let seconds = (self.simulation.iter().chain(&self.drafts.0))
+            .find(|s| Arc::ptr_eq(&s.simulated, &simulated))
+            .map_or(0.0, |s| s.seconds);
+        let making = Shared::<Making>::default();
+        self.drive.making = Arc::clone(&making);
+        self.jobs.start(ctx, Task::Design(quality), key, move |r| {
+            let start = Instant::now();
+            let mut design = make(&inputs, simulated, quality, known, &making, r)?;
+            let stage = StageTime {
+                stage: "simulate",
+                seconds,
+            };
+            design.seconds.insert(0, stage);
+            let seconds = start.elapsed().as_secs_f64();
+            let inputs = Box::new(inputs);
+            Ok(Finished::Design(Arc::new(design), inputs, quality, seconds))
+        });
+    }
+
+    /// What of the last design of a quality still holds.
+    fn known(&self, quality: Quality, simulated: &Arc<Simulated>) -> Known {
+        let last = [&self.design, &self.drafts.1].into_iter().flatten();
+        let same =
+            |d: &&DesignResult| d.quality == quality && Arc::ptr_eq(&d.design.simulated, simulated);
+        let Some(last) = { last }.find(same) else {
+            return Known::default();
+        };
+        let design = &last.design;
+        let reduced = self.document.candidates_key_at(quality) == last.keys[0];
+        let selections = self.document.selection_key_at(quality) == last.keys[1];
+        Known {
+            reduced: reduced
+                .then(|| (Arc::clone(&design.feasibility), Arc::clone(&design.reduced))),
+            selections: selections.then(|| Arc::clone(&design.selections)),
+            truth: Some(Arc::clone(&design.truth)),
+        }
+    }
+
+    /// Takes in what jobs have brought.
+    pub(super) fn collect_jobs(&mut self, ctx: &Context) {
+        for (task, key, outcome) in self.jobs.collect() {
+            match outcome {
+                Outcome::Done(finished) => self.finished(finished, key),
+                Outcome::Failed(message) => {
+                    self.complain(format!("{}: {message}", task.name()));
+                    self.drive.fail(task, key, message);
+                }
+                Outcome::Cancelled => {}
+            }
+            ctx.request_repaint();
+        }
+    }
+
+    fn finished(&mut self, finished: Finished, key: String) {
+        match finished {
+            Finished::Simulation(simulated, quality, seconds) => {
+                if key == self.document.simulation_key_at(quality) {
+                    self.take_simulation(simulated, quality, key, seconds);
+                } else {
+                    self.dropped("simulation");
+                }
+            }
+            Finished::Filtered(verdicts) => {
+                if Some(&key) == self.shown_feasible_key().as_ref() {
+                    self.feasibility = Some((key, verdicts));
+                }
+            }
+            Finished::Design(design, inputs, quality, seconds) => {
+                if key == self.document.design_key_at(quality) {
+                    self.take_design(design, *inputs, quality, seconds);
+                } else {
+                    self.dropped("selection");
+                }
+            }
+            Finished::Exported(folder) => {
+                let report = folder.join("report.html");
+                self.tell(format!("The report is in {}", report.display()));
+            }
+            Finished::Opened(opened) => self.take_opened(*opened),
+        }
+    }
+
+    fn dropped(&mut self, what: &str) {
+        self.tell(format!(
+            "The {what} was for settings that have changed since, and was dropped"
+        ));
+    }
+
+    fn take_simulation(
+        &mut self,
+        simulated: Arc<Simulated>,
+        quality: Quality,
+        key: String,
+        seconds: f64,
+    ) {
+        let result = SimulationResult {
+            simulated,
+            key,
+            quality,
+            seconds,
+        };
+        if quality == Quality::Draft {
+            self.drafts.0 = Some(result.clone());
+        }
+        let better = self
+            .simulation
+            .as_ref()
+            .is_some_and(|s| s.quality > quality);
+        if !(better && self.simulation_holds() == Some(true)) {
+            self.simulation = Some(result);
+        }
+    }
+
+    fn take_design(&mut self, design: Arc<Design>, inputs: Inputs, quality: Quality, seconds: f64) {
+        let keys = [
+            self.document.candidates_key_at(quality),
+            self.document.selection_key_at(quality),
+        ];
+        let feasibility = Arc::clone(&design.feasibility);
+        let first = self.design.is_none();
+        let result = DesignResult {
+            key: self.document.design_key_at(quality),
+            keys,
+            design,
+            inputs,
+            quality,
+            seconds,
+        };
+        if quality == Quality::Draft {
+            self.drafts.1 = Some(result.clone());
+        }
+        self.design = Some(result);
+        if self.shown_feasible_key() == Some(self.document.feasible_key_at(quality)) {
+            self.feasibility = Some((self.document.feasible_key_at(quality), feasibility));
+        }
+        if first {
+            self.results = super::results::Tab::Error;
+        }
+        self.follow_lead();
+        if self.drive.take {
+            self.take_sites();
+        }
+    }
+
+    /// The project's gauges are those that the design chose.
+    pub(super) fn take_sites(&mut self) {
+        let Some(result) = &self.design else {
+            return;
+        };
+        let design = &result.design;
+        let sites = as_chosen(&design.simulated.dataset.sites, design.chosen());
+        if self.document.state.project.selection.sites != sites {
+            self.document.state.project.selection.sites = sites;
+            self.picked.clear();
+            self.document.settle();
+        }
+        self.drive.take = true;
+    }
+
+    /// Another selector's sites are shown when the project names it: all are there already.
+    pub(super) fn follow_lead(&mut self) {
+        let asked = self.document.state.project.selection.selector;
+        let Some(result) = &mut self.design else {
+            return;
+        };
+        let has = result.design.selections.iter().any(|s| s.selector == asked);
+        if result.design.lead == asked || !has {
+            return;
+        }
+        let mut design = Design::clone(&result.design);
+        design.lead = asked;
+        result.design = Arc::new(design);
+        result.inputs.project.selection.selector = asked;
+        if self.drive.take && self.design_holds() == Some(true) {
+            self.take_sites();
+        }
+    }
+
+    /// The gauges to draw: those of the running selection as far as it has come, else the project's.
+    pub(super) fn gauges(&self) -> Vec<ChosenSite> {
+        let running = self.drive.take
+            && (self.jobs.running.iter()).any(|r| matches!(r.task, Task::Design(_)));
+        let making = running
+            .then(|| self.drive.making.lock().ok().map(|m| m.sites.clone()))
+            .flatten()
+            .filter(|sites| !sites.is_empty());
+        making.unwrap_or_else(|| self.document.state.project.selection.sites.clone())
+    }
+
+    /// The key of the filters' verdicts on the simulation that is shown, where it holds.
+    pub(super) fn shown_feasible_key(&self) -> Option<String> {
+        let quality = self.simulation.as_ref()?.quality;
+        (self.simulation_holds() == Some(true)).then(|| self.document.feasible_key_at(quality))
+    }
+
+    /// Filters anew when anything they depend on has changed and no stroke is under way.
+    pub(super) fn refresh_feasibility(&mut self, ctx: &Context) {
+        if ctx.input(|i| i.pointer.any_down()) || self.view.is_stroking() {
+            return;
+        }
+        let Some(key) = self.shown_feasible_key() else {
+            return;
+        };
+        let known = self.feasibility.as_ref().is_some_and(|(k, _)| *k == key);
+        let under_way =
+            (self.jobs.running.iter()).any(|r| r.task == Task::Filter && r.job.key == key);
+        let failed = self.drive.failure(Task::Filter, &key).is_some();
+        let Some(simulation) = self
+            .simulation
+            .as_ref()
+            .filter(|_| !known && !under_way && !failed)
+        else {
+            return;
+        };
+        let simulated = Arc::clone(&simulation.simulated);
+        let inputs = self.document.inputs();
+        self.jobs.start(ctx, Task::Filter, key, move |_| {
+            Ok(Finished::Filtered(Arc::new(design::filter(
+                &inputs, &simulated,
+            ))))
+        });
+    }
+
+    /// Writes the report and what belongs to it into a folder.
+    pub fn export(&mut self, ctx: &Context, folder: PathBuf) {
+        let Some(result) = &self.design else {
+            self.complain("There is no design to report yet. Press “Select gauges” first");
+            return;
+        };
+        let design = Arc::clone(&result.design);
+        let inputs = result.inputs.clone();
+        let mesh_path = match self.settled_mesh(&folder) {
+            Ok(path) => path,
+            Err(message) => return self.complain(message),
+        };
+        self.jobs.start(ctx, Task::Export, String::new(), move |_| {
+            let provenance = artifacts::Provenance {
+                mesh_path: &mesh_path,
+                version: env!("CARGO_PKG_VERSION"),
+            };
+            artifacts::write_all(&folder, &inputs, &design, &provenance)
+                .map_err(|e| Stop::Failed(e.to_string()))?;
+            Ok(Finished::Exported(folder))
+        });
+    }
+
+    /// A path under which a saved project finds its mesh: the bundled limb is written beside it.
+    pub(crate) fn settled_mesh(&self, folder: &Path) -> Result<PathBuf, String> {
+        if !self.document.bundled {
+            return Ok(self.document.mesh_path.clone());
+        }
+        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        cli::write_bundled_mesh(folder).map_err(|e| format!("{e:#}"))
+    }
+
+    /// Ends whatever runs, at once.
+    pub fn cancel(&mut self) {
+        self.drive.rest();
+        let ended = self.jobs.cancel(|_| true);
+        if ended > 0 {
+            let name = self.jobs.ended.last().map(|e| e.name.clone());
+            self.tell(format!(
+                "{} was cancelled",
+                name.unwrap_or_else(|| "The job".into())
+            ));
+        }
+    }
+}
+
+/// Everything after the simulation.
+fn make(
+    inputs: &Inputs,
+    simulated: Arc<Simulated>,
+    quality: Quality,
+    known: Known,
+    making: &Mutex<Making>,
+    r: &Reporter,
+) -> Result<Design, Stop> {
+    let start = Instant::now();
+    let first = inputs.project.selection.selector;
+    let kinds: Vec<SelectorKind> = std::iter::once(first)
+        .chain(SelectorKind::ALL.into_iter().filter(|&k| k != first))
+        .collect();
+    let hooks = Hooks {
+        clock: &|| start.elapsed().as_secs_f64(),
+        watch: &|p: Progress| r.report(p),
+        found: &|kind: SelectorKind, set: &SensorSet, sites: &[Site]| {
+            if kind == first
+                && let Ok(mut making) = making.lock()
+            {
+                making.sites = as_chosen(sites, &set.sites);
+            }
+        },
+        entered: &|step| {
+            if let Ok(mut making) = making.lock() {
+                making.step = Some(step);
+            }
+        },
+    };
+    let budget = quality.budget();
+    design::run_step_by_step(inputs, simulated, &kinds, &budget, known, &hooks)
+        .map_err(|e| stop(&e))
+}
+
+/// Whether a hand is at the settings.
+fn is_moving(ctx: &Context) -> bool {
+    ctx.input(|i| i.pointer.any_down()) || ctx.egui_wants_keyboard_input()
+}
+
+/// A stage's error as a job's end.
+fn stop(error: &DesignError) -> Stop {
+    if error.is_cancelled() {
+        Stop::Cancelled
+    } else {
+        Stop::Failed(error.to_string())
+    }
+}
