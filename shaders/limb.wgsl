@@ -5,6 +5,8 @@ struct Scene {
     eye: vec4f,        // towards the eye, relative units
     target_scale: vec4f, // xyz: target (m), w: 1 / distance
     deform: vec4f,     // x: exaggeration, y: 1 when a field is shown, z: 1 when the region is shown
+    section: vec4f,    // what lies on the positive side of this plane is cut away, relative units
+    look: vec4f,       // x: how much a wall in front covers
 };
 
 @group(0) @binding(0) var<uniform> scene: Scene;
@@ -16,7 +18,7 @@ struct Vertex {
     @location(1) normal: vec3f,
     @location(2) displacement: vec3f,
     @location(3) value: f32,
-    @location(4) region: f32,
+    @location(4) region: vec4f,
 };
 
 struct Fragment {
@@ -24,7 +26,7 @@ struct Fragment {
     @location(0) world: vec3f,
     @location(1) normal: vec3f,
     @location(2) value: f32,
-    @location(3) region: f32,
+    @location(3) region: vec4f,
 };
 
 @vertex
@@ -34,8 +36,7 @@ fn vs(v: Vertex) -> Fragment {
     return Fragment(scene.matrix * vec4f(local, 1.0), local, v.normal, v.value, v.region);
 }
 
-@fragment
-fn fs(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+fn colour(f: Fragment, front: bool) -> vec3f {
     let to_eye = normalize(scene.eye.xyz - f.world);
     var n = normalize(f.normal);
     if (dot(n, to_eye) < 0.0) { n = -n; }
@@ -45,14 +46,31 @@ fn fs(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
 
     var base = select(vec3f(0.62, 0.59, 0.55), vec3f(0.86, 0.87, 0.89), front);
     if (scene.deform.z > 0.5) {
-        let tint = select(vec3f(0.30, 0.55, 0.50), vec3f(0.42, 0.75, 0.68), front);
-        base = mix(base, tint, smoothstep(0.35, 0.65, f.region));
+        // Layers over each other: where gauges may go, touches come, the part is held, gauges must not go.
+        let weight = smoothstep(vec4f(0.35), vec4f(0.65), f.region);
+        base = mix(base, select(vec3f(0.30, 0.55, 0.50), vec3f(0.42, 0.75, 0.68), front), weight.x);
+        base = mix(base, select(vec3f(0.33, 0.40, 0.62), vec3f(0.50, 0.60, 0.90), front), 0.7 * weight.y);
+        base = mix(base, select(vec3f(0.58, 0.50, 0.22), vec3f(0.86, 0.74, 0.34), front), weight.z);
+        base = mix(base, select(vec3f(0.62, 0.34, 0.28), vec3f(0.86, 0.45, 0.36), front), weight.w);
     }
     if (scene.deform.y > 0.5) {
         let color = textureSampleLevel(map, map_sampler, vec2f(clamp(f.value, 0.0, 1.0), 0.5), 0.0).rgb;
         base = select(color * 0.72, color, front);
     }
     let shine = select(0.0, 0.06 * pow(headlight, 40.0), front);
-    // Already encoded for the screen: the window blends in gamma space.
-    return vec4f(base * light + shine, 1.0);
+    return base * light + shine;
+}
+
+// Already encoded for the screen: the window blends in gamma space.
+@fragment
+fn fs(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    if (dot(scene.section, vec4f(f.world, 1.0)) > 0.0) { discard; }
+    return vec4f(colour(f, front), 1.0);
+}
+
+// A wall in front of what is behind it, colour times cover.
+@fragment
+fn fs_ghost(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    if (dot(scene.section, vec4f(f.world, 1.0)) > 0.0) { discard; }
+    return vec4f(colour(f, front) * scene.look.x, scene.look.x);
 }

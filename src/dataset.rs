@@ -155,6 +155,7 @@ pub fn spread_touches(
     margin: f64,
     even: bool,
     tip: (f64, f64),
+    allowed: &dyn Fn(DVec3) -> bool,
 ) -> Vec<Touch> {
     let rims: Vec<u32> = (0..)
         .zip(mesh.boundary_vertices())
@@ -163,7 +164,9 @@ pub fn spread_touches(
     let edge = geodesic::from_vertices(mesh, &rims, 2.0 * margin + 4.0 * mesh.mean_edge());
     let far = |v: f64| if v.is_finite() { v } else { 1e3 };
     let edge: Vec<f64> = edge.into_iter().map(far).collect();
-    let inside = |at: SurfacePoint| rims.is_empty() || mesh.interpolate(&edge, at) >= margin;
+    let inside = |at: SurfacePoint| {
+        (rims.is_empty() || mesh.interpolate(&edge, at) >= margin) && allowed(mesh.point(at))
+    };
     let points = if even {
         sample::even(mesh, count, seed, inside)
     } else {

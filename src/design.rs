@@ -32,7 +32,7 @@ pub enum DesignError {
     #[error(transparent)]
     Placement(#[from] PlacementError),
     #[error(
-        "no touch lands on the part: lower touch.edge_margin_mm ({margin_mm} mm) or check the unit of the mesh (the part is {size_mm:.3} mm across)"
+        "no touch lands on the part: lower touch.edge_margin_mm ({margin_mm} mm), widen touch.region if there is one, or check the unit of the mesh (the part is {size_mm:.3} mm across)"
     )]
     NoTouches { margin_mm: f64, size_mm: f64 },
     #[error(

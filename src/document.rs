@@ -1,5 +1,7 @@
 //! The open project as the window edits it: plain data, with undo and redo.
 
+mod paint;
+
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::sync::{Arc, Weak};
@@ -7,12 +9,13 @@ use std::sync::{Arc, Weak};
 use crate::budget::Quality;
 use crate::design::Inputs;
 use crate::io::project_file::LoadedProject;
-use crate::mesh::geodesic::March;
+use crate::mesh::geodesic::{March, Scratch};
 use crate::mesh::repair::Repair;
-use crate::mesh::unroll::Axis;
-use crate::mesh::{RepairReport, SurfacePoint, TriMesh};
+use crate::mesh::{RepairReport, TriMesh};
 use crate::placement::SelectorKind;
-use crate::project::{Masks, Project, SelectionKeys, SupportKeys, SupportKind};
+use crate::project::{Masks, Project, SelectionKeys, SupportKeys};
+
+pub use paint::{Brush, Layer};
 
 /// What undo brings back. The mesh is not part of it: opening a file begins a new history.
 #[derive(Clone, PartialEq)]
@@ -35,6 +38,7 @@ pub struct Document {
     pub bundled: bool,
     /// The ways over the part: a brush asks for them many times a second.
     march: March,
+    scratch: Scratch,
     /// Body and repairs that the part was taken in with.
     taken_in: (usize, Repair),
     fingerprints: Fingerprints,
@@ -45,15 +49,12 @@ pub struct Document {
     future: Vec<State>,
 }
 
+/// What is painted on all layers and what is held: equal when these are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PaintKey([Option<u64>; 4], Vec<(SupportKeys, Option<u64>)>);
+
 /// Undo steps kept.
 const DEPTH: usize = 200;
-
-/// Whether a stroke adds to the painted region or takes from it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Brush {
-    Paint,
-    Erase,
-}
 
 impl Document {
     #[must_use]
@@ -67,6 +68,7 @@ impl Document {
         Self {
             taken_in: (part.body, part.repair()),
             march: March::over(&loaded.inputs.part),
+            scratch: Scratch::default(),
             part: loaded.inputs.part,
             repairs: loaded.repairs,
             path,
@@ -88,27 +90,6 @@ impl Document {
         self.taken_in != (part.body, part.repair())
     }
 
-    /// Holds what is painted: a support on those vertices, under a name of its own. The painted region
-    /// itself is free again.
-    pub fn hold_painted(&mut self) {
-        let Some(mask) = self.state.painted.take() else {
-            return;
-        };
-        let free = |name: &String| !self.state.masks.contains_key(name);
-        let numbered = (1..).map(|k| format!("support-{k}"));
-        let Some(name) = numbered.take(10_000).find(free) else {
-            return;
-        };
-        self.state.masks.insert(name.clone(), mask);
-        self.state.project.supports.push(SupportKeys {
-            kind: SupportKind::Clamped,
-            box_mm: None,
-            vertices: Some(name),
-            normal: Axis::Z,
-        });
-        self.settle();
-    }
-
     /// A snapshot for a job.
     #[must_use]
     pub fn inputs(&self) -> Inputs {
@@ -122,6 +103,7 @@ impl Document {
 
     /// Ends a gesture: what changed since the last one becomes one undo step.
     pub fn settle(&mut self) {
+        self.drop_empty_layers();
         if self.state == self.settled {
             return;
         }
@@ -191,88 +173,6 @@ impl Document {
             .into_owned()
     }
 
-    /// One dab of the brush: every vertex within `radius` (m) over the surface. The first dab of paint on
-    /// an unpainted part begins from nothing painted, the first erasing dab from everything.
-    pub fn dab(&mut self, brush: Brush, at: SurfacePoint, radius: f64) {
-        let reached = self.march.distances(&self.part, at, radius);
-        let vertices = self.part.positions().len();
-        let mask = self
-            .state
-            .painted
-            .get_or_insert_with(|| Arc::new(vec![brush == Brush::Erase; vertices]));
-        let mask = Arc::make_mut(mask);
-        for (m, d) in mask.iter_mut().zip(reached) {
-            if d <= radius {
-                *m = brush == Brush::Paint;
-            }
-        }
-        // A brush finer than the mesh still leaves its mark.
-        let nearest = (0..3).max_by(|&a, &b| at.barycentric[a].total_cmp(&at.barycentric[b]));
-        if let Some(corner) = nearest {
-            let vertex = self.part.triangles()[at.triangle as usize][corner];
-            mask[vertex as usize] = brush == Brush::Paint;
-        }
-    }
-
-    /// Every vertex is painted.
-    pub fn fill_paint(&mut self) {
-        self.repaint(|_, mask| mask.fill(true));
-    }
-
-    /// What was painted is not, and what was not is; without a painted region everything counts as it.
-    pub fn invert_paint(&mut self) {
-        self.repaint(|_, mask| mask.iter_mut().for_each(|m| *m = !*m));
-    }
-
-    /// The painted region grows by a distance over the surface (m), by one vertex at least.
-    pub fn grow_paint(&mut self, by: f64) {
-        self.repaint(|document, mask| document.spread(mask, true, by));
-    }
-
-    /// The painted region shrinks by a distance over the surface (m), by one vertex at least.
-    pub fn shrink_paint(&mut self, by: f64) {
-        self.repaint(|document, mask| document.spread(mask, false, by));
-    }
-
-    /// One step of undo that changes the painted region.
-    fn repaint(&mut self, change: impl FnOnce(&Self, &mut Vec<bool>)) {
-        let vertices = self.part.positions().len();
-        let mut mask = match &self.state.painted {
-            Some(mask) => mask.as_ref().clone(),
-            None => vec![true; vertices],
-        };
-        change(self, &mut mask);
-        self.state.painted = Some(Arc::new(mask));
-        self.settle();
-    }
-
-    /// Vertices near those that are `painted` become so too.
-    fn spread(&self, mask: &mut [bool], painted: bool, by: f64) {
-        let from: Vec<u32> = (0..)
-            .zip(&*mask)
-            .filter_map(|(v, &m)| (m == painted).then_some(v))
-            .collect();
-        let beside: Vec<u32> = (self.part.edges().iter())
-            .filter(|e| mask[e.a as usize] != mask[e.b as usize])
-            .flat_map(|e| [e.a, e.b])
-            .collect();
-        let reached = self.march.from_set(&from, by);
-        for (m, d) in mask.iter_mut().zip(reached) {
-            if d <= by {
-                *m = painted;
-            }
-        }
-        for v in beside {
-            mask[v as usize] = painted;
-        }
-    }
-
-    /// Everything may carry gauges again.
-    pub fn clear_paint(&mut self) {
-        self.state.painted = None;
-        self.settle();
-    }
-
     /// The part without the path of its mesh: the mesh itself is known by its place in memory, and saving
     /// under another name changes nothing that was computed.
     fn part_key(&self) -> crate::project::Part {
@@ -305,13 +205,21 @@ impl Document {
     pub fn simulation_key_at(&self, quality: Quality) -> String {
         let p = &self.state.project;
         format!(
-            "{} {:?} {:?} {:?} {:?}",
+            "{} {:?} {:?} {:?} {:?} {:?}",
             self.model_key(),
             p.touch,
+            p.touch.region.as_ref().map(|name| self.mask_key(name)),
             p.sites,
             (p.gauge.signal, p.gauge.directions),
             (quality, p.budget.seed)
         )
+    }
+
+    /// What is painted on all layers, and what is held.
+    #[must_use]
+    pub fn paint_key(&self) -> PaintKey {
+        let of = |layer| self.layer(layer).map(|mask| self.fingerprints.of(mask));
+        PaintKey(Layer::ALL.map(of), self.supports_key())
     }
 
     /// What the elastic model alone depends on.
@@ -339,10 +247,11 @@ impl Document {
         let p = &self.state.project;
         let painted = self.state.painted.as_ref().map(|m| self.fingerprints.of(m));
         format!(
-            "{} {:?} {:?} {painted:?}",
+            "{} {:?} {:?} {painted:?} {:?}",
             self.simulation_key_at(quality),
             p.gauge,
-            p.feasible
+            p.feasible,
+            p.feasible.keep_out.as_ref().map(|name| self.mask_key(name)),
         )
     }
 
@@ -411,15 +320,19 @@ impl Fingerprints {
 }
 
 fn hash(mask: &[bool]) -> u64 {
-    use std::hash::{DefaultHasher, Hash, Hasher};
+    use std::hash::{DefaultHasher, Hasher};
     let mut hasher = DefaultHasher::new();
-    mask.hash(&mut hasher);
+    hasher.write_usize(mask.len());
+    for chunk in mask.chunks(64) {
+        hasher.write_u64(chunk.iter().fold(0, |bits, &m| bits << 1 | u64::from(m)));
+    }
     hasher.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::SurfacePoint;
 
     fn document() -> Document {
         Document::new(crate::cli::bundled().unwrap(), None)
@@ -433,43 +346,11 @@ mod tests {
     }
 
     #[test]
-    fn a_painted_region_grows_shrinks_and_turns_over() {
-        let mut d = document();
-        let place = at(&d);
-        let count = |d: &Document| {
-            let mask = d.state.painted.as_ref();
-            mask.map_or(0, |m| m.iter().filter(|&&m| m).count())
-        };
-        d.dab(Brush::Paint, place, 9e-3);
-        d.settle();
-        let dab = count(&d);
-        d.grow_paint(6e-3);
-        let grown = count(&d);
-        d.shrink_paint(6e-3);
-        let back = count(&d);
-        assert!(
-            grown > dab + 20 && back.abs_diff(dab) <= dab / 4,
-            "{dab} {grown} {back}"
-        );
-        d.invert_paint();
-        assert_eq!(count(&d), d.part.positions().len() - back);
-        d.fill_paint();
-        assert_eq!(count(&d), d.part.positions().len());
-        for expected in [d.part.positions().len() - back, back, grown, dab] {
-            d.undo();
-            assert_eq!(count(&d), expected);
-        }
-        // Less than an element still moves the rim by one vertex.
-        d.grow_paint(1e-6);
-        assert!(count(&d) > dab);
-    }
-
-    #[test]
     fn a_stroke_is_one_step_of_undo() {
         let mut d = document();
         let place = at(&d);
-        d.dab(Brush::Paint, place, 6e-3);
-        d.dab(Brush::Paint, place, 9e-3);
+        d.dab(Layer::Feasible, Brush::Paint, place, 6e-3);
+        d.dab(Layer::Feasible, Brush::Paint, place, 9e-3);
         d.settle();
         let painted = d
             .state
@@ -480,7 +361,7 @@ mod tests {
             .filter(|&&m| m)
             .count();
         assert!(painted > 10 && painted < 300, "{painted}");
-        d.dab(Brush::Erase, place, 4e-3);
+        d.dab(Layer::Feasible, Brush::Erase, place, 4e-3);
         d.settle();
         d.undo();
         assert_eq!(

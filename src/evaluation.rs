@@ -1,5 +1,6 @@
 //! How well a set of gauges finds a touch that nobody trained on.
 
+pub mod estimate;
 pub mod failures;
 
 use std::borrow::Cow;
@@ -64,6 +65,9 @@ pub struct EvaluationRow {
 /// Settings are searched for these set sizes and for no others; a size between two takes the settings
 /// of the smaller.
 const TUNED_SIZES: [usize; 6] = [1, 2, 3, 5, 8, 13];
+
+/// The name under which all candidates together are judged.
+pub const BASELINE: &str = "all-candidates";
 
 /// A set to judge: whose it is and which rows of the trial's matrices it has.
 pub struct Candidate {
@@ -141,8 +145,8 @@ fn fail(
     let targets: Vec<[f64; 3]> = touches.iter().map(|&t| trial.train_targets[t]).collect();
     let train = noisy.train.select_columns(&touches);
     let last_of_its_kind = |k: usize| {
-        sets.get(k + 1)
-            .is_some_and(|next| next.selector != sets[k].selector)
+        let next = sets.get(k + 1);
+        sets[k].selector != BASELINE && next.is_none_or(|next| next.selector != sets[k].selector)
     };
     (0..sets.len())
         .filter(|&k| last_of_its_kind(k) && sets[k].rows.len() > 1)

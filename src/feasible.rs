@@ -40,6 +40,7 @@ pub enum Filter {
     Noise,
     Range,
     Painted,
+    KeptOut,
 }
 
 impl Filter {
@@ -53,6 +54,7 @@ impl Filter {
             Self::Noise => "Signal below noise",
             Self::Range => "Strain beyond range",
             Self::Painted => "Not painted",
+            Self::KeptOut => "Kept out",
         }
     }
 }
@@ -76,7 +78,7 @@ impl Feasibility {
     /// How many sites each filter took, of those that had passed the ones before.
     #[must_use]
     pub fn taken(&self) -> Vec<(Filter, usize)> {
-        use Filter::{Edge, Flatness, Footprint, Noise, Painted, Range, SupportClearance};
+        use Filter::{Edge, Flatness, Footprint, KeptOut, Noise, Painted, Range, SupportClearance};
         [
             SupportClearance,
             Edge,
@@ -85,6 +87,7 @@ impl Feasibility {
             Noise,
             Range,
             Painted,
+            KeptOut,
         ]
         .map(|f| (f, self.verdicts.iter().filter(|&&v| v == Some(f)).count()))
         .to_vec()
@@ -101,6 +104,8 @@ pub struct FeasibleInput<'a> {
     pub sites: &'a [Site],
     /// One value a site: in the painted region or not; absent when nothing was painted.
     pub painted: Option<&'a [bool]>,
+    /// One value a site: where no gauge may go; absent when there is no such region.
+    pub kept_out: Option<&'a [bool]>,
 }
 
 /// Applies all filters.
@@ -111,7 +116,7 @@ pub fn feasible(input: &FeasibleInput, rules: &FeasibleRules) -> Feasibility {
     let verdicts = (0..input.sites.len())
         .map(|i| {
             let site = &input.sites[i];
-            let checks: [(Filter, &dyn Fn() -> bool); 7] = [
+            let checks: [(Filter, &dyn Fn() -> bool); 8] = [
                 (Filter::SupportClearance, &|| {
                     input.mesh.interpolate(&clearance, input.points[i]) >= rules.support_clearance
                 }),
@@ -127,6 +132,7 @@ pub fn feasible(input: &FeasibleInput, rules: &FeasibleRules) -> Feasibility {
                 }),
                 (Filter::Range, &|| site.peak_strain <= rules.range),
                 (Filter::Painted, &|| input.painted.is_none_or(|p| p[i])),
+                (Filter::KeptOut, &|| input.kept_out.is_none_or(|k| !k[i])),
             ];
             checks.iter().find(|(_, passes)| !passes()).map(|c| c.0)
         })

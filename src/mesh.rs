@@ -3,6 +3,7 @@
 //! Positions are in metres. Everything after this layer may index without checking again.
 
 pub mod cut;
+pub mod flatten;
 pub mod geodesic;
 pub mod locate;
 pub mod remesh;
@@ -321,6 +322,19 @@ impl TriMesh {
         blend
             .try_normalize()
             .unwrap_or_else(|| self.facet_normal(at.triangle))
+    }
+
+    /// Whether a point lies where a mask (one value a vertex) is mostly set.
+    #[must_use]
+    pub fn mostly_in(&self, mask: &[bool], at: SurfacePoint) -> bool {
+        let corners = self.triangles[at.triangle as usize];
+        let set = |(v, w): (u32, f64)| if mask[v as usize] { w } else { 0.0 };
+        corners
+            .into_iter()
+            .zip(at.barycentric)
+            .map(set)
+            .sum::<f64>()
+            >= 0.5
     }
 
     /// Linear interpolation of a value given at the vertices.

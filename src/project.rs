@@ -60,6 +60,9 @@ pub struct Project {
     pub evaluation: EvaluationKeys,
     #[serde(default)]
     pub budget: BudgetKeys,
+    /// Selections that were kept to be compared.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub kept: Vec<Kept>,
 }
 
 /// Unit of a mesh file.
@@ -200,6 +203,9 @@ pub struct TouchKeys {
     pub tip_radius_mm: f64,
     pub count: usize,
     pub edge_margin_mm: f64,
+    /// Name of a mask (one value a vertex of the part): touches come only where it is set.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub region: Option<String>,
 }
 
 /// How sites are laid out on the inside.
@@ -244,6 +250,9 @@ pub struct FeasibleKeys {
     /// Name of the painted mask (one value a vertex) in the arrays beside the project file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub painted: Option<String>,
+    /// Name of a mask of vertices that no gauge may go to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub keep_out: Option<String>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -330,6 +339,46 @@ pub struct ChosenSite {
     pub direction: [f64; 3],
 }
 
+/// A selection with what was found out about it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Kept {
+    pub name: String,
+    /// The selector's name, or "by-hand".
+    pub selector: String,
+    pub quality: Quality,
+    /// What all its gauges cost together, 1 each where nothing else is said.
+    pub cost: f64,
+    /// Of choosing it, by the clock.
+    pub seconds: f64,
+    #[serde(default, rename = "site", skip_serializing_if = "Vec::is_empty")]
+    pub sites: Vec<ChosenSite>,
+    #[serde(default, rename = "error", skip_serializing_if = "Vec::is_empty")]
+    pub errors: Vec<KeptError>,
+    #[serde(default, rename = "failure", skip_serializing_if = "Vec::is_empty")]
+    pub failures: Vec<KeptFailure>,
+}
+
+/// Errors of a kept selection's first so many gauges, in a region.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeptError {
+    pub region: String,
+    pub sensors: usize,
+    pub mean_mm: f64,
+    pub median_mm: f64,
+    pub p95_mm: f64,
+}
+
+/// Mean error of a kept selection with failed gauges.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeptFailure {
+    pub failed: usize,
+    pub retrained: bool,
+    pub mean_mm: f64,
+}
+
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationKeys {
@@ -388,6 +437,7 @@ impl Default for TouchKeys {
             tip_radius_mm: 5.0,
             count: 4000,
             edge_margin_mm: 2.4,
+            region: None,
         }
     }
 }
@@ -420,6 +470,7 @@ impl Default for FeasibleKeys {
             edge_neighbours: 20,
             edge_radius_mm: 2.1,
             painted: None,
+            keep_out: None,
         }
     }
 }
@@ -488,6 +539,7 @@ impl Project {
             selection: SelectionKeys::default(),
             evaluation: EvaluationKeys::default(),
             budget: BudgetKeys::default(),
+            kept: Vec::new(),
         }
     }
 
@@ -500,6 +552,34 @@ impl Project {
             },
             thickness: self.part.thickness_mm * MM,
         }
+    }
+
+    /// The names of all masks that the project refers to, beside what is painted.
+    pub fn mask_names(&mut self) -> impl Iterator<Item = &mut String> {
+        let supports = self.supports.iter_mut().filter_map(|s| s.vertices.as_mut());
+        supports
+            .chain(self.touch.region.as_mut())
+            .chain(self.feasible.keep_out.as_mut())
+    }
+
+    /// A mask that the project names.
+    ///
+    /// # Errors
+    /// [`BadValue`] where there is none of that name.
+    pub fn mask<'a>(
+        key: &str,
+        name: Option<&String>,
+        masks: &'a Masks,
+    ) -> Result<Option<&'a Arc<Vec<bool>>>, BadValue> {
+        let Some(name) = name else {
+            return Ok(None);
+        };
+        let found = masks.get(name).ok_or_else(|| BadValue {
+            key: key.into(),
+            rule: "the name of an array beside the project file or of a group of the mesh file",
+            value: format!("\"{name}\" (there is {})", names(masks)),
+        })?;
+        Ok(Some(found))
     }
 
     /// The supports, with the masks of the part's vertices that some of them name.
@@ -730,6 +810,14 @@ impl Project {
 /// Masks of the part's vertices by name: arrays beside the project file, and groups of the mesh file.
 pub type Masks = BTreeMap<String, Arc<Vec<bool>>>;
 
+fn names(masks: &Masks) -> String {
+    if masks.is_empty() {
+        "none".into()
+    } else {
+        masks.keys().cloned().collect::<Vec<_>>().join(", ")
+    }
+}
+
 fn region(support: &SupportKeys, masks: &Masks) -> Result<Region, BadValue> {
     match (&support.box_mm, &support.vertices) {
         (Some(corners), None) => {
@@ -740,19 +828,9 @@ fn region(support: &SupportKeys, masks: &Masks) -> Result<Region, BadValue> {
             })
         }
         (None, Some(name)) => {
-            let mask = masks.get(name).ok_or_else(|| BadValue {
-                key: "support.vertices".into(),
-                rule: "the name of an array beside the project file or of a group of the mesh file",
-                value: format!(
-                    "\"{name}\" (there is {})",
-                    if masks.is_empty() {
-                        "none".into()
-                    } else {
-                        masks.keys().cloned().collect::<Vec<_>>().join(", ")
-                    }
-                ),
-            })?;
-            Ok(Region::Vertices(Arc::clone(mask)))
+            let mask = Project::mask("support.vertices", Some(name), masks)?;
+            let mask = mask.map(Arc::clone).unwrap_or_default();
+            Ok(Region::Vertices(mask))
         }
         (both, _) => Err(BadValue {
             key: "support".into(),

@@ -7,8 +7,12 @@ mod dialogs;
 mod drive;
 mod fields;
 mod form;
+mod gauges;
 mod inspector;
 mod jobs;
+mod kept;
+mod labels;
+mod measure;
 mod opening;
 mod overlay;
 mod palette;
@@ -18,6 +22,8 @@ mod recovery;
 mod results;
 mod stages;
 mod theme;
+mod toolbar;
+mod tools;
 mod touching;
 mod viewport;
 
@@ -36,8 +42,10 @@ use crate::io::project_file::{self, LoadedProject};
 
 pub use commands::Command;
 pub use fields::Field;
+pub use gauges::Way;
 pub use stages::Stage;
-pub use viewport::Tool;
+pub use tools::Tool;
+pub use viewport::{Pane, Section};
 
 /// Something to tell the user that stays until it is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,6 +96,10 @@ pub struct Studio {
     drafts: (Option<SimulationResult>, Option<DesignResult>),
     /// Numbers of the gauges that are picked, from zero.
     pub picked: Vec<usize>,
+    by_hand: gauges::ByHand,
+    /// Numbers of the kept selections that are shown.
+    shown_kept: std::collections::BTreeSet<usize>,
+    slow: fields::Slow,
     /// The stage whose settings are shown.
     pub stage: Stage,
     results: results::Tab,
@@ -139,6 +151,9 @@ impl Studio {
             drive: drive::Drive::following(true),
             drafts: (None, None),
             picked: Vec::new(),
+            by_hand: gauges::ByHand::default(),
+            shown_kept: std::collections::BTreeSet::new(),
+            slow: None,
             stage: Stage::default(),
             results: results::Tab::default(),
             ask_quit: false,
@@ -182,6 +197,7 @@ impl Studio {
         self.follow_lead();
         self.advance(ctx);
         self.refresh_feasibility(ctx);
+        self.refresh_by_hand(ctx);
     }
 
     fn update_title(&mut self, ctx: &egui::Context) {

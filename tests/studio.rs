@@ -15,6 +15,7 @@ use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;
 use hapdef::budget::Quality;
 use hapdef::cli;
+use hapdef::document::{Brush, Layer};
 use hapdef::studio::{Field, Studio};
 use image::RgbaImage;
 
@@ -438,7 +439,7 @@ fn a_saved_project_opens_again() {
         "{:?}",
         w.harness.state().messages
     );
-    w.harness.state_mut().document.clear_paint();
+    w.harness.state_mut().document.clear(Layer::Feasible);
     w.open_file(&path, None);
     assert_eq!(
         w.painted(),
@@ -507,12 +508,13 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
         triangle: 0,
         barycentric: [1.0 / 3.0; 3],
     };
+    w.stage("Supports and material");
+    w.press("Paint a support");
+    assert_eq!(w.harness.state().view.layer, Layer::Support);
     let document = &mut w.harness.state_mut().document;
-    document.dab(hapdef::document::Brush::Paint, at, 0.02);
+    document.dab(Layer::Support, Brush::Paint, at, 0.02);
     document.settle();
     w.harness.run_ok();
-    w.stage("Supports and material");
-    w.press("Hold what is painted");
     let state = &w.harness.state().document.state;
     assert_eq!(
         state.project.supports[0].vertices.as_deref(),
@@ -523,8 +525,10 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
     w.press("Simulate");
     w.wait("the simulation", 120, |s| !s.busy());
     assert!(w.harness.state().simulation.is_some());
-    w.harness.state_mut().document.undo();
-    w.harness.state_mut().document.undo();
+    // The quality, the stroke, and the support itself.
+    for _ in 0..3 {
+        w.harness.state_mut().document.undo();
+    }
     assert!(w.harness.state().document.state.project.supports.is_empty());
 }
 
@@ -540,7 +544,7 @@ fn the_palette_reaches_every_command() {
     let vertices = window.harness.state().document.part.positions().len();
     for (letters, expected) in [
         ("invert", Some(0)),
-        ("paint every", Some(vertices)),
+        ("fill painted", Some(vertices)),
         ("undo", Some(0)),
         ("clrpnt", None),
     ] {
@@ -577,9 +581,9 @@ fn what_was_not_saved_is_offered_again() {
     {
         let document = &mut window.harness.state_mut().document;
         document.state.project.selection.sensors = 7;
-        document.invert_paint();
-        document.shrink_paint(0.0);
-        document.fill_paint();
+        document.invert(Layer::Feasible);
+        document.shrink(Layer::Feasible, 0.0);
+        document.fill(Layer::Feasible);
     }
     let kept = || {
         let folders = std::fs::read_dir(home.path()).unwrap();

@@ -31,10 +31,11 @@ use crate::regression::tune::Effort;
 #[must_use]
 pub fn filter(inputs: &Inputs, simulated: &Simulated) -> Feasibility {
     let mesh = &simulated.mesh;
-    let painted = inputs
-        .painted
-        .as_ref()
-        .map(|mask| painted_sites(&inputs.part, mask, &simulated.dataset));
+    let on =
+        |mask: &std::sync::Arc<Vec<bool>>| painted_sites(&inputs.part, mask, &simulated.dataset);
+    let painted = inputs.painted.as_ref().map(on);
+    let named = inputs.project.feasible.keep_out.as_ref();
+    let kept_out = named.and_then(|name| inputs.masks.get(name)).map(on);
     feasible(
         &FeasibleInput {
             mesh,
@@ -43,6 +44,7 @@ pub fn filter(inputs: &Inputs, simulated: &Simulated) -> Feasibility {
             points: &simulated.points,
             sites: &simulated.dataset.sites,
             painted: painted.as_deref(),
+            kept_out: kept_out.as_deref(),
         },
         &inputs.project.feasible_rules(),
     )
@@ -51,11 +53,10 @@ pub fn filter(inputs: &Inputs, simulated: &Simulated) -> Feasibility {
 /// Whether each site lies where the mask (one value a vertex of the part) is mostly set.
 fn painted_sites(part: &TriMesh, mask: &[bool], dataset: &Dataset) -> Vec<bool> {
     let index = SurfaceIndex::new(part);
-    let values: Vec<f64> = mask.iter().map(|&m| f64::from(u8::from(m))).collect();
     dataset
         .sites
         .iter()
-        .map(|site| part.interpolate(&values, index.nearest(site.position).0) >= 0.5)
+        .map(|site| part.mostly_in(mask, index.nearest(site.position).0))
         .collect()
 }
 
@@ -67,8 +68,17 @@ pub struct Reduced {
     pub pca: Pca,
     pub candidates: Candidates,
     /// Made when a selector first asks for it.
-    geometry: OnceLock<(Geometry, Vec<usize>)>,
+    geometry: OnceLock<Located>,
     /// Candidates as numbered in the dataset, in the order of the pivots.
+    pub sites: Vec<usize>,
+}
+
+/// A Gaussian process and where its locations are.
+pub struct Located {
+    pub geometry: Geometry,
+    /// The feasible ones among them, which come first: rows of the reduced signals.
+    pub rows: Vec<usize>,
+    /// All of them, as numbered in the dataset.
     pub sites: Vec<usize>,
 }
 
@@ -76,7 +86,22 @@ impl Reduced {
     /// The Gaussian process, where a selector asked for it.
     #[must_use]
     pub fn geometry(&self) -> Option<&Geometry> {
-        self.geometry.get().map(|g| &g.0)
+        self.geometry.get().map(|g| &g.geometry)
+    }
+
+    /// What the Gaussian process leaves uncertain (σ², 1 where nothing is known) at each of its locations
+    /// (dataset sites) when there are gauges at some positions (m); each counts at the nearest location.
+    #[must_use]
+    pub fn uncertainty(&self, all: &[Site], gauges: &[DVec3]) -> Option<(Vec<usize>, Vec<f64>)> {
+        let located = self.geometry.get()?;
+        let away = |l: usize, p: DVec3| all[located.sites[l]].position.distance_squared(p);
+        let measured: Vec<usize> = (gauges.iter())
+            .filter_map(|&p| {
+                (0..located.sites.len()).min_by(|&a, &b| away(a, p).total_cmp(&away(b, p)))
+            })
+            .collect();
+        let variances = located.geometry.variances_given(&measured);
+        Some((located.sites.clone(), variances))
     }
 }
 
@@ -135,8 +160,7 @@ pub fn reduce_sites(
     })
 }
 
-/// The Gaussian process over the feasible sites (first) and all others, and how many of the feasible
-/// ones it knows: rows of the reduced signals.
+/// The Gaussian process over the feasible sites (first) and all others.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
@@ -146,7 +170,7 @@ pub fn geometry(
     reduced: &Reduced,
     budget: &Budget,
     watch: Watch,
-) -> Result<(Geometry, Vec<usize>), Cancelled> {
+) -> Result<Located, Cancelled> {
     /// Locations nearer than this are one (m).
     const SAME: f64 = 1e-6;
     let mut feasible = vec![false; simulated.points.len()];
@@ -183,7 +207,11 @@ pub fn geometry(
         coinciding: distances.coinciding(SAME),
         map,
     };
-    Ok((geometry, rows))
+    Ok(Located {
+        geometry,
+        rows,
+        sites: order,
+    })
 }
 
 /// What is asked of a selector beside the count: the project's wishes, by places in a pool of sites.
@@ -294,12 +322,13 @@ pub fn select_step_by_step(
     if kind == SelectorKind::PcaQr {
         return Ok(pca_qr::from_components(&reduced.pca, &pool, &request)?);
     }
-    let (geometry, rows) = if let Some(known) = reduced.geometry.get() {
+    let located = if let Some(known) = reduced.geometry.get() {
         known
     } else {
         let made = geometry(inputs, simulated, reduced, budget, watch)?;
         reduced.geometry.get_or_init(|| made)
     };
+    let Located { geometry, rows, .. } = located;
     let x = reduced.x.select_rows(rows);
     let known: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
     let places = positions(&known);

@@ -7,11 +7,12 @@ use rand_chacha::ChaCha8Rng;
 use super::layout::touches_on;
 use super::{DesignError, Inputs, NOISE_SEED, Reduced, Simulated, TEST_SEED, WORKSHOP_SEED};
 use crate::budget::{Budget, Cancelled, Watch, Work};
-use crate::dataset::{self, SignalMatrix, Site};
+use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
 use crate::elasticity::load::Touch;
 use crate::evaluation::{self, Candidate, Evaluation, Region, Trial};
 use crate::placement::Selection;
 use crate::project::Project;
+use crate::regression::folds::evenly;
 
 /// The judge: a model of half the element size, with touches of its own.
 #[derive(Clone)]
@@ -64,7 +65,7 @@ pub fn truth(
     let laid = simulated.ground.halved(&simulated.laid);
     let mesh = &laid.mesh;
     let seed = project.budget.seed.wrapping_add(TEST_SEED);
-    let touches = touches_on(mesh, project, budget.test_touches, seed, false)?;
+    let touches = touches_on(mesh, inputs, budget.test_touches, seed, false)?;
     let model = simulated.ground.model(&laid, watch)?;
     let mut rows = sites.to_vec();
     rows.sort_unstable();
@@ -174,9 +175,44 @@ pub fn evaluate(
         }
     }
     sets.push(Candidate {
-        selector: "all-candidates".to_owned(),
+        selector: evaluation::BASELINE.to_owned(),
         rows: reduced.sites.iter().filter_map(row_of).collect(),
     });
+    judge(inputs, simulated, truth, &sets, budget, watch)
+}
+
+/// Judges one set of sites (as numbered in the dataset) that nobody selected, with the seeds and touches
+/// of every other set; its name in the rows is `name`.
+///
+/// # Errors
+/// As [`truth`].
+pub fn judge_set(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    sites: &[usize],
+    name: &str,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Evaluation, DesignError> {
+    let truth = truth(inputs, simulated, sites, budget, watch)?;
+    let rows = sites
+        .iter()
+        .filter_map(|s| truth.sites.binary_search(s).ok());
+    let set = Candidate {
+        selector: name.to_owned(),
+        rows: rows.collect(),
+    };
+    Ok(judge(inputs, simulated, &truth, &[set], budget, watch)?)
+}
+
+fn judge(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    truth: &Truth,
+    sets: &[Candidate],
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Evaluation, Cancelled> {
     let train = simulated.dataset.x.select_rows(&truth.sites);
     let test_targets: Vec<[f64; 3]> = truth
         .touches
@@ -195,10 +231,30 @@ pub fn evaluate(
             noise: inputs.project.gauge.noise_microstrain * 1e-6,
             seed: inputs.project.budget.seed.wrapping_add(NOISE_SEED),
         },
-        &sets,
+        sets,
         budget,
         watch,
     )
+}
+
+/// An estimate of the mean error (mm) of a set of sites, from the training touches alone: quick, and good
+/// for comparing sets that differ little.
+#[must_use]
+pub fn estimate(inputs: &Inputs, dataset: &Dataset, sites: &[usize], gamma: f64) -> f64 {
+    /// Touches that are learned from.
+    const TOUCHES: usize = 400;
+    let all = dataset.targets_mm();
+    let touches = evenly(all.len(), TOUCHES);
+    let targets: Vec<[f64; 3]> = touches.iter().map(|&t| all[t]).collect();
+    let x = dataset.x.select_rows(sites).select_columns(&touches);
+    let noise = if dataset.signal == Signal::Strain {
+        inputs.project.gauge.noise_microstrain * 1e-6
+    } else {
+        0.0
+    };
+    let seed = inputs.project.budget.seed.wrapping_add(NOISE_SEED);
+    let x = evaluation::add_noise(&x, noise, seed);
+    evaluation::estimate::leave_one_out(&x, &targets, gamma)
 }
 
 /// Every site that the evaluation of some selections looks at.

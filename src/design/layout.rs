@@ -1,5 +1,7 @@
 //! Where sites and touches lie on the part, and whether all of it fits into memory.
 
+use glam::DVec3;
+
 use super::{DesignError, Inputs, MOST_GB, MOST_SITES};
 use crate::budget::Budget;
 use crate::dataset::{self};
@@ -52,22 +54,29 @@ pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoi
 
 pub(super) fn lay_out_touches(
     mesh: &TriMesh,
-    project: &Project,
+    inputs: &Inputs,
     budget: &Budget,
 ) -> Result<Vec<Touch>, DesignError> {
-    let count = project.touch.count.min(budget.touches);
-    touches_on(mesh, project, count, project.budget.seed, true)
+    let count = inputs.project.touch.count.min(budget.touches);
+    touches_on(mesh, inputs, count, inputs.project.budget.seed, true)
 }
 
 pub(super) fn touches_on(
     mesh: &TriMesh,
-    project: &Project,
+    inputs: &Inputs,
     count: usize,
     seed: u64,
     even: bool,
 ) -> Result<Vec<Touch>, DesignError> {
+    let project = &inputs.project;
     let margin = project.touch.edge_margin_mm * 1e-3;
-    let touches = dataset::spread_touches(mesh, count, seed, margin, even, project.tip());
+    let region = Project::mask("touch.region", project.touch.region.as_ref(), &inputs.masks)?;
+    let index = region.map(|_| SurfaceIndex::new(&inputs.part));
+    let allowed = |p: DVec3| match (&index, region) {
+        (Some(index), Some(mask)) => inputs.part.mostly_in(mask, index.nearest(p).0),
+        _ => true,
+    };
+    let touches = dataset::spread_touches(mesh, count, seed, margin, even, project.tip(), &allowed);
     if touches.is_empty() {
         return Err(DesignError::NoTouches {
             margin_mm: project.touch.edge_margin_mm,

@@ -99,6 +99,18 @@ impl Design {
         Some(scatter::to_vertices(mesh, &places, errors))
     }
 
+    /// What the Gaussian process leaves uncertain around each vertex of a mesh (σ², 1 where nothing is
+    /// known) when there are gauges at some positions (m).
+    #[must_use]
+    pub fn uncertainty_map(&self, mesh: &TriMesh, gauges: &[DVec3]) -> Option<Vec<f64>> {
+        let sites = &self.simulated.dataset.sites;
+        let (locations, variances) = self.reduced.uncertainty(sites, gauges)?;
+        let places: Vec<(DVec3, DVec3)> = (locations.iter())
+            .map(|&s| (sites[s].position, sites[s].normal))
+            .collect();
+        Some(scatter::to_vertices(mesh, &places, &variances))
+    }
+
     /// All counted work.
     #[must_use]
     pub fn work(&self) -> Work {

@@ -61,7 +61,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     check_held(&ground.held.mesh, &ground.held.held)?;
     let sites = lay_out_sites(&layout, project)?;
     check_memory(sites.len(), project.touch.count.min(budget.touches))?;
-    let touches = lay_out_touches(&layout, project, budget)?;
+    let touches = lay_out_touches(&layout, inputs, budget)?;
     let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
     let graded = ground.grade(&touches, &places, &budget.elements, watch)?;
     let checks = Checks::of(&graded);

@@ -9,9 +9,8 @@ use super::mesh_file::{LoadedMesh, read_mesh};
 use super::npz::{NpzFile, read_mask};
 use super::{FileError, atomic};
 use crate::design::Inputs;
-use crate::elasticity::support::MOST;
 use crate::mesh::RepairReport;
-use crate::project::{FORMAT, Masks, Project};
+use crate::project::{FORMAT, Kept, Masks, Project};
 
 /// Name of the painted mask among the arrays.
 const PAINTED: &str = "painted";
@@ -27,13 +26,16 @@ pub struct LoadedProject {
     pub bundled: bool,
 }
 
-/// Reads a project, its mesh and its painted mask.
+/// Between the name of a mask and the fingerprint of its values, in a file.
+const MARK: char = '@';
+
+/// Reads a project, its mesh and its masks.
 ///
 /// # Errors
 /// [`FileError`] naming the file, the place in it and the remedy.
 pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
     let text = std::fs::read_to_string(path).map_err(|e| FileError::of(path, &e))?;
-    let project = parse(&text).map_err(|m| FileError::broken(path, m))?;
+    let mut project = parse(&text).map_err(|m| FileError::broken(path, m))?;
     let mesh_path = path
         .parent()
         .unwrap_or(Path::new("."))
@@ -48,11 +50,15 @@ pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
         project.part.body,
         project.part.repair(),
     )?;
-    let masks = read_masks(path, &project, groups, mesh.positions().len())?;
+    let vertices = mesh.positions().len();
+    let masks = read_masks(path, &mut project, groups, vertices)?;
     let painted = match &project.feasible.painted {
-        Some(name) => Some(read_painted(path, name, mesh.positions().len())?),
+        Some(name) => Some(read_painted(path, name, vertices)?),
         None => None,
     };
+    if let Some(name) = &mut project.feasible.painted {
+        *name = plain(name).to_owned();
+    }
     Ok(LoadedProject {
         inputs: Inputs {
             project,
@@ -67,26 +73,49 @@ pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
     })
 }
 
-/// The masks that supports name: arrays beside the project come before groups of the mesh file.
+/// The masks that a project names, which are then named without their fingerprints: arrays beside the
+/// project come before groups of the mesh file.
 fn read_masks(
     path: &Path,
-    project: &Project,
+    project: &mut Project,
     groups: Masks,
     vertices: usize,
 ) -> Result<Masks, FileError> {
     let mut masks = groups;
     let arrays = arrays_path(path);
-    for name in project.supports.iter().filter_map(|s| s.vertices.as_ref()) {
+    for name in project.mask_names() {
+        let own = plain(name).to_owned();
         if arrays.is_file() && super::npz::holds(&arrays, name)? {
             // A mask for another mesh gives way to the group of that name, where the file has one.
             match read_painted(path, name, vertices) {
-                Ok(mask) => drop(masks.insert(name.clone(), Arc::new(mask))),
-                Err(_) if masks.contains_key(name) => {}
+                Ok(mask) => drop(masks.insert(own.clone(), Arc::new(mask))),
+                Err(_) if masks.contains_key(&own) => {}
                 Err(error) => return Err(error),
             }
         }
+        *name = own;
     }
     Ok(masks)
+}
+
+/// The name without its fingerprint.
+fn plain(name: &str) -> &str {
+    match name.rsplit_once(MARK) {
+        Some((plain, mark)) if !mark.is_empty() && mark.bytes().all(|b| b.is_ascii_hexdigit()) => {
+            plain
+        }
+        _ => name,
+    }
+}
+
+/// The name with the fingerprint of what it names: other values stand under another name, so that arrays
+/// for the old project and for the new one can lie in a file together.
+fn marked(name: &str, mask: &[bool]) -> String {
+    // FNV-1a: the same on every machine.
+    let hash = mask.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, &set| {
+        (h ^ u64::from(set)).wrapping_mul(0x0100_0000_01b3)
+    });
+    format!("{}{MARK}{hash:016x}", plain(name))
 }
 
 fn read_painted(path: &Path, name: &str, vertices: usize) -> Result<Vec<bool>, FileError> {
@@ -96,7 +125,8 @@ fn read_painted(path: &Path, name: &str, vertices: usize) -> Result<Vec<bool>, F
         return Err(FileError::broken(
             &arrays,
             format!(
-                "the mask \"{name}\" is for a mesh of {} vertices, but the part has {vertices}. Paint it again, or give that support a box",
+                "the mask \"{}\" is for a mesh of {} vertices, but the part has {vertices}. Paint it again, or give that support a box",
+                plain(name),
                 mask.len()
             ),
         ));
@@ -162,8 +192,9 @@ pub fn parse(text: &str) -> Result<Project, String> {
     Ok(project)
 }
 
-/// Saves a project atomically, one backup kept, its painted mask beside it. Paths in it are taken as
-/// they are: relative to the file.
+/// Saves a project atomically, one backup kept, its masks beside it. Paths in it are taken as they are:
+/// relative to the file. Whenever it is interrupted, the project is wholly the old one or the new one: the
+/// arrays of both lie beside it, those of the old one for its backup.
 ///
 /// # Errors
 /// [`FileError`] naming the file that could not be written; what was there before is whole, in its place
@@ -175,38 +206,54 @@ pub fn save(
     masks: &Masks,
 ) -> Result<(), FileError> {
     let mut project = project.clone();
-    // Under a name that no support uses.
-    let taken = |name: &str| {
-        project
-            .supports
-            .iter()
-            .any(|s| s.vertices.as_deref() == Some(name))
-    };
-    let free = (0..).map(|k| {
-        if k == 0 {
-            PAINTED.to_owned()
-        } else {
-            format!("{PAINTED}-{k}")
+    let mut kept: BTreeMap<String, &[bool]> = BTreeMap::new();
+    for name in project.mask_names() {
+        if let Some(mask) = masks.get(plain(name)) {
+            *name = marked(name, mask);
+            kept.insert(name.clone(), mask);
         }
-    });
-    let name = free.take(MOST + 1).find(|n| !taken(n)).unwrap_or_default();
-    project.feasible.painted = painted.map(|_| name.clone());
-    let named = project.supports.iter().filter_map(|s| s.vertices.as_ref());
-    let mut kept: BTreeMap<&str, &[bool]> = named
-        .filter_map(|name| Some((name.as_str(), masks.get(name)?.as_slice())))
-        .collect();
-    kept.extend(painted.map(|mask| (name.as_str(), mask)));
+    }
+    project.feasible.painted = painted.map(|mask| marked(PAINTED, mask));
+    if let (Some(name), Some(mask)) = (&project.feasible.painted, painted) {
+        kept.insert(name.clone(), mask);
+    }
+    let arrays = arrays_path(path);
+    let old = old_arrays(path);
     if !kept.is_empty() {
-        let arrays = arrays_path(path);
-        let mut file = NpzFile::default();
-        for (name, mask) in kept {
-            file.add(name, &[mask.len()], mask)
-                .map_err(|e| FileError::of(&arrays, &e))?;
-        }
-        let bytes = file.finish().map_err(|e| FileError::of(&arrays, &e))?;
-        atomic::write_with_backup(&arrays, &bytes)?;
+        let mut both: BTreeMap<&str, &[bool]> = (old.iter())
+            .map(|(name, mask)| (name.as_str(), mask.as_slice()))
+            .collect();
+        both.extend(kept.iter().map(|(name, mask)| (name.as_str(), *mask)));
+        write_arrays(&arrays, &both)?;
     }
     atomic::write_with_backup(path, to_text(&project).as_bytes())
+}
+
+/// The arrays that the project in a file names; none where there is no readable one.
+fn old_arrays(path: &Path) -> BTreeMap<String, Vec<bool>> {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let Ok(mut old) = parse(&text) else {
+        return BTreeMap::new();
+    };
+    let painted = old.feasible.painted.clone();
+    let names: Vec<String> = old.mask_names().map(|n| n.clone()).chain(painted).collect();
+    let arrays = arrays_path(path);
+    names
+        .into_iter()
+        .filter_map(|name| {
+            let mask = read_mask(&arrays, &name).ok()?;
+            Some((name, mask))
+        })
+        .collect()
+}
+
+fn write_arrays(path: &Path, arrays: &BTreeMap<&str, &[bool]>) -> Result<(), FileError> {
+    let mut file = NpzFile::default();
+    for (name, mask) in arrays {
+        file.add(name, &[mask.len()], mask)
+            .map_err(|e| FileError::of(path, &e))?;
+    }
+    file.save(path)
 }
 
 /// A path as a project at `project` should name it: relative where it can be.
@@ -242,6 +289,9 @@ pub fn to_text(project: &Project) -> String {
     feasible(&mut t, project);
     selection(&mut t, project);
     evaluation(&mut t, project);
+    for selection in &project.kept {
+        kept(&mut t, selection);
+    }
     t.0
 }
 
@@ -339,6 +389,11 @@ fn touch(t: &mut Text, project: &Project) {
         float(project.touch.edge_margin_mm),
         "least distance of a touch from a free edge",
     );
+    t.maybe(
+        "region",
+        project.touch.region.as_deref().map(quoted),
+        "touches come only here: a mask in the NPZ file beside this one, or a group of the mesh file",
+    );
     t.table("sites");
     t.key(
         "spacing_mm",
@@ -373,6 +428,11 @@ fn feasible(t: &mut Text, project: &Project) {
         "painted",
         project.feasible.painted.as_deref().map(quoted),
         "painted region, an array in the NPZ file beside this one",
+    );
+    t.maybe(
+        "keep_out",
+        project.feasible.keep_out.as_deref().map(quoted),
+        "no gauge goes here: a mask in the NPZ file beside this one, or a group of the mesh file",
     );
     t.table("candidates");
     t.key(
@@ -524,6 +584,38 @@ fn selection(t: &mut Text, project: &Project) {
     }
 }
 
+fn kept(t: &mut Text, kept: &Kept) {
+    t.list("kept");
+    t.key(
+        "name",
+        quoted(&kept.name),
+        "a selection kept to be compared",
+    );
+    t.key("selector", quoted(&kept.selector), "");
+    t.key("quality", quoted(kept.quality.name()), "");
+    t.key("cost", float(kept.cost), "of all its gauges");
+    t.key("seconds", float(kept.seconds), "that choosing it took");
+    for site in &kept.sites {
+        t.list("kept.site");
+        t.key("position_mm", triple(&site.position_mm), "");
+        t.key("direction", triple(&site.direction), "");
+    }
+    for error in &kept.errors {
+        t.list("kept.error");
+        t.key("region", quoted(&error.region), "");
+        t.key("sensors", error.sensors, "");
+        t.key("mean_mm", float(error.mean_mm), "");
+        t.key("median_mm", float(error.median_mm), "");
+        t.key("p95_mm", float(error.p95_mm), "");
+    }
+    for failure in &kept.failures {
+        t.list("kept.failure");
+        t.key("failed", failure.failed, "");
+        t.key("retrained", failure.retrained, "");
+        t.key("mean_mm", float(failure.mean_mm), "");
+    }
+}
+
 #[derive(Default)]
 struct Text(String);
 
@@ -579,7 +671,9 @@ fn serialized(value: &impl serde::Serialize) -> String {
 mod tests {
     use super::*;
     use crate::mesh::unroll::Axis;
-    use crate::project::{ChosenSite, CostKeys, RegionKeys, SupportKeys, SupportKind, Unit};
+    use crate::project::{
+        ChosenSite, CostKeys, KeptError, KeptFailure, RegionKeys, SupportKeys, SupportKind, Unit,
+    };
 
     fn full() -> Project {
         let mut p = Project::around("a \"part\".stl", Some(Unit::Inch));
@@ -597,6 +691,8 @@ mod tests {
         });
         p.candidates.count = Some(407);
         p.feasible.painted = Some("painted".into());
+        p.feasible.keep_out = Some("connector".into());
+        p.touch.region = Some("grip".into());
         p.selection.sites.push(ChosenSite {
             position_mm: [0.1, 1.0 / 3.0, -7e-17],
             direction: [0.0, 0.0, 1.0],
@@ -606,6 +702,26 @@ mod tests {
         p.selection.costs.push(CostKeys {
             box_mm: [[0.0; 3], [1.0; 3]],
             cost: 2.5,
+        });
+        p.kept.push(Kept {
+            name: "greedy \"ten\"".into(),
+            selector: "by-hand".into(),
+            quality: crate::budget::Quality::Draft,
+            cost: 3.5,
+            seconds: 12.25,
+            sites: p.selection.sites.clone(),
+            errors: vec![KeptError {
+                region: "all touches".into(),
+                sensors: 1,
+                mean_mm: 3.0,
+                median_mm: 1.5,
+                p95_mm: 9.0,
+            }],
+            failures: vec![KeptFailure {
+                failed: 2,
+                retrained: true,
+                mean_mm: 5.5,
+            }],
         });
         p.evaluation.regions.push(RegionKeys {
             name: "middle".into(),

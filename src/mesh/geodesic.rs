@@ -66,6 +66,7 @@ pub fn between(
 }
 
 /// Where a wave has come.
+#[derive(Default)]
 struct Waves {
     /// One value a vertex (m); infinite where it has not come.
     distance: Vec<f64>,
@@ -127,6 +128,47 @@ impl PartialOrd for Entry {
     }
 }
 
+/// The corners around a point and how far they are.
+fn seeds(mesh: &TriMesh, source: SurfacePoint) -> [(u32, f64); 3] {
+    let origin = mesh.point(source);
+    let corners = mesh.triangles()[source.triangle as usize];
+    corners.map(|v| (v, origin.distance(mesh.positions()[v as usize])))
+}
+
+/// What a march needs to remember, kept between marches that stay small.
+#[derive(Default)]
+pub struct Scratch {
+    waves: Waves,
+    settled: Vec<bool>,
+    /// Vertices that hold anything of the last march.
+    reached: Vec<u32>,
+}
+
+impl Scratch {
+    fn fit(&mut self, vertices: usize) {
+        self.waves.distance.resize(vertices, f64::INFINITY);
+        self.waves.bend.resize(vertices, None);
+        self.settled.resize(vertices, false);
+    }
+
+    fn reach(&mut self, vertex: u32, distance: f64, bend: Option<u32>) {
+        let v = vertex as usize;
+        if self.waves.distance[v].is_infinite() {
+            self.reached.push(vertex);
+        }
+        self.waves.distance[v] = distance;
+        self.waves.bend[v] = bend;
+    }
+
+    fn clear(&mut self) {
+        for v in self.reached.drain(..) {
+            self.waves.distance[v as usize] = f64::INFINITY;
+            self.waves.bend[v as usize] = None;
+            self.settled[v as usize] = false;
+        }
+    }
+}
+
 /// How waves go over one mesh: made once, for many sources.
 pub struct March {
     helps: Vec<Vec<Help>>,
@@ -158,43 +200,67 @@ impl March {
 
     /// From one point.
     fn circles(&self, mesh: &TriMesh, source: SurfacePoint, limit: f64) -> Waves {
-        let origin = mesh.point(source);
-        let seeds: Vec<(u32, f64)> = mesh.triangles()[source.triangle as usize]
-            .iter()
-            .map(|&v| (v, origin.distance(mesh.positions()[v as usize])))
+        self.run(&seeds(mesh, source), limit, Front::Circular)
+    }
+
+    /// Vertices within `limit` of a point, with their distances (m), in no particular order: as
+    /// [`Self::distances`], but whatever lies farther away costs nothing.
+    #[must_use]
+    pub fn near(
+        &self,
+        mesh: &TriMesh,
+        source: SurfacePoint,
+        limit: f64,
+        scratch: &mut Scratch,
+    ) -> Vec<(u32, f64)> {
+        scratch.fit(self.helps.len());
+        self.march(scratch, &seeds(mesh, source), limit, Front::Circular);
+        let settled = (scratch.reached.iter()).filter(|&&v| scratch.settled[v as usize]);
+        let near = settled
+            .map(|&v| (v, scratch.waves.distance[v as usize]))
             .collect();
-        self.run(&seeds, limit, Front::Circular)
+        scratch.clear();
+        near
     }
 
     fn run(&self, seeds: &[(u32, f64)], limit: f64, front: Front) -> Waves {
+        let mut scratch = Scratch::default();
+        scratch.fit(self.helps.len());
+        self.march(&mut scratch, seeds, limit, front);
+        let Scratch {
+            mut waves, settled, ..
+        } = scratch;
+        for (d, done) in waves.distance.iter_mut().zip(&settled) {
+            if !done {
+                *d = f64::INFINITY;
+            }
+        }
+        waves
+    }
+
+    fn march(&self, scratch: &mut Scratch, seeds: &[(u32, f64)], limit: f64, front: Front) {
         /// Less than this share is no shorter way.
         const SHORTER: f64 = 1e-9;
-        let mut waves = Waves {
-            distance: vec![f64::INFINITY; self.helps.len()],
-            bend: vec![None; self.helps.len()],
-        };
-        let mut settled = vec![false; self.helps.len()];
         let mut heap = BinaryHeap::new();
         for &(vertex, distance) in seeds {
-            if distance < waves.distance[vertex as usize] {
-                waves.distance[vertex as usize] = distance;
+            if distance < scratch.waves.distance[vertex as usize] {
+                scratch.reach(vertex, distance, None);
                 heap.push(Entry { distance, vertex });
             }
         }
         while let Some(Entry { distance, vertex }) = heap.pop() {
-            if settled[vertex as usize] || distance > limit {
+            if scratch.settled[vertex as usize] || distance > limit {
                 continue;
             }
-            settled[vertex as usize] = true;
+            scratch.settled[vertex as usize] = true;
             for help in &self.helps[vertex as usize] {
-                let other = settled[help.other as usize].then_some(help.other);
-                let (reach, bend) = self.reach(&waves, front, vertex, help, other);
+                let other = scratch.settled[help.other as usize].then_some(help.other);
+                let (reach, bend) = self.reach(&scratch.waves, front, vertex, help, other);
                 // Also what was settled: near the source a wave may come late through one triangle.
                 let target = help.target as usize;
-                if reach < waves.distance[target] * (1.0 - SHORTER) && reach <= limit {
-                    waves.distance[target] = reach;
-                    waves.bend[target] = bend;
-                    settled[target] = false;
+                if reach < scratch.waves.distance[target] * (1.0 - SHORTER) && reach <= limit {
+                    scratch.reach(help.target, reach, bend);
+                    scratch.settled[target] = false;
                     heap.push(Entry {
                         distance: reach,
                         vertex: help.target,
@@ -202,12 +268,6 @@ impl March {
                 }
             }
         }
-        for (d, done) in waves.distance.iter_mut().zip(&settled) {
-            if !done {
-                *d = f64::INFINITY;
-            }
-        }
-        waves
     }
 
     /// The shortest way to what is helped: between the two that help, or straight from the first. Also the

@@ -41,6 +41,18 @@ impl Geometry {
         }
     }
 
+    /// σ² of the field at every location, given a measurement at some of them (1 where nothing is known).
+    #[must_use]
+    pub fn variances_given(&self, measured: &[usize]) -> Vec<f64> {
+        let mut conditional = Conditional::nothing(&self.covariance);
+        for &place in measured {
+            conditional.observe(place);
+        }
+        (0..conditional.variances.len())
+            .map(|place| conditional.variance(place))
+            .collect()
+    }
+
     /// Nothing chosen, with the wishes checked.
     pub(super) fn field<'a>(
         &self,

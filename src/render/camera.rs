@@ -112,6 +112,12 @@ impl Camera {
         self.target + self.toward_eye() * self.distance
     }
 
+    /// To the right in the view, unit length.
+    #[must_use]
+    pub fn side(&self) -> DVec3 {
+        self.plane().0
+    }
+
     fn plane(&self) -> (DVec3, DVec3) {
         let toward = self.toward_eye();
         let right = DVec3::Z.cross(toward).normalize();

@@ -1,23 +1,54 @@
 //! The wgpu side: draws the limb into a target of its own (4× anti-aliased, with depth), which the window
 //! then copies. Nothing is uploaded or drawn again that has not changed.
 
-use crate::colormap::{ColorMap, TABLE};
 use std::sync::Arc;
 
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
 use eframe::wgpu::{self, util::DeviceExt};
 
+use crate::colormap::{ColorMap, TABLE};
 use crate::mesh::TriMesh;
 
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 const SAMPLES: u32 = 4;
 
+/// A vertex of a [`Solid`].
 #[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Fixed {
-    position: [f32; 3],
-    normal: [f32; 3],
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Vertex {
+    /// m.
+    pub position: [f32; 3],
+    pub normal: [f32; 3],
+}
+
+/// Triangles to be drawn.
+pub struct Solid {
+    pub vertices: Vec<Vertex>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Solid {
+    #[must_use]
+    pub fn of(mesh: &TriMesh) -> Self {
+        let vertices = mesh.positions().iter().zip(mesh.vertex_normals());
+        Self {
+            vertices: vertices
+                .map(|(p, n)| Vertex {
+                    position: p.as_vec3().to_array(),
+                    normal: n.as_vec3().to_array(),
+                })
+                .collect(),
+            triangles: mesh.triangles().to_vec(),
+        }
+    }
+}
+
+/// Pictures that a window shows side by side, each with a target of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slot {
+    Limb,
+    Unrolled,
 }
 
 /// What changes with field and region, a vertex.
@@ -28,8 +59,8 @@ pub struct Shown {
     pub displacement: [f32; 3],
     /// Field, 0–1 over the legend's range.
     pub value: f32,
-    /// 1 in the feasible region.
-    pub region: f32,
+    /// 255 where a layer is: gauges may go, touches come, held, gauges must not go.
+    pub region: [u8; 4],
 }
 
 /// The uniforms of the shader, as it names them.
@@ -40,11 +71,17 @@ pub struct Uniforms {
     pub eye: [f32; 4],
     pub target_scale: [f32; 4],
     pub deform: [f32; 4],
+    /// A plane: what lies on its positive side is cut away.
+    pub section: [f32; 4],
+    /// x: how much of the wall that faces the eye covers what is behind it, 1 for all.
+    pub look: [f32; 4],
 }
 
 /// One frame to be drawn.
 pub struct Frame3d {
-    pub mesh: Arc<TriMesh>,
+    pub slot: Slot,
+    pub solid: Arc<Solid>,
+    /// One a vertex.
     pub shown: Arc<Vec<Shown>>,
     pub map: ColorMap,
     pub uniforms: Uniforms,
@@ -63,22 +100,34 @@ pub struct GpuWork {
 
 /// Everything on the graphics adapter.
 pub struct SceneGpu {
-    scene_pipeline: wgpu::RenderPipeline,
+    pipelines: Pipelines,
     scene_layout: wgpu::BindGroupLayout,
-    blit_pipeline: wgpu::RenderPipeline,
     blit_layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
+    slots: [SlotGpu; 2],
+    pub work: GpuWork,
+}
+
+struct Pipelines {
+    whole: wgpu::RenderPipeline,
+    /// The walls that face away, and those that face the eye drawn over them.
+    away: wgpu::RenderPipeline,
+    ghost: wgpu::RenderPipeline,
+    blit: wgpu::RenderPipeline,
+}
+
+/// One picture.
+struct SlotGpu {
     uniforms: wgpu::Buffer,
     mesh: Option<MeshGpu>,
-    maps: Option<(ColorMap, wgpu::BindGroup)>,
+    map: Option<(ColorMap, wgpu::BindGroup)>,
     targets: Option<Targets>,
     drawn: Option<(Uniforms, ColorMap, [u32; 2])>,
-    pub work: GpuWork,
 }
 
 struct MeshGpu {
     // Held, so that "the same" below compares living allocations.
-    mesh: Arc<TriMesh>,
+    solid: Arc<Solid>,
     shown: Arc<Vec<Shown>>,
     fixed: wgpu::Buffer,
     changing: wgpu::Buffer,
@@ -105,33 +154,22 @@ impl SceneGpu {
     pub fn new(device: &wgpu::Device, window: wgpu::TextureFormat) -> Self {
         let scene_layout = layout(device, true);
         let blit_layout = layout(device, false);
-        let uniforms = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("limb uniforms"),
-            size: size_of::<Uniforms>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
             ..Default::default()
         });
         Self {
-            scene_pipeline: scene_pipeline(device, &scene_layout),
-            blit_pipeline: blit_pipeline(device, &blit_layout, window),
+            pipelines: Pipelines::new(device, &scene_layout, &blit_layout, window),
             scene_layout,
             blit_layout,
             sampler,
-            uniforms,
-            mesh: None,
-            maps: None,
-            targets: None,
-            drawn: None,
+            slots: [SlotGpu::new(device), SlotGpu::new(device)],
             work: GpuWork::default(),
         }
     }
 
-    /// Draws a frame into the target, if anything in it changed.
+    /// Draws a frame into its target, if anything in it changed.
     pub fn draw(
         &mut self,
         device: &wgpu::Device,
@@ -139,22 +177,105 @@ impl SceneGpu {
         encoder: &mut wgpu::CommandEncoder,
         frame: &Frame3d,
     ) {
-        let uploaded = self.upload(device, queue, frame);
+        let slot = &mut self.slots[frame.slot as usize];
+        let uploaded = slot.upload(device, queue, frame);
+        self.work.uploads += u64::from(uploaded);
         let signature = (frame.uniforms, frame.map, frame.size);
-        if !uploaded && self.drawn == Some(signature) {
+        if !uploaded && slot.drawn == Some(signature) {
             return;
         }
-        self.retarget(device, frame.size);
-        self.remap(device, queue, frame.map);
-        queue.write_buffer(&self.uniforms, 0, bytemuck::bytes_of(&frame.uniforms));
-        self.pass(encoder, frame.background);
-        self.drawn = Some(signature);
+        if slot.targets.as_ref().is_none_or(|t| t.size != frame.size) {
+            let targets = Targets::new(device, &self.blit_layout, &self.sampler, frame.size);
+            slot.targets = Some(targets);
+        }
+        if slot
+            .map
+            .as_ref()
+            .is_none_or(|(known, _)| *known != frame.map)
+        {
+            let bind = bind_map(
+                device,
+                queue,
+                frame.map,
+                &self.scene_layout,
+                &slot.uniforms,
+                &self.sampler,
+            );
+            slot.map = Some((frame.map, bind));
+        }
+        queue.write_buffer(&slot.uniforms, 0, bytemuck::bytes_of(&frame.uniforms));
+        let through = frame.uniforms.look[0] < 1.0;
+        slot.pass(encoder, &self.pipelines, frame.background, through);
+        slot.drawn = Some(signature);
         self.work.redraws += 1;
+    }
+}
+
+/// A colour map with the uniforms, as the shader sees them.
+fn bind_map(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    map: ColorMap,
+    layout: &wgpu::BindGroupLayout,
+    uniforms: &wgpu::Buffer,
+    sampler: &wgpu::Sampler,
+) -> wgpu::BindGroup {
+    let table: Vec<u8> = map.table().into_iter().flatten().collect();
+    let texture = device.create_texture_with_data(
+        queue,
+        &wgpu::TextureDescriptor {
+            label: Some("colour map"),
+            size: wgpu::Extent3d {
+                width: TABLE as u32,
+                height: 1,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: COLOR,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        },
+        wgpu::util::TextureDataOrder::LayerMajor,
+        &table,
+    );
+    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    let resources = [
+        uniforms.as_entire_binding(),
+        wgpu::BindingResource::TextureView(&view),
+        wgpu::BindingResource::Sampler(sampler),
+    ];
+    let entries: Vec<wgpu::BindGroupEntry> = (0..)
+        .zip(resources)
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+        .collect();
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("limb"),
+        layout,
+        entries: &entries,
+    })
+}
+
+impl SlotGpu {
+    fn new(device: &wgpu::Device) -> Self {
+        Self {
+            uniforms: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("limb uniforms"),
+                size: size_of::<Uniforms>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            mesh: None,
+            map: None,
+            targets: None,
+            drawn: None,
+        }
     }
 
     fn upload(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, frame: &Frame3d) -> bool {
         match &mut self.mesh {
-            Some(known) if Arc::ptr_eq(&known.mesh, &frame.mesh) => {
+            Some(known) if Arc::ptr_eq(&known.solid, &frame.solid) => {
                 if Arc::ptr_eq(&known.shown, &frame.shown) {
                     return false;
                 }
@@ -163,64 +284,17 @@ impl SceneGpu {
             }
             _ => self.mesh = Some(MeshGpu::new(device, frame)),
         }
-        self.work.uploads += 1;
         true
     }
 
-    fn retarget(&mut self, device: &wgpu::Device, size: [u32; 2]) {
-        if self.targets.as_ref().is_none_or(|t| t.size != size) {
-            self.targets = Some(Targets::new(device, &self.blit_layout, &self.sampler, size));
-        }
-    }
-
-    fn remap(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, map: ColorMap) {
-        if self.maps.as_ref().is_some_and(|(known, _)| *known == map) {
-            return;
-        }
-        let table: Vec<u8> = map.table().into_iter().flatten().collect();
-        let texture = device.create_texture_with_data(
-            queue,
-            &wgpu::TextureDescriptor {
-                label: Some("colour map"),
-                size: wgpu::Extent3d {
-                    width: TABLE as u32,
-                    height: 1,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: COLOR,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-                view_formats: &[],
-            },
-            wgpu::util::TextureDataOrder::LayerMajor,
-            &table,
-        );
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let bind = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("limb"),
-            layout: &self.scene_layout,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: self.uniforms.as_entire_binding(),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::TextureView(&view),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 2,
-                    resource: wgpu::BindingResource::Sampler(&self.sampler),
-                },
-            ],
-        });
-        self.maps = Some((map, bind));
-    }
-
-    fn pass(&self, encoder: &mut wgpu::CommandEncoder, [r, g, b, a]: [f64; 4]) {
-        let (Some(targets), Some(mesh), Some((_, bind))) = (&self.targets, &self.mesh, &self.maps)
+    fn pass(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        pipelines: &Pipelines,
+        [r, g, b, a]: [f64; 4],
+        through: bool,
+    ) {
+        let (Some(targets), Some(mesh), Some((_, bind))) = (&self.targets, &self.mesh, &self.map)
         else {
             return;
         };
@@ -247,28 +321,24 @@ impl SceneGpu {
             occlusion_query_set: None,
             multiview_mask: None,
         });
-        pass.set_pipeline(&self.scene_pipeline);
         pass.set_bind_group(0, bind, &[]);
         pass.set_vertex_buffer(0, mesh.fixed.slice(..));
         pass.set_vertex_buffer(1, mesh.changing.slice(..));
         pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..mesh.count, 0, 0..1);
+        let layers = if through {
+            vec![&pipelines.away, &pipelines.ghost]
+        } else {
+            vec![&pipelines.whole]
+        };
+        for pipeline in layers {
+            pass.set_pipeline(pipeline);
+            pass.draw_indexed(0..mesh.count, 0, 0..1);
+        }
     }
 }
 
 impl MeshGpu {
     fn new(device: &wgpu::Device, frame: &Frame3d) -> Self {
-        let mesh = &frame.mesh;
-        let fixed: Vec<Fixed> = mesh
-            .positions()
-            .iter()
-            .zip(mesh.vertex_normals())
-            .map(|(p, n)| Fixed {
-                position: p.as_vec3().to_array(),
-                normal: n.as_vec3().to_array(),
-            })
-            .collect();
-        let indices: Vec<u32> = mesh.triangles().iter().flatten().copied().collect();
         let buffer = |label, contents: &[u8], usage| {
             device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                 label: Some(label),
@@ -276,10 +346,11 @@ impl MeshGpu {
                 usage: usage | wgpu::BufferUsages::COPY_DST,
             })
         };
+        let solid = &frame.solid;
         Self {
             fixed: buffer(
                 "limb vertices",
-                bytemuck::cast_slice(&fixed),
+                bytemuck::cast_slice(&solid.vertices),
                 wgpu::BufferUsages::VERTEX,
             ),
             changing: buffer(
@@ -289,11 +360,11 @@ impl MeshGpu {
             ),
             indices: buffer(
                 "limb triangles",
-                bytemuck::cast_slice(&indices),
+                bytemuck::cast_slice(&solid.triangles),
                 wgpu::BufferUsages::INDEX,
             ),
-            count: indices.len() as u32,
-            mesh: Arc::clone(mesh),
+            count: 3 * solid.triangles.len() as u32,
+            solid: Arc::clone(solid),
             shown: Arc::clone(&frame.shown),
         }
     }
@@ -383,18 +454,51 @@ fn layout(device: &wgpu::Device, scene: bool) -> wgpu::BindGroupLayout {
     })
 }
 
-fn scene_pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
-    let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("limb"),
-        source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/limb.wgsl").into()),
-    });
+/// Which walls a pipeline draws.
+#[derive(Clone, Copy, PartialEq)]
+enum Walls {
+    /// Both sides: through the windows the inside is seen.
+    All,
+    FacingAway,
+    /// Those that face the eye, over what is behind them.
+    Ghost,
+}
+
+impl Pipelines {
+    fn new(
+        device: &wgpu::Device,
+        scene: &wgpu::BindGroupLayout,
+        blit: &wgpu::BindGroupLayout,
+        window: wgpu::TextureFormat,
+    ) -> Self {
+        let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("limb"),
+            source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/limb.wgsl").into()),
+        });
+        let of = |walls| scene_pipeline(device, scene, &shader, walls);
+        Self {
+            whole: of(Walls::All),
+            away: of(Walls::FacingAway),
+            ghost: of(Walls::Ghost),
+            blit: blit_pipeline(device, blit, window),
+        }
+    }
+}
+
+fn scene_pipeline(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    shader: &wgpu::ShaderModule,
+    walls: Walls,
+) -> wgpu::RenderPipeline {
+    let ghost = walls == Walls::Ghost;
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("limb"),
         bind_group_layouts: &[Some(layout)],
         immediate_size: 0,
     });
     let fixed = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
-    let changing = wgpu::vertex_attr_array![2 => Float32x3, 3 => Float32, 4 => Float32];
+    let changing = wgpu::vertex_attr_array![2 => Float32x3, 3 => Float32, 4 => Unorm8x4];
     let buffer = |stride, attributes| {
         Some(wgpu::VertexBufferLayout {
             array_stride: stride,
@@ -406,19 +510,25 @@ fn scene_pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu
         label: Some("limb"),
         layout: Some(&pipeline_layout),
         vertex: wgpu::VertexState {
-            module: &shader,
+            module: shader,
             entry_point: Some("vs"),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             buffers: &[
-                buffer(size_of::<Fixed>() as u64, &fixed),
+                buffer(size_of::<Vertex>() as u64, &fixed),
                 buffer(size_of::<Shown>() as u64, &changing),
             ],
         },
-        // Both sides: through the windows the inside is seen.
-        primitive: wgpu::PrimitiveState::default(),
+        primitive: wgpu::PrimitiveState {
+            cull_mode: match walls {
+                Walls::All => None,
+                Walls::FacingAway => Some(wgpu::Face::Front),
+                Walls::Ghost => Some(wgpu::Face::Back),
+            },
+            ..Default::default()
+        },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH,
-            depth_write_enabled: Some(true),
+            depth_write_enabled: Some(!ghost),
             depth_compare: Some(wgpu::CompareFunction::Less),
             stencil: wgpu::StencilState::default(),
             bias: wgpu::DepthBiasState::default(),
@@ -428,10 +538,14 @@ fn scene_pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu
             ..Default::default()
         },
         fragment: Some(wgpu::FragmentState {
-            module: &shader,
-            entry_point: Some("fs"),
+            module: shader,
+            entry_point: Some(if ghost { "fs_ghost" } else { "fs" }),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
-            targets: &[Some(COLOR.into())],
+            targets: &[Some(wgpu::ColorTargetState {
+                format: COLOR,
+                blend: ghost.then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
         }),
         multiview_mask: None,
         cache: None,
@@ -499,8 +613,8 @@ impl CallbackTrait for Frame3d {
         let Some(scene) = resources.get::<SceneGpu>() else {
             return;
         };
-        if let Some(targets) = &scene.targets {
-            pass.set_pipeline(&scene.blit_pipeline);
+        if let Some(targets) = &scene.slots[self.slot as usize].targets {
+            pass.set_pipeline(&scene.pipelines.blit);
             pass.set_bind_group(0, &targets.bind, &[]);
             pass.draw(0..3, 0..1);
         }

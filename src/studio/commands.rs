@@ -2,14 +2,24 @@
 
 use egui::{Context, Key, KeyboardShortcut, Modifiers};
 
-use super::Studio;
 use super::dialogs::Dialog;
+use super::gauges::Way;
 use super::palette::Palette;
-use super::viewport::Tool;
+use super::tools::Tool;
+use super::viewport::Section;
+use super::{Stage, Studio};
+use crate::document::Layer;
+use crate::mesh::unroll::Axis;
 use crate::render::camera::Preset;
 
 /// By how much a key makes the brush wider.
 const BRUSH_STEP: f64 = 1.25;
+/// By how much a key makes the window's text larger.
+const ZOOM_STEP: f32 = 0.1;
+
+fn zoom(ctx: &Context, by: f32) {
+    ctx.set_zoom_factor((ctx.zoom_factor() + by).clamp(0.5, 3.0));
+}
 
 /// Everything that can be commanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +28,7 @@ pub enum Command {
     Save,
     SaveAs,
     Export,
+    SavePicture,
     Quit,
     Undo,
     Redo,
@@ -31,11 +42,24 @@ pub enum Command {
     Palette,
     Simulate,
     Select,
+    Keep,
     Cancel,
     Follow,
+    Pin,
+    RemoveGauges,
+    Nudge(Way),
     Frame,
+    FramePicked,
+    SeeThrough,
+    Section,
+    Unrolled,
+    DarkLight,
+    LargerText,
+    SmallerText,
     Look(Preset),
     Tool(Tool),
+    Paint(Layer),
+    Stage(Stage),
 }
 
 impl Command {
@@ -47,24 +71,66 @@ impl Command {
             Self::Save => "Save",
             Self::SaveAs => "Save as…",
             Self::Export => "Export report…",
+            Self::SavePicture => "Save picture…",
             Self::Quit => "Quit",
             Self::Undo => "Undo",
             Self::Redo => "Redo",
-            Self::ClearPaint => "Clear painted region",
-            Self::FillPaint => "Paint everything",
-            Self::InvertPaint => "Invert painted region",
-            Self::GrowPaint => "Grow painted region",
-            Self::ShrinkPaint => "Shrink painted region",
+            Self::ClearPaint => "Clear painted layer",
+            Self::FillPaint => "Fill painted layer",
+            Self::InvertPaint => "Invert painted layer",
+            Self::GrowPaint => "Grow painted layer",
+            Self::ShrinkPaint => "Shrink painted layer",
             Self::WiderBrush => "Wider brush",
             Self::NarrowerBrush => "Narrower brush",
             Self::Palette => "Find a command…",
             Self::Simulate => "Simulate",
             Self::Select => "Select gauges",
+            Self::Keep => "Keep this selection",
             Self::Cancel => "Cancel all jobs",
             Self::Follow => "Follow changes",
+            Self::Pin => "Pin picked gauges",
+            Self::RemoveGauges => "Remove picked gauges",
+            Self::Nudge(Way::Left) => "Move picked gauges left",
+            Self::Nudge(Way::Right) => "Move picked gauges right",
+            Self::Nudge(Way::Up) => "Move picked gauges up",
+            Self::Nudge(Way::Down) => "Move picked gauges down",
             Self::Frame => "Frame the limb",
+            Self::FramePicked => "Frame picked gauges",
+            Self::SeeThrough => "See-through",
+            Self::Section => "Section",
+            Self::Unrolled => "Unrolled view",
+            Self::DarkLight => "Dark or light",
+            Self::LargerText => "Larger text",
+            Self::SmallerText => "Smaller text",
             Self::Look(preset) => preset.name(),
             Self::Tool(tool) => tool.name(),
+            Self::Paint(Layer::Feasible) => "Paint where gauges may go",
+            Self::Paint(Layer::KeepOut) => "Paint where no gauge may go",
+            Self::Paint(Layer::Support) => "Paint what is held",
+            Self::Paint(Layer::Touch) => "Paint where touches come",
+            Self::Stage(Stage::Part) => "Go to part",
+            Self::Stage(Stage::Supports) => "Go to supports and material",
+            Self::Stage(Stage::Simulation) => "Go to simulation",
+            Self::Stage(Stage::Feasible) => "Go to feasible region",
+            Self::Stage(Stage::Candidates) => "Go to candidates",
+            Self::Stage(Stage::Selection) => "Go to selection",
+            Self::Stage(Stage::Evaluation) => "Go to evaluation",
+            Self::Stage(Stage::Report) => "Go to report",
+        }
+    }
+
+    /// As a button over the views names it, where there is little room.
+    #[must_use]
+    pub fn short_name(self) -> &'static str {
+        match self {
+            Self::ClearPaint => "Clear",
+            Self::FillPaint => "Fill",
+            Self::InvertPaint => "Invert",
+            Self::GrowPaint => "Grow",
+            Self::ShrinkPaint => "Shrink",
+            Self::Frame => "Frame",
+            Self::Unrolled => "Unrolled",
+            other => other.name(),
         }
     }
 
@@ -77,11 +143,12 @@ impl Command {
             Self::Export => {
                 "Write the placement report, the table of sites and the dataset into a folder"
             }
+            Self::SavePicture => "Write what the 3D view shows into a PNG file of any size",
             Self::Quit => "Close the window",
             Self::Undo => "Take back the last change",
             Self::Redo => "Make the change again",
-            Self::ClearPaint => "Every site that passes the filters may carry a gauge again",
-            Self::FillPaint => "Gauges may go anywhere; erase from there",
+            Self::ClearPaint => "As if nothing had ever been painted on this layer",
+            Self::FillPaint => "Paint every vertex of this layer; erase from there",
             Self::InvertPaint => "What was painted is not, and what was not is",
             Self::GrowPaint | Self::ShrinkPaint => {
                 "By a quarter of the brush's radius over the surface"
@@ -90,13 +157,31 @@ impl Command {
             Self::Palette => "Reach every command by a few letters of its name",
             Self::Simulate => "Compute how the limb deforms under all touches",
             Self::Select => "Filter, reduce, choose the gauges and judge them on unseen touches",
+            Self::Keep => "Keep the gauges as they are, to compare them with others",
             Self::Cancel => "Stop whatever is being computed",
             Self::Follow => "Compute anew what a change has made stale, a draft first; on or off",
+            Self::Pin => "Selections must have a gauge there; pinned ones are let go",
+            Self::RemoveGauges => "Take the picked gauges away",
+            Self::Nudge(_) => "To the next free site that way on the screen",
             Self::Frame => "Show the whole limb",
+            Self::FramePicked => "Come near to the picked gauges",
+            Self::SeeThrough => "See the inside through the walls in front",
+            Self::Section => "Cut a part of the limb away",
+            Self::Unrolled => "Show the limb laid flat beside it",
+            Self::DarkLight => "Change between dark and light",
+            Self::LargerText | Self::SmallerText => "Everything in the window",
             Self::Look(_) => "Look from this side",
             Self::Tool(Tool::Touch) => "Click on the limb to press it there; drag to look around",
-            Self::Tool(Tool::Paint) => "Drag over the limb to paint where gauges may go",
-            Self::Tool(Tool::Erase) => "Drag over the limb to keep gauges away",
+            Self::Tool(Tool::Gauges) => {
+                "Click a gauge to pick it, drag it elsewhere; Ctrl-click puts a new one"
+            }
+            Self::Tool(Tool::Paint) => "Drag over the limb to paint a layer",
+            Self::Tool(Tool::Erase) => "Drag over the limb to take from a layer",
+            Self::Tool(Tool::Box) => "Drag a box around what is to be painted; Ctrl erases",
+            Self::Tool(Tool::Lasso) => "Draw around what is to be painted; Ctrl erases",
+            Self::Tool(Tool::Measure) => "Click two points to see how far they are apart",
+            Self::Paint(_) => "Take the brush for this layer",
+            Self::Stage(_) => "Show the settings of this stage",
         }
     }
 
@@ -106,34 +191,58 @@ impl Command {
         const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
         let plain = |key| Some(KeyboardShortcut::new(Modifiers::NONE, key));
         let ctrl = |key| Some(KeyboardShortcut::new(CTRL, key));
+        let shifted = |key| Some(KeyboardShortcut::new(CTRL_SHIFT, key));
         match self {
             Self::Open => ctrl(Key::O),
             Self::Save => ctrl(Key::S),
-            Self::SaveAs => Some(KeyboardShortcut::new(CTRL_SHIFT, Key::S)),
+            Self::SaveAs => shifted(Key::S),
             Self::Export => ctrl(Key::E),
+            Self::SavePicture => shifted(Key::E),
             Self::Quit => ctrl(Key::Q),
             Self::Undo => ctrl(Key::Z),
-            Self::Redo => Some(KeyboardShortcut::new(CTRL_SHIFT, Key::Z)),
+            Self::Redo => shifted(Key::Z),
             Self::Simulate => plain(Key::F5),
             Self::Select => plain(Key::F6),
+            Self::Keep => ctrl(Key::D),
             Self::Cancel => plain(Key::Escape),
+            Self::Pin => plain(Key::P),
+            Self::RemoveGauges => plain(Key::Delete),
+            Self::Nudge(Way::Left) => plain(Key::ArrowLeft),
+            Self::Nudge(Way::Right) => plain(Key::ArrowRight),
+            Self::Nudge(Way::Up) => plain(Key::ArrowUp),
+            Self::Nudge(Way::Down) => plain(Key::ArrowDown),
             Self::Frame => plain(Key::Home),
+            Self::FramePicked => plain(Key::Period),
+            Self::SeeThrough => plain(Key::H),
+            Self::Section => plain(Key::C),
+            Self::Unrolled => plain(Key::U),
+            Self::LargerText => ctrl(Key::Plus),
+            Self::SmallerText => ctrl(Key::Minus),
             Self::Look(Preset::Front) => plain(Key::Num1),
             Self::Look(Preset::Right) => plain(Key::Num3),
             Self::Look(Preset::Top) => plain(Key::Num7),
+            Self::Look(Preset::Back) => plain(Key::Num2),
+            Self::Look(Preset::Left) => plain(Key::Num4),
+            Self::Look(Preset::Bottom) => plain(Key::Num8),
             Self::Tool(Tool::Touch) => plain(Key::T),
+            Self::Tool(Tool::Gauges) => plain(Key::G),
             Self::Tool(Tool::Paint) => plain(Key::B),
             Self::Tool(Tool::Erase) => plain(Key::X),
+            Self::Tool(Tool::Box) => plain(Key::R),
+            Self::Tool(Tool::Lasso) => plain(Key::L),
+            Self::Tool(Tool::Measure) => plain(Key::M),
             Self::InvertPaint => ctrl(Key::I),
             Self::Palette => ctrl(Key::K),
             Self::NarrowerBrush => plain(Key::OpenBracket),
             Self::WiderBrush => plain(Key::CloseBracket),
-            Self::Look(_)
-            | Self::ClearPaint
+            Self::ClearPaint
             | Self::FillPaint
             | Self::GrowPaint
             | Self::ShrinkPaint
-            | Self::Follow => None,
+            | Self::Follow
+            | Self::DarkLight
+            | Self::Paint(_)
+            | Self::Stage(_) => None,
         }
     }
 
@@ -144,6 +253,7 @@ impl Command {
             Self::SaveAs,
             Self::Save,
             Self::Open,
+            Self::SavePicture,
             Self::Export,
             Self::Quit,
             Self::Redo,
@@ -158,12 +268,25 @@ impl Command {
             Self::Palette,
             Self::Simulate,
             Self::Select,
+            Self::Keep,
             Self::Cancel,
             Self::Follow,
+            Self::Pin,
+            Self::RemoveGauges,
             Self::Frame,
+            Self::FramePicked,
+            Self::SeeThrough,
+            Self::Section,
+            Self::Unrolled,
+            Self::DarkLight,
+            Self::LargerText,
+            Self::SmallerText,
         ];
+        all.extend(Way::ALL.map(Self::Nudge));
         all.extend(Preset::ALL.map(Self::Look));
         all.extend(Tool::ALL.map(Self::Tool));
+        all.extend(Layer::ALL.map(Self::Paint));
+        all.extend(Stage::ALL.map(Self::Stage));
         all
     }
 }
@@ -176,18 +299,26 @@ impl Studio {
             Command::Undo => self.document.can_undo(),
             Command::Redo => self.document.can_redo(),
             Command::ClearPaint | Command::GrowPaint | Command::ShrinkPaint => {
-                self.document.state.painted.is_some()
+                self.document.layer(self.view.layer).is_some()
             }
             Command::Cancel => self.busy(),
             Command::Export => self.design.is_some(),
+            Command::Keep => !self.document.state.project.selection.sites.is_empty(),
+            Command::Pin | Command::RemoveGauges | Command::FramePicked | Command::Nudge(_) => {
+                !self.picked.is_empty()
+            }
             _ => true,
         }
     }
 
     /// Whether a command that turns something on or off has it on.
-    fn is_on(&self, command: Command) -> bool {
+    pub(super) fn is_on(&self, command: Command) -> bool {
         match command {
             Command::Follow => self.drive.follow,
+            Command::SeeThrough => self.view.see_through,
+            Command::Section => self.view.section.is_some(),
+            Command::Unrolled => self.view.unrolled_shown,
+            Command::Tool(tool) => self.view.tool == tool,
             _ => false,
         }
     }
@@ -218,21 +349,68 @@ impl Studio {
             Command::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             Command::Undo => self.document.undo(),
             Command::Redo => self.document.redo(),
-            Command::ClearPaint => self.document.clear_paint(),
-            Command::FillPaint => self.document.fill_paint(),
-            Command::InvertPaint => self.document.invert_paint(),
-            Command::GrowPaint => self.document.grow_paint(self.view.brush / 4.0),
-            Command::ShrinkPaint => self.document.shrink_paint(self.view.brush / 4.0),
+            Command::SavePicture => self.dialog = Some(Dialog::picture(&self.document)),
+            Command::ClearPaint => self.document.clear(self.view.layer),
+            Command::FillPaint => self.document.fill(self.view.layer),
+            Command::InvertPaint => self.document.invert(self.view.layer),
+            Command::GrowPaint => self.document.grow(self.view.layer, self.view.brush / 4.0),
+            Command::ShrinkPaint => self.document.shrink(self.view.layer, self.view.brush / 4.0),
             Command::WiderBrush => self.view.brush *= BRUSH_STEP,
             Command::NarrowerBrush => self.view.brush /= BRUSH_STEP,
             Command::Palette => self.palette = Some(Palette::default()),
             Command::Simulate => self.simulate(ctx),
             Command::Select => self.select(ctx),
+            Command::Keep => self.keep(),
             Command::Cancel => self.cancel(),
             Command::Follow => self.drive.follow = !self.drive.follow,
+            Command::Pin => self.pin_picked(),
+            Command::RemoveGauges => self.remove_picked(),
+            Command::Nudge(way) => self.nudge(way),
+            command => self.change_view(ctx, command),
+        }
+    }
+
+    /// Commands that change only how things are shown.
+    fn change_view(&mut self, ctx: &Context, command: Command) {
+        match command {
             Command::Frame => self.view.frame(&self.document),
+            Command::FramePicked => {
+                let all = self.gauge_places();
+                let picked: Vec<_> = self
+                    .picked
+                    .iter()
+                    .filter_map(|&n| all.get(n).copied())
+                    .collect();
+                self.view.frame_points(&picked, &self.document);
+            }
+            Command::SeeThrough => self.view.see_through = !self.view.see_through,
+            Command::Section => {
+                let (lower, upper) = self.document.part.bounds();
+                let axis = Axis::X;
+                self.view.section = match self.view.section {
+                    Some(_) => None,
+                    None => Some(Section {
+                        axis,
+                        offset: ((lower + upper) / 2.0).dot(axis.direction()),
+                        flip: false,
+                    }),
+                };
+            }
+            Command::Unrolled => self.view.unrolled_shown = !self.view.unrolled_shown,
+            Command::DarkLight => ctx.set_theme(match ctx.theme() {
+                egui::Theme::Dark => egui::Theme::Light,
+                egui::Theme::Light => egui::Theme::Dark,
+            }),
+            Command::LargerText => zoom(ctx, ZOOM_STEP),
+            Command::SmallerText => zoom(ctx, -ZOOM_STEP),
             Command::Look(preset) => self.view.camera.look_from(preset),
             Command::Tool(tool) => self.view.take(tool),
+            Command::Paint(layer) => {
+                self.view.layer = layer;
+                self.view.take(Tool::Paint);
+            }
+            Command::Stage(stage) => self.stage = stage,
+            _ => {}
         }
     }
 
@@ -280,6 +458,7 @@ impl Studio {
                 }
                 ui.separator();
                 self.button(ui, Command::Export);
+                self.button(ui, Command::SavePicture);
                 ui.separator();
                 self.button(ui, Command::Quit);
             });
@@ -292,28 +471,61 @@ impl Studio {
                     self.button(ui, Command::Tool(tool));
                 }
                 ui.separator();
-                for command in [
-                    Command::ClearPaint,
-                    Command::FillPaint,
-                    Command::InvertPaint,
-                    Command::GrowPaint,
-                    Command::ShrinkPaint,
-                ] {
-                    self.button(ui, command);
-                }
+                ui.menu_button("Painted layer", |ui| {
+                    for layer in Layer::ALL {
+                        self.button(ui, Command::Paint(layer));
+                    }
+                    ui.separator();
+                    for command in [
+                        Command::FillPaint,
+                        Command::InvertPaint,
+                        Command::GrowPaint,
+                        Command::ShrinkPaint,
+                        Command::ClearPaint,
+                    ] {
+                        self.button(ui, command);
+                    }
+                });
+                ui.menu_button("Gauges", |ui| {
+                    for command in [Command::Pin, Command::RemoveGauges] {
+                        self.button(ui, command);
+                    }
+                    ui.separator();
+                    for way in Way::ALL {
+                        self.button(ui, Command::Nudge(way));
+                    }
+                });
                 ui.separator();
                 self.button(ui, Command::Palette);
             });
             ui.menu_button("View", |ui| {
-                self.button(ui, Command::Frame);
+                for command in [Command::Frame, Command::FramePicked] {
+                    self.button(ui, command);
+                }
+                ui.separator();
+                for command in [Command::SeeThrough, Command::Section, Command::Unrolled] {
+                    self.button(ui, command);
+                }
+                ui.separator();
                 for preset in Preset::ALL {
                     self.button(ui, Command::Look(preset));
                 }
                 ui.separator();
-                ui.horizontal(egui::widgets::global_theme_preference_buttons);
+                for command in [
+                    Command::DarkLight,
+                    Command::LargerText,
+                    Command::SmallerText,
+                ] {
+                    self.button(ui, command);
+                }
             });
             ui.menu_button("Run", |ui| {
-                for command in [Command::Simulate, Command::Select, Command::Cancel] {
+                for command in [
+                    Command::Simulate,
+                    Command::Select,
+                    Command::Keep,
+                    Command::Cancel,
+                ] {
                     self.button(ui, command);
                 }
                 ui.separator();

@@ -16,6 +16,7 @@ enum Purpose {
     Open,
     SaveAs,
     Export,
+    Picture,
 }
 
 /// A dialog that asks for a path.
@@ -23,6 +24,9 @@ pub(super) struct Dialog {
     purpose: Purpose,
     path: String,
     unit: Unit,
+    /// Of a picture: width and height in pixels, and whether what is behind the limb is left out.
+    size: [u32; 2],
+    transparent: bool,
     /// The desktop's own dialog, while it is open.
     browsing: Option<Receiver<Option<PathBuf>>>,
     focused: bool,
@@ -34,6 +38,8 @@ impl Dialog {
             purpose,
             path,
             unit: Unit::Millimetre,
+            size: [1920, 1080],
+            transparent: false,
             browsing: None,
             focused: false,
         }
@@ -78,11 +84,20 @@ impl Dialog {
         Self::new(Purpose::Export, folder.join("report").display().to_string())
     }
 
+    pub fn picture(document: &Document) -> Self {
+        let mesh = document.path.as_ref().unwrap_or(&document.mesh_path);
+        let name = mesh.file_name().unwrap_or_default().to_string_lossy();
+        let stem = name.split('.').next().unwrap_or("limb");
+        let path = mesh.with_file_name(format!("{stem}.png"));
+        Self::new(Purpose::Picture, path.display().to_string())
+    }
+
     fn title(&self) -> &'static str {
         match self.purpose {
             Purpose::Open => "Open a project or mesh",
             Purpose::SaveAs => "Save the project",
             Purpose::Export => "Export the report",
+            Purpose::Picture => "Save a picture",
         }
     }
 
@@ -91,6 +106,7 @@ impl Dialog {
             Purpose::Open => "Open file",
             Purpose::SaveAs => "Save file",
             Purpose::Export => "Export",
+            Purpose::Picture => "Save picture",
         }
     }
 
@@ -98,6 +114,7 @@ impl Dialog {
         match self.purpose {
             Purpose::Open => "NAME.hapdef.toml, or a mesh: glb, gltf, obj, ply, stl",
             Purpose::SaveAs => "NAME.hapdef.toml",
+            Purpose::Picture => "NAME.png",
             Purpose::Export => "A folder for report.html, sites.csv, design.json, dataset.npz",
         }
     }
@@ -128,6 +145,7 @@ impl Dialog {
                 }
                 Purpose::SaveAs => dialog.set_file_name("limb.hapdef.toml").save_file(),
                 Purpose::Export => dialog.pick_folder(),
+                Purpose::Picture => dialog.set_file_name("limb.png").save_file(),
             };
             let _ = sender.send(chosen);
             ctx.request_repaint();
@@ -177,6 +195,16 @@ impl Studio {
                     }
                 });
             }
+            if dialog.purpose == Purpose::Picture {
+                ui.horizontal(|ui| {
+                    let names = ["Width in pixels", "Height in pixels"];
+                    for (name, side) in names.into_iter().zip(&mut dialog.size) {
+                        ui.add(egui::DragValue::new(side).range(16..=16384).suffix(" px"))
+                            .accessible_name(name);
+                    }
+                    ui.checkbox(&mut dialog.transparent, "Transparent background");
+                });
+            }
             let discards = dialog.purpose == Purpose::Open && self.document.is_dirty();
             if discards {
                 let text = format!(
@@ -224,6 +252,10 @@ impl Studio {
             }
             Purpose::SaveAs => self.save_to(&path),
             Purpose::Export => self.export(ctx, path),
+            Purpose::Picture => {
+                let path = path.with_extension("png");
+                self.save_picture(ctx, path, dialog.size, dialog.transparent);
+            }
         }
     }
 

@@ -13,6 +13,7 @@ use crate::budget::{Progress, Quality};
 use crate::cli;
 use crate::dataset::Site;
 use crate::design::{self, Design, DesignError, Hooks, Inputs, Known, Simulated, StageTime, Step};
+use crate::evaluation::Evaluation;
 use crate::feasible::Feasibility;
 use crate::io::artifacts::{self, as_chosen};
 use crate::job::{Outcome, Reporter, Stop};
@@ -28,6 +29,12 @@ pub(super) enum Finished {
     Filtered(Arc<Feasibility>),
     Design(Arc<Design>, Box<Inputs>, Quality, f64),
     Exported(PathBuf),
+    Estimate(f64),
+    Judged(Arc<Evaluation>, f64),
+    Field(Vec<f64>),
+    /// Metres over the surface.
+    Measured(f64),
+    Pictured(PathBuf),
     Opened(Box<opening::Opened>),
 }
 
@@ -318,6 +325,18 @@ impl Studio {
                 self.tell(format!("The report is in {}", report.display()));
             }
             Finished::Opened(opened) => self.take_opened(*opened),
+            Finished::Estimate(mm) if key == self.by_hand_key() => {
+                self.by_hand.estimate = Some(mm);
+            }
+            Finished::Judged(found, seconds) if key == self.by_hand_key() => {
+                self.by_hand.exact = Some(found);
+                self.by_hand.seconds = seconds;
+            }
+            // Of gauges that have moved on.
+            Finished::Estimate(_) | Finished::Judged(..) => {}
+            Finished::Field(values) => self.slow = Some((key, Arc::new(values))),
+            Finished::Measured(over) => self.measured(&key, over),
+            Finished::Pictured(path) => self.tell(format!("The picture is in {}", path.display())),
         }
     }
 
@@ -549,7 +568,7 @@ fn is_moving(ctx: &Context) -> bool {
 }
 
 /// A stage's error as a job's end.
-fn stop(error: &DesignError) -> Stop {
+pub(super) fn stop(error: &DesignError) -> Stop {
     if error.is_cancelled() {
         Stop::Cancelled
     } else {

@@ -1,15 +1,23 @@
 //! What colours the limb: the fields a vertex, their legends, and the shape that is shown.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use egui::Context;
+use glam::DVec3;
+
 use super::Studio;
-use super::viewport::Tool;
+use super::drive::Finished;
+use super::jobs::Task;
+use super::tools::Tool;
 use crate::colormap::ColorMap;
+use crate::document::{Layer, PaintKey};
+use crate::elasticity::support::held_freedoms;
 use crate::io::report::{robust_top, round_up};
 use crate::render::gpu::Shown;
 
 /// What colours the limb.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Field {
     #[default]
     Region,
@@ -17,37 +25,64 @@ pub enum Field {
     Displacement,
     SignalToNoise,
     Error,
+    Uncertainty,
 }
 
 impl Field {
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Region,
         Self::Strain,
         Self::Displacement,
         Self::SignalToNoise,
         Self::Error,
+        Self::Uncertainty,
     ];
 
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Self::Region => "Feasible region",
+            Self::Region => "Regions",
             Self::Strain => "Strain, inside",
             Self::Displacement => "Displacement",
             Self::SignalToNoise => "Signal to noise",
             Self::Error => "Localization error",
+            Self::Uncertainty => "GP variance",
         }
     }
 }
 
-/// A field ready to be shown: one value a vertex, and the legend that goes with it.
+/// Ranges of the colours that stay whatever the values are, in the legend's units.
+#[derive(Default)]
+pub(super) struct Ranges(BTreeMap<Field, (f64, f64)>);
+
+impl Ranges {
+    pub fn of(&self, field: Field) -> Option<(f64, f64)> {
+        self.0.get(&field).copied()
+    }
+
+    pub fn set(&mut self, field: Field, range: Option<(f64, f64)>) {
+        match range {
+            Some(range) => drop(self.0.insert(field, range)),
+            None => drop(self.0.remove(&field)),
+        }
+    }
+}
+
+/// What the regions were built from: the verdicts by their place in memory, and what is painted.
+type RegionKey = (Option<usize>, PaintKey);
+
+/// A field ready to be shown, and the legend that goes with it.
 pub(super) struct Built {
-    pub signature: String,
+    /// What the field and the regions were built from.
+    field: String,
+    region: RegionKey,
     pub shown: Arc<Vec<Shown>>,
+    /// The same for the unrolled part when that is shown, and what it was made from.
+    pub flat: Option<FlatShown>,
     pub legend: Option<Legend>,
 }
 
-#[derive(Clone)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Legend {
     pub title: &'static str,
     pub low: f64,
@@ -55,161 +90,236 @@ pub(super) struct Legend {
     pub map: ColorMap,
 }
 
+pub(super) struct FlatShown {
+    of: Arc<Vec<Shown>>,
+    pub shown: Arc<Vec<Shown>>,
+}
+
+/// A field that took a job to compute: what from, and its values a vertex of the part.
+pub(super) type Slow = Option<(String, Arc<Vec<f64>>)>;
+
 /// How large the largest displacement is drawn, as a share of the limb.
 const SHOWN_DEFORMATION: f64 = 0.06;
 
 impl Studio {
-    /// Builds what is shown a vertex, when anything it depends on has changed.
-    pub(super) fn build_field(&mut self) {
-        let signature = format!(
-            "{:?} {} {:?} {:?} {:?} {:?}",
-            self.view.field,
-            self.touching.version,
-            self.feasibility
-                .as_ref()
-                .filter(|f| !self.view.is_stroking() && f.0 == self.document.feasible_key())
-                .map(|f| Arc::as_ptr(&f.1)),
-            self.simulation.as_ref().map(|s| Arc::as_ptr(&s.simulated)),
-            self.design.as_ref().map(|d| Arc::as_ptr(&d.design)),
-            self.document.state.painted.as_ref().map(|m| {
-                use std::hash::{DefaultHasher, Hash, Hasher};
-                let mut hasher = DefaultHasher::new();
-                m.hash(&mut hasher);
-                hasher.finish()
-            }),
-        );
-        if self
-            .view
-            .built
-            .as_ref()
-            .is_some_and(|b| b.signature == signature)
-        {
-            return;
+    /// Builds what is shown a vertex, where anything it depends on has changed.
+    pub(super) fn build_field(&mut self, ctx: &Context) {
+        let field = self.field_key();
+        let region = self.region_key();
+        let last = self.view.built.take();
+        let same_field = last.as_ref().is_some_and(|b| b.field == field);
+        let same_region = last.as_ref().is_some_and(|b| b.region == region);
+        let mut built = match last {
+            Some(built) if same_field && same_region => built,
+            Some(mut built) if same_field => {
+                let shown: &mut Vec<Shown> = Arc::make_mut(&mut built.shown);
+                self.colour_regions(shown);
+                built.region = region;
+                built
+            }
+            _ => {
+                let (mut shown, legend) = self.field_shown(ctx, &field);
+                self.colour_regions(&mut shown);
+                Built {
+                    field,
+                    region,
+                    shown: Arc::new(shown),
+                    flat: None,
+                    legend,
+                }
+            }
+        };
+        if self.view.unrolled_shown {
+            let known = built.flat.as_ref();
+            if known.is_none_or(|k| !Arc::ptr_eq(&k.of, &built.shown)) {
+                let flat = self.view.unrolled.flat.vertices.iter().map(|&v| Shown {
+                    displacement: [0.0; 3],
+                    ..built.shown[v as usize]
+                });
+                built.flat = Some(FlatShown {
+                    shown: Arc::new(flat.collect()),
+                    of: Arc::clone(&built.shown),
+                });
+            }
+        } else {
+            built.flat = None;
         }
-        let (values, legend) = self.field_values();
-        let region = self.region_values();
-        let shown = (0..self.document.part.positions().len())
-            .map(|v| Shown {
-                displacement: self
-                    .touching
-                    .result()
-                    .map_or([0.0; 3], |t| t.displacement[v].as_vec3().to_array()),
-                value: values.as_ref().map_or(0.0, |x| x[v] as f32),
-                region: region[v] as f32,
-            })
-            .collect();
-        self.view.built = Some(Built {
-            signature,
-            shown: Arc::new(shown),
-            legend,
-        });
+        self.view.built = Some(built);
     }
 
-    /// The chosen field over the legend's range (0–1 a vertex).
-    fn field_values(&self) -> (Option<Vec<f64>>, Option<Legend>) {
+    fn field_key(&self) -> String {
+        let field = self.view.field;
+        let slow = self.slow.as_ref().map(|(_, values)| Arc::as_ptr(values));
+        format!(
+            "{field:?} {:?} {} {:?} {:?} {:?} {:?} {slow:?}",
+            self.view.ranges.of(field),
+            self.touching.version,
+            self.simulation.as_ref().map(|s| Arc::as_ptr(&s.simulated)),
+            self.design.as_ref().map(|d| Arc::as_ptr(&d.design)),
+            self.document.state.project.gauge.noise_microstrain,
+            (field == Field::Uncertainty).then(|| self.gauge_places()),
+        )
+    }
+
+    fn region_key(&self) -> RegionKey {
+        let verdicts = self.current_verdicts().map(|v| Arc::as_ptr(v) as usize);
+        (verdicts, self.document.paint_key())
+    }
+
+    /// The filters' verdicts while they hold and no stroke changes them.
+    fn current_verdicts(&self) -> Option<&Arc<crate::feasible::Feasibility>> {
+        let (key, verdicts) = self.feasibility.as_ref()?;
+        let holds = !self.view.is_stroking() && self.shown_feasible_key().as_ref() == Some(key);
+        holds.then_some(verdicts)
+    }
+
+    /// Positions (m) of the project's gauges.
+    pub(super) fn gauge_places(&self) -> Vec<DVec3> {
+        let sites = &self.document.state.project.selection.sites;
+        let places = sites
+            .iter()
+            .map(|s| DVec3::from_array(s.position_mm) / 1000.0);
+        places.collect()
+    }
+
+    /// The field over its range, a vertex, with the shape that is shown.
+    fn field_shown(&mut self, ctx: &Context, key: &str) -> (Vec<Shown>, Option<Legend>) {
+        let field = self.view.field;
+        let found = self.field_values(ctx, key).map(|(values, mut legend)| {
+            if let Some((low, high)) = self.view.ranges.of(field) {
+                (legend.low, legend.high) = (low, high);
+            }
+            (values, legend)
+        });
+        let moved = self.touching.result().map(|t| &t.displacement);
+        let shown = (0..self.document.part.positions().len()).map(|v| Shown {
+            displacement: moved.map_or([0.0; 3], |d| d[v].as_vec3().to_array()),
+            value: found.as_ref().map_or(0.0, |(values, legend)| {
+                ((values[v] - legend.low) / (legend.high - legend.low)) as f32
+            }),
+            region: [0; 4],
+        });
+        (shown.collect(), found.map(|f| f.1))
+    }
+
+    /// The chosen field a vertex of the part, in the units of its legend.
+    fn field_values(&mut self, ctx: &Context, key: &str) -> Option<(Vec<f64>, Legend)> {
+        let legend = |title, low, high, map| Legend {
+            title,
+            low,
+            high,
+            map,
+        };
         match self.view.field {
-            Field::Region => (None, None),
-            Field::Strain => self.touching.result().map_or((None, None), |t| {
-                let micro: Vec<f64> = t.strain.iter().map(|e| e * 1e6).collect();
+            Field::Region => None,
+            Field::Strain => {
+                let touched = self.touching.result()?;
+                let micro: Vec<f64> = touched.strain.iter().map(|e| e * 1e6).collect();
                 let top = robust_top(&micro);
-                let values = micro.iter().map(|e| 0.5 + 0.5 * e / top).collect();
-                (
-                    Some(values),
-                    Some(Legend {
-                        title: "strain (microstrain)",
-                        low: -top,
-                        high: top,
-                        map: ColorMap::BlueOrange,
-                    }),
-                )
-            }),
-            Field::Displacement => self.touching.result().map_or((None, None), |t| {
-                let top = round_up(t.largest * 1000.0);
-                let values = t
-                    .displacement
-                    .iter()
-                    .map(|d| d.length() * 1000.0 / top)
-                    .collect();
-                (
-                    Some(values),
-                    Some(Legend {
-                        title: "displacement (mm)",
-                        low: 0.0,
-                        high: top,
-                        map: ColorMap::Viridis,
-                    }),
-                )
-            }),
-            Field::Error => {
-                // On the mesh that was computed on, whose size has a limit, and carried from there.
-                let vertices = self.document.part.positions().len();
-                let simulated = (self.design.as_ref())
-                    .map(|d| (&d.design, &d.design.simulated))
-                    .filter(|(_, simulated)| simulated.carried.len() == vertices);
-                let Some((simulated, map)) =
-                    simulated.and_then(|(design, s)| Some((s, design.error_map(&s.mesh)?)))
-                else {
-                    return (None, None);
-                };
-                let errors: Vec<f64> = (simulated.carried.iter())
-                    .map(|&at| simulated.mesh.interpolate(&map, at))
-                    .collect();
-                let top = robust_top(&errors);
-                (
-                    Some(errors.iter().map(|e| e / top).collect()),
-                    Some(Legend {
-                        title: "error (mm)",
-                        low: 0.0,
-                        high: top,
-                        map: ColorMap::Viridis,
-                    }),
-                )
+                let map = ColorMap::BlueOrange;
+                Some((micro, legend("strain (microstrain)", -top, top, map)))
+            }
+            Field::Displacement => {
+                let touched = self.touching.result()?;
+                let top = round_up(touched.largest * 1000.0);
+                let mm = touched.displacement.iter().map(|d| d.length() * 1000.0);
+                let map = ColorMap::Viridis;
+                Some((mm.collect(), legend("displacement (mm)", 0.0, top, map)))
             }
             Field::SignalToNoise => {
                 let noise = self.document.state.project.gauge.noise_microstrain * 1e-6;
-                let Some(simulation) = self.simulation.as_ref().filter(|_| noise > 0.0) else {
-                    return (None, None);
-                };
-                let rms: Vec<f64> = simulation
-                    .simulated
-                    .dataset
-                    .sites
-                    .iter()
-                    .map(|s| s.rms_strain / noise)
-                    .collect();
+                let simulation = self.simulation.as_ref().filter(|_| noise > 0.0)?;
+                let sites = simulation.simulated.dataset.sites.iter();
+                let rms: Vec<f64> = sites.map(|s| s.rms_strain / noise).collect();
                 let ratio = self.carried_from_sites(&rms);
                 let top = robust_top(&ratio);
-                let values = ratio.iter().map(|r| r / top).collect();
-                (
-                    Some(values),
-                    Some(Legend {
-                        title: "signal to noise (rms)",
-                        low: 0.0,
-                        high: top,
-                        map: ColorMap::Viridis,
-                    }),
-                )
+                let map = ColorMap::Viridis;
+                Some((ratio, legend("signal to noise (rms)", 0.0, top, map)))
+            }
+            Field::Error => {
+                let errors = self.slow_field(ctx, key)?;
+                let top = robust_top(&errors);
+                let map = ColorMap::Viridis;
+                Some((errors.to_vec(), legend("error (mm)", 0.0, top, map)))
+            }
+            Field::Uncertainty => {
+                let variances = self.slow_field(ctx, key)?;
+                let map = ColorMap::Viridis;
+                let title = "variance left (1: nothing known)";
+                Some((variances.to_vec(), legend(title, 0.0, 1.0, map)))
             }
         }
     }
 
-    /// 1 where gauges may go: the filters' verdicts where they are known, else what was painted.
-    fn region_values(&self) -> Vec<f64> {
-        let current = self
-            .feasibility
-            .as_ref()
-            .filter(|f| !self.view.is_stroking() && f.0 == self.document.feasible_key());
-        if let Some((_, verdicts)) = current {
-            let passed: Vec<f64> = verdicts
+    /// A field that is computed in the background, once it is there.
+    fn slow_field(&mut self, ctx: &Context, key: &str) -> Option<Arc<Vec<f64>>> {
+        // What the values came from: the key without the values.
+        let asked = key.rsplit_once(' ').map_or(key, |k| k.0).to_owned();
+        if let Some((known, values)) = &self.slow
+            && *known == asked
+        {
+            return Some(Arc::clone(values));
+        }
+        let vertices = self.document.part.positions().len();
+        let design = Arc::clone(&self.design.as_ref()?.design);
+        let under_way =
+            (self.jobs.running.iter()).any(|r| r.task == Task::Field && r.job.key == asked);
+        // Until the new one is there the last of its kind stays.
+        let kind = |key: &str| key.split(' ').next().map(str::to_owned);
+        let last = (self.slow.as_ref())
+            .filter(|(known, values)| kind(known) == kind(&asked) && values.len() == vertices)
+            .map(|(_, values)| Arc::clone(values));
+        if under_way || design.simulated.carried.len() != vertices {
+            return last;
+        }
+        let uncertain = self.view.field == Field::Uncertainty;
+        let gauges = self.gauge_places();
+        self.jobs.start(ctx, Task::Field, asked, move |_| {
+            // On the mesh that was computed on, whose size has a limit, and carried from there.
+            let mesh = &design.simulated.mesh;
+            let map = if uncertain {
+                design.uncertainty_map(mesh, &gauges)
+            } else {
+                design.error_map(mesh)
+            };
+            let map = map.unwrap_or_else(|| vec![0.0; mesh.positions().len()]);
+            let carried = design.simulated.carried.iter();
+            let values = carried.map(|&at| mesh.interpolate(&map, at)).collect();
+            Ok(Finished::Field(values))
+        });
+        last
+    }
+
+    /// Writes the layers into what is shown.
+    fn colour_regions(&self, shown: &mut [Shown]) {
+        let shades = |weight: f64| (255.0 * weight.clamp(0.0, 1.0)) as u8;
+        let verdicts = self.current_verdicts().map(|verdicts| {
+            let passed = verdicts
                 .verdicts
                 .iter()
-                .map(|v| f64::from(u8::from(v.is_none())))
-                .collect();
-            return self.carried_from_sites(&passed);
-        }
-        match &self.document.state.painted {
-            Some(mask) => mask.iter().map(|&m| f64::from(u8::from(m))).collect(),
-            None => vec![0.0; self.document.part.positions().len()],
+                .map(|v| f64::from(u8::from(v.is_none())));
+            self.carried_from_sites(&passed.collect::<Vec<_>>())
+        });
+        let mask = |layer| self.document.layer(layer).map(|m| m.as_slice());
+        let painted = mask(Layer::Feasible);
+        let (touch, out) = (mask(Layer::Touch), mask(Layer::KeepOut));
+        let supports = self
+            .document
+            .state
+            .project
+            .supports(&self.document.state.masks);
+        let held = supports
+            .map(|s| held_freedoms(&self.document.part, &s))
+            .unwrap_or_default();
+        let set =
+            |mask: Option<&[bool]>, v: usize| if mask.is_some_and(|m| m[v]) { 255 } else { 0 };
+        for (v, shown) in shown.iter_mut().enumerate() {
+            let feasible = match &verdicts {
+                Some(passed) => shades(passed[v]),
+                None => set(painted, v),
+            };
+            let held = held.get(v).is_some_and(|h| h.0 != 0);
+            shown.region = [feasible, set(touch, v), u8::from(held) * 255, set(out, v)];
         }
     }
 
@@ -257,8 +367,8 @@ impl Studio {
             .collect()
     }
 
-    /// How much the deformation is exaggerated; nothing without a touch, nor while painting: the brush
-    /// works on the limb at rest.
+    /// How much the deformation is exaggerated; nothing without a touch, nor with other tools: they work
+    /// on the limb at rest.
     #[must_use]
     pub fn exaggeration(&self) -> Option<f64> {
         let touched = self

@@ -6,6 +6,7 @@ use super::form::{choice, count, number, percentage, rows};
 use super::{Stage, Studio, quality_name};
 use crate::budget::Quality;
 use crate::dataset::Signal;
+use crate::document::Layer;
 use crate::limb::BoxMm;
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
@@ -73,16 +74,16 @@ impl Studio {
     fn supports_form(&mut self, ui: &mut Ui) {
         let bounds = self.document.part.bounds();
         let bounds = [bounds.0, bounds.1].map(|p| (p * 1000.0).to_array());
-        let mask = self.document.state.painted.as_ref();
-        let painted = mask.is_some_and(|m| m.iter().any(|&set| set));
         let project = &mut self.document.state.project;
         rows(ui, "Material", |ui| material(ui, project));
-        let mut hold = false;
-        rows(ui, "Supports", |ui| {
-            hold = supports(ui, project, bounds, painted);
-        });
-        if hold {
-            self.document.hold_painted();
+        rows(ui, "Supports", |ui| supports(ui, project, bounds));
+        let paint = ui
+            .button("Paint a support")
+            .on_hover_text("Another support, on the vertices that you paint next");
+        if paint.clicked() {
+            self.document.add_painted_support();
+            self.view.layer = Layer::Support;
+            self.view.take(super::Tool::Paint);
         }
     }
 
@@ -214,8 +215,7 @@ fn material(ui: &mut Ui, project: &mut Project) {
     );
 }
 
-/// Whether what is painted is to be held.
-fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm, painted: bool) -> bool {
+fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm) {
     let mut removed = None;
     for (k, support) in project.supports.iter_mut().enumerate() {
         let number = k + 1;
@@ -269,13 +269,7 @@ fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm, painted: bool) ->
             normal: Axis::Z,
         });
     }
-    let pressed = ui
-        .add_enabled(painted, egui::Button::new("Hold what is painted"))
-        .on_hover_text("A support on the painted vertices; the painted region itself is free again")
-        .on_disabled_hover_text("Paint a region first (B)")
-        .clicked();
     ui.end_row();
-    pressed
 }
 
 fn regions_form(ui: &mut Ui, regions: &mut Vec<RegionKeys>, bounds: BoxMm) {

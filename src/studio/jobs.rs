@@ -20,6 +20,13 @@ pub enum Task {
     Design(Quality),
     Export,
     Open,
+    /// How gauges put by hand do, quickly and truly.
+    Estimate,
+    Judge,
+    /// A field that takes a while.
+    Field,
+    Measure,
+    Picture,
 }
 
 impl Task {
@@ -34,12 +41,25 @@ impl Task {
             Self::Filter => "Filter the sites".into(),
             Self::Export => "Export the report".into(),
             Self::Open => "Open".into(),
+            Self::Estimate => "Estimate the error".into(),
+            Self::Judge => "Judge the gauges".into(),
+            Self::Field => "Compute the field".into(),
+            Self::Measure => "Measure".into(),
+            Self::Picture => "Save the picture".into(),
         }
+    }
+
+    /// Whether it writes a file, and is not ended on the way.
+    fn writes(self) -> bool {
+        matches!(self, Self::Export | Self::Picture)
     }
 
     /// Whether it is over before anybody needs to hear of it.
     fn is_quiet(self) -> bool {
-        matches!(self, Self::Filter | Self::Open)
+        matches!(
+            self,
+            Self::Filter | Self::Open | Self::Estimate | Self::Field | Self::Measure
+        )
     }
 }
 
@@ -130,7 +150,7 @@ impl Jobs {
         let (gone, kept): (Vec<Running>, Vec<Running>) = self
             .running
             .drain(..)
-            .partition(|r| which(r.task) && r.task != Task::Export);
+            .partition(|r| which(r.task) && !r.task.writes());
         self.running = kept;
         for r in gone {
             r.job.cancel();

@@ -171,6 +171,9 @@ impl Studio {
         self.feasibility = None;
         self.design = None;
         self.picked.clear();
+        self.shown_kept.clear();
+        self.by_hand = super::gauges::ByHand::default();
+        self.slow = None;
         for said in opened.said {
             self.tell(said);
         }

@@ -3,23 +3,32 @@
 use std::sync::Arc;
 
 use eframe::egui_wgpu;
-use egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, pos2, vec2};
-use glam::DVec3;
+use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
+use glam::{DVec3, Mat4};
 
 use super::fields::Field;
-use super::viewport::Tool;
-use super::{Studio, theme};
+use super::tools::{Gesture, Tool};
+use super::viewport::Pane;
+use super::{Studio, labels, theme};
 use crate::colormap::ColorMap;
-use crate::render::gpu::{Frame3d, Uniforms};
+use crate::project::ChosenSite;
+use crate::render::gpu::{Frame3d, Slot, Uniforms};
+
+/// How much a wall covers what is behind it when it can be seen through.
+const GHOST: f32 = 0.22;
+/// Of a gauge's number (points).
+const MARK: f32 = 9.0;
 
 impl Studio {
     /// The limb with all that belongs to it, for a picture.
     pub(super) fn scene(&mut self, ui: &Ui, rect: Rect, transparent: bool) {
         self.view.rect = rect;
-        self.build_field();
+        self.build_field(ui.ctx());
         self.paint_limb(ui, rect, transparent);
         let painter = ui.painter_at(rect);
-        self.paint_gauges(&painter);
+        self.paint_touch(&painter, Pane::Limb);
+        self.paint_kept(&painter, Pane::Limb);
+        self.paint_gauges(&painter, Pane::Limb);
         self.paint_legend(&painter, rect);
     }
 
@@ -30,110 +39,259 @@ impl Studio {
         let camera = &self.view.camera;
         let eye = camera.toward_eye().as_vec3();
         let target = camera.target.as_vec3();
-        let flag = |on: bool| f32::from(u8::from(on));
-        let region = self.view.field == Field::Region
-            && (self.feasibility.is_some() || self.document.state.painted.is_some());
+        let section = self.view.section.map_or([0.0, 0.0, 0.0, -1.0], |section| {
+            let (n, d) = section.plane();
+            let w = (n.dot(camera.target) - d) / camera.distance;
+            [n.x as f32, n.y as f32, n.z as f32, w as f32]
+        });
         let uniforms = Uniforms {
             matrix: camera.matrix(rect.aspect_ratio()).to_cols_array_2d(),
             eye: [eye.x, eye.y, eye.z, 0.0],
             target_scale: [target.x, target.y, target.z, (1.0 / camera.distance) as f32],
-            deform: [
-                self.exaggeration().unwrap_or(0.0) as f32,
-                flag(built.legend.is_some()),
-                flag(region),
+            deform: self.deform_flags(self.exaggeration().unwrap_or(0.0) as f32),
+            section,
+            look: [
+                if self.view.see_through { GHOST } else { 1.0 },
+                0.0,
+                0.0,
                 0.0,
             ],
         };
-        let pixels = rect.size() * ui.pixels_per_point();
         let back = if transparent {
             Color32::TRANSPARENT
         } else {
             theme::backdrop(ui.ctx().theme())
         };
         let frame = Frame3d {
-            mesh: Arc::clone(&self.document.part),
+            slot: Slot::Limb,
+            solid: Arc::clone(&self.view.solid),
             shown: Arc::clone(&built.shown),
             map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
             uniforms,
             background: back.to_array().map(|c| f64::from(c) / 255.0),
-            size: [
-                pixels.x.round().max(1.0) as u32,
-                pixels.y.round().max(1.0) as u32,
-            ],
+            size: pixels(ui, rect),
         };
         ui.painter()
             .add(egui_wgpu::Callback::new_paint_callback(rect, frame));
     }
 
-    pub(super) fn paint_touch(&self, painter: &egui::Painter) {
+    /// Exaggeration, and whether a field or the regions colour the limb.
+    fn deform_flags(&self, exaggeration: f32) -> [f32; 4] {
+        let flag = |on: bool| f32::from(u8::from(on));
+        let field = self.view.built.as_ref().is_some_and(|b| b.legend.is_some());
+        let region = self.view.field == Field::Region;
+        [exaggeration, flag(field), flag(region), 0.0]
+    }
+
+    pub(super) fn paint_unrolled(&self, ui: &Ui, rect: Rect) {
+        let Some((built, flat)) =
+            (self.view.built.as_ref()).and_then(|built| Some((built, built.flat.as_ref()?)))
+        else {
+            return;
+        };
+        let (middle, per_point) = self.view.flat_view();
+        // Half the view is high as one unit; outer walls lie nearer to the eye.
+        let unit = (per_point * f64::from(rect.height()) / 2.0).max(f64::MIN_POSITIVE);
+        let depth =
+            0.25 * unit / (self.view.unrolled.flat.upper - self.view.unrolled.flat.lower).length();
+        let matrix = Mat4::from_cols_array_2d(&[
+            [1.0 / rect.aspect_ratio(), 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, -depth as f32, 0.0],
+            [0.0, 0.0, 0.5, 1.0],
+        ]);
+        let uniforms = Uniforms {
+            matrix: matrix.to_cols_array_2d(),
+            // So far above that it looks straight down everywhere.
+            eye: [0.0, 0.0, 1e4, 0.0],
+            target_scale: [middle.x as f32, middle.y as f32, 0.0, (1.0 / unit) as f32],
+            deform: self.deform_flags(0.0),
+            section: [0.0, 0.0, 0.0, -1.0],
+            look: [1.0, 0.0, 0.0, 0.0],
+        };
+        let back = theme::backdrop(ui.ctx().theme());
+        let frame = Frame3d {
+            slot: Slot::Unrolled,
+            solid: Arc::clone(&self.view.unrolled.solid),
+            shown: Arc::clone(&flat.shown),
+            map: built.legend.as_ref().map_or(ColorMap::Viridis, |l| l.map),
+            uniforms,
+            background: back.to_array().map(|c| f64::from(c) / 255.0),
+            size: pixels(ui, rect),
+        };
+        ui.painter()
+            .add(egui_wgpu::Callback::new_paint_callback(rect, frame));
+    }
+
+    pub(super) fn paint_touch(&self, painter: &Painter, pane: Pane) {
         let shown = self.view.tool == Tool::Touch;
         let Some(touched) = self.touching.result().filter(|_| shown) else {
             return;
         };
         let touch = touched.touch;
-        let length = 0.16 * self.view.camera.distance;
-        let (Some(tip), Some(tail)) = (
-            self.view.place(touch.position),
-            self.view.place(touch.position + touch.normal * length),
-        ) else {
+        let text = format!("{} N · {:.2} mm", touch.force, touched.largest * 1000.0);
+        let Some(tip) = self.view.place_in(pane, touch.position) else {
             return;
         };
-        painter.arrow(tail, tip - tail, Stroke::new(3.0, theme::TOUCHED));
-        let text = format!("{} N · {:.2} mm", touch.force, touched.largest * 1000.0);
-        label(painter, tail, Align2::CENTER_BOTTOM, &text, theme::TOUCHED);
-    }
-
-    pub(super) fn paint_gauges(&self, painter: &egui::Painter) {
-        let toward = self.view.camera.toward_eye();
-        let deformation = self.exaggeration().unwrap_or(0.0);
-        for (number, site) in (1..).zip(self.gauges()) {
-            let position = DVec3::from_array(site.position_mm) / 1000.0;
-            let direction = DVec3::from_array(site.direction);
-            let (at, _) = self.view.index.nearest(position);
-            let normal = self.document.part.normal(at);
-            let shift =
-                self.touching
-                    .result()
-                    .filter(|_| deformation > 0.0)
-                    .map_or(DVec3::ZERO, |t| {
-                        let tri = self.document.part.triangles()[at.triangle as usize];
-                        (0..3)
-                            .map(|k| t.displacement[tri[k] as usize] * at.barycentric[k])
-                            .sum::<DVec3>()
-                            * deformation
-                    });
-            let centre = position + shift;
-            let half = self.document.state.project.gauge.grid_length_mm * 0.5e-3;
-            let ends = [-half, half].map(|h| self.view.place(centre + direction * h));
-            if let ([Some(a), Some(b)], Some(middle)) = (ends, self.view.place(centre)) {
-                marker(painter, (a, b), middle, number, normal.dot(toward) > 0.0);
-            }
+        if pane == Pane::Unrolled {
+            painter.circle(tip, 6.0, theme::TOUCHED, Stroke::new(1.5, Color32::WHITE));
+            return;
+        }
+        let length = 0.16 * self.view.camera.distance;
+        if let Some(tail) = self.view.place(touch.position + touch.normal * length) {
+            painter.arrow(tail, tip - tail, Stroke::new(3.0, theme::TOUCHED));
+            label(painter, tail, Align2::CENTER_BOTTOM, &text, theme::TOUCHED);
         }
     }
 
-    pub(super) fn paint_brush(&self, painter: &egui::Painter) {
-        let Some(centre) = self.view.hover else {
+    /// How far a point of the limb is drawn from where it is at rest.
+    fn shift_at(&self, position: DVec3) -> DVec3 {
+        let deformation = self.exaggeration().unwrap_or(0.0);
+        let Some(touched) = self.touching.result().filter(|_| deformation > 0.0) else {
+            return DVec3::ZERO;
+        };
+        let (at, _) = self.view.index.nearest(position);
+        let corners = self.document.part.triangles()[at.triangle as usize];
+        let moved = |(v, w): (u32, f64)| touched.displacement[v as usize] * w;
+        let shift: DVec3 = corners.into_iter().zip(at.barycentric).map(moved).sum();
+        shift * deformation
+    }
+
+    pub(super) fn paint_gauges(&self, painter: &Painter, pane: Pane) {
+        let sites = self.gauges();
+        let rect = self.view.rect_of(pane);
+        let marks: Vec<Mark> = (0..)
+            .zip(&sites)
+            .filter_map(|(number, site)| self.mark(pane, number, site))
+            .filter(|mark| rect.expand(20.0).contains(mark.at))
+            .collect();
+        let anchors: Vec<Pos2> = marks.iter().map(|m| m.at).collect();
+        for (mark, place) in marks.iter().zip(labels::spread(&anchors, MARK + 0.5)) {
+            mark.paint(painter, place);
+        }
+    }
+
+    /// How a gauge is drawn in a view.
+    fn mark(&self, pane: Pane, number: usize, site: &ChosenSite) -> Option<Mark> {
+        let position = DVec3::from_array(site.position_mm) / 1000.0;
+        let direction = DVec3::from_array(site.direction);
+        let half = self.document.state.project.gauge.grid_length_mm * 0.5e-3;
+        let (ends, at, near) = match pane {
+            Pane::Unrolled => {
+                let at = self.view.flat_place(position)?;
+                let turned = self.view.unrolled.flat.turn(position, direction);
+                let along = (turned * half / self.view.flat_view().1).as_vec2();
+                let along = vec2(along.x, -along.y);
+                ([at - along, at + along], at, true)
+            }
+            Pane::Limb => {
+                if self.view.is_cut(position) {
+                    return None;
+                }
+                let (on, _) = self.view.index.nearest(position);
+                let normal = self.document.part.normal(on);
+                let centre = position + self.shift_at(position);
+                let ends = [-half, half].map(|h| self.view.place(centre + direction * h));
+                let [Some(a), Some(b)] = ends else {
+                    return None;
+                };
+                let near = normal.dot(self.view.camera.toward_eye()) > 0.0;
+                ([a, b], self.view.place(centre)?, near)
+            }
+        };
+        Some(Mark {
+            number: number + 1,
+            ends,
+            at,
+            near,
+            picked: self.picked.contains(&number),
+            pinned: self.is_pinned(site),
+        })
+    }
+
+    pub(super) fn paint_brush(&self, painter: &Painter, pane: Pane) {
+        let Some(at) = self.view.hover else {
             return;
         };
-        let (at, _) = self.view.index.nearest(centre);
-        let normal = self.document.part.normal(at);
-        let frame = crate::elasticity::observe::tangent_frame(normal);
-        let ring: Vec<Pos2> = (0..=48)
-            .filter_map(|k| {
-                let a = f64::from(k) / 48.0 * std::f64::consts::TAU;
-                let offset = (frame.x_axis * a.cos() + frame.y_axis * a.sin()) * self.view.brush;
-                self.view.place(centre + offset)
-            })
-            .collect();
+        let centre = self.document.part.point(at);
+        if !self.view.tool.is_brush() {
+            // What is pointed at in one view shows in the other.
+            let other = !self
+                .view
+                .rect_of(pane)
+                .contains(painter.ctx().pointer_latest_pos().unwrap_or_default());
+            if let Some(at) = self.view.place_in(pane, centre).filter(|_| other) {
+                painter.circle_stroke(at, 5.0, Stroke::new(1.5, Color32::WHITE));
+            }
+            return;
+        }
+        let mut centres = vec![centre];
+        if let Some(axis) = self.view.mirror {
+            let (image, _) = self
+                .view
+                .index
+                .nearest(self.document.mirrored(centre, axis));
+            centres.push(self.document.part.point(image));
+        }
         let colour = if self.view.tool == Tool::Paint {
             Color32::WHITE
         } else {
             theme::ERROR
         };
-        painter.line(ring, Stroke::new(1.5, colour));
+        for (k, centre) in centres.into_iter().enumerate() {
+            let ring = self.ring(pane, centre);
+            let alpha = if k == 0 { 1.0 } else { 0.5 };
+            painter.line(ring, Stroke::new(1.5, colour.gamma_multiply(alpha)));
+        }
     }
 
-    pub(super) fn paint_legend(&self, painter: &egui::Painter, rect: Rect) {
+    /// The brush around a point of the part, as a line in a view.
+    fn ring(&self, pane: Pane, centre: DVec3) -> Vec<Pos2> {
+        let (at, _) = self.view.index.nearest(centre);
+        let normal = self.document.part.normal(at);
+        let frame = crate::elasticity::observe::tangent_frame(normal);
+        let around = (0..=48).map(|k| {
+            let a = f64::from(k) / 48.0 * std::f64::consts::TAU;
+            (frame.x_axis * a.cos() + frame.y_axis * a.sin()) * self.view.brush
+        });
+        match pane {
+            Pane::Limb => around
+                .filter_map(|off| self.view.place(centre + off))
+                .collect(),
+            Pane::Unrolled => {
+                let Some(middle) = self.view.flat_place(centre) else {
+                    return Vec::new();
+                };
+                let per_point = self.view.flat_view().1;
+                let turn = |off| {
+                    let flat = self.view.unrolled.flat.turn(centre, off) / per_point;
+                    middle + vec2(flat.x as f32, -flat.y as f32)
+                };
+                around.map(turn).collect()
+            }
+        }
+    }
+
+    /// What a box or lasso has gone around so far.
+    pub(super) fn paint_outline(&self, painter: &Painter, pane: Pane) {
+        let Gesture::Outline(own, outline) = &self.view.gesture else {
+            return;
+        };
+        if *own != pane {
+            return;
+        }
+        let stroke = Stroke::new(1.5, Color32::WHITE);
+        if let (Tool::Box, [a, b]) = (self.view.tool, &outline[..]) {
+            let rect = Rect::from_two_pos(*a, *b);
+            painter.rect_filled(rect, 0.0, Color32::from_white_alpha(18));
+            painter.rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Middle);
+        } else {
+            let closed = outline.iter().chain(outline.first()).copied();
+            painter.line(closed.collect(), stroke);
+        }
+    }
+
+    pub(super) fn paint_legend(&self, painter: &Painter, rect: Rect) {
         let mut bottom = rect.bottom() - 16.0;
         if let Some(scale) = self.exaggeration() {
             let text = format!("Deformation × {scale}");
@@ -190,30 +348,23 @@ impl Studio {
         );
     }
 
-    pub(super) fn paint_hint(&self, painter: &egui::Painter, rect: Rect) {
+    pub(super) fn paint_hint(&self, painter: &Painter, rect: Rect) {
         let text = match self.view.tool {
             _ if self.touching.is_waiting() => "Computing the touch …",
-            Tool::Touch
-                if matches!(self.view.field, Field::Strain | Field::Displacement)
-                    && self.touching.result().is_none() =>
-            {
-                "Click on the limb to press it and see this field"
-            }
-            Tool::Touch if self.view.field == Field::SignalToNoise && self.simulation.is_none() => {
-                "Press “Simulate” to see the signal at each site"
-            }
-            Tool::Touch if self.view.field == Field::Error && self.design.is_none() => {
-                "Press “Select gauges” to see where touches are found well and where not"
-            }
-            Tool::Touch => {
-                "Click: press the limb   ·   drag: look around   ·   Shift-drag: shift   ·   wheel: zoom"
-            }
             Tool::Paint => {
-                "Drag over the limb: paint where gauges may go   ·   Ctrl: erase   ·   right-drag: look around"
+                "Drag over the limb: paint   ·   Ctrl: erase   ·   [ ]: radius   ·   right-drag: look around"
             }
             Tool::Erase => {
-                "Drag over the limb: keep gauges away   ·   Ctrl: paint   ·   right-drag: look around"
+                "Drag over the limb: erase   ·   Ctrl: paint   ·   [ ]: radius   ·   right-drag: look around"
             }
+            Tool::Box | Tool::Lasso => {
+                "Drag around what is to be painted   ·   Ctrl: erase   ·   walls behind only when see-through"
+            }
+            Tool::Gauges => {
+                "Click a gauge to pick it, drag it to another place   ·   Shift: pick several   ·   right-drag: look around"
+            }
+            Tool::Measure => "Click two points of the limb",
+            Tool::Touch => self.field_hint(),
         };
         label(
             painter,
@@ -223,40 +374,91 @@ impl Studio {
             Color32::from_gray(215),
         );
     }
+
+    /// What is missing before a field can be seen, or how to look around.
+    fn field_hint(&self) -> &'static str {
+        match self.view.field {
+            Field::Strain | Field::Displacement if self.touching.result().is_none() => {
+                "Click on the limb to press it and see this field"
+            }
+            Field::SignalToNoise if self.simulation.is_none() => {
+                "Press “Simulate” to see the signal at each site"
+            }
+            Field::Error if self.design.is_none() => {
+                "Press “Select gauges” to see where touches are found well and where not"
+            }
+            Field::Uncertainty if self.design.is_none() => {
+                "Press “Select gauges” to see what the gauges leave uncertain"
+            }
+            Field::Error | Field::Uncertainty
+                if self.view.built.as_ref().is_none_or(|b| b.legend.is_none()) =>
+            {
+                "Computing the field …"
+            }
+            _ => {
+                "Click: press the limb   ·   drag: look around   ·   Shift-drag: shift   ·   wheel: zoom"
+            }
+        }
+    }
 }
 
-/// A numbered gauge: a bar along its direction; hollow on the far wall.
-fn marker(painter: &egui::Painter, (a, b): (Pos2, Pos2), middle: Pos2, number: usize, near: bool) {
-    let along = (b - a).normalized();
-    let half = ((b - a).length() / 2.0).max(12.0);
-    let alpha = if near { 1.0 } else { 0.55 };
-    let colour = theme::CHOSEN.gamma_multiply(alpha);
-    painter.line_segment(
-        [middle - along * half, middle + along * half],
-        Stroke::new(4.0, colour),
-    );
-    if near {
-        painter.circle_filled(middle, 9.0, colour);
-    } else {
-        painter.circle(
-            middle,
-            9.0,
-            Color32::from_rgb(40, 44, 50),
-            Stroke::new(1.5, colour),
+/// The size of a view in pixels.
+fn pixels(ui: &Ui, rect: Rect) -> [u32; 2] {
+    let size = rect.size() * ui.pixels_per_point();
+    [size.x, size.y].map(|s| s.round().max(1.0) as u32)
+}
+
+/// A gauge as it is drawn: a bar along its direction with its number; hollow on the far wall.
+struct Mark {
+    number: usize,
+    ends: [Pos2; 2],
+    at: Pos2,
+    near: bool,
+    picked: bool,
+    pinned: bool,
+}
+
+impl Mark {
+    /// With its number at `place`, and a line to it where that is elsewhere.
+    fn paint(&self, painter: &Painter, place: Pos2) {
+        let [a, b] = self.ends;
+        let along = (b - a).normalized();
+        let half = ((b - a).length() / 2.0).max(12.0);
+        let alpha = if self.near { 1.0 } else { 0.55 };
+        let colour = theme::CHOSEN.gamma_multiply(alpha);
+        painter.line_segment(
+            [self.at - along * half, self.at + along * half],
+            Stroke::new(4.0, colour),
+        );
+        if place != self.at {
+            painter.line_segment([self.at, place], Stroke::new(1.0, colour));
+            painter.circle_filled(self.at, 2.5, colour);
+        }
+        if self.picked {
+            painter.circle_stroke(place, MARK + 3.5, Stroke::new(2.0, Color32::WHITE));
+        }
+        if self.near {
+            painter.circle_filled(place, MARK, colour);
+        } else {
+            let fill = Color32::from_rgb(40, 44, 50);
+            painter.circle(place, MARK, fill, Stroke::new(1.5, colour));
+        }
+        if self.pinned {
+            painter.circle_filled(place + vec2(7.0, -7.0), 3.5, Color32::WHITE);
+        }
+        let ink = if self.near { Color32::WHITE } else { colour };
+        painter.text(
+            place,
+            Align2::CENTER_CENTER,
+            self.number,
+            FontId::proportional(11.0),
+            ink,
         );
     }
-    let ink = if near { Color32::WHITE } else { colour };
-    painter.text(
-        middle,
-        Align2::CENTER_CENTER,
-        number,
-        FontId::proportional(11.0),
-        ink,
-    );
 }
 
 /// Text on a dark plate, readable over anything.
-fn label(painter: &egui::Painter, at: Pos2, align: Align2, text: &str, colour: Color32) {
+pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str, colour: Color32) {
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(12.5), colour);
     let rect = align.anchor_size(at, galley.size());
     painter.rect_filled(

@@ -1,12 +1,18 @@
 //! Pictures of the limb at any size, without a window.
 
+use std::path::PathBuf;
+
 use anyhow::Context as _;
-use egui::{Context, Pos2, RawInput, Rect, vec2};
+use eframe::egui_wgpu::RenderState;
+use egui::{Context, FullOutput, Pos2, RawInput, Rect, vec2};
 
 use super::Studio;
+use super::drive::Finished;
+use super::jobs::Task;
 use crate::cli::render::{RenderArgs, ViewArg};
 use crate::io::atomic;
 use crate::io::project_file::LoadedProject;
+use crate::job::Stop;
 use crate::render::camera::Preset;
 use crate::render::offscreen;
 
@@ -59,21 +65,69 @@ pub fn png(loaded: LoadedProject, picture: &Picture) -> Result<Vec<u8>, String> 
     }
     let [width, height] = picture.size.map(|s| s as f32);
     fit(&mut studio, width / height);
-    let points = vec2(width, height) * (POINTS / height.max(1.0));
-    let mut input = RawInput {
-        screen_rect: Some(Rect::from_min_size(Pos2::ZERO, points)),
-        ..RawInput::default()
-    };
-    for viewport in input.viewports.values_mut() {
-        viewport.native_pixels_per_point = Some(height / POINTS);
-    }
-    let output = ctx.run_ui(input, |ui| {
-        let rect = ui.ctx().content_rect();
-        studio.scene(ui, rect, picture.transparent);
-    });
-    let mut pixels = offscreen::draw(&state, &ctx, output, picture.size)?;
+    let output = studio.drawn(&ctx, picture);
+    finish(&state, &ctx, output, picture.size)
+}
+
+/// What was drawn, as a PNG file.
+fn finish(
+    state: &RenderState,
+    ctx: &Context,
+    output: FullOutput,
+    size: [u32; 2],
+) -> Result<Vec<u8>, String> {
+    let mut pixels = offscreen::draw(state, ctx, output, size)?;
     straighten(&mut pixels);
-    encode(pixels, picture.size)
+    encode(pixels, size)
+}
+
+impl Studio {
+    /// The 3D view as it would be in a window of a picture's size, on a context of its own.
+    fn drawn(&mut self, ctx: &Context, picture: &Picture) -> FullOutput {
+        let [width, height] = picture.size.map(|s| s as f32);
+        let points = vec2(width, height) * (POINTS / height.max(1.0));
+        let mut input = RawInput {
+            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, points)),
+            ..RawInput::default()
+        };
+        for viewport in input.viewports.values_mut() {
+            viewport.native_pixels_per_point = Some(height / POINTS);
+        }
+        ctx.run_ui(input, |ui| {
+            let rect = ui.ctx().content_rect();
+            self.scene(ui, rect, picture.transparent);
+        })
+    }
+
+    /// Writes what the 3D view shows into a PNG file.
+    pub(super) fn save_picture(
+        &mut self,
+        ctx: &Context,
+        path: PathBuf,
+        size: [u32; 2],
+        transparent: bool,
+    ) {
+        let picture = Picture {
+            size,
+            view: None,
+            transparent,
+        };
+        // On a context and an adapter of its own: the window goes on meanwhile.
+        let own = Context::default();
+        own.set_theme(ctx.theme());
+        let rect = self.view.rect;
+        let mut output = self.drawn(&own, &picture);
+        self.view.rect = rect;
+        self.jobs
+            .start(ctx, Task::Picture, String::new(), move |_| {
+                let state = offscreen::adapter().inspect_err(|_| output.textures_delta.clear());
+                let state = state.map_err(Stop::Failed)?;
+                crate::render::gpu::install(&state);
+                let png = finish(&state, &own, output, size).map_err(Stop::Failed)?;
+                atomic::write(&path, &png).map_err(|e| Stop::Failed(e.to_string()))?;
+                Ok(Finished::Pictured(path))
+            });
+    }
 }
 
 /// Comes as near as shows all of the limb.

@@ -1,28 +1,31 @@
 //! The lower side: error against number of gauges, with failed gauges, the chosen sites, the reduction.
 
-use egui::{RichText, Role, Ui, WidgetInfo};
-use egui_plot::{Corner, HLine, Legend, Line, Plot, PlotPoints, Points};
+use egui::{Color32, Response, RichText, Role, Ui, WidgetInfo};
+use egui_plot::{Corner, HLine, Legend, Line, LineStyle, Plot, PlotPoints, PlotUi, Points};
 
 use super::Studio;
-use crate::io::artifacts::{as_chosen, range, signal_to_noise, signal_unit};
+use crate::evaluation::BASELINE;
+use crate::io::artifacts::{range, signal_to_noise, signal_unit};
 use crate::io::report::{curve, failure_curve, failure_name, failure_title};
 
-/// What is shown below the view.
+/// What is shown below the views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Tab {
     #[default]
     Error,
     Failures,
-    Sites,
+    Compare,
+    Gauges,
     Reduction,
     Jobs,
 }
 
 impl Tab {
-    const ALL: [Self; 5] = [
+    const ALL: [Self; 6] = [
         Self::Error,
         Self::Failures,
-        Self::Sites,
+        Self::Compare,
+        Self::Gauges,
         Self::Reduction,
         Self::Jobs,
     ];
@@ -31,19 +34,62 @@ impl Tab {
         match self {
             Self::Error => "Error",
             Self::Failures => "Failures",
-            Self::Sites => "Sites",
+            Self::Compare => "Compare",
+            Self::Gauges => "Gauge table",
             Self::Reduction => "Reduction",
             Self::Jobs => "Jobs",
         }
     }
+
+    /// Whether it shows what a design found.
+    fn is_of_design(self) -> bool {
+        matches!(self, Self::Error | Self::Failures | Self::Reduction)
+    }
 }
 
-const COLOURS: [egui::Color32; 4] = [
-    egui::Color32::from_rgb(86, 180, 233),
-    egui::Color32::from_rgb(230, 159, 0),
-    egui::Color32::from_rgb(0, 158, 115),
-    egui::Color32::from_rgb(204, 121, 167),
+const COLOURS: [Color32; 4] = [
+    Color32::from_rgb(86, 180, 233),
+    Color32::from_rgb(230, 159, 0),
+    Color32::from_rgb(0, 158, 115),
+    Color32::from_rgb(204, 121, 167),
 ];
+
+/// A plot that stays as it is: nothing is dragged or zoomed in it.
+fn plot(
+    id: impl std::hash::Hash + std::fmt::Debug,
+    height: f32,
+    corner: Corner,
+    x: &str,
+    y: &str,
+) -> Plot<'static> {
+    Plot::new(id)
+        .height(height)
+        .legend(Legend::default().position(corner))
+        .x_axis_label(x.to_owned())
+        .x_grid_spacer(egui_plot::uniform_grid_spacer(|_| [10.0, 5.0, 1.0]))
+        .y_axis_label(y.to_owned())
+        .include_y(0.0)
+        .allow_scroll(false)
+        .allow_drag(false)
+        .allow_zoom(false)
+}
+
+/// One curve with its points.
+fn draw(plot: &mut PlotUi<'_>, name: &str, points: &[(f64, f64)], colour: Color32, dashed: bool) {
+    let points: Vec<[f64; 2]> = points.iter().map(|&(x, y)| [x, y]).collect();
+    let mut line = Line::new(name, PlotPoints::from(points.clone()))
+        .color(colour)
+        .width(2.0);
+    if dashed {
+        line = line.style(LineStyle::dashed_dense());
+    }
+    plot.line(line);
+    plot.points(Points::new(name, points).color(colour).radius(3.0));
+}
+
+fn figure(response: &Response, label: &str) {
+    response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, label));
+}
 
 impl Studio {
     pub(super) fn results(&mut self, ui: &mut Ui) {
@@ -54,13 +100,14 @@ impl Studio {
             for tab in Tab::ALL {
                 ui.selectable_value(&mut self.results, tab, tab.name());
             }
-            let stale = self.design_holds() == Some(false);
-            if stale && !matches!(self.results, Tab::Sites | Tab::Jobs) {
+            if self.design_holds() == Some(false) && self.results.is_of_design() {
                 ui.colored_label(super::theme::STALE, "of settings that have changed since");
             }
+            self.by_hand_label(ui);
         });
         ui.separator();
-        if self.design.is_none() && !matches!(self.results, Tab::Sites | Tab::Jobs) {
+        let nothing = self.design.is_none() && self.compared().next().is_none();
+        if nothing && self.results.is_of_design() {
             empty(
                 ui,
                 "Nothing selected yet. Press “Select gauges” to choose the sites and judge them on unseen touches",
@@ -70,114 +117,128 @@ impl Studio {
         match self.results {
             Tab::Error => self.error_plots(ui),
             Tab::Failures => self.failure_plots(ui),
-            Tab::Sites => self.site_table(ui),
+            Tab::Gauges => self.gauge_table(ui),
+            Tab::Compare => self.compare_tab(ui),
             Tab::Reduction => self.reduction_plot(ui),
             Tab::Jobs => self.jobs_tab(ui),
         }
     }
 
-    fn error_plots(&self, ui: &mut Ui) {
-        let Some(result) = &self.design else {
+    /// What gauges that were moved by hand do to the error.
+    fn by_hand_label(&self, ui: &mut Ui) {
+        let sites = &self.document.state.project.selection.sites;
+        if self.by_hand.sites != *sites || sites.is_empty() || self.as_designed() {
             return;
+        }
+        let exact = self.by_hand.exact.as_ref();
+        let row = exact.and_then(|e| e.rows.iter().find(|r| r.region == "all touches"));
+        let text = match (row, self.by_hand.estimate) {
+            (Some(row), _) => format!("by hand: {:.2} mm on unseen touches", row.error_mm),
+            (None, Some(mm)) => format!("by hand: about {mm:.2} mm, judging …"),
+            (None, None) => "by hand: …".into(),
         };
-        let design = &result.design;
-        let mut regions: Vec<&str> = Vec::new();
-        for row in &design.evaluation.rows {
-            if !regions.contains(&row.region.as_str()) {
-                regions.push(&row.region);
+        let chosen = self.design.as_ref().and_then(|d| {
+            let (lead, count) = (d.design.lead.name(), d.design.chosen().len());
+            let mut rows = d.design.evaluation.rows.iter();
+            rows.find(|r| r.selector == lead && r.sensors == count && r.region == "all touches")
+        });
+        let beside = chosen.map_or(String::new(), |r| {
+            format!("; as selected {:.2} mm", r.error_mm)
+        });
+        ui.separator();
+        ui.label(RichText::new(text + &beside).color(super::theme::TOUCHED));
+    }
+
+    fn regions(&self) -> Vec<String> {
+        let designed = self.design.iter().flat_map(|d| &d.design.evaluation.rows);
+        let kept = self.compared().flat_map(|(_, k)| &k.errors);
+        let mut regions: Vec<String> = Vec::new();
+        for region in designed.map(|r| &r.region).chain(kept.map(|e| &e.region)) {
+            if !regions.contains(region) {
+                regions.push(region.clone());
             }
         }
+        regions
+    }
+
+    fn error_plots(&self, ui: &mut Ui) {
+        let regions = self.regions();
         let height = ui.available_height() - 26.0;
         ui.columns(regions.len().max(1), |columns| {
             for (ui, region) in columns.iter_mut().zip(&regions) {
-                let baseline = design
-                    .evaluation
-                    .rows
-                    .iter()
-                    .find(|r| r.selector == "all-candidates" && r.region == *region);
-                ui.label(RichText::new(*region).strong());
-                let plot = Plot::new(("error", region))
-                    .height(height)
-                    .legend(Legend::default().position(Corner::RightTop))
-                    .x_axis_label("gauges")
-                    .x_grid_spacer(egui_plot::uniform_grid_spacer(|_| [10.0, 5.0, 1.0]))
-                    .y_axis_label("mean error (mm)")
-                    .include_y(0.0)
-                    .allow_scroll(false)
-                    .allow_drag(false)
-                    .allow_zoom(false)
-                    .show(ui, |plot| {
-                        for (k, selection) in design.selections.iter().enumerate() {
-                            let points: Vec<[f64; 2]> = curve(design, selection.selector, region)
-                                .into_iter()
-                                .map(|(x, y)| [x, y])
-                                .collect();
-                            let title = selection.selector.title();
-                            plot.line(
-                                Line::new(title, PlotPoints::from(points.clone()))
-                                    .color(COLOURS[k % COLOURS.len()])
-                                    .width(2.0),
-                            );
-                            plot.points(
-                                Points::new(title, points)
-                                    .color(COLOURS[k % COLOURS.len()])
-                                    .radius(3.0),
-                            );
-                        }
-                        if let Some(row) = baseline {
-                            plot.hline(
-                                HLine::new(format!("all {} candidates", row.sensors), row.error_mm)
-                                    .color(egui::Color32::GRAY),
-                            );
-                        }
-                    });
+                ui.label(RichText::new(region).strong());
+                let id = ("error", region);
+                let shown = plot(id, height, Corner::RightTop, "gauges", "mean error (mm)")
+                    .show(ui, |plot| self.error_curves(plot, region));
                 let label = format!("Error against number of gauges, {region}");
-                plot.response
-                    .widget_info(|| WidgetInfo::labeled(Role::Figure, true, &label));
+                figure(&shown.response, &label);
             }
         });
     }
 
+    fn error_curves(&self, plot: &mut PlotUi<'_>, region: &str) {
+        if let Some(design) = self.design.as_ref().map(|d| &d.design) {
+            for (k, selection) in design.selections.iter().enumerate() {
+                let points = curve(design, selection.selector, region);
+                let colour = COLOURS[k % COLOURS.len()];
+                draw(plot, selection.selector.title(), &points, colour, false);
+            }
+            let mut rows = design.evaluation.rows.iter();
+            if let Some(row) = rows.find(|r| r.selector == BASELINE && r.region == *region) {
+                let name = format!("all {} candidates", row.sensors);
+                plot.hline(HLine::new(name, row.error_mm).color(Color32::GRAY));
+            }
+        }
+        for (k, kept) in self.compared() {
+            let rows = kept.errors.iter().filter(|e| e.region == *region);
+            let points: Vec<(f64, f64)> = rows.map(|e| (e.sensors as f64, e.mean_mm)).collect();
+            draw(plot, &kept.name, &points, super::kept::colour(k), true);
+        }
+    }
+
     fn failure_plots(&self, ui: &mut Ui) {
-        let Some(result) = &self.design else {
-            return;
-        };
-        let failures = &result.design.evaluation.failures;
         let height = ui.available_height() - 26.0;
         ui.columns(2, |columns| {
             for (ui, retrained) in columns.iter_mut().zip([false, true]) {
                 let title = failure_title(retrained);
                 ui.label(RichText::new(title).strong());
-                let plot = Plot::new(("failures", retrained))
-                    .height(height)
-                    .legend(Legend::default().position(Corner::RightBottom))
-                    .x_axis_label("failed gauges")
-                    .x_grid_spacer(egui_plot::uniform_grid_spacer(|_| [10.0, 5.0, 1.0]))
-                    .y_axis_label("mean error (mm)")
-                    .include_y(0.0)
-                    .allow_scroll(false)
-                    .allow_drag(false)
-                    .allow_zoom(false)
-                    .show(ui, |plot| {
-                        for (k, set) in failures.iter().enumerate() {
-                            let points: Vec<[f64; 2]> = failure_curve(set, retrained)
-                                .into_iter()
-                                .map(|(x, y)| [x, y])
-                                .collect();
-                            let colour = COLOURS[k % COLOURS.len()];
-                            let name = failure_name(set);
-                            plot.line(
-                                Line::new(name, PlotPoints::from(points.clone()))
-                                    .color(colour)
-                                    .width(2.0),
-                            );
-                            plot.points(Points::new(name, points).color(colour).radius(3.0));
-                        }
-                    });
-                plot.response
-                    .widget_info(|| WidgetInfo::labeled(Role::Figure, true, title));
+                let id = ("failures", retrained);
+                let shown = plot(
+                    id,
+                    height,
+                    Corner::RightBottom,
+                    "failed gauges",
+                    "mean error (mm)",
+                )
+                .show(ui, |plot| self.failure_curves(plot, retrained));
+                figure(&shown.response, title);
             }
         });
+    }
+
+    fn failure_curves(&self, plot: &mut PlotUi<'_>, retrained: bool) {
+        let sets = self
+            .design
+            .iter()
+            .flat_map(|d| &d.design.evaluation.failures);
+        for (k, set) in sets.enumerate() {
+            let colour = COLOURS[k % COLOURS.len()];
+            draw(
+                plot,
+                failure_name(set),
+                &failure_curve(set, retrained),
+                colour,
+                false,
+            );
+        }
+        for (k, kept) in self.compared() {
+            let rows = kept
+                .failures
+                .iter()
+                .filter(|f| f.retrained == retrained || f.failed == 0);
+            let points: Vec<(f64, f64)> = rows.map(|f| (f.failed as f64, f.mean_mm)).collect();
+            draw(plot, &kept.name, &points, super::kept::colour(k), true);
+        }
     }
 
     fn reduction_plot(&self, ui: &mut Ui) {
@@ -185,59 +246,47 @@ impl Studio {
             return;
         };
         let candidates = &result.design.reduced.candidates;
-        let points: Vec<[f64; 2]> = candidates
-            .curve
-            .iter()
-            .map(|p| [p.sites as f64, 100.0 * p.unexplained])
+        let points: Vec<(f64, f64)> = (candidates.curve.iter())
+            .map(|p| (p.sites as f64, 100.0 * p.unexplained))
             .collect();
-        let plot = Plot::new("reduction")
-            .height(ui.available_height() - 4.0)
+        let height = ui.available_height() - 4.0;
+        let target = 100.0 * result.inputs.project.candidates.unexplained;
+        let shown = Plot::new("reduction")
+            .height(height)
             .legend(Legend::default().position(Corner::RightTop))
             .x_axis_label("sites kept")
             .y_axis_label("held-out variance unexplained (%)")
             .include_y(0.0)
             .allow_scroll(false)
             .show(ui, |plot| {
-                plot.line(
-                    Line::new("PCA-QR", PlotPoints::from(points.clone()))
-                        .color(COLOURS[0])
-                        .width(2.0),
-                );
-                plot.points(Points::new("PCA-QR", points).color(COLOURS[0]).radius(3.0));
-                let target = 100.0 * result.inputs.project.candidates.unexplained;
-                plot.hline(HLine::new("asked for", target).color(egui::Color32::GRAY));
+                draw(plot, "PCA-QR", &points, COLOURS[0], false);
+                plot.hline(HLine::new("asked for", target).color(Color32::GRAY));
             });
-        plot.response.widget_info(|| {
-            WidgetInfo::labeled(
-                Role::Figure,
-                true,
-                "Unexplained variance against sites kept",
-            )
-        });
+        figure(&shown.response, "Unexplained variance against sites kept");
     }
 
-    /// The project's sites; with a design also what they will report.
-    fn site_table(&self, ui: &mut Ui) {
-        let sites = &self.document.state.project.selection.sites;
+    /// The project's gauges; with a design also what they will report.
+    fn gauge_table(&mut self, ui: &mut Ui) {
+        let sites = self.document.state.project.selection.sites.clone();
         if sites.is_empty() {
-            empty(ui, "No gauges chosen yet");
+            empty(
+                ui,
+                "No gauges chosen yet. Press “Select gauges”, or put some with the tool “Gauges” and Ctrl-click",
+            );
             return;
         }
-        // Only where the table shows the very sites that the design chose.
-        let design = self
-            .design
-            .as_ref()
-            .filter(|d| as_chosen(&d.design.simulated.dataset.sites, d.design.chosen()) == *sites);
+        let designed = self.as_designed();
+        let mut asked = None;
         egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
-            egui::Grid::new("sites")
-                .num_columns(10)
+            egui::Grid::new("gauges")
+                .num_columns(11)
                 .striped(true)
                 .spacing([18.0, 3.0])
                 .show(ui, |ui| {
-                    for title in ["Gauge", "x (mm)", "y (mm)", "z (mm)", "Direction"] {
+                    for title in ["Gauge", "Pinned", "x (mm)", "y (mm)", "z (mm)", "Direction"] {
                         ui.strong(title);
                     }
-                    if let Some(d) = design {
+                    if let Some(d) = self.design.as_ref().filter(|_| designed) {
                         let unit = signal_unit(d.design.simulated.dataset.signal);
                         ui.strong(format!("Signal, from – to ({unit})"));
                         ui.strong("Rms strain (µε)");
@@ -245,34 +294,94 @@ impl Studio {
                     }
                     ui.end_row();
                     for (k, site) in sites.iter().enumerate() {
-                        ui.monospace(format!("{:>3}", k + 1));
-                        for x in site.position_mm {
-                            ui.monospace(format!("{x:8.2}"));
+                        if let Some(what) = self.gauge_row(ui, k, site) {
+                            asked = Some((k, what));
                         }
-                        let [x, y, z] = site.direction;
-                        ui.monospace(format!("{x:+.3} {y:+.3} {z:+.3}"));
-                        if let Some(d) = design {
-                            let dataset = &d.design.simulated.dataset;
-                            let index = d.design.chosen()[k];
-                            let (low, high) = range(dataset, index);
-                            let rms = dataset.sites[index].rms_strain;
-                            let decimals = if signal_unit(dataset.signal) == "mm" {
-                                3
-                            } else {
-                                0
-                            };
-                            ui.monospace(format!("{low:8.decimals$} – {high:8.decimals$}"));
-                            ui.monospace(format!("{:7.0}", rms * 1e6));
-                            ui.monospace(
-                                signal_to_noise(&d.inputs, rms)
-                                    .map_or("–".into(), |r| format!("{r:7.0}")),
-                            );
+                        if designed {
+                            self.report_cells(ui, k);
                         }
                         ui.end_row();
                     }
                 });
         });
+        match asked {
+            None => {}
+            Some((k, Row::Pick)) => {
+                self.picked = vec![k];
+                self.view.take(super::Tool::Gauges);
+            }
+            Some((k, Row::Add)) => self.picked.push(k),
+            Some((k, Row::Frame)) => {
+                self.picked = vec![k];
+                let ctx = ui.ctx().clone();
+                self.execute(&ctx, super::Command::FramePicked);
+            }
+            Some((k, Row::Pin)) => {
+                self.picked = vec![k];
+                self.pin_picked();
+            }
+        }
     }
+
+    /// Number, pin, place and direction of a gauge, and what was pressed.
+    fn gauge_row(&self, ui: &mut Ui, k: usize, site: &crate::project::ChosenSite) -> Option<Row> {
+        let picked = self.picked.contains(&k);
+        let number = RichText::new(format!("{:>3}", k + 1)).monospace();
+        let button = ui
+            .add(egui::Button::selectable(picked, number))
+            .on_hover_text("Pick it; double-click comes near to it")
+            .accessible_name(format!("Gauge {}", k + 1));
+        let shift = ui.input(|i| i.modifiers.shift);
+        let mut asked = match (button.double_clicked(), button.clicked()) {
+            (true, _) => Some(Row::Frame),
+            (_, true) if shift && !picked => Some(Row::Add),
+            (_, true) => Some(Row::Pick),
+            _ => None,
+        };
+        let mut pinned = self.is_pinned(site);
+        let tick = ui
+            .checkbox(&mut pinned, "")
+            .on_hover_text("Selections must have a gauge here");
+        if tick
+            .accessible_name(format!("Pin gauge {}", k + 1))
+            .changed()
+        {
+            asked = Some(Row::Pin);
+        }
+        for x in site.position_mm {
+            ui.monospace(format!("{x:8.2}"));
+        }
+        let [x, y, z] = site.direction;
+        ui.monospace(format!("{x:+.3} {y:+.3} {z:+.3}"));
+        asked
+    }
+
+    /// What a gauge of the design will report.
+    fn report_cells(&self, ui: &mut Ui, k: usize) {
+        let Some(d) = &self.design else {
+            return;
+        };
+        let dataset = &d.design.simulated.dataset;
+        let index = d.design.chosen()[k];
+        let (low, high) = range(dataset, index);
+        let rms = dataset.sites[index].rms_strain;
+        let decimals = if signal_unit(dataset.signal) == "mm" {
+            3
+        } else {
+            0
+        };
+        ui.monospace(format!("{low:8.decimals$} – {high:8.decimals$}"));
+        ui.monospace(format!("{:7.0}", rms * 1e6));
+        ui.monospace(signal_to_noise(&d.inputs, rms).map_or("–".into(), |r| format!("{r:7.0}")));
+    }
+}
+
+/// What was pressed in a row of the table.
+enum Row {
+    Pick,
+    Add,
+    Frame,
+    Pin,
 }
 
 pub(super) fn empty(ui: &mut Ui, text: &str) {

@@ -1,68 +1,140 @@
-//! The 3D view: the limb, its fields, the gauges on it, and the tools that work on it.
+//! The views: the limb in space and, beside it, laid flat; what is where in them.
 
 use std::sync::Arc;
 
-use egui::{PointerButton, Pos2, Rect, Role, Sense, Ui, WidgetInfo, vec2};
+use egui::{Pos2, Rect, Role, Sense, Ui, Vec2, WidgetInfo, vec2};
 use glam::{DVec2, DVec3};
 
-use super::fields::{Built, Field};
-use super::{Command, Studio};
-use crate::document::{Brush, Document};
-use crate::mesh::SurfacePoint;
+use super::Studio;
+use super::fields::{Built, Field, Ranges};
+use super::measure::Measure;
+use super::tools::{Gesture, Tool};
+use crate::document::{Document, Layer};
+use crate::mesh::flatten::Flat;
 use crate::mesh::locate::SurfaceIndex;
-use crate::render::camera::{Camera, Preset};
+use crate::mesh::unroll::Axis;
+use crate::mesh::{SurfacePoint, TriMesh};
+use crate::render::camera::Camera;
+use crate::render::gpu::{Solid, Vertex};
 
-/// What the pointer does on the limb.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tool {
-    #[default]
-    Touch,
-    Paint,
-    Erase,
+/// One of the views.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pane {
+    Limb,
+    Unrolled,
 }
 
-impl Tool {
-    pub const ALL: [Self; 3] = [Self::Touch, Self::Paint, Self::Erase];
+/// What is cut away so that the inside can be seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Section {
+    pub axis: Axis,
+    /// Along the axis (m).
+    pub offset: f64,
+    /// Cut away what lies below instead of what lies above.
+    pub flip: bool,
+}
+
+impl Section {
+    /// Normal n and d: what has n·p > d is cut away.
+    #[must_use]
+    pub fn plane(&self) -> (DVec3, f64) {
+        let sign = if self.flip { -1.0 } else { 1.0 };
+        (self.axis.direction() * sign, self.offset * sign)
+    }
 
     #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Touch => "Touch",
-            Self::Paint => "Paint",
-            Self::Erase => "Erase",
-        }
+    pub fn cuts(&self, p: DVec3) -> bool {
+        let (normal, d) = self.plane();
+        normal.dot(p) > d
     }
 }
 
-/// State of the view; none of it belongs to the project.
+/// The part laid flat, as it is drawn and picked.
+pub(super) struct Unrolled {
+    pub flat: Flat,
+    pub solid: Arc<Solid>,
+    axis: Axis,
+}
+
+impl Unrolled {
+    fn of(mesh: &TriMesh, axis: Axis) -> Self {
+        let flat = Flat::of(mesh, axis);
+        let up = [0.0, 0.0, 1.0];
+        let vertices = flat.positions.iter().map(|p| Vertex {
+            position: p.as_vec3().to_array(),
+            normal: up,
+        });
+        let solid = Solid {
+            vertices: vertices.collect(),
+            triangles: flat.triangles.clone(),
+        };
+        Self {
+            solid: Arc::new(solid),
+            flat,
+            axis,
+        }
+    }
+
+    fn centre(&self) -> DVec2 {
+        (self.flat.lower + self.flat.upper) / 2.0
+    }
+}
+
+/// State of the views; none of it belongs to the project.
 pub struct Viewport {
     pub camera: Camera,
     pub tool: Tool,
+    pub layer: Layer,
     pub field: Field,
     /// Brush radius (m).
     pub brush: f64,
+    /// Strokes are repeated on the other side of the part's middle across this axis.
+    pub mirror: Option<Axis>,
+    pub section: Option<Section>,
+    pub see_through: bool,
+    pub unrolled_shown: bool,
+    pub(super) ranges: Ranges,
     pub(super) index: Arc<SurfaceIndex>,
+    pub(super) solid: Arc<Solid>,
+    pub(super) unrolled: Unrolled,
+    /// Middle of the flat view (m) and metres a point of the window.
+    flat_view: (DVec2, f64),
     pub(super) built: Option<Built>,
-    last_dab: Option<Pos2>,
-    pub(super) hover: Option<DVec3>,
+    pub(super) gesture: Gesture,
+    /// The point of the part under the pointer, in whichever view.
+    pub(super) hover: Option<SurfacePoint>,
+    pub(super) measure: Measure,
     /// Where the view was last shown, in points: what a place on it means.
     pub rect: Rect,
+    pub flat_rect: Rect,
 }
 
 impl Viewport {
     #[must_use]
     pub fn new(document: &Document) -> Self {
         let (lower, upper) = document.part.bounds();
+        let unrolled = Unrolled::of(&document.part, document.state.project.part.axis);
         Self {
             camera: Camera::framing(lower, upper),
             tool: Tool::Touch,
+            layer: Layer::Feasible,
             field: Field::Region,
             brush: 6e-3_f64.min((upper - lower).length() / 8.0),
+            mirror: None,
+            section: None,
+            see_through: false,
+            unrolled_shown: false,
+            ranges: Ranges::default(),
             index: Arc::new(SurfaceIndex::new(&document.part)),
+            solid: Arc::new(Solid::of(&document.part)),
+            flat_view: (unrolled.centre(), 0.0),
+            unrolled,
             built: None,
-            last_dab: None,
+            gesture: Gesture::None,
             hover: None,
+            measure: Measure::default(),
             rect: Rect::NOTHING,
+            flat_rect: Rect::NOTHING,
         }
     }
 
@@ -71,20 +143,38 @@ impl Viewport {
         let framed = Camera::framing(lower, upper);
         self.camera.target = framed.target;
         self.camera.distance = framed.distance;
+        self.flat_view.1 = 0.0;
+    }
+
+    /// Comes near to some points (m).
+    pub fn frame_points(&mut self, points: &[DVec3], document: &Document) {
+        let Some(&first) = points.first() else {
+            return;
+        };
+        let (part_lower, part_upper) = document.part.bounds();
+        let around = DVec3::splat(0.08 * (part_upper - part_lower).length());
+        let lower = points.iter().fold(first, |l, &p| l.min(p)) - around;
+        let upper = points.iter().fold(first, |u, &p| u.max(p)) + around;
+        let framed = Camera::framing(lower, upper);
+        self.camera.target = framed.target;
+        self.camera.distance = framed.distance;
+        let flat = points.iter().map(|&p| self.unrolled.flat.place(p));
+        let sum: DVec2 = flat.sum();
+        self.flat_view.0 = sum / points.len() as f64;
     }
 
     /// Takes a tool in hand; a brush shows what it paints.
     pub fn take(&mut self, tool: Tool) {
         self.tool = tool;
-        self.last_dab = None;
-        if tool != Tool::Touch {
+        self.gesture = Gesture::None;
+        if tool.paints() {
             self.field = Field::Region;
         }
     }
 
     #[must_use]
     pub fn is_stroking(&self) -> bool {
-        self.last_dab.is_some()
+        matches!(self.gesture, Gesture::Stroke(..))
     }
 
     /// Where a point of the limb appears in the window, in points.
@@ -94,188 +184,162 @@ impl Viewport {
         Some(self.rect.lerp_inside(vec2(at.x as f32, at.y as f32)))
     }
 
-    /// The point of the limb under a place of the window.
-    fn pick(&self, at: Pos2) -> Option<SurfacePoint> {
-        self.pick_on(&self.index, at)
+    /// Where a point of the limb appears in the unrolled view, in points.
+    #[must_use]
+    pub fn flat_place(&self, p: DVec3) -> Option<Pos2> {
+        let (middle, per_point) = self.flat_view;
+        if per_point == 0.0 {
+            return None;
+        }
+        let off = (self.unrolled.flat.place(p) - middle) / per_point;
+        Some(self.flat_rect.center() + vec2(off.x as f32, -off.y as f32))
     }
 
-    fn pick_on(&self, index: &SurfaceIndex, at: Pos2) -> Option<SurfacePoint> {
+    pub(super) fn place_in(&self, pane: Pane, p: DVec3) -> Option<Pos2> {
+        match pane {
+            Pane::Limb => self.place(p).filter(|_| !self.is_cut(p)),
+            Pane::Unrolled => self.flat_place(p),
+        }
+    }
+
+    pub(super) fn rect_of(&self, pane: Pane) -> Rect {
+        match pane {
+            Pane::Limb => self.rect,
+            Pane::Unrolled => self.flat_rect,
+        }
+    }
+
+    /// Whether the section cuts a point away.
+    pub(super) fn is_cut(&self, p: DVec3) -> bool {
+        self.section.is_some_and(|section| section.cuts(p))
+    }
+
+    /// The point of the limb under a place of the window.
+    pub(super) fn pick(&self, pane: Pane, at: Pos2) -> Option<SurfacePoint> {
+        match pane {
+            Pane::Limb => self.pick_on(&self.index, at),
+            Pane::Unrolled => {
+                let off = at - self.flat_rect.center();
+                let off = DVec2::new(f64::from(off.x), -f64::from(off.y)) * self.flat_view.1;
+                self.unrolled.flat.lift(self.flat_view.0 + off)
+            }
+        }
+    }
+
+    pub(super) fn pick_on(&self, index: &SurfaceIndex, at: Pos2) -> Option<SurfacePoint> {
         let u = (at - self.rect.min) / self.rect.size();
         let place = DVec2::new(f64::from(u.x), f64::from(u.y));
         let (origin, direction) = self.camera.ray(place, self.rect.aspect_ratio());
-        index.ray(origin, direction).map(|hit| hit.0)
+        let Some(section) = self.section else {
+            return index.ray(origin, direction).map(|hit| hit.0);
+        };
+        let (normal, d) = section.plane();
+        let (height, rise) = (normal.dot(origin) - d, normal.dot(direction));
+        if height > 0.0 {
+            // From what is cut away into what is left, if ever.
+            let enter = origin + direction * (height / -rise);
+            return (rise < 0.0)
+                .then(|| index.ray(enter, direction))
+                .flatten()
+                .map(|hit| hit.0);
+        }
+        let (hit, distance) = index.ray(origin, direction)?;
+        (rise <= 0.0 || distance < -height / rise).then_some(hit)
+    }
+
+    fn show_all_flat(&mut self) {
+        let size = self.unrolled.flat.upper - self.unrolled.flat.lower;
+        let room = self.flat_rect.size().max(Vec2::splat(1.0));
+        let fit = (size.x / f64::from(room.x)).max(size.y / f64::from(room.y));
+        self.flat_view = (self.unrolled.centre(), fit / 0.9);
+    }
+
+    pub(super) fn pan_flat(&mut self, drag: Vec2) {
+        let drag = DVec2::new(f64::from(drag.x), -f64::from(drag.y));
+        self.flat_view.0 -= drag * self.flat_view.1;
+    }
+
+    /// Zooms around a place of the window, which stays where it is.
+    pub(super) fn zoom_flat(&mut self, at: Pos2, factor: f64) {
+        let off = at - self.flat_rect.center();
+        let off = DVec2::new(f64::from(off.x), -f64::from(off.y));
+        let before = self.flat_view.1;
+        self.flat_view.1 = (before * factor).clamp(1e-9, 1e3);
+        self.flat_view.0 += off * (before - self.flat_view.1);
+    }
+
+    /// Middle (m) and metres a point of the unrolled view.
+    pub(super) fn flat_view(&self) -> (DVec2, f64) {
+        self.flat_view
     }
 }
 
 impl Studio {
     pub(super) fn viewport(&mut self, ui: &mut Ui) {
         self.toolbar(ui);
-        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
-        response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, "3D view"));
-        self.view.rect = rect;
-        self.navigate(ui, &response);
-        self.use_tool(ui, &response);
-        self.build_field();
-        self.paint_limb(ui, rect, false);
-        let painter = ui.painter_at(rect);
-        self.paint_touch(&painter);
-        self.paint_gauges(&painter);
-        self.paint_brush(&painter);
-        self.paint_legend(&painter, rect);
-        self.paint_hint(&painter, rect);
-    }
-
-    fn toolbar(&mut self, ui: &mut Ui) {
-        egui::Frame::new()
-            .inner_margin(egui::Margin::symmetric(8, 5))
-            .show(ui, |ui| {
-                ui.horizontal_wrapped(|ui| {
-                    for tool in Tool::ALL {
-                        let chosen = self.view.tool == tool;
-                        let button = ui.add(egui::Button::selectable(chosen, tool.name()));
-                        if button
-                            .on_hover_text(Command::Tool(tool).tooltip())
-                            .clicked()
-                        {
-                            self.view.take(tool);
-                        }
-                    }
-                    if self.view.tool != Tool::Touch {
-                        let mut mm = self.view.brush * 1000.0;
-                        ui.add(
-                            egui::DragValue::new(&mut mm)
-                                .range(0.5..=500.0)
-                                .speed(0.1)
-                                .fixed_decimals(1)
-                                .prefix("Radius ")
-                                .suffix(" mm"),
-                        )
-                        .on_hover_text("Radius of the brush over the surface");
-                        self.view.brush = mm / 1000.0;
-                    }
-                    ui.separator();
-                    egui::ComboBox::new("field", "")
-                        .selected_text(self.view.field.name())
-                        .width(128.0)
-                        .show_ui(ui, |ui| {
-                            for field in Field::ALL {
-                                ui.selectable_value(&mut self.view.field, field, field.name());
-                            }
-                        })
-                        .response
-                        .on_hover_text("What colours the limb")
-                        .accessible_name("Field");
-                    ui.separator();
-                    for preset in Preset::ALL {
-                        if ui
-                            .button(preset.name())
-                            .on_hover_text(Command::Look(preset).tooltip())
-                            .clicked()
-                        {
-                            self.view.camera.look_from(preset);
-                        }
-                    }
-                    if ui
-                        .button("Frame")
-                        .on_hover_text(Command::Frame.tooltip())
-                        .clicked()
-                    {
-                        self.view.frame(&self.document);
-                    }
-                });
-            });
-    }
-
-    /// Orbit with the right button (or the left one beside the limb and with the touch tool), pan with
-    /// the middle one or with Shift, zoom with the wheel.
-    fn navigate(&mut self, ui: &Ui, response: &egui::Response) {
-        let drag = response.drag_delta();
-        let drag = DVec2::new(f64::from(drag.x), f64::from(drag.y));
-        let shift = ui.input(|i| i.modifiers.shift);
-        let left = response.dragged_by(PointerButton::Primary);
-        let turning = response.dragged_by(PointerButton::Secondary)
-            || left && (self.view.tool == Tool::Touch || !self.view.is_stroking());
-        if response.dragged_by(PointerButton::Middle) || turning && shift {
-            self.view
-                .camera
-                .pan(drag, f64::from(self.view.rect.height()));
-        } else if turning {
-            self.view.camera.orbit(drag);
-        }
-        if response.hovered() {
-            let wheel = ui.input(|i| i.smooth_scroll_delta().y + 400.0 * (i.zoom_delta() - 1.0));
-            if wheel != 0.0 {
-                self.view.camera.zoom((-0.0022 * f64::from(wheel)).exp());
-            }
-        }
-    }
-
-    fn use_tool(&mut self, ui: &Ui, response: &egui::Response) {
         self.view.hover = None;
-        let brush = match self.view.tool {
-            Tool::Touch => {
-                if response.clicked() {
-                    self.press(ui, response.interact_pointer_pos());
-                }
-                return;
-            }
-            // Control turns the brush around, as elsewhere.
-            Tool::Paint if !ui.input(|i| i.modifiers.ctrl) => Brush::Paint,
-            Tool::Erase if ui.input(|i| i.modifiers.ctrl) => Brush::Paint,
-            Tool::Paint | Tool::Erase => Brush::Erase,
+        let axis = self.document.state.project.part.axis;
+        if self.view.unrolled.axis != axis {
+            self.view.unrolled = Unrolled::of(&self.document.part, axis);
+            self.view.flat_view.1 = 0.0;
+            self.view.built = None;
+        }
+        let all = ui.available_rect_before_wrap();
+        let beside = if self.view.unrolled_shown { 0.42 } else { 0.0 };
+        let split = all.right() - beside * all.width();
+        let limb = Rect::from_min_max(all.min, Pos2::new(split, all.bottom()));
+        let shown = self.pane(ui, Pane::Limb, limb);
+        let mut panes = vec![(Pane::Limb, shown)];
+        if self.view.unrolled_shown {
+            let flat = Rect::from_min_max(Pos2::new(split + 1.0, all.top()), all.max);
+            let shown = self.pane(ui, Pane::Unrolled, flat);
+            panes.push((Pane::Unrolled, shown));
+        }
+        ui.advance_cursor_after_rect(all);
+        self.build_field(ui.ctx());
+        // Drawn after all that happened in either: what is hovered in one shows in the other.
+        for (pane, rect) in panes {
+            self.draw(ui, pane, rect);
+        }
+    }
+
+    /// Takes in what the pointer does in a view.
+    fn pane(&mut self, ui: &mut Ui, pane: Pane, rect: Rect) -> Rect {
+        let name = match pane {
+            Pane::Limb => "3D view",
+            Pane::Unrolled => "Unrolled view",
         };
-        if let Some(at) = response.hover_pos() {
-            self.view.hover = self.view.pick(at).map(|p| self.document.part.point(p));
-        }
-        let began = ui.input(|i| i.pointer.primary_pressed()) && response.contains_pointer();
-        let down = ui.input(|i| i.pointer.primary_down());
-        match response.interact_pointer_pos().or(response.hover_pos()) {
-            Some(at) if began && self.view.pick(at).is_some() => self.stroke(brush, at),
-            Some(at) if down && self.view.is_stroking() => self.stroke(brush, at),
-            _ => {}
-        }
-        if !down && self.view.last_dab.take().is_some() {
-            self.document.settle();
-        }
-    }
-
-    fn press(&mut self, ui: &Ui, at: Option<Pos2>) {
-        match at.and_then(|at| self.pick_shown(at)) {
-            Some(place) => {
-                self.touching.apply(ui.ctx(), &self.document, place);
-                if !matches!(self.view.field, Field::Strain | Field::Displacement) {
-                    self.view.field = Field::Strain;
+        let response = ui.interact(rect, ui.scope_id().with(name), Sense::click_and_drag());
+        response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, name));
+        match pane {
+            Pane::Limb => self.view.rect = rect,
+            Pane::Unrolled => {
+                self.view.flat_rect = rect;
+                if self.view.flat_view.1 == 0.0 {
+                    self.view.show_all_flat();
                 }
             }
-            None => self.touching.clear(),
         }
+        self.navigate(ui, &response, pane);
+        self.use_tool(ui, &response, pane);
+        rect
     }
 
-    /// The point of the limb under a place of the window, on the shape that is shown there.
-    fn pick_shown(&self, at: Pos2) -> Option<SurfacePoint> {
-        let (Some(scale), Some(touched)) = (self.exaggeration(), self.touching.result()) else {
-            return self.view.pick(at);
-        };
-        let part = &self.document.part;
-        let moved = part.positions().iter().zip(&touched.displacement);
-        let index = SurfaceIndex::of(
-            moved.map(|(p, u)| *p + *u * scale).collect(),
-            part.triangles(),
-        );
-        self.view.pick_on(&index, at)
-    }
-
-    /// Dabs along the way from the last pointer sample, so that a fast stroke has no gaps.
-    fn stroke(&mut self, brush: Brush, to: Pos2) {
-        const STEP: f32 = 6.0;
-        let from = self.view.last_dab.unwrap_or(to);
-        let steps = ((to - from).length() / STEP).ceil().clamp(1.0, 64.0) as usize;
-        for k in 1..=steps {
-            let at = from.lerp(to, k as f32 / steps as f32);
-            if let Some(place) = self.view.pick(at) {
-                self.document.dab(brush, place, self.view.brush);
-            }
+    fn draw(&mut self, ui: &Ui, pane: Pane, rect: Rect) {
+        match pane {
+            Pane::Limb => self.paint_limb(ui, rect, false),
+            Pane::Unrolled => self.paint_unrolled(ui, rect),
         }
-        self.view.last_dab = Some(to);
+        let painter = ui.painter_at(rect);
+        self.paint_touch(&painter, pane);
+        self.paint_kept(&painter, pane);
+        self.paint_gauges(&painter, pane);
+        self.paint_measure(&painter, pane);
+        self.paint_brush(&painter, pane);
+        self.paint_outline(&painter, pane);
+        if pane == Pane::Limb {
+            self.paint_legend(&painter, rect);
+            self.paint_hint(&painter, rect);
+        }
     }
 }

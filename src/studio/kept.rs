@@ -1,0 +1,276 @@
+//! Selections that are kept: named, shown beside each other, taken again.
+
+use std::collections::BTreeSet;
+
+use egui::{Color32, RichText, TextEdit, Ui};
+use egui::{Painter, Stroke, vec2};
+use glam::DVec3;
+
+use super::gauges::BY_HAND;
+use super::viewport::Pane;
+use super::{Command, Studio, quality_name};
+use crate::evaluation::Evaluation;
+use crate::placement::SelectorKind;
+use crate::project::{Kept, KeptError, KeptFailure};
+
+/// Colours of kept selections, apart from each other for colour-blind eyes and from the selectors' own
+/// (M. Okabe and K. Ito, 2008; P. Tol, 2021).
+const COLOURS: [Color32; 6] = [
+    Color32::from_rgb(240, 228, 66),
+    Color32::from_rgb(170, 68, 153),
+    Color32::from_rgb(136, 204, 238),
+    Color32::from_rgb(153, 153, 51),
+    Color32::from_rgb(204, 102, 119),
+    Color32::from_rgb(187, 187, 187),
+];
+
+pub(super) fn colour(k: usize) -> Color32 {
+    COLOURS[k % COLOURS.len()]
+}
+
+/// A selector's name as read by people.
+fn title(selector: &str) -> &str {
+    let kind = SelectorKind::ALL.into_iter().find(|k| k.name() == selector);
+    kind.map_or("By hand", SelectorKind::title)
+}
+
+impl Studio {
+    /// Keeps the gauges as they are, with what is known of them.
+    pub(super) fn keep(&mut self) {
+        let project = &self.document.state.project;
+        let sites = project.selection.sites.clone();
+        if sites.is_empty() {
+            self.complain("There are no gauges to keep yet. Press “Select gauges” first");
+            return;
+        }
+        let cost = sites
+            .iter()
+            .map(|s| self.cost_of(DVec3::from_array(s.position_mm)))
+            .sum();
+        let designed = self.as_designed() && self.design_holds() == Some(true);
+        let known = self.by_hand.sites == sites;
+        let (selector, evaluation, seconds): (_, Option<&Evaluation>, f64) = match &self.design {
+            Some(d) if designed => {
+                let name = d.design.lead.name();
+                let stage = format!("select {name}");
+                let took = d.design.seconds.iter().find(|s| s.stage == stage);
+                (
+                    name,
+                    Some(&d.design.evaluation),
+                    took.map_or(0.0, |s| s.seconds),
+                )
+            }
+            _ if known => (BY_HAND, self.by_hand.exact.as_deref(), 0.0),
+            _ => (BY_HAND, None, 0.0),
+        };
+        let quality = self.design.as_ref().map_or(self.quality(), |d| d.quality);
+        let kept = Kept {
+            name: self.free_name(&format!("{}, {} gauges", title(selector), sites.len())),
+            selector: selector.into(),
+            quality,
+            cost,
+            seconds: (seconds * 10.0).round() / 10.0,
+            sites,
+            errors: evaluation.map_or_else(Vec::new, |e| errors_of(e, selector)),
+            failures: evaluation.map_or_else(Vec::new, |e| failures_of(e, selector)),
+        };
+        self.shown_kept.insert(project.kept.len());
+        self.document.state.project.kept.push(kept);
+        self.document.settle();
+        self.results = super::results::Tab::Compare;
+    }
+
+    fn cost_of(&self, at_mm: DVec3) -> f64 {
+        let costs = self.document.state.project.selection.costs.iter().rev();
+        { costs }
+            .find(|c| c.contains(at_mm))
+            .map_or(1.0, |c| c.cost)
+    }
+
+    fn free_name(&self, wanted: &str) -> String {
+        let taken = |name: &str| {
+            self.document
+                .state
+                .project
+                .kept
+                .iter()
+                .any(|k| k.name == name)
+        };
+        let numbered = (2..).map(|k| format!("{wanted} ({k})"));
+        let mut names = std::iter::once(wanted.to_owned()).chain(numbered);
+        names.find(|n| !taken(n)).unwrap_or_default()
+    }
+
+    /// The tab: what is kept, side by side.
+    pub(super) fn compare_tab(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| self.button(ui, Command::Keep));
+        if self.document.state.project.kept.is_empty() {
+            super::results::empty(
+                ui,
+                "Nothing kept yet. Keep a selection, change what you like, and keep the next to see both side by side",
+            );
+            return;
+        }
+        let mut asked = Asked::None;
+        egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+            egui::Grid::new("kept")
+                .num_columns(10)
+                .striped(true)
+                .spacing([16.0, 4.0])
+                .show(ui, |ui| {
+                    for title in [
+                        "Show",
+                        "Name",
+                        "Chosen by",
+                        "Quality",
+                        "Gauges",
+                        "Error (mm)",
+                        "Median (mm)",
+                        "3 failed (mm)",
+                        "Cost",
+                        "Time (s)",
+                        "",
+                    ] {
+                        ui.strong(title);
+                    }
+                    ui.end_row();
+                    let shown = &mut self.shown_kept;
+                    for (k, kept) in self.document.state.project.kept.iter_mut().enumerate() {
+                        kept_row(ui, k, kept, shown, &mut asked);
+                    }
+                });
+        });
+        match asked {
+            Asked::None => {}
+            Asked::Use(k) => {
+                let sites = self.document.state.project.kept[k].sites.clone();
+                self.document.state.project.selection.sites = sites;
+                self.picked.clear();
+                self.drive.take = false;
+                self.document.settle();
+            }
+            Asked::Delete(k) => {
+                self.document.state.project.kept.remove(k);
+                self.shown_kept = (self.shown_kept.iter())
+                    .filter(|s| **s != k)
+                    .map(|&s| if s > k { s - 1 } else { s })
+                    .collect();
+                self.document.settle();
+            }
+        }
+    }
+
+    /// Kept selections that are shown, with their numbers.
+    pub(super) fn compared(&self) -> impl Iterator<Item = (usize, &Kept)> {
+        let kept = self.document.state.project.kept.iter().enumerate();
+        kept.filter(|(k, _)| self.shown_kept.contains(k))
+    }
+
+    /// The sites of the kept selections that are shown, as rhombs.
+    pub(super) fn paint_kept(&self, painter: &Painter, pane: Pane) {
+        let toward = self.view.camera.toward_eye();
+        for (k, kept) in self.compared() {
+            for site in &kept.sites {
+                let position = DVec3::from_array(site.position_mm) / 1000.0;
+                let (on, _) = self.view.index.nearest(position);
+                let away = self.document.part.normal(on).dot(toward) < 0.0;
+                let Some(at) = self.view.place_in(pane, position) else {
+                    continue;
+                };
+                let faint = pane == Pane::Limb && away;
+                let ink = colour(k).gamma_multiply(if faint { 0.45 } else { 1.0 });
+                let around = [
+                    vec2(0.0, -8.0),
+                    vec2(8.0, 0.0),
+                    vec2(0.0, 8.0),
+                    vec2(-8.0, 0.0),
+                ];
+                let corners = around.map(|off| at + off).to_vec();
+                painter.add(egui::Shape::closed_line(corners, Stroke::new(2.5, ink)));
+            }
+        }
+    }
+}
+
+enum Asked {
+    None,
+    Use(usize),
+    Delete(usize),
+}
+
+fn kept_row(
+    ui: &mut Ui,
+    k: usize,
+    kept: &mut Kept,
+    shown: &mut BTreeSet<usize>,
+    asked: &mut Asked,
+) {
+    let name = kept.name.clone();
+    let mut on = shown.contains(&k);
+    ui.horizontal(|ui| {
+        let tick = ui.checkbox(&mut on, "");
+        if tick.accessible_name(format!("Show {name}")).changed() {
+            if on {
+                shown.insert(k);
+            } else {
+                shown.remove(&k);
+            }
+        }
+        ui.label(RichText::new("◆").color(colour(k)));
+    });
+    ui.add(TextEdit::singleline(&mut kept.name).desired_width(180.0))
+        .accessible_name(format!("Name of kept selection {}", k + 1));
+    ui.label(title(&kept.selector));
+    ui.label(quality_name(kept.quality));
+    ui.monospace(format!("{:>3}", kept.sites.len()));
+    let last = (kept.errors.iter())
+        .rev()
+        .find(|e| e.region == "all touches");
+    let number = |value: Option<f64>| value.map_or("–".into(), |v| format!("{v:6.2}"));
+    ui.monospace(number(last.map(|e| e.mean_mm)));
+    ui.monospace(number(last.map(|e| e.median_mm)));
+    let failed = kept.failures.iter().find(|f| f.failed == 3 && !f.retrained);
+    ui.monospace(number(failed.map(|f| f.mean_mm)));
+    ui.monospace(format!("{:5.1}", kept.cost));
+    ui.monospace(format!("{:6.1}", kept.seconds));
+    ui.horizontal(|ui| {
+        let button = ui
+            .button("Use")
+            .on_hover_text("Make these the project's gauges");
+        if button.accessible_name(format!("Use {name}")).clicked() {
+            *asked = Asked::Use(k);
+        }
+        let button = ui.button("Delete");
+        if button.accessible_name(format!("Delete {name}")).clicked() {
+            *asked = Asked::Delete(k);
+        }
+    });
+    ui.end_row();
+}
+
+fn errors_of(evaluation: &Evaluation, selector: &str) -> Vec<KeptError> {
+    let rows = evaluation.rows.iter().filter(|r| r.selector == selector);
+    let round = |x: f64| (x * 1e4).round() / 1e4;
+    rows.map(|r| KeptError {
+        region: r.region.clone(),
+        sensors: r.sensors,
+        mean_mm: round(r.error_mm),
+        median_mm: round(r.median_mm),
+        p95_mm: round(r.p95_mm),
+    })
+    .collect()
+}
+
+fn failures_of(evaluation: &Evaluation, selector: &str) -> Vec<KeptFailure> {
+    let sets = evaluation
+        .failures
+        .iter()
+        .filter(|f| f.selector == selector);
+    sets.flat_map(|set| &set.rows)
+        .map(|r| KeptFailure {
+            failed: r.failed,
+            retrained: r.retrained,
+            mean_mm: (r.error_mm * 1e4).round() / 1e4,
+        })
+        .collect()
+}

@@ -1,0 +1,193 @@
+//! Over the views: tools and what they need, what colours the limb, and how it is looked at.
+
+use egui::{DragValue, Ui};
+
+use super::fields::Field;
+use super::tools::Tool;
+use super::viewport::Section;
+use super::{Command, Studio};
+use crate::document::Layer;
+use crate::mesh::unroll::Axis;
+use crate::render::camera::Preset;
+
+const AXES: [(Axis, &str); 3] = [(Axis::X, "x"), (Axis::Y, "y"), (Axis::Z, "z")];
+
+impl Studio {
+    pub(super) fn toolbar(&mut self, ui: &mut Ui) {
+        egui::Frame::new()
+            .inner_margin(egui::Margin::symmetric(8, 5))
+            .show(ui, |ui| {
+                ui.horizontal_wrapped(|ui| {
+                    for tool in Tool::ALL {
+                        self.toggle(ui, Command::Tool(tool));
+                    }
+                    self.paint_controls(ui);
+                });
+                ui.horizontal_wrapped(|ui| {
+                    self.field_controls(ui);
+                    ui.separator();
+                    self.toggle(ui, Command::SeeThrough);
+                    self.toggle(ui, Command::Section);
+                    self.section_controls(ui);
+                    self.toggle(ui, Command::Unrolled);
+                    ui.separator();
+                    for preset in Preset::ALL {
+                        self.toggle(ui, Command::Look(preset));
+                    }
+                    self.toggle(ui, Command::Frame);
+                });
+            });
+    }
+
+    /// A small button for a command, pressed in while it is on.
+    fn toggle(&mut self, ui: &mut Ui, command: Command) {
+        let on = self.is_on(command);
+        let button = ui.add_enabled(
+            self.enabled(command),
+            egui::Button::selectable(on, command.short_name()),
+        );
+        let mut help = command.tooltip().to_owned();
+        if let Some(shortcut) = command.shortcut() {
+            help = format!("{help} ({})", ui.ctx().format_shortcut(&shortcut));
+        }
+        if button.on_hover_text(help).clicked() {
+            let ctx = ui.ctx().clone();
+            self.execute(&ctx, command);
+        }
+    }
+
+    fn paint_controls(&mut self, ui: &mut Ui) {
+        if !self.view.tool.paints() {
+            return;
+        }
+        ui.separator();
+        egui::ComboBox::new("layer", "")
+            .selected_text(self.view.layer.name())
+            .width(96.0)
+            .show_ui(ui, |ui| {
+                for layer in Layer::ALL {
+                    ui.selectable_value(&mut self.view.layer, layer, layer.name());
+                }
+            })
+            .response
+            .on_hover_text("What is painted: where gauges may go, where they must not, what is held, where touches come")
+            .accessible_name("Layer");
+        if self.view.tool.is_brush() {
+            let mut mm = self.view.brush * 1000.0;
+            ui.add(
+                DragValue::new(&mut mm)
+                    .range(0.5..=500.0)
+                    .speed(0.1)
+                    .fixed_decimals(1)
+                    .prefix("Radius ")
+                    .suffix(" mm"),
+            )
+            .on_hover_text("Of the brush over the surface ([ and ], or the wheel with Shift)")
+            .accessible_name("Radius of the brush");
+            self.view.brush = mm / 1000.0;
+            let mirror = self.view.mirror;
+            let name = |m: Option<Axis>| match m {
+                None => "No mirror",
+                Some(Axis::X) => "Mirror x",
+                Some(Axis::Y) => "Mirror y",
+                Some(Axis::Z) => "Mirror z",
+            };
+            egui::ComboBox::new("mirror", "")
+                .selected_text(name(mirror))
+                .width(80.0)
+                .show_ui(ui, |ui| {
+                    for option in std::iter::once(None).chain(AXES.map(|(axis, _)| Some(axis))) {
+                        ui.selectable_value(&mut self.view.mirror, option, name(option));
+                    }
+                })
+                .response
+                .on_hover_text("Repeat each stroke on the other side of the part's middle")
+                .accessible_name("Mirror");
+        }
+        for command in [
+            Command::FillPaint,
+            Command::InvertPaint,
+            Command::GrowPaint,
+            Command::ShrinkPaint,
+            Command::ClearPaint,
+        ] {
+            self.toggle(ui, command);
+        }
+    }
+
+    fn field_controls(&mut self, ui: &mut Ui) {
+        egui::ComboBox::new("field", "")
+            .selected_text(self.view.field.name())
+            .width(128.0)
+            .show_ui(ui, |ui| {
+                for field in Field::ALL {
+                    ui.selectable_value(&mut self.view.field, field, field.name());
+                }
+            })
+            .response
+            .on_hover_text("What colours the limb")
+            .accessible_name("Field");
+        let shown = self.view.built.as_ref().and_then(|b| b.legend.clone());
+        let Some(legend) = shown else {
+            return;
+        };
+        let field = self.view.field;
+        let mut fixed = self.view.ranges.of(field).is_some();
+        let tick = ui
+            .add(egui::Button::selectable(fixed, "Fixed range"))
+            .on_hover_text("Keep the range of the colours whatever the values are");
+        if tick.clicked() {
+            fixed = !fixed;
+            let range = fixed.then_some((legend.low, legend.high));
+            self.view.ranges.set(field, range);
+        }
+        if let Some((mut low, mut high)) = self.view.ranges.of(field) {
+            let speed = 0.005 * (high - low).abs().max(1e-9);
+            ui.add(DragValue::new(&mut low).speed(speed).max_decimals(3))
+                .accessible_name("Lowest value of the colours");
+            ui.label("to");
+            ui.add(DragValue::new(&mut high).speed(speed).max_decimals(3))
+                .accessible_name("Highest value of the colours");
+            self.view.ranges.set(field, Some((low, high)));
+        }
+    }
+
+    fn section_controls(&mut self, ui: &mut Ui) {
+        let (lower, upper) = self.document.part.bounds();
+        let Some(section) = &mut self.view.section else {
+            return;
+        };
+        for (axis, name) in AXES {
+            let button = ui
+                .add(egui::Button::selectable(section.axis == axis, name))
+                .on_hover_text("Cut across this axis")
+                .accessible_name(format!("Section across {name}"));
+            if button.clicked() {
+                *section = Section {
+                    axis,
+                    offset: ((lower + upper) / 2.0).dot(axis.direction()),
+                    ..*section
+                };
+            }
+        }
+        let along = section.axis.direction();
+        let range = lower.dot(along) * 1000.0..=upper.dot(along) * 1000.0;
+        let mut mm = section.offset * 1000.0;
+        ui.spacing_mut().slider_width = 110.0;
+        ui.add(
+            egui::Slider::new(&mut mm, range)
+                .suffix(" mm")
+                .fixed_decimals(1),
+        )
+        .on_hover_text("Where it is cut")
+        .accessible_name("Place of the section");
+        section.offset = mm / 1000.0;
+        let flip = ui
+            .add(egui::Button::selectable(section.flip, "Flip"))
+            .on_hover_text("Cut away the other side")
+            .accessible_name("Flip the section");
+        if flip.clicked() {
+            section.flip = !section.flip;
+        }
+    }
+}

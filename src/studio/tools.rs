@@ -1,0 +1,341 @@
+//! What the pointer does on the limb, in space or unrolled.
+
+use egui::{PointerButton, Pos2, Response, Ui};
+use glam::DVec2;
+
+use super::Studio;
+use super::fields::Field;
+use super::viewport::Pane;
+use crate::document::Brush;
+use crate::mesh::SurfacePoint;
+use crate::mesh::locate::SurfaceIndex;
+
+/// What the pointer does on the limb.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tool {
+    #[default]
+    Touch,
+    Gauges,
+    Paint,
+    Erase,
+    Box,
+    Lasso,
+    Measure,
+}
+
+impl Tool {
+    pub const ALL: [Self; 7] = [
+        Self::Touch,
+        Self::Gauges,
+        Self::Paint,
+        Self::Erase,
+        Self::Box,
+        Self::Lasso,
+        Self::Measure,
+    ];
+
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Touch => "Touch",
+            Self::Gauges => "Gauges",
+            Self::Paint => "Paint",
+            Self::Erase => "Erase",
+            Self::Box => "Box",
+            Self::Lasso => "Lasso",
+            Self::Measure => "Measure",
+        }
+    }
+
+    /// Whether it changes what is painted.
+    #[must_use]
+    pub fn paints(self) -> bool {
+        matches!(self, Self::Paint | Self::Erase | Self::Box | Self::Lasso)
+    }
+
+    /// Whether it has a radius.
+    #[must_use]
+    pub fn is_brush(self) -> bool {
+        matches!(self, Self::Paint | Self::Erase)
+    }
+
+    /// Whether a drag with the left button is its own and not a look around.
+    fn drags(self) -> bool {
+        self.paints() || self == Self::Gauges
+    }
+}
+
+/// What is under way between pressing and letting go.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) enum Gesture {
+    #[default]
+    None,
+    /// A stroke, and where its last dab was.
+    Stroke(Pane, Pos2),
+    /// The outline drawn so far.
+    Outline(Pane, Vec<Pos2>),
+    /// A gauge that is moved, by its number from zero.
+    Gauge(Pane, usize),
+}
+
+impl Studio {
+    /// Orbit with the right button (or the left one where the tool has no use for it), pan with the middle
+    /// one or with Shift, zoom with the wheel; with Shift the wheel sets the brush.
+    pub(super) fn navigate(&mut self, ui: &Ui, response: &Response, pane: Pane) {
+        let drag = response.drag_delta();
+        let shift = ui.input(|i| i.modifiers.shift);
+        let left = response.dragged_by(PointerButton::Primary);
+        let free = !self.view.tool.drags() || self.view.gesture == Gesture::None;
+        let turning = response.dragged_by(PointerButton::Secondary) || left && free;
+        let panning = response.dragged_by(PointerButton::Middle) || turning && shift;
+        let moved = DVec2::new(f64::from(drag.x), f64::from(drag.y));
+        match pane {
+            Pane::Unrolled if panning || turning => self.view.pan_flat(drag),
+            Pane::Limb if panning => {
+                let height = f64::from(self.view.rect.height());
+                self.view.camera.pan(moved, height);
+            }
+            Pane::Limb if turning => self.view.camera.orbit(moved),
+            _ => {}
+        }
+        if !response.hovered() {
+            return;
+        }
+        let wheel = ui.input(|i| {
+            // With Shift a wheel scrolls sideways.
+            let scroll = i.smooth_scroll_delta();
+            scroll.x + scroll.y + 400.0 * (i.zoom_delta() - 1.0)
+        });
+        if wheel == 0.0 {
+            return;
+        }
+        let factor = (-0.0022 * f64::from(wheel)).exp();
+        match (pane, response.hover_pos()) {
+            _ if shift && self.view.tool.is_brush() => self.view.brush /= factor,
+            (Pane::Limb, _) => self.view.camera.zoom(factor),
+            (Pane::Unrolled, Some(at)) => self.view.zoom_flat(at, factor),
+            _ => {}
+        }
+    }
+
+    pub(super) fn use_tool(&mut self, ui: &Ui, response: &Response, pane: Pane) {
+        if let Some(at) = response.hover_pos() {
+            self.view.hover = self.view.pick(pane, at);
+        }
+        let began = ui.input(|i| i.pointer.primary_pressed()) && response.contains_pointer();
+        let at = response.interact_pointer_pos().or(response.hover_pos());
+        match (self.view.tool, at) {
+            (Tool::Touch, _) if response.clicked() => {
+                self.press(ui, pane, response.interact_pointer_pos());
+            }
+            (Tool::Measure, Some(at)) if response.clicked() => {
+                let place = self.view.pick(pane, at);
+                self.measure_to(ui.ctx(), place);
+            }
+            (Tool::Gauges, Some(at)) if began => self.grab(ui, pane, at),
+            (Tool::Paint | Tool::Erase, Some(at))
+                if began && self.view.pick(pane, at).is_some() =>
+            {
+                self.view.gesture = Gesture::Stroke(pane, at);
+                self.stroke(ui, pane, at);
+            }
+            (Tool::Box | Tool::Lasso, Some(at)) if began => {
+                self.view.gesture = Gesture::Outline(pane, vec![at]);
+            }
+            (_, Some(at)) => self.go_on(ui, pane, at),
+            _ => {}
+        }
+        if !ui.input(|i| i.pointer.primary_down()) {
+            self.let_go(ui, pane);
+        }
+    }
+
+    /// The pointer moves while something is under way in this view.
+    fn go_on(&mut self, ui: &Ui, pane: Pane, at: Pos2) {
+        match &mut self.view.gesture {
+            Gesture::Stroke(own, _) if *own == pane => self.stroke(ui, pane, at),
+            Gesture::Outline(own, outline) if *own == pane => match self.view.tool {
+                Tool::Box => outline.splice(1.., [at]).for_each(drop),
+                _ if outline.last().is_some_and(|last| last.distance(at) > 3.0) => outline.push(at),
+                _ => {}
+            },
+            Gesture::Gauge(own, number) if *own == pane => {
+                let number = *number;
+                self.drag_gauge(ui.ctx(), pane, number, at);
+            }
+            _ => {}
+        }
+    }
+
+    fn let_go(&mut self, ui: &Ui, pane: Pane) {
+        let own = match &self.view.gesture {
+            Gesture::None => return,
+            Gesture::Stroke(own, _) | Gesture::Outline(own, _) | Gesture::Gauge(own, _) => *own,
+        };
+        if own != pane {
+            return;
+        }
+        match std::mem::take(&mut self.view.gesture) {
+            Gesture::Outline(_, outline) => self.paint_inside(ui, pane, outline),
+            // What the move does to the error is found out when the window is next drawn.
+            Gesture::Gauge(..) => ui.ctx().request_repaint(),
+            _ => {}
+        }
+        self.document.settle();
+    }
+
+    fn press(&mut self, ui: &Ui, pane: Pane, at: Option<Pos2>) {
+        match at.and_then(|at| self.pick_shown(pane, at)) {
+            Some(place) => {
+                self.touching.apply(ui.ctx(), &self.document, place);
+                if !matches!(self.view.field, Field::Strain | Field::Displacement) {
+                    self.view.field = Field::Strain;
+                }
+            }
+            None => self.touching.clear(),
+        }
+    }
+
+    /// The point of the limb under a place of the window, on the shape that is shown there.
+    fn pick_shown(&self, pane: Pane, at: Pos2) -> Option<SurfacePoint> {
+        let (Some(scale), Some(touched)) = (self.exaggeration(), self.touching.result()) else {
+            return self.view.pick(pane, at);
+        };
+        if pane == Pane::Unrolled {
+            return self.view.pick(pane, at);
+        }
+        let part = &self.document.part;
+        let moved = part.positions().iter().zip(&touched.displacement);
+        let index = SurfaceIndex::of(
+            moved.map(|(p, u)| *p + *u * scale).collect(),
+            part.triangles(),
+        );
+        self.view.pick_on(&index, at)
+    }
+
+    /// What a brush or outline does now: Control turns it around, as elsewhere.
+    fn brush(&self, ui: &Ui) -> Brush {
+        let erases = self.view.tool == Tool::Erase;
+        if erases == ui.input(|i| i.modifiers.ctrl) {
+            Brush::Paint
+        } else {
+            Brush::Erase
+        }
+    }
+
+    /// Dabs along the way from the last pointer sample, so that a fast stroke has no gaps: half a radius
+    /// apart, nearer where that is less than a few points of the window.
+    fn stroke(&mut self, ui: &Ui, pane: Pane, to: Pos2) {
+        const MOST: f32 = 256.0;
+        let brush = self.brush(ui);
+        let Gesture::Stroke(_, from) = self.view.gesture else {
+            return;
+        };
+        let step = self.dab_step(pane, to).max(4.0);
+        let steps = ((to - from).length() / step).ceil().clamp(1.0, MOST) as usize;
+        let radius = self.view.brush;
+        for k in 1..=steps {
+            let at = from.lerp(to, k as f32 / steps as f32);
+            let Some(place) = self.view.pick(pane, at) else {
+                continue;
+            };
+            self.document.dab(self.view.layer, brush, place, radius);
+            if let Some(axis) = self.view.mirror {
+                let image = self
+                    .document
+                    .mirrored(self.document.part.point(place), axis);
+                let (image, off) = self.view.index.nearest(image);
+                // A part that is not its own mirror image has nothing there.
+                if off < radius {
+                    self.document.dab(self.view.layer, brush, image, radius);
+                }
+            }
+        }
+        self.view.gesture = Gesture::Stroke(pane, to);
+    }
+
+    /// Half the brush's radius in points of the window.
+    fn dab_step(&self, pane: Pane, at: Pos2) -> f32 {
+        match pane {
+            Pane::Unrolled => (0.5 * self.view.brush / self.view.flat_view().1) as f32,
+            Pane::Limb => {
+                let Some(place) = self.view.pick(pane, at) else {
+                    return 0.0;
+                };
+                let p = self.document.part.point(place);
+                let side = self.view.camera.side() * self.view.brush * 0.5;
+                let ends = [self.view.place(p), self.view.place(p + side)];
+                match ends {
+                    [Some(a), Some(b)] => a.distance(b),
+                    _ => 0.0,
+                }
+            }
+        }
+    }
+
+    /// Paints the vertices inside an outline: those that can be seen, or all where walls are see-through.
+    fn paint_inside(&mut self, ui: &Ui, pane: Pane, mut outline: Vec<Pos2>) {
+        if let (Tool::Box, [a, b]) = (self.view.tool, &outline[..]) {
+            outline = vec![*a, Pos2::new(b.x, a.y), *b, Pos2::new(a.x, b.y)];
+        }
+        if outline.len() < 3 {
+            return;
+        }
+        let brush = self.brush(ui);
+        let part = std::sync::Arc::clone(&self.document.part);
+        let bounds = egui::Rect::from_points(&outline);
+        let inside: Vec<u32> = (0..part.positions().len() as u32)
+            .filter(|&v| {
+                let p = part.positions()[v as usize];
+                (self.view.place_in(pane, p))
+                    .is_some_and(|at| bounds.contains(at) && encloses(&outline, at))
+            })
+            .filter(|&v| pane == Pane::Unrolled || self.view.see_through || self.is_seen(v))
+            .collect();
+        self.document.mark(self.view.layer, brush, inside);
+    }
+
+    /// Whether nothing of the part lies between the eye and one of its vertices.
+    fn is_seen(&self, vertex: u32) -> bool {
+        let part = &self.document.part;
+        let p = part.positions()[vertex as usize];
+        let Some(at) = self.view.place(p) else {
+            return false;
+        };
+        let near = 1e-3 * self.view.camera.distance + part.mean_edge();
+        (self.view.pick(Pane::Limb, at)).is_none_or(|hit| part.point(hit).distance(p) < near)
+    }
+}
+
+/// Whether a point lies inside a polygon (even-odd rule).
+fn encloses(outline: &[Pos2], at: Pos2) -> bool {
+    let mut inside = false;
+    for (k, a) in outline.iter().enumerate() {
+        let b = outline[(k + 1) % outline.len()];
+        if (a.y > at.y) != (b.y > at.y) {
+            let x = a.x + (at.y - a.y) / (b.y - a.y) * (b.x - a.x);
+            inside ^= at.x < x;
+        }
+    }
+    inside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_outline_may_bend_inwards() {
+        let outline = [
+            (0.0, 0.0),
+            (10.0, 0.0),
+            (10.0, 10.0),
+            (5.0, 2.0),
+            (0.0, 10.0),
+        ]
+        .map(|(x, y)| Pos2::new(x, y));
+        assert!(encloses(&outline, Pos2::new(1.0, 5.0)));
+        assert!(!encloses(&outline, Pos2::new(5.0, 5.0)));
+        assert!(!encloses(&outline, Pos2::new(-1.0, 1.0)));
+    }
+}
