@@ -130,6 +130,8 @@ impl Command {
             Self::ShrinkPaint => "Shrink",
             Self::Frame => "Frame",
             Self::Unrolled => "Unrolled",
+            Self::Pin => "Pin",
+            Self::RemoveGauges => "Remove",
             other => other.name(),
         }
     }
@@ -415,7 +417,11 @@ impl Studio {
     }
 
     pub(super) fn shortcuts(&mut self, ctx: &Context) {
-        if self.dialog.is_some() || self.ask_quit || self.palette.is_some() {
+        if self.dialog.is_some()
+            || self.ask_quit
+            || self.palette.is_some()
+            || self.offers_recovery()
+        {
             return;
         }
         let typing = ctx.egui_wants_keyboard_input();

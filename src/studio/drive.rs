@@ -436,9 +436,11 @@ impl Studio {
         }
     }
 
-    /// The gauges to draw: those of the running selection as far as it has come, else the project's.
+    /// The gauges to draw: those of the running selection as far as it has come where there is no draft of
+    /// it, else the project's.
     pub(super) fn gauges(&self) -> Vec<ChosenSite> {
         let running = self.drive.take
+            && self.design_holds() != Some(true)
             && (self.jobs.running.iter()).any(|r| matches!(r.task, Task::Design(_)));
         let making = running
             .then(|| self.drive.making.lock().ok().map(|m| m.sites.clone()))

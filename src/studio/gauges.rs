@@ -302,11 +302,8 @@ impl Studio {
         let resting = !ctx.input(|i| i.pointer.any_down()) && self.view.gesture == Gesture::None;
         let known =
             self.by_hand.exact.is_some() || self.jobs.running.iter().any(|r| r.task == Task::Judge);
-        let busy = (self.jobs.running.iter())
-            .any(|r| matches!(r.task, Task::Simulate(_) | Task::Design(_)));
         if resting
             && !known
-            && !busy
             && self
                 .drive
                 .failure(Task::Judge, &self.by_hand_key())

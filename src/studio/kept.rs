@@ -2,8 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use egui::{Color32, RichText, TextEdit, Ui};
-use egui::{Painter, Stroke, vec2};
+use egui::{Color32, Painter, Stroke, TextEdit, Ui, vec2};
 use glam::DVec3;
 
 use super::gauges::BY_HAND;
@@ -179,17 +178,16 @@ impl Studio {
                 };
                 let faint = pane == Pane::Limb && away;
                 let ink = colour(k).gamma_multiply(if faint { 0.45 } else { 1.0 });
-                let around = [
-                    vec2(0.0, -8.0),
-                    vec2(8.0, 0.0),
-                    vec2(0.0, 8.0),
-                    vec2(-8.0, 0.0),
-                ];
-                let corners = around.map(|off| at + off).to_vec();
-                painter.add(egui::Shape::closed_line(corners, Stroke::new(2.5, ink)));
+                painter.add(rhomb(at, 8.0, ink));
             }
         }
     }
+}
+
+fn rhomb(at: egui::Pos2, radius: f32, ink: Color32) -> egui::Shape {
+    let around = [(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)];
+    let corners = around.map(|(x, y)| at + vec2(x, y) * radius).to_vec();
+    egui::Shape::closed_line(corners, Stroke::new(2.5, ink))
 }
 
 enum Asked {
@@ -216,9 +214,11 @@ fn kept_row(
                 shown.remove(&k);
             }
         }
-        ui.label(RichText::new("◆").color(colour(k)));
+        let (rect, _) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::hover());
+        ui.painter().add(rhomb(rect.center(), 6.0, colour(k)));
     });
-    ui.add(TextEdit::singleline(&mut kept.name).desired_width(180.0))
+    let height = ui.spacing().interact_size.y;
+    ui.add_sized([200.0, height], TextEdit::singleline(&mut kept.name))
         .accessible_name(format!("Name of kept selection {}", k + 1));
     ui.label(title(&kept.selector));
     ui.label(quality_name(kept.quality));

@@ -11,6 +11,7 @@ use super::tools::{Gesture, Tool};
 use super::viewport::Pane;
 use super::{Studio, labels, theme};
 use crate::colormap::ColorMap;
+use crate::document::Layer;
 use crate::project::ChosenSite;
 use crate::render::gpu::{Frame3d, Slot, Uniforms};
 
@@ -366,13 +367,54 @@ impl Studio {
             Tool::Measure => "Click two points of the limb",
             Tool::Touch => self.field_hint(),
         };
-        label(
+        let room = (rect.width() - 28.0).max(60.0);
+        let ink = Color32::from_gray(215);
+        let galley = painter.layout(text.to_owned(), FontId::proportional(12.5), ink, room);
+        plate(
             painter,
-            pos2(rect.left() + 14.0, rect.bottom() - 14.0),
+            rect.left_bottom() + vec2(14.0, -14.0),
             Align2::LEFT_BOTTOM,
-            text,
-            Color32::from_gray(215),
+            galley,
         );
+    }
+
+    /// What the colours of the regions mean, of those that are there.
+    pub(super) fn paint_region_key(&self, painter: &Painter, rect: Rect) {
+        if self.view.field != Field::Region {
+            return;
+        }
+        let verdicts = self.feasibility.is_some() || self.document.layer(Layer::Feasible).is_some();
+        let rows = [
+            (verdicts, "Gauges may go", Color32::from_rgb(107, 191, 173)),
+            (
+                self.document.layer(Layer::KeepOut).is_some(),
+                "Keep out",
+                Color32::from_rgb(219, 115, 92),
+            ),
+            (
+                !self.document.state.project.supports.is_empty(),
+                "Held",
+                Color32::from_rgb(219, 189, 87),
+            ),
+            (
+                self.document.layer(Layer::Touch).is_some(),
+                "Touches come",
+                Color32::from_rgb(128, 153, 230),
+            ),
+        ];
+        let mut at = rect.right_top() + vec2(-16.0, 12.0);
+        for (_, name, colour) in rows.into_iter().filter(|r| r.0) {
+            let font = FontId::proportional(11.5);
+            let galley = painter.layout_no_wrap(name.to_owned(), font, Color32::WHITE);
+            let height = galley.size().y;
+            let board = plate(painter, at, Align2::RIGHT_TOP, galley);
+            let square = Rect::from_center_size(
+                pos2(board.left() - 10.0, board.center().y),
+                vec2(11.0, 11.0),
+            );
+            painter.rect_filled(square, 2.0, colour);
+            at.y += height + 10.0;
+        }
     }
 
     /// What is missing before a field can be seen, or how to look around.
@@ -460,13 +502,16 @@ impl Mark {
 /// Text on a dark plate, readable over anything.
 pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str, colour: Color32) {
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(12.5), colour);
+    plate(painter, at, align, galley);
+}
+
+/// A dark plate under a text; where it is.
+fn plate(painter: &Painter, at: Pos2, align: Align2, galley: Arc<egui::Galley>) -> Rect {
     let rect = align.anchor_size(at, galley.size());
-    painter.rect_filled(
-        rect.expand2(vec2(7.0, 4.0)),
-        5.0,
-        Color32::from_black_alpha(150),
-    );
-    painter.galley(rect.min, galley, colour);
+    let board = rect.expand2(vec2(7.0, 4.0));
+    painter.rect_filled(board, 5.0, Color32::from_black_alpha(150));
+    painter.galley(rect.min, galley, Color32::WHITE);
+    board
 }
 
 fn tidy(value: f64) -> String {

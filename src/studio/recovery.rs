@@ -198,10 +198,19 @@ impl Studio {
         }
     }
 
+    fn left(&self) -> Option<&Left> {
+        let open = self.recovery.as_ref().filter(|r| !r.asked);
+        open.and_then(|r| r.left.first())
+    }
+
+    /// Whether somebody is being asked about what was left behind.
+    pub(super) fn offers_recovery(&self) -> bool {
+        self.left().is_some()
+    }
+
     /// Offers what was left behind, one project at a time.
     pub(super) fn recovery_dialog(&mut self, ctx: &Context) {
-        let open = self.recovery.as_ref().filter(|r| !r.asked);
-        let Some(left) = open.and_then(|r| r.left.first()) else {
+        let Some(left) = self.left() else {
             return;
         };
         let (mut recover, mut discard) = (false, false);

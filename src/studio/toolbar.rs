@@ -13,6 +13,7 @@ use crate::render::camera::Preset;
 const AXES: [(Axis, &str); 3] = [(Axis::X, "x"), (Axis::Y, "y"), (Axis::Z, "z")];
 
 impl Studio {
+    /// Two rows that stay as high as they are, whatever is chosen in them.
     pub(super) fn toolbar(&mut self, ui: &mut Ui) {
         egui::Frame::new()
             .inner_margin(egui::Margin::symmetric(8, 5))
@@ -21,15 +22,13 @@ impl Studio {
                     for tool in Tool::ALL {
                         self.toggle(ui, Command::Tool(tool));
                     }
-                    self.paint_controls(ui);
+                    ui.separator();
+                    self.field_controls(ui);
                 });
                 ui.horizontal_wrapped(|ui| {
-                    self.field_controls(ui);
-                    ui.separator();
-                    self.toggle(ui, Command::SeeThrough);
-                    self.toggle(ui, Command::Section);
-                    self.section_controls(ui);
-                    self.toggle(ui, Command::Unrolled);
+                    for command in [Command::SeeThrough, Command::Section, Command::Unrolled] {
+                        self.toggle(ui, command);
+                    }
                     ui.separator();
                     for preset in Preset::ALL {
                         self.toggle(ui, Command::Look(preset));
@@ -37,6 +36,48 @@ impl Studio {
                     self.toggle(ui, Command::Frame);
                 });
             });
+    }
+
+    /// What the chosen tool and the section need, over the view: nothing moves when it comes and goes.
+    pub(super) fn options(&mut self, ui: &mut Ui, view: egui::Rect) {
+        let has = self.view.section.is_some()
+            || self.view.tool.paints()
+            || self.view.ranges.of(self.view.field).is_some()
+            || self.view.tool == Tool::Gauges;
+        if !has {
+            return;
+        }
+        let room = egui::Rect::from_min_max(
+            view.left_top() + egui::vec2(10.0, 10.0),
+            view.right_bottom() - egui::vec2(10.0, 10.0),
+        );
+        let builder = egui::UiBuilder::new().max_rect(room);
+        ui.scope_builder(builder, |ui| {
+            let fill = ui.visuals().panel_fill.gamma_multiply(0.92);
+            egui::Frame::new()
+                .fill(fill)
+                .corner_radius(6.0)
+                .inner_margin(8.0)
+                .show(ui, |ui| {
+                    ui.set_max_width(190.0);
+                    self.paint_controls(ui);
+                    self.gauge_controls(ui);
+                    self.section_controls(ui);
+                    self.range_controls(ui);
+                });
+        });
+    }
+
+    fn gauge_controls(&mut self, ui: &mut Ui) {
+        if self.view.tool != Tool::Gauges {
+            return;
+        }
+        let all = self.document.state.project.selection.sites.len();
+        ui.label(format!("{all} gauges, {} picked", self.picked.len()));
+        ui.horizontal(|ui| {
+            self.toggle(ui, Command::Pin);
+            self.toggle(ui, Command::RemoveGauges);
+        });
     }
 
     /// A small button for a command, pressed in while it is on.
@@ -60,7 +101,6 @@ impl Studio {
         if !self.view.tool.paints() {
             return;
         }
-        ui.separator();
         egui::ComboBox::new("layer", "")
             .selected_text(self.view.layer.name())
             .width(96.0)
@@ -104,15 +144,17 @@ impl Studio {
                 .on_hover_text("Repeat each stroke on the other side of the part's middle")
                 .accessible_name("Mirror");
         }
-        for command in [
-            Command::FillPaint,
-            Command::InvertPaint,
-            Command::GrowPaint,
-            Command::ShrinkPaint,
-            Command::ClearPaint,
-        ] {
-            self.toggle(ui, command);
-        }
+        ui.horizontal_wrapped(|ui| {
+            for command in [
+                Command::FillPaint,
+                Command::InvertPaint,
+                Command::GrowPaint,
+                Command::ShrinkPaint,
+                Command::ClearPaint,
+            ] {
+                self.toggle(ui, command);
+            }
+        });
     }
 
     fn field_controls(&mut self, ui: &mut Ui) {
@@ -141,15 +183,23 @@ impl Studio {
             let range = fixed.then_some((legend.low, legend.high));
             self.view.ranges.set(field, range);
         }
-        if let Some((mut low, mut high)) = self.view.ranges.of(field) {
-            let speed = 0.005 * (high - low).abs().max(1e-9);
+    }
+
+    fn range_controls(&mut self, ui: &mut Ui) {
+        let field = self.view.field;
+        let Some((mut low, mut high)) = self.view.ranges.of(field) else {
+            return;
+        };
+        let speed = 0.005 * (high - low).abs().max(1e-9);
+        ui.horizontal(|ui| {
+            ui.label("Range");
             ui.add(DragValue::new(&mut low).speed(speed).max_decimals(3))
                 .accessible_name("Lowest value of the colours");
             ui.label("to");
             ui.add(DragValue::new(&mut high).speed(speed).max_decimals(3))
                 .accessible_name("Highest value of the colours");
-            self.view.ranges.set(field, Some((low, high)));
-        }
+        });
+        self.view.ranges.set(field, Some((low, high)));
     }
 
     fn section_controls(&mut self, ui: &mut Ui) {
@@ -157,19 +207,28 @@ impl Studio {
         let Some(section) = &mut self.view.section else {
             return;
         };
-        for (axis, name) in AXES {
-            let button = ui
-                .add(egui::Button::selectable(section.axis == axis, name))
-                .on_hover_text("Cut across this axis")
-                .accessible_name(format!("Section across {name}"));
-            if button.clicked() {
-                *section = Section {
-                    axis,
-                    offset: ((lower + upper) / 2.0).dot(axis.direction()),
-                    ..*section
-                };
+        ui.horizontal(|ui| {
+            ui.label("Cut across");
+            for (axis, name) in AXES {
+                let button = ui
+                    .add(egui::Button::selectable(section.axis == axis, name))
+                    .accessible_name(format!("Section across {name}"));
+                if button.clicked() {
+                    *section = Section {
+                        axis,
+                        offset: ((lower + upper) / 2.0).dot(axis.direction()),
+                        ..*section
+                    };
+                }
             }
-        }
+            let flip = ui
+                .add(egui::Button::selectable(section.flip, "Flip"))
+                .on_hover_text("Cut away the other side")
+                .accessible_name("Flip the section");
+            if flip.clicked() {
+                section.flip = !section.flip;
+            }
+        });
         let along = section.axis.direction();
         let range = lower.dot(along) * 1000.0..=upper.dot(along) * 1000.0;
         let mut mm = section.offset * 1000.0;
@@ -182,12 +241,5 @@ impl Studio {
         .on_hover_text("Where it is cut")
         .accessible_name("Place of the section");
         section.offset = mm / 1000.0;
-        let flip = ui
-            .add(egui::Button::selectable(section.flip, "Flip"))
-            .on_hover_text("Cut away the other side")
-            .accessible_name("Flip the section");
-        if flip.clicked() {
-            section.flip = !section.flip;
-        }
     }
 }

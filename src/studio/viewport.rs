@@ -301,6 +301,7 @@ impl Studio {
         for (pane, rect) in panes {
             self.draw(ui, pane, rect);
         }
+        self.options(ui, limb);
     }
 
     /// Takes in what the pointer does in a view.
@@ -339,6 +340,7 @@ impl Studio {
         self.paint_outline(&painter, pane);
         if pane == Pane::Limb {
             self.paint_legend(&painter, rect);
+            self.paint_region_key(&painter, rect);
             self.paint_hint(&painter, rect);
         }
     }
