@@ -43,7 +43,7 @@ use crate::io::project_file::{self, LoadedProject};
 pub use commands::Command;
 pub use fields::Field;
 pub use gauges::Way;
-pub use stages::Stage;
+pub use stages::{Stage, Standing};
 pub use tools::Tool;
 pub use viewport::{Pane, Section};
 

@@ -358,6 +358,19 @@ pub fn select_step_by_step(
     Ok(selection)
 }
 
+/// The feasible sites nearest to the places where gauges must be: rows of the reduced signals.
+fn required_rows(inputs: &Inputs, simulated: &Simulated, reduced: &Reduced) -> Vec<usize> {
+    let place = |row: usize| simulated.dataset.sites[reduced.feasible[row]].position;
+    let required = inputs.project.selection.required_mm.iter();
+    required
+        .filter_map(|&at| {
+            let at = DVec3::from_array(at) / 1000.0;
+            let off = |row: &usize| place(*row).distance_squared(at);
+            (0..reduced.feasible.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
+        })
+        .collect()
+}
+
 fn select_by_svr(
     inputs: &Inputs,
     simulated: &Simulated,
@@ -369,11 +382,17 @@ fn select_by_svr(
     let all = simulated.dataset.targets_mm();
     let sensors = inputs.project.selection.sensors;
     let limit = budget.selection_candidates.max(sensors);
-    let rows = if reduced.sites.len() > limit {
+    let mut rows = if reduced.sites.len() > limit {
         reduced.pca.pivots(limit)
     } else {
         reduced.candidates.rows.clone()
     };
+    // A place that must have a gauge is a candidate whether or not the reduction kept it.
+    for row in required_rows(inputs, simulated, reduced) {
+        if !rows.contains(&row) {
+            rows.push(row);
+        }
+    }
     let sites: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
     let touches = evenly(all.len(), budget.selection_touches);
     let heard = heard(inputs, reduced);

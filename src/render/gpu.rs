@@ -116,13 +116,16 @@ struct Pipelines {
     blit: wgpu::RenderPipeline,
 }
 
+/// What a picture that lies in a target was drawn with, beside its buffers.
+type Signature = (Uniforms, ColorMap, [u32; 2], [f64; 4]);
+
 /// One picture.
 struct SlotGpu {
     uniforms: wgpu::Buffer,
     mesh: Option<MeshGpu>,
     map: Option<(ColorMap, wgpu::BindGroup)>,
     targets: Option<Targets>,
-    drawn: Option<(Uniforms, ColorMap, [u32; 2])>,
+    drawn: Option<Signature>,
 }
 
 struct MeshGpu {
@@ -180,7 +183,7 @@ impl SceneGpu {
         let slot = &mut self.slots[frame.slot as usize];
         let uploaded = slot.upload(device, queue, frame);
         self.work.uploads += u64::from(uploaded);
-        let signature = (frame.uniforms, frame.map, frame.size);
+        let signature = (frame.uniforms, frame.map, frame.size, frame.background);
         if !uploaded && slot.drawn == Some(signature) {
             return;
         }

@@ -93,7 +93,7 @@ impl Studio {
             }
             Some(number) => {
                 self.picked = vec![number];
-                self.view.gesture = Gesture::Gauge(pane, number);
+                self.view.gesture = Gesture::Gauge(pane, number, at);
             }
             None if modifiers.command => {
                 if let Some(site) = self.site_at(pane, at, usize::MAX) {
@@ -107,13 +107,8 @@ impl Studio {
         }
     }
 
-    pub(super) fn drag_gauge(&mut self, ctx: &Context, pane: Pane, number: usize, at: Pos2) {
-        // A click that trembles is no move.
-        let moved = ctx
-            .input(|i| i.pointer.press_origin())
-            .is_some_and(|p| p.distance(at) > 4.0);
-        let sites = &self.document.state.project.selection.sites;
-        if !moved || number >= sites.len() {
+    pub(super) fn drag_gauge(&mut self, pane: Pane, number: usize, at: Pos2) {
+        if number >= self.document.state.project.selection.sites.len() {
             return;
         }
         if let Some(site) = self.site_at(pane, at, number) {
@@ -275,6 +270,17 @@ impl Studio {
             (all[best].position.distance(p) < spacing).then_some(best)
         };
         sites.iter().map(find).collect()
+    }
+
+    /// Mean errors (mm) of gauges that were put somewhere by hand: estimated, and on unseen touches.
+    #[must_use]
+    pub fn by_hand_error(&self) -> (Option<f64>, Option<f64>) {
+        if self.by_hand.sites != self.document.state.project.selection.sites {
+            return (None, None);
+        }
+        let exact = self.by_hand.exact.as_ref();
+        let row = exact.and_then(|e| e.rows.iter().find(|r| r.region == "all touches"));
+        (self.by_hand.estimate, row.map(|r| r.error_mm))
     }
 
     /// Whether the gauges are those that the design chose.

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::gauges::BY_HAND;
 use super::viewport::Pane;
-use super::{Command, Studio, quality_name};
+use super::{Studio, quality_name};
 use crate::evaluation::Evaluation;
 use crate::placement::SelectorKind;
 use crate::project::{Kept, KeptError, KeptFailure};
@@ -102,11 +102,10 @@ impl Studio {
 
     /// The tab: what is kept, side by side.
     pub(super) fn compare_tab(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| self.button(ui, Command::Keep));
         if self.document.state.project.kept.is_empty() {
             super::results::empty(
                 ui,
-                "Nothing kept yet. Keep a selection, change what you like, and keep the next to see both side by side",
+                "Nothing kept yet. Press “Keep this selection”, change what you like, and keep the next to see both side by side",
             );
             return;
         }

@@ -130,11 +130,9 @@ impl Studio {
         if self.by_hand.sites != *sites || sites.is_empty() || self.as_designed() {
             return;
         }
-        let exact = self.by_hand.exact.as_ref();
-        let row = exact.and_then(|e| e.rows.iter().find(|r| r.region == "all touches"));
-        let text = match (row, self.by_hand.estimate) {
-            (Some(row), _) => format!("by hand: {:.2} mm on unseen touches", row.error_mm),
-            (None, Some(mm)) => format!("by hand: about {mm:.2} mm, judging …"),
+        let text = match self.by_hand_error() {
+            (_, Some(mm)) => format!("by hand: {mm:.2} mm on unseen touches"),
+            (Some(mm), None) => format!("by hand: about {mm:.2} mm, judging …"),
             (None, None) => "by hand: …".into(),
         };
         let chosen = self.design.as_ref().and_then(|d| {

@@ -118,16 +118,22 @@ impl Studio {
                 ui.label(RichText::new(standing.word()).small().color(colour));
             }
         });
+        let lines = self.achieved(stage);
+        let next = next_commands(stage);
+        let failed = matches!(standing, Standing::Failed(_));
+        if lines.is_empty() && next.is_empty() && !failed {
+            return;
+        }
         ui.indent(stage.name(), |ui| {
             if let Standing::Failed(message) = &standing {
                 let text = RichText::new(message).size(11.5).color(theme::ERROR);
                 ui.add(egui::Label::new(text).wrap());
             }
-            for line in self.achieved(stage) {
+            for line in lines {
                 ui.add(egui::Label::new(RichText::new(line).size(11.5).weak()).wrap());
             }
             self.notes_of(ui, stage);
-            if let Some(command) = next_command(stage) {
+            for &command in next {
                 self.button(ui, command);
             }
         });
@@ -402,12 +408,12 @@ impl Studio {
 }
 
 /// What to press at a stage.
-fn next_command(stage: Stage) -> Option<Command> {
+fn next_commands(stage: Stage) -> &'static [Command] {
     match stage {
-        Stage::Simulation => Some(Command::Simulate),
-        Stage::Selection => Some(Command::Select),
-        Stage::Report => Some(Command::Export),
-        _ => None,
+        Stage::Simulation => &[Command::Simulate],
+        Stage::Selection => &[Command::Select, Command::Keep],
+        Stage::Report => &[Command::Export],
+        _ => &[],
     }
 }
 

@@ -65,6 +65,9 @@ impl Tool {
     }
 }
 
+/// A click that moves less than this (points) is no drag.
+const TREMBLE: f32 = 4.0;
+
 /// What is under way between pressing and letting go.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) enum Gesture {
@@ -74,8 +77,8 @@ pub(super) enum Gesture {
     Stroke(Pane, Pos2),
     /// The outline drawn so far.
     Outline(Pane, Vec<Pos2>),
-    /// A gauge that is moved, by its number from zero.
-    Gauge(Pane, usize),
+    /// A gauge that is moved, by its number from zero, and where it was taken.
+    Gauge(Pane, usize, Pos2),
 }
 
 impl Studio {
@@ -122,31 +125,41 @@ impl Studio {
         if let Some(at) = response.hover_pos() {
             self.view.hover = self.view.pick(pane, at);
         }
-        let began = ui.input(|i| i.pointer.primary_pressed()) && response.contains_pointer();
         let at = response.interact_pointer_pos().or(response.hover_pos());
-        match (self.view.tool, at) {
-            (Tool::Touch, _) if response.clicked() => {
+        match self.view.tool {
+            Tool::Touch if response.clicked() => {
                 self.press(ui, pane, response.interact_pointer_pos());
             }
-            (Tool::Measure, Some(at)) if response.clicked() => {
-                let place = self.view.pick(pane, at);
+            Tool::Measure if response.clicked() => {
+                let place = at.and_then(|at| self.view.pick(pane, at));
                 self.measure_to(ui.ctx(), place);
             }
-            (Tool::Gauges, Some(at)) if began => self.grab(ui, pane, at),
-            (Tool::Paint | Tool::Erase, Some(at))
-                if began && self.view.pick(pane, at).is_some() =>
-            {
-                self.view.gesture = Gesture::Stroke(pane, at);
-                self.stroke(ui, pane, at);
-            }
-            (Tool::Box | Tool::Lasso, Some(at)) if began => {
-                self.view.gesture = Gesture::Outline(pane, vec![at]);
-            }
-            (_, Some(at)) => self.go_on(ui, pane, at),
             _ => {}
+        }
+        if let Some(from) = pressed_at(ui).filter(|_| response.contains_pointer()) {
+            self.begin(ui, pane, from);
+        }
+        // In the same frame too: where frames are slow, a hand has pressed and moved on in one.
+        if let Some(at) = at {
+            self.go_on(ui, pane, at);
         }
         if !ui.input(|i| i.pointer.primary_down()) {
             self.let_go(ui, pane);
+        }
+    }
+
+    /// The left button goes down.
+    fn begin(&mut self, ui: &Ui, pane: Pane, from: Pos2) {
+        match self.view.tool {
+            Tool::Gauges => self.grab(ui, pane, from),
+            Tool::Paint | Tool::Erase if self.view.pick(pane, from).is_some() => {
+                self.view.gesture = Gesture::Stroke(pane, from);
+                self.stroke(ui, pane, from);
+            }
+            Tool::Box | Tool::Lasso => {
+                self.view.gesture = Gesture::Outline(pane, vec![from]);
+            }
+            _ => {}
         }
     }
 
@@ -159,9 +172,11 @@ impl Studio {
                 _ if outline.last().is_some_and(|last| last.distance(at) > 3.0) => outline.push(at),
                 _ => {}
             },
-            Gesture::Gauge(own, number) if *own == pane => {
+            Gesture::Gauge(own, number, from) if *own == pane && from.distance(at) > TREMBLE => {
+                // From here on it follows however little the pointer moves.
+                *from = Pos2::new(f32::MAX, 0.0);
                 let number = *number;
-                self.drag_gauge(ui.ctx(), pane, number, at);
+                self.drag_gauge(pane, number, at);
             }
             _ => {}
         }
@@ -170,7 +185,7 @@ impl Studio {
     fn let_go(&mut self, ui: &Ui, pane: Pane) {
         let own = match &self.view.gesture {
             Gesture::None => return,
-            Gesture::Stroke(own, _) | Gesture::Outline(own, _) | Gesture::Gauge(own, _) => *own,
+            Gesture::Stroke(own, _) | Gesture::Outline(own, _) | Gesture::Gauge(own, ..) => *own,
         };
         if own != pane {
             return;
@@ -305,6 +320,20 @@ impl Studio {
         let near = 1e-3 * self.view.camera.distance + part.mean_edge();
         (self.view.pick(Pane::Limb, at)).is_none_or(|hit| part.point(hit).distance(p) < near)
     }
+}
+
+/// Where the left button went down in this frame.
+fn pressed_at(ui: &Ui) -> Option<Pos2> {
+    let down = |event: &egui::Event| match event {
+        egui::Event::PointerButton {
+            pos,
+            button: PointerButton::Primary,
+            pressed: true,
+            ..
+        } => Some(*pos),
+        _ => None,
+    };
+    ui.input(|i| i.events.iter().find_map(down))
 }
 
 /// Whether a point lies inside a polygon (even-odd rule).

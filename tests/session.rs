@@ -1,0 +1,351 @@
+//! Whole sessions in the real window, as an engineer has them who has read nothing.
+#![cfg(feature = "studio")]
+
+mod window;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use glam::DVec3;
+use hapdef::design::Design;
+use hapdef::document::Layer;
+use hapdef::placement::SelectorKind;
+use hapdef::project::ChosenSite;
+use hapdef::studio::{Field, Stage, Standing, Tool};
+use window::Window;
+
+/// What the stages say, in the order of the road.
+fn standings(w: &Window) -> Vec<Standing> {
+    Stage::ALL
+        .map(|stage| w.harness.state().standing(stage))
+        .to_vec()
+}
+
+fn gauges_of(w: &Window) -> Vec<ChosenSite> {
+    let project = &w.harness.state().document.state.project;
+    project.selection.sites.clone()
+}
+
+fn gauges(w: &Window) -> usize {
+    gauges_of(w).len()
+}
+
+/// The paper's task: where do ten gauges go in this limb, how well do they find a touch, what if some fail,
+/// would fewer do, and what does the workshop get?
+#[test]
+fn the_whole_design_task() {
+    let Some(mut w) = Window::open() else { return };
+    let home = tempfile::tempdir().unwrap();
+    w.harness.state_mut().keep_unsaved_in(home.path());
+    w.harness.run_ok();
+
+    // There is something to see and something to press.
+    assert_eq!(standings(&w)[0], Standing::Current);
+    assert_eq!(standings(&w)[2], Standing::Open);
+    w.show("1-start");
+
+    press_and_paint(&mut w);
+
+    // One button leads to the answer; the stages fill in on the way.
+    w.press("Touch");
+    w.press("Select gauges");
+    w.wait("the simulation", 120, |s| s.simulation.is_some());
+    w.wait("the design", 300, |s| s.design.is_some() && !s.busy());
+    for (stage, standing) in Stage::ALL.into_iter().zip(standings(&w)) {
+        assert_eq!(standing, Standing::Current, "{stage:?}");
+    }
+    assert_eq!(gauges(&w), 10);
+    let state = w.harness.state();
+    let places = state.document.state.project.selection.sites.clone();
+    for site in &places {
+        // Nothing on the painted strip.
+        let p = DVec3::from_array(site.position_mm);
+        assert!(
+            p.distance(DVec3::new(31.83, 0.0, p.z)) > 3.0 || p.z > 86.0 || p.z < 34.0,
+            "{p}"
+        );
+    }
+    let design = Arc::clone(&state.design.as_ref().unwrap().design);
+    assert!(
+        design
+            .feasibility
+            .taken()
+            .iter()
+            .any(|(f, n)| f.label() == "Kept out" && *n > 20)
+    );
+    w.press("Unrolled");
+    w.show("3-selected");
+    w.click_label("Failures");
+    w.show("4-failures");
+    w.harness.state_mut().view.field = Field::Error;
+    w.wait("the map of the error", 60, |s| !s.busy());
+    w.show("5-error-map");
+    w.harness.state_mut().view.field = Field::Uncertainty;
+    w.wait("what is uncertain", 60, |s| !s.busy());
+    w.harness.state_mut().view.field = Field::Region;
+
+    compare(&mut w, &design);
+    by_hand(&mut w);
+    out(&mut w, home.path());
+}
+
+/// The limb is pressed, and painted where a cable runs.
+fn press_and_paint(w: &mut Window) {
+    // Press the limb: it bends.
+    w.press("Front");
+    let hoop = w.place(31.83, 0.0, 60.0);
+    w.click(hoop);
+    w.wait("the touch", 60, |s| s.touched().is_some());
+    w.show("2-touch");
+
+    // A cable runs along the front: no gauge may go there.
+    w.press("Paint");
+    w.key(Modifiers::NONE, Key::OpenBracket);
+    w.harness.state_mut().view.layer = Layer::KeepOut;
+    let path: Vec<_> = (0..9)
+        .map(|k| w.place(31.83, 0.0, 40.0 + 5.0 * f64::from(k)))
+        .collect();
+    w.drag(&path);
+    let kept_out = |w: &Window| {
+        let layer = w.harness.state().document.layer(Layer::KeepOut);
+        layer.map(|m| m.iter().filter(|&&m| m).count())
+    };
+    let painted = kept_out(w).expect("a stroke paints");
+    w.key(Modifiers::COMMAND, Key::Z);
+    assert_eq!(kept_out(w), None, "one stroke is one step");
+    w.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    assert_eq!(kept_out(w), Some(painted));
+}
+
+/// Selections beside each other, and what is computed again for them.
+fn compare(w: &mut Window, design: &Arc<Design>) {
+    let places = gauges_of(w);
+    // Another selector is there at once: all four were run.
+    w.press("Keep this selection");
+    w.harness
+        .state_mut()
+        .document
+        .state
+        .project
+        .selection
+        .selector = SelectorKind::PcaQr;
+    w.harness.run_ok();
+    assert!(!w.harness.state().busy());
+    let other = &w.harness.state().document.state.project.selection.sites;
+    assert_ne!(*other, places);
+    w.press("Keep this selection");
+    w.harness
+        .state_mut()
+        .document
+        .state
+        .project
+        .selection
+        .selector = SelectorKind::GreedySvr;
+
+    // Would five do? Only what depends on the number is computed again.
+    w.harness
+        .state_mut()
+        .document
+        .state
+        .project
+        .selection
+        .sensors = 5;
+    w.harness.run_ok();
+    assert_eq!(standings(w)[5], Standing::Stale);
+    assert_eq!(standings(w)[2], Standing::Current);
+    w.wait("the change to be followed", 300, |s| {
+        !s.busy() && s.standing(Stage::Evaluation) == Standing::Current
+    });
+    assert_eq!(gauges(w), 5);
+    let five = &w.harness.state().design.as_ref().unwrap().design;
+    assert!(
+        Arc::ptr_eq(&five.simulated, &design.simulated),
+        "the simulation is the same one"
+    );
+    w.press("Keep this selection");
+    let kept = &w.harness.state().document.state.project.kept;
+    let error = |k: usize| {
+        kept[k]
+            .errors
+            .iter()
+            .rfind(|e| e.region == "all touches")
+            .unwrap()
+            .mean_mm
+    };
+    assert_eq!(kept.len(), 3);
+    assert!(error(2) > error(0), "five find touches less well than ten");
+    w.show("6-compare");
+}
+
+/// The place that the workshop cannot reach: a gauge is moved by hand and pinned.
+fn by_hand(w: &mut Window) {
+    w.press("Gauges");
+    let sites = w
+        .harness
+        .state()
+        .document
+        .state
+        .project
+        .selection
+        .sites
+        .clone();
+    let [x, y, z] = sites[2].position_mm;
+    // Along its hoop.
+    let from = w.flat_place(x, y, z);
+    let to = from + egui::vec2(24.0, 0.0);
+    let path: Vec<_> = (0..=10).map(|k| from.lerp(to, k as f32 / 10.0)).collect();
+    w.drag(&path);
+    let moved = w.harness.state().document.state.project.selection.sites[2].clone();
+    assert_ne!(moved, sites[2], "the gauge follows the pointer");
+    assert_eq!(w.harness.state().picked, [2]);
+    assert_eq!(gauges(w), sites.len());
+    // An estimate at once, the exact figure after it.
+    let start = Instant::now();
+    w.wait("an estimate", 20, |s| s.by_hand_error().0.is_some());
+    eprintln!("estimate after {:?}", start.elapsed());
+    w.wait("the exact error", 120, |s| {
+        s.by_hand_error().1.is_some() && !s.busy()
+    });
+    let (Some(quick), Some(exact)) = w.harness.state().by_hand_error() else {
+        panic!("both are known")
+    };
+    assert!((quick / exact - 1.0).abs() < 0.5, "{quick} {exact}");
+    w.show("7-by-hand");
+    // Pinned, it stays where it is in the next selection.
+    w.key(Modifiers::NONE, Key::P);
+    w.wait("the selection around the pin", 300, |s| {
+        !s.busy() && s.standing(Stage::Evaluation) == Standing::Current
+    });
+    w.press("Select gauges");
+    w.wait("the gauges", 300, |s| !s.busy());
+    let at = DVec3::from_array(moved.position_mm);
+    let sites = &w.harness.state().document.state.project.selection.sites;
+    let near = |s: &&ChosenSite| DVec3::from_array(s.position_mm).distance(at) < 0.01;
+    assert!(sites.iter().any(|s| near(&s)), "{at} among {sites:?}");
+}
+
+/// Saved, pictured, reported; and what was not saved comes back after a crash.
+fn out(w: &mut Window, home: &std::path::Path) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arm.hapdef.toml");
+    w.key(Modifiers::COMMAND, Key::S);
+    w.type_path(&path);
+    w.press("Save file");
+    assert!(
+        !w.harness.state().document.is_dirty(),
+        "{:?}",
+        w.harness.state().messages
+    );
+    w.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::E);
+    let picture = folder.path().join("arm.png");
+    w.type_path(&picture);
+    w.press("Save picture");
+    w.wait("the picture", 60, |s| !s.busy());
+    let image = image::open(&picture).unwrap().to_rgba8();
+    assert_eq!(image.dimensions(), (1920, 1080));
+    assert!(
+        image.pixels().any(|p| p.0[0] > 200 && p.0[2] < 80),
+        "gauges are on it"
+    );
+    w.press("Export report…");
+    let report = folder.path().join("report");
+    w.type_path(&report);
+    w.press("Export");
+    w.wait("the report", 60, |s| !s.busy());
+    assert!(report.join("report.html").exists() && report.join("sites.csv").exists());
+    w.show("8-reported");
+    // A change, a crash, and another window.
+    w.harness.state_mut().document.state.project.touch.force_n = 7.5;
+    let start = Instant::now();
+    let kept = || {
+        std::fs::read_dir(home)
+            .unwrap()
+            .filter_map(|f| Some(f.ok()?.path().join("origin.json")))
+            .any(|f| f.exists())
+    };
+    while !kept() {
+        assert!(start.elapsed() < Duration::from_secs(30));
+        w.harness.step();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let mut again = Window::open().unwrap();
+    // The first window is still there, and its lock with it: it must be gone first.
+    let gone = std::mem::replace(w, Window::open().unwrap());
+    drop(gone);
+    again.harness.state_mut().keep_unsaved_in(home);
+    again.harness.run_ok();
+    again.press("Recover changes");
+    again.wait("the changes", 60, |s| !s.busy());
+    let document = &again.harness.state().document;
+    assert_eq!(document.state.project.touch.force_n, 7.5);
+    assert_eq!(document.state.project.kept.len(), 3);
+    assert_eq!(
+        document.path.as_deref(),
+        Some(path.canonicalize().unwrap().as_path())
+    );
+    assert!(document.is_dirty() && document.layer(Layer::KeepOut).is_some());
+}
+
+/// Every control that can be reached has a name, with every tool and at every stage.
+#[test]
+fn every_control_has_a_name() {
+    let Some(mut w) = Window::open() else { return };
+    w.press("Section");
+    for stage in Stage::ALL {
+        w.harness.state_mut().stage = stage;
+        w.harness.run_ok();
+        named(&w, &format!("{stage:?}"));
+    }
+    for tool in Tool::ALL {
+        w.harness.state_mut().view.take(tool);
+        w.harness.run_ok();
+        named(&w, &format!("{tool:?}"));
+    }
+}
+
+fn named(w: &Window, place: &str) {
+    let controls = [
+        egui::Role::Button,
+        egui::Role::CheckBox,
+        egui::Role::ComboBox,
+        egui::Role::Slider,
+        egui::Role::SpinButton,
+        egui::Role::TextInput,
+    ];
+    let mut seen = 0;
+    for role in controls {
+        for node in w.harness.query_all_by(|n| n.role() == role) {
+            let node = node.accesskit_node();
+            seen += 1;
+            let label = node.label().or(node.value());
+            assert!(
+                label.is_some_and(|l| !l.trim().is_empty()),
+                "{place}: a {role:?} has no name"
+            );
+        }
+    }
+    assert!(seen > 20);
+}
+
+/// An idle window draws nothing, whatever is shown.
+#[test]
+fn an_idle_window_rests() {
+    let Some(mut w) = Window::open() else { return };
+    w.press("Unrolled");
+    w.press("See-through");
+    let rests = |w: &mut Window| {
+        // As many frames as an animation may take, and then none is asked for.
+        for _ in 0..120 {
+            w.harness.step();
+        }
+        let wanted = w.harness.output().viewport_output.values();
+        wanted.map(|v| v.repaint_delay).min().unwrap()
+    };
+    assert!(rests(&mut w) > Duration::from_secs(1));
+    let hoop = w.place(31.83, 0.0, 60.0);
+    w.click(hoop);
+    w.wait("the touch", 60, |s| s.touched().is_some());
+    assert!(rests(&mut w) > Duration::from_secs(1));
+}

@@ -1,0 +1,168 @@
+//! The real window in a test: driven by its accessible names, rendered by a real wgpu adapter.
+#![allow(dead_code, reason = "each test uses some of it")]
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use eframe::egui_wgpu::wgpu;
+use egui::{Event, Modifiers, PointerButton, Pos2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use glam::DVec3;
+use hapdef::budget::Quality;
+use hapdef::cli;
+use hapdef::studio::Studio;
+use image::RgbaImage;
+
+/// Whether there is an adapter; in CI there must be one.
+pub fn adapter() -> bool {
+    let instance =
+        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    assert!(
+        !adapters.is_empty() || std::env::var_os("CI").is_none(),
+        "no graphics adapter: install mesa-vulkan-drivers"
+    );
+    if adapters.is_empty() {
+        eprintln!("SKIPPED: no graphics adapter. Install mesa-vulkan-drivers");
+    }
+    !adapters.is_empty()
+}
+
+pub struct Window {
+    pub harness: Harness<'static, Studio>,
+}
+
+impl Window {
+    pub fn open() -> Option<Self> {
+        if !adapter() {
+            return None;
+        }
+        let harness = Harness::builder()
+            .with_size([1440.0, 900.0])
+            .with_theme(egui::Theme::Dark)
+            .with_max_steps(120)
+            .with_step_dt(1.0 / 60.0)
+            .with_render_cursor(false)
+            .wgpu()
+            .build_eframe(|cc| {
+                let mut loaded = cli::bundled().unwrap();
+                loaded.inputs.project.budget.quality = Quality::Draft;
+                Studio::new(cc, loaded, None).unwrap()
+            });
+        Some(Self { harness })
+    }
+
+    pub fn press(&mut self, name: &str) {
+        self.harness
+            .get_by_role_and_label(egui::Role::Button, name)
+            .click();
+        self.harness.run_ok();
+    }
+
+    /// Looks at a stage.
+    pub fn stage(&mut self, name: &str) {
+        let label = format!("Stage: {name}");
+        self.harness.get_by_label_contains(&label).click();
+        self.harness.run_ok();
+    }
+
+    /// Opens a file and waits until it is there, or was refused.
+    pub fn open_file(&mut self, path: &Path, unit: Option<hapdef::project::Unit>) {
+        let ctx = self.harness.ctx.clone();
+        self.harness.state_mut().open_path(&ctx, path, unit);
+        self.wait("the file", 60, |s| !s.busy());
+    }
+
+    /// Replaces the path in the open dialog.
+    pub fn type_path(&mut self, path: &Path) {
+        self.harness.get_by_label("Path").focus();
+        self.harness
+            .key_press_modifiers(Modifiers::COMMAND, egui::Key::A);
+        self.harness
+            .get_by_label("Path")
+            .type_text(&path.display().to_string());
+        self.harness.run_ok();
+    }
+
+    pub fn wait(&mut self, what: &str, seconds: u64, done: impl Fn(&Studio) -> bool) {
+        let start = Instant::now();
+        while !done(self.harness.state()) {
+            assert!(
+                start.elapsed().as_secs() < seconds,
+                "timed out waiting for {what}: {:?}",
+                self.harness.state().messages
+            );
+            self.harness.step();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        self.harness.run_ok();
+    }
+
+    pub fn picture(&mut self) -> RgbaImage {
+        self.harness.render().unwrap()
+    }
+
+    /// Where a point of the limb (mm) is in the window.
+    pub fn place(&self, x: f64, y: f64, z: f64) -> Pos2 {
+        self.harness
+            .state()
+            .view
+            .place(DVec3::new(x, y, z) / 1000.0)
+            .unwrap()
+    }
+
+    pub fn click(&mut self, at: Pos2) {
+        self.drag(&[at]);
+    }
+
+    pub fn drag(&mut self, path: &[Pos2]) {
+        self.harness.hover_at(path[0]);
+        self.harness.step();
+        let button = |pos, pressed| Event::PointerButton {
+            pos,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        };
+        self.harness.event(button(path[0], true));
+        for &p in path {
+            self.harness.hover_at(p);
+        }
+        self.harness.event(button(path[path.len() - 1], false));
+        self.harness.run_ok();
+    }
+
+    pub fn painted(&self) -> Option<usize> {
+        let mask = self.harness.state().document.state.painted.as_ref()?;
+        Some(mask.iter().filter(|&&m| m).count())
+    }
+}
+
+/// A command of the palette or of a key.
+impl Window {
+    pub fn key(&mut self, modifiers: Modifiers, key: egui::Key) {
+        self.harness.key_press_modifiers(modifiers, key);
+        self.harness.run_ok();
+    }
+
+    /// Clicks whatever has a label, of any role.
+    pub fn click_label(&mut self, label: &str) {
+        self.harness.get_by_label(label).click();
+        self.harness.run_ok();
+    }
+
+    /// Where a point of the limb (mm) is in the unrolled view.
+    pub fn flat_place(&self, x: f64, y: f64, z: f64) -> Pos2 {
+        let p = DVec3::new(x, y, z) / 1000.0;
+        self.harness.state().view.flat_place(p).unwrap()
+    }
+
+    /// Writes what the window shows into the folder that `HAPDEF_PICTURES` names, if it does.
+    pub fn show(&mut self, name: &str) {
+        if let Some(folder) = std::env::var_os("HAPDEF_PICTURES") {
+            let path = Path::new(&folder).join(format!("{name}.png"));
+            self.picture().save(&path).unwrap();
+        }
+    }
+}
