@@ -147,6 +147,12 @@ impl Studio {
         self.view.built = Some(built);
     }
 
+    /// Whether colours with a legend are shown.
+    #[must_use]
+    pub fn shows_field(&self) -> bool {
+        self.view.built.as_ref().is_some_and(|b| b.legend.is_some())
+    }
+
     fn field_key(&self) -> String {
         let field = self.view.field;
         let slow = self.slow.as_ref().map(|(_, values)| Arc::as_ptr(values));

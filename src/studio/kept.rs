@@ -114,7 +114,7 @@ impl Studio {
             egui::Grid::new("kept")
                 .num_columns(10)
                 .striped(true)
-                .spacing([16.0, 4.0])
+                .spacing([12.0, 4.0])
                 .show(ui, |ui| {
                     for title in [
                         "Show",
@@ -217,7 +217,7 @@ fn kept_row(
         ui.painter().add(rhomb(rect.center(), 6.0, colour(k)));
     });
     let height = ui.spacing().interact_size.y;
-    ui.add_sized([200.0, height], TextEdit::singleline(&mut kept.name))
+    ui.add_sized([160.0, height], TextEdit::singleline(&mut kept.name))
         .accessible_name(format!("Name of kept selection {}", k + 1));
     ui.label(title(&kept.selector));
     ui.label(quality_name(kept.quality));

@@ -27,9 +27,9 @@ impl Studio {
         self.build_field(ui.ctx());
         self.paint_limb(ui, rect, transparent);
         let painter = ui.painter_at(rect);
-        self.paint_touch(&painter, Pane::Limb);
         self.paint_kept(&painter, Pane::Limb);
         self.paint_gauges(&painter, Pane::Limb);
+        self.paint_touch(&painter, Pane::Limb);
         self.paint_legend(&painter, rect);
     }
 
@@ -367,7 +367,13 @@ impl Studio {
             Tool::Measure => "Click two points of the limb",
             Tool::Touch => self.field_hint(),
         };
-        let room = (rect.width() - 28.0).max(60.0);
+        // Beside what the other corner says.
+        let corner = if self.exaggeration().is_some() {
+            150.0
+        } else {
+            28.0
+        };
+        let room = (rect.width() - corner).max(60.0);
         let ink = Color32::from_gray(215);
         let galley = painter.layout(text.to_owned(), FontId::proportional(12.5), ink, room);
         plate(

@@ -16,8 +16,10 @@ impl Studio {
     /// Two rows that stay as high as they are, whatever is chosen in them.
     pub(super) fn toolbar(&mut self, ui: &mut Ui) {
         egui::Frame::new()
+            .fill(ui.visuals().panel_fill)
             .inner_margin(egui::Margin::symmetric(8, 5))
             .show(ui, |ui| {
+                ui.set_min_width(ui.available_width());
                 ui.horizontal_wrapped(|ui| {
                     for tool in Tool::ALL {
                         self.toggle(ui, Command::Tool(tool));

@@ -332,9 +332,9 @@ impl Studio {
             Pane::Unrolled => self.paint_unrolled(ui, rect),
         }
         let painter = ui.painter_at(rect);
-        self.paint_touch(&painter, pane);
         self.paint_kept(&painter, pane);
         self.paint_gauges(&painter, pane);
+        self.paint_touch(&painter, pane);
         self.paint_measure(&painter, pane);
         self.paint_brush(&painter, pane);
         self.paint_outline(&painter, pane);
