@@ -122,6 +122,10 @@ pub struct TriMesh {
     triangle_edges: Vec<[u32; 3]>,
     vertex_triangles: Vec<Vec<u32>>,
     vertex_normals: Vec<DVec3>,
+    /// Sizes of the whole, which are asked for again and again.
+    bounds: (DVec3, DVec3),
+    area: f64,
+    mean_edge: f64,
 }
 
 const MAX_TRIANGLES: usize = 4_000_000;
@@ -188,7 +192,20 @@ impl TriMesh {
             }
         }
         let vertex_normals = vertex_normals(&positions, &triangles);
+        let corners = |t: &[u32; 3]| t.map(|v| positions[v as usize]);
+        let area = |t| {
+            let [a, b, c] = corners(t);
+            (b - a).cross(c - a).length() / 2.0
+        };
+        let length = |e: &Edge| positions[e.a as usize].distance(positions[e.b as usize]);
         Self {
+            bounds: positions
+                .iter()
+                .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), &p| {
+                    (l.min(p), u.max(p))
+                }),
+            area: triangles.iter().map(area).sum(),
+            mean_edge: edges.iter().map(length).sum::<f64>() / edges.len() as f64,
             positions,
             triangles,
             edges,
@@ -264,29 +281,19 @@ impl TriMesh {
     /// Area of the whole surface (m²).
     #[must_use]
     pub fn area(&self) -> f64 {
-        (0..self.triangles.len() as u32)
-            .map(|t| self.facet_area(t))
-            .sum()
+        self.area
     }
 
     /// Mean edge length (m): the element size that figures are quoted for.
     #[must_use]
     pub fn mean_edge(&self) -> f64 {
-        let sum: f64 = self
-            .edges
-            .iter()
-            .map(|e| self.positions[e.a as usize].distance(self.positions[e.b as usize]))
-            .sum();
-        sum / self.edges.len() as f64
+        self.mean_edge
     }
 
     /// Lower and upper corner of the axis-aligned box around the surface (m).
     #[must_use]
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        self.positions.iter().fold(
-            (DVec3::INFINITY, DVec3::NEG_INFINITY),
-            |(lower, upper), &p| (lower.min(p), upper.max(p)),
-        )
+        self.bounds
     }
 
     /// Edges with a triangle on one side only: the free rims of the surface.

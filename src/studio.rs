@@ -251,10 +251,7 @@ impl eframe::App for Studio {
             .default_size(260.0)
             .size_range(120.0..=520.0)
             .show(ui, |ui| self.results(ui));
-        let views = egui::Frame::new().fill(ui.visuals().panel_fill);
-        CentralPanel::default()
-            .frame(views)
-            .show(ui, |ui| self.viewport(ui));
+        CentralPanel::no_frame().show(ui, |ui| self.viewport(ui));
         self.dialogs(&ctx);
         self.palette(&ctx);
         self.recovery_dialog(&ctx);

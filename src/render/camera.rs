@@ -133,19 +133,20 @@ impl Camera {
         perspective(FOV as f32, aspect, 0.02, 20.0) * view
     }
 
+    /// Where points appear in a view, for many of them.
+    #[must_use]
+    pub fn projection(&self, aspect: f32) -> Projection {
+        Projection {
+            matrix: self.matrix(aspect),
+            target: self.target,
+            distance: self.distance,
+        }
+    }
+
     /// Where a point (m) appears in a view (0–1 from the upper left), and its depth; nothing behind.
     #[must_use]
     pub fn project(&self, p: DVec3, aspect: f32) -> Option<(DVec2, f32)> {
-        let local = ((p - self.target) / self.distance).as_vec3();
-        let clip: Vec4 = self.matrix(aspect) * local.extend(1.0);
-        if clip.w <= 0.0 {
-            return None;
-        }
-        let ndc = clip / clip.w;
-        Some((
-            DVec2::new(f64::from(ndc.x) * 0.5 + 0.5, 0.5 - f64::from(ndc.y) * 0.5),
-            ndc.z,
-        ))
+        self.projection(aspect).place(p)
     }
 
     /// The ray through a place of the view (0–1 from the upper left): origin (m) and direction.
@@ -157,6 +158,31 @@ impl Camera {
         let y = (1.0 - 2.0 * place.y) * half;
         let direction = (-self.toward_eye() + right * x + up * y).normalize();
         (self.eye(), direction)
+    }
+}
+
+/// A camera's look at a view of some shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projection {
+    matrix: Mat4,
+    target: DVec3,
+    distance: f64,
+}
+
+impl Projection {
+    /// As [`Camera::project`].
+    #[must_use]
+    pub fn place(&self, p: DVec3) -> Option<(DVec2, f32)> {
+        let local = ((p - self.target) / self.distance).as_vec3();
+        let clip: Vec4 = self.matrix * local.extend(1.0);
+        if clip.w <= 0.0 {
+            return None;
+        }
+        let ndc = clip / clip.w;
+        Some((
+            DVec2::new(f64::from(ndc.x) * 0.5 + 0.5, 0.5 - f64::from(ndc.y) * 0.5),
+            ndc.z,
+        ))
     }
 }
 

@@ -188,7 +188,7 @@ impl SceneGpu {
             return;
         }
         if slot.targets.as_ref().is_none_or(|t| t.size != frame.size) {
-            let targets = Targets::new(device, &self.blit_layout, &self.sampler, frame.size);
+            let targets = Targets::new(device, &self.blit_layout, frame.size);
             slot.targets = Some(targets);
         }
         if slot
@@ -374,12 +374,7 @@ impl MeshGpu {
 }
 
 impl Targets {
-    fn new(
-        device: &wgpu::Device,
-        layout: &wgpu::BindGroupLayout,
-        sampler: &wgpu::Sampler,
-        size: [u32; 2],
-    ) -> Self {
+    fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, size: [u32; 2]) -> Self {
         let view = |format, sample_count, usage| {
             device
                 .create_texture(&wgpu::TextureDescriptor {
@@ -403,16 +398,10 @@ impl Targets {
         let bind = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("limb picture"),
             layout,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(&resolved),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::Sampler(sampler),
-                },
-            ],
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(&resolved),
+            }],
         });
         Self {
             size,
@@ -424,7 +413,7 @@ impl Targets {
     }
 }
 
-/// Bindings of the scene (uniforms, map, sampler) or of the blit (picture, sampler).
+/// Bindings of the scene (uniforms, map, sampler) or of the blit (picture).
 fn layout(device: &wgpu::Device, scene: bool) -> wgpu::BindGroupLayout {
     let texture = wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Float { filterable: true },
@@ -440,7 +429,7 @@ fn layout(device: &wgpu::Device, scene: bool) -> wgpu::BindGroupLayout {
     let kinds = if scene {
         vec![uniforms, texture, sampler]
     } else {
-        vec![texture, sampler]
+        vec![texture]
     };
     let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
         .zip(kinds)

@@ -50,47 +50,88 @@ pub fn draw(
     mut output: FullOutput,
     size: [u32; 2],
 ) -> Result<Vec<u8>, String> {
-    let (device, queue) = (&state.device, &state.queue);
-    let most = device.limits().max_texture_dimension_2d;
-    if size.iter().any(|&s| s == 0 || s > most) {
-        // It must not be dropped full.
-        output.textures_delta.clear();
-        return Err(format!(
-            "a picture of {} × {} pixels cannot be drawn here: both sides must lie between 1 and {most}",
-            size[0], size[1]
-        ));
+    // It must not be dropped full.
+    let canvas = Canvas::new(state, size).inspect_err(|_| output.textures_delta.clear())?;
+    canvas.paint(ctx, output)?;
+    read_back(&state.device, &state.queue, &canvas.texture)
+}
+
+/// Something to draw on, as large as a window.
+pub struct Canvas<'a> {
+    state: &'a RenderState,
+    texture: wgpu::Texture,
+    size: [u32; 2],
+}
+
+impl<'a> Canvas<'a> {
+    /// # Errors
+    /// A message where the adapter cannot hold it.
+    pub fn new(state: &'a RenderState, size: [u32; 2]) -> Result<Self, String> {
+        let most = state.device.limits().max_texture_dimension_2d;
+        if size.iter().any(|&s| s == 0 || s > most) {
+            return Err(format!(
+                "a picture of {} × {} pixels cannot be drawn here: both sides must lie between 1 and {most}",
+                size[0], size[1]
+            ));
+        }
+        Ok(Self {
+            texture: target(state, size),
+            state,
+            size,
+        })
     }
-    let mut renderer = state.renderer.write();
-    update_textures(state, &mut renderer, &mut output);
-    let screen = ScreenDescriptor {
-        pixels_per_point: ctx.pixels_per_point(),
-        size_in_pixels: size,
+
+    /// Draws one pass of a context over nothing, and waits until it is there.
+    ///
+    /// # Errors
+    /// A message where the adapter does not finish.
+    pub fn paint(&self, ctx: &Context, mut output: FullOutput) -> Result<(), String> {
+        let (device, queue) = (&self.state.device, &self.state.queue);
+        let mut renderer = self.state.renderer.write();
+        update_textures(self.state, &mut renderer, &mut output);
+        let screen = ScreenDescriptor {
+            pixels_per_point: ctx.pixels_per_point(),
+            size_in_pixels: self.size,
+        };
+        let shapes = ctx.tessellate(std::mem::take(&mut output.shapes), ctx.pixels_per_point());
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let before = renderer.update_buffers(device, queue, &mut encoder, &shapes, &screen);
+        let view = self
+            .texture
+            .create_view(&wgpu::TextureViewDescriptor::default());
+        {
+            let mut pass = encoder
+                .begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("picture"),
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view: &view,
+                        resolve_target: None,
+                        depth_slice: None,
+                        ops: wgpu::Operations {
+                            load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                            store: wgpu::StoreOp::Store,
+                        },
+                    })],
+                    ..wgpu::RenderPassDescriptor::default()
+                })
+                .forget_lifetime();
+            renderer.render(&mut pass, &shapes, &screen);
+        }
+        let submission = queue.submit(before.into_iter().chain(iter::once(encoder.finish())));
+        wait_for(device, submission)
+    }
+}
+
+fn wait_for(device: &wgpu::Device, submission: wgpu::SubmissionIndex) -> Result<(), String> {
+    let wait = wgpu::PollType::Wait {
+        submission_index: Some(submission),
+        timeout: Some(PATIENCE),
     };
-    let shapes = ctx.tessellate(std::mem::take(&mut output.shapes), ctx.pixels_per_point());
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    let before = renderer.update_buffers(device, queue, &mut encoder, &shapes, &screen);
-    let texture = target(state, size);
-    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-    {
-        let mut pass = encoder
-            .begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("picture"),
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &view,
-                    resolve_target: None,
-                    depth_slice: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                ..wgpu::RenderPassDescriptor::default()
-            })
-            .forget_lifetime();
-        renderer.render(&mut pass, &shapes, &screen);
-    }
-    queue.submit(before.into_iter().chain(iter::once(encoder.finish())));
-    read_back(device, queue, &texture)
+    device.poll(wait).map(drop).map_err(|e| unfinished(&e))
+}
+
+fn unfinished(error: &dyn std::fmt::Display) -> String {
+    format!("the graphics adapter did not finish the picture: {error}")
 }
 
 /// Fonts and other textures of the context.
@@ -158,21 +199,15 @@ fn read_back(
         .map_async(wgpu::MapMode::Read, move |mapped| {
             let _ = sender.send(mapped);
         });
-    let failed =
-        |e: &dyn std::fmt::Display| format!("the graphics adapter did not finish the picture: {e}");
-    let wait = wgpu::PollType::Wait {
-        submission_index: Some(submission),
-        timeout: Some(PATIENCE),
-    };
-    device.poll(wait).map_err(|e| failed(&e))?;
+    wait_for(device, submission)?;
     receiver
         .recv()
-        .map_err(|e| failed(&e))?
-        .map_err(|e| failed(&e))?;
+        .map_err(|e| unfinished(&e))?
+        .map_err(|e| unfinished(&e))?;
     let bytes = buffer
         .slice(..)
         .get_mapped_range()
-        .map_err(|e| failed(&e))?;
+        .map_err(|e| unfinished(&e))?;
     Ok(bytes
         .chunks_exact(padded)
         .flat_map(|r| &r[..row])

@@ -158,6 +158,11 @@ impl Studio {
         }
     }
 
+    /// Shows kept selections by their numbers, beside those that are shown already.
+    pub fn show_kept(&mut self, numbers: impl IntoIterator<Item = usize>) {
+        self.shown_kept.extend(numbers);
+    }
+
     /// Kept selections that are shown, with their numbers.
     pub(super) fn compared(&self) -> impl Iterator<Item = (usize, &Kept)> {
         let kept = self.document.state.project.kept.iter().enumerate();

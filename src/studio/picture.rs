@@ -136,9 +136,9 @@ fn fit(studio: &mut Studio, aspect: f32) {
     const FILLED: f64 = 0.9;
     // Perspective: what is nearer grows more, so the second time corrects the first.
     for _ in 0..4 {
-        let camera = studio.view.camera;
+        let projection = studio.view.camera.projection(aspect);
         let reach = (studio.document.part.positions().iter())
-            .filter_map(|&p| camera.project(p, aspect))
+            .filter_map(|&p| projection.place(p))
             .map(|(at, _)| 2.0 * (at - 0.5).abs().max_element())
             .fold(0.0, f64::max);
         if reach > 0.0 {

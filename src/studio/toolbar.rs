@@ -20,6 +20,7 @@ impl Studio {
             .inner_margin(egui::Margin::symmetric(8, 5))
             .show(ui, |ui| {
                 ui.set_min_width(ui.available_width());
+                ui.spacing_mut().item_spacing.y = 4.0;
                 ui.horizontal_wrapped(|ui| {
                     for tool in Tool::ALL {
                         self.toggle(ui, Command::Tool(tool));

@@ -299,11 +299,11 @@ impl Studio {
         let brush = self.brush(ui);
         let part = std::sync::Arc::clone(&self.document.part);
         let bounds = egui::Rect::from_points(&outline);
+        let place = self.view.placing(pane);
         let inside: Vec<u32> = (0..part.positions().len() as u32)
             .filter(|&v| {
-                let p = part.positions()[v as usize];
-                (self.view.place_in(pane, p))
-                    .is_some_and(|at| bounds.contains(at) && encloses(&outline, at))
+                let at = place(part.positions()[v as usize]);
+                at.is_some_and(|at| bounds.contains(at) && encloses(&outline, at))
             })
             .filter(|&v| pane == Pane::Unrolled || self.view.see_through || self.is_seen(v))
             .collect();

@@ -202,6 +202,18 @@ impl Viewport {
         }
     }
 
+    /// As [`Self::place_in`], for many points.
+    pub(super) fn placing(&self, pane: Pane) -> impl Fn(DVec3) -> Option<Pos2> + '_ {
+        let projection = self.camera.projection(self.rect.aspect_ratio());
+        move |p| match pane {
+            Pane::Limb => {
+                let (at, _) = projection.place(p).filter(|_| !self.is_cut(p))?;
+                Some(self.rect.lerp_inside(vec2(at.x as f32, at.y as f32)))
+            }
+            Pane::Unrolled => self.flat_place(p),
+        }
+    }
+
     pub(super) fn rect_of(&self, pane: Pane) -> Rect {
         match pane {
             Pane::Limb => self.rect,
@@ -276,7 +288,10 @@ impl Viewport {
 
 impl Studio {
     pub(super) fn viewport(&mut self, ui: &mut Ui) {
+        // The views cover everything below the bar: nothing is painted behind them.
+        ui.spacing_mut().item_spacing.y = 0.0;
         self.toolbar(ui);
+        ui.reset_style();
         self.view.hover = None;
         let axis = self.document.state.project.part.axis;
         if self.view.unrolled.axis != axis {
@@ -291,7 +306,7 @@ impl Studio {
         let shown = self.pane(ui, Pane::Limb, limb);
         let mut panes = vec![(Pane::Limb, shown)];
         if self.view.unrolled_shown {
-            let flat = Rect::from_min_max(Pos2::new(split + 1.0, all.top()), all.max);
+            let flat = Rect::from_min_max(Pos2::new(split, all.top()), all.max);
             let shown = self.pane(ui, Pane::Unrolled, flat);
             panes.push((Pane::Unrolled, shown));
         }
@@ -300,6 +315,10 @@ impl Studio {
         // Drawn after all that happened in either: what is hovered in one shows in the other.
         for (pane, rect) in panes {
             self.draw(ui, pane, rect);
+        }
+        if self.view.unrolled_shown {
+            let line = ui.visuals().widgets.noninteractive.bg_stroke;
+            ui.painter().vline(split, all.y_range(), line);
         }
         self.options(ui, limb);
     }
