@@ -16,7 +16,7 @@ use crate::elasticity::model::{check_held, check_section};
 use crate::elasticity::{Freedoms, ShellModel};
 use crate::mesh::remesh::Remeshed;
 use crate::mesh::{SurfacePoint, TriMesh};
-use crate::project::Elements;
+use crate::project::{Elements, Project};
 
 /// The elastic stage: the mesh that was computed on, the sites on it and the dataset.
 pub struct Simulated {
@@ -54,6 +54,8 @@ impl Simulated {
 pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simulated, DesignError> {
     let project = &inputs.project;
     project.check()?;
+    let kept_out = project.feasible.keep_out.as_ref();
+    Project::mask("feasible.keep_out", kept_out, &inputs.masks)?;
     let ground = ground(inputs)?;
     let layout = layout(inputs, &ground);
     // First what cannot be computed at all: a part that nothing holds is the likeliest mistake.

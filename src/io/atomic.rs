@@ -76,16 +76,16 @@ fn sync_folder(path: &Path) -> std::io::Result<()> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::cell::Cell;
     use std::process::Command;
 
     use super::*;
 
     /// Set for a program that is to die: at which step, and while writing where.
-    const DIE_AT: &str = "HAPDEF_TEST_DIE_AT";
+    pub const DIE_AT: &str = "HAPDEF_TEST_DIE_AT";
     const DIE_WRITING: &str = "HAPDEF_TEST_DIE_WRITING";
-    const STEPS: u32 = 7;
+    pub const STEPS: u32 = 7;
 
     thread_local! {
         static STEP: Cell<u32> = const { Cell::new(0) };

@@ -98,9 +98,6 @@ pub(super) struct FlatShown {
 /// A field that took a job to compute: what from, and its values a vertex of the part.
 pub(super) type Slow = Option<(String, Arc<Vec<f64>>)>;
 
-/// How large the largest displacement is drawn, as a share of the limb.
-const SHOWN_DEFORMATION: f64 = 0.06;
-
 impl Studio {
     /// Builds what is shown a vertex, where anything it depends on has changed.
     pub(super) fn build_field(&mut self, ctx: &Context) {
@@ -377,17 +374,9 @@ impl Studio {
     /// on the limb at rest.
     #[must_use]
     pub fn exaggeration(&self) -> Option<f64> {
-        let touched = self
-            .touching
-            .result()
-            .filter(|t| self.view.tool == Tool::Touch && t.largest > 0.0)?;
-        let (lower, upper) = self.document.part.bounds();
-        let wanted =
-            SHOWN_DEFORMATION * (upper - lower).length() / touched.largest.max(f64::MIN_POSITIVE);
-        let power = 10f64.powf(wanted.log10().floor());
-        [5.0, 2.0, 1.0]
-            .map(|m| m * power)
-            .into_iter()
-            .find(|s| *s <= wanted)
+        let touched = self.touching.result()?;
+        touched
+            .exaggeration
+            .filter(|_| self.view.tool == Tool::Touch)
     }
 }

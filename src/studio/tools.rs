@@ -8,7 +8,6 @@ use super::fields::Field;
 use super::viewport::Pane;
 use crate::document::Brush;
 use crate::mesh::SurfacePoint;
-use crate::mesh::locate::SurfaceIndex;
 
 /// What the pointer does on the limb.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -213,19 +212,12 @@ impl Studio {
 
     /// The point of the limb under a place of the window, on the shape that is shown there.
     fn pick_shown(&self, pane: Pane, at: Pos2) -> Option<SurfacePoint> {
-        let (Some(scale), Some(touched)) = (self.exaggeration(), self.touching.result()) else {
-            return self.view.pick(pane, at);
-        };
-        if pane == Pane::Unrolled {
-            return self.view.pick(pane, at);
+        match self.touching.result() {
+            Some(touched) if pane == Pane::Limb && self.exaggeration().is_some() => {
+                self.view.pick_on(&touched.index, at)
+            }
+            _ => self.view.pick(pane, at),
         }
-        let part = &self.document.part;
-        let moved = part.positions().iter().zip(&touched.displacement);
-        let index = SurfaceIndex::of(
-            moved.map(|(p, u)| *p + *u * scale).collect(),
-            part.triangles(),
-        );
-        self.view.pick_on(&index, at)
     }
 
     /// What a brush or outline does now: Control turns it around, as elsewhere.

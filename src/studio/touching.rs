@@ -9,7 +9,8 @@ use crate::design::{self, DesignError, Inputs};
 use crate::document::Document;
 use crate::elasticity::observe::{Face, Observer};
 use crate::elasticity::{ShellModel, Touch};
-use crate::mesh::SurfacePoint;
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::{SurfacePoint, TriMesh};
 
 /// What a touch did, at every vertex of the part.
 pub struct Touched {
@@ -20,7 +21,26 @@ pub struct Touched {
     pub strain: Vec<f64>,
     /// Largest displacement (m).
     pub largest: f64,
+    /// How much the displacement is exaggerated where it is shown; nothing where there is none.
+    pub exaggeration: Option<f64>,
+    /// The part as it is shown, to be pointed at.
+    pub index: SurfaceIndex,
     key: String,
+}
+
+/// How large the largest displacement is drawn, as a share of the limb.
+const SHOWN_DEFORMATION: f64 = 0.06;
+
+/// A round factor by which a largest displacement (m) shows on a part.
+fn exaggeration(part: &TriMesh, largest: f64) -> Option<f64> {
+    if largest <= 0.0 {
+        return None;
+    }
+    let (lower, upper) = part.bounds();
+    let wanted = SHOWN_DEFORMATION * (upper - lower).length() / largest;
+    let power = 10f64.powf(wanted.log10().floor());
+    let round = [5.0, 2.0, 1.0].map(|m| m * power);
+    round.into_iter().find(|s| *s <= wanted)
 }
 
 struct Request {
@@ -165,7 +185,7 @@ fn build(inputs: &Inputs) -> Result<ShellModel, DesignError> {
 
 fn solve(model: &ShellModel, observer: &Observer, request: &Request) -> Touched {
     let u = model.solve(&model.forces(&request.touch));
-    let displacement = observer.displacement_of(model, &u);
+    let displacement: Vec<DVec3> = observer.displacement_of(model, &u);
     let strain = observer
         .strain_of(model, &u)
         .into_iter()
@@ -174,9 +194,17 @@ fn solve(model: &ShellModel, observer: &Observer, request: &Request) -> Touched 
             mean + radius * if mean < 0.0 { -1.0 } else { 1.0 }
         })
         .collect();
+    let largest = displacement.iter().map(|d| d.length()).fold(0.0, f64::max);
+    let part = &request.inputs.part;
+    let exaggeration = exaggeration(part, largest);
+    let scale = exaggeration.unwrap_or(0.0);
+    let moved = part.positions().iter().zip(&displacement);
+    let shown = moved.map(|(p, u)| *p + *u * scale).collect();
     Touched {
         touch: request.touch,
-        largest: displacement.iter().map(|d| d.length()).fold(0.0, f64::max),
+        largest,
+        exaggeration,
+        index: SurfaceIndex::of(shown, part.triangles()),
         displacement,
         strain,
         key: request.key.clone(),

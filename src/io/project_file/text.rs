@@ -1,0 +1,395 @@
+//! A project as the text of its file, with a comment at every key.
+
+use std::fmt::Write as _;
+
+use crate::project::{Kept, Project};
+
+/// The commented text of a project.
+#[must_use]
+pub fn to_text(project: &Project) -> String {
+    let mut t = Text::default();
+    t.line("# A HapDef project. Lengths in millimetres, forces in newtons; paths are relative to this file.");
+    t.key("format", project.format, "version of this file's format");
+    part(&mut t, project);
+    touch(&mut t, project);
+    gauge(&mut t, project);
+    feasible(&mut t, project);
+    selection(&mut t, project);
+    evaluation(&mut t, project);
+    for selection in &project.kept {
+        kept(&mut t, selection);
+    }
+    t.0
+}
+
+fn part(t: &mut Text, project: &Project) {
+    t.table("part");
+    let part = &project.part;
+    t.key("mesh", quoted(&part.mesh), "glTF/GLB, OBJ, STL or PLY");
+    t.maybe(
+        "unit",
+        part.unit.map(|u| quoted(u.name())),
+        "unit of the mesh file: \"mm\", \"cm\", \"m\" or \"in\"; glTF is in metres and needs none",
+    );
+    t.key(
+        "body",
+        part.body,
+        "which connected body, 0 being the largest",
+    );
+    t.key(
+        "weld_mm",
+        float(part.weld_mm),
+        "vertices nearer than this are joined; 0 joins equal ones only",
+    );
+    t.key(
+        "fill_holes_mm",
+        float(part.fill_holes_mm),
+        "holes up to this far across are filled",
+    );
+    t.key(
+        "elements",
+        serialized(&part.elements),
+        "\"graded\": computed on a mesh of its own, finer where the strain changes; \"as-given\": on the file's triangles",
+    );
+    t.key(
+        "model",
+        quoted("shell"),
+        "\"shell\": the mesh is the mid-surface",
+    );
+    t.key("thickness_mm", float(part.thickness_mm), "of the shell");
+    t.key(
+        "axis",
+        serialized(&part.axis),
+        "the axis the part is unrolled about: \"x\", \"y\" or \"z\"",
+    );
+    t.table("material");
+    t.key(
+        "youngs_modulus_gpa",
+        float(project.material.youngs_modulus_gpa),
+        "",
+    );
+    t.key(
+        "poissons_ratio",
+        float(project.material.poissons_ratio),
+        "above -1 and below 0.5",
+    );
+    for support in &project.supports {
+        t.list("support");
+        t.key("kind", serialized(&support.kind), "\"clamped\" (no displacement, no rotation), \"pinned\" (no displacement) or \"symmetry\"");
+        t.maybe(
+            "box_mm",
+            support.box_mm.as_ref().map(corners),
+            "every point of the part inside it is held",
+        );
+        t.maybe(
+            "vertices",
+            support.vertices.as_deref().map(quoted),
+            "instead of a box: a mask in the NPZ file beside this one, or a group of the mesh file",
+        );
+        t.key(
+            "normal",
+            serialized(&support.normal),
+            "of a symmetry plane; unused otherwise",
+        );
+    }
+}
+
+fn touch(t: &mut Text, project: &Project) {
+    t.table("touch");
+    t.key(
+        "force_n",
+        float(project.touch.force_n),
+        "pressed along the inward normal",
+    );
+    t.key(
+        "tip_radius_mm",
+        float(project.touch.tip_radius_mm),
+        "the tip spreads the force as (1 - r²/a²)²",
+    );
+    t.key(
+        "count",
+        project.touch.count,
+        "touches simulated; lower qualities take fewer",
+    );
+    t.key(
+        "edge_margin_mm",
+        float(project.touch.edge_margin_mm),
+        "least distance of a touch from a free edge",
+    );
+    t.maybe(
+        "region",
+        project.touch.region.as_deref().map(quoted),
+        "touches come only here: a mask in the NPZ file beside this one, or a group of the mesh file",
+    );
+    t.table("sites");
+    t.key(
+        "spacing_mm",
+        float(project.sites.spacing_mm),
+        "of the possible gauge positions on the inside",
+    );
+    t.key(
+        "lattice",
+        serialized(&project.sites.lattice),
+        "\"even\" (any surface) or \"unrolled\" (rows and columns about the axis)",
+    );
+}
+
+fn feasible(t: &mut Text, project: &Project) {
+    t.table("feasible");
+    t.key(
+        "support_clearance_mm",
+        float(project.feasible.support_clearance_mm),
+        "least distance over the surface from anything held",
+    );
+    t.key(
+        "edge_neighbours",
+        project.feasible.edge_neighbours,
+        "k of the centre-of-mass filter …",
+    );
+    t.key(
+        "edge_radius_mm",
+        float(project.feasible.edge_radius_mm),
+        "… and its radius",
+    );
+    t.maybe(
+        "painted",
+        project.feasible.painted.as_deref().map(quoted),
+        "painted region, an array in the NPZ file beside this one",
+    );
+    t.maybe(
+        "keep_out",
+        project.feasible.keep_out.as_deref().map(quoted),
+        "no gauge goes here: a mask in the NPZ file beside this one, or a group of the mesh file",
+    );
+    t.table("candidates");
+    t.key(
+        "unexplained",
+        float(project.candidates.unexplained),
+        "share of the held-out variance the candidates may leave unexplained",
+    );
+    t.maybe(
+        "count",
+        project.candidates.count,
+        "a fixed number of candidates instead",
+    );
+}
+
+fn evaluation(t: &mut Text, project: &Project) {
+    t.table("evaluation");
+    for region in &project.evaluation.regions {
+        t.list("evaluation.region");
+        t.key(
+            "name",
+            quoted(&region.name),
+            "errors are quoted for it, beside all touches",
+        );
+        t.key("box_mm", corners(&region.box_mm), "");
+    }
+    t.table("budget");
+    t.key(
+        "quality",
+        quoted(project.budget.quality.name()),
+        "\"draft\", \"standard\" or \"reference\"",
+    );
+    t.key("seed", project.budget.seed, "of every random draw");
+}
+
+fn gauge(t: &mut Text, project: &Project) {
+    let gauge = &project.gauge;
+    t.table("gauge");
+    t.key(
+        "signal",
+        quoted(gauge.signal.name()),
+        "\"strain\", \"displacement\" or \"normal-displacement\"",
+    );
+    t.key(
+        "directions",
+        gauge.directions,
+        "a place may take a gauge in: 1 along the largest strain, 2 also across, up to 4",
+    );
+    t.key(
+        "noise_microstrain",
+        float(gauge.noise_microstrain),
+        "standard deviation of a reading",
+    );
+    t.key(
+        "range_microstrain",
+        float(gauge.range_microstrain),
+        "largest strain gauge and amplifier can take",
+    );
+    t.key(
+        "least_signal_to_noise",
+        float(gauge.least_signal_to_noise),
+        "rms strain over noise that a site must reach",
+    );
+    t.key(
+        "grid_length_mm",
+        float(gauge.grid_length_mm),
+        "of the measuring grid, along the gauge",
+    );
+    t.key("grid_width_mm", float(gauge.grid_width_mm), "across it");
+    t.key(
+        "flatness_mm",
+        float(gauge.flatness_mm),
+        "largest height of the surface over the gauge's plane",
+    );
+}
+
+fn selection(t: &mut Text, project: &Project) {
+    let selection = &project.selection;
+    t.table("selection");
+    t.key(
+        "selector",
+        quoted(selection.selector.name()),
+        "\"greedy-svr\", \"pca-qr\", \"entropy\" or \"mutual-information\"",
+    );
+    t.key("sensors", selection.sensors, "gauges to place");
+    t.key(
+        "c_mm",
+        float(selection.c_mm),
+        "C of greedy SVR's regression (targets in mm, features standardized)",
+    );
+    t.key("epsilon_mm", float(selection.epsilon_mm), "its ε");
+    t.key("gamma", float(selection.gamma), "its γ");
+    t.key(
+        "spacing_mm",
+        float(selection.spacing_mm),
+        "least distance between two gauges",
+    );
+    let required: Vec<String> = selection.required_mm.iter().map(triple).collect();
+    t.maybe(
+        "required_mm",
+        (!required.is_empty()).then(|| format!("[{}]", required.join(", "))),
+        "places of gauges that must be there, [[x, y, z], …]; the nearest site is taken",
+    );
+    t.maybe(
+        "target_mm",
+        selection.target_mm.map(float),
+        "error at which greedy SVR adds no more gauges",
+    );
+    t.maybe(
+        "cost_budget",
+        selection.cost_budget.map(float),
+        "what all gauges together may cost: 1 each, or as in [[selection.cost]]",
+    );
+    t.key(
+        "with_noise",
+        selection.with_noise,
+        "choose from signals with the gauge's noise added",
+    );
+    t.key(
+        "failure",
+        float(selection.failure),
+        "probability that one gauge has failed when it is needed (greedy SVR)",
+    );
+    let process = &selection.gaussian_process;
+    t.table("selection.gaussian_process");
+    t.maybe(
+        "length_mm",
+        process.length_mm.map(float),
+        "length of the kernel of entropy and mutual information; searched when left out",
+    );
+    t.maybe(
+        "power",
+        process.power.map(float),
+        "its power, up to 2; searched when left out",
+    );
+    t.key(
+        "noise",
+        float(process.noise),
+        "variance of a measurement's noise over the field's",
+    );
+    for cost in &selection.costs {
+        t.list("selection.cost");
+        t.key("box_mm", corners(&cost.box_mm), "a gauge in here costs");
+        t.key("cost", float(cost.cost), "");
+    }
+    for site in &selection.sites {
+        t.list("selection.site");
+        t.key("position_mm", triple(&site.position_mm), "");
+        t.key("direction", triple(&site.direction), "");
+    }
+}
+
+fn kept(t: &mut Text, kept: &Kept) {
+    t.list("kept");
+    t.key(
+        "name",
+        quoted(&kept.name),
+        "a selection kept to be compared",
+    );
+    t.key("selector", quoted(&kept.selector), "");
+    t.key("quality", quoted(kept.quality.name()), "");
+    t.key("cost", float(kept.cost), "of all its gauges");
+    t.key("seconds", float(kept.seconds), "that choosing it took");
+    for site in &kept.sites {
+        t.list("kept.site");
+        t.key("position_mm", triple(&site.position_mm), "");
+        t.key("direction", triple(&site.direction), "");
+    }
+    for error in &kept.errors {
+        t.list("kept.error");
+        t.key("region", quoted(&error.region), "");
+        t.key("sensors", error.sensors, "");
+        t.key("mean_mm", float(error.mean_mm), "");
+        t.key("median_mm", float(error.median_mm), "");
+        t.key("p95_mm", float(error.p95_mm), "");
+    }
+    for failure in &kept.failures {
+        t.list("kept.failure");
+        t.key("failed", failure.failed, "");
+        t.key("retrained", failure.retrained, "");
+        t.key("mean_mm", float(failure.mean_mm), "");
+    }
+}
+
+#[derive(Default)]
+struct Text(String);
+
+impl Text {
+    fn line(&mut self, line: &str) {
+        self.0.push_str(line);
+        self.0.push('\n');
+    }
+    fn table(&mut self, name: &str) {
+        self.line(&format!("\n[{name}]"));
+    }
+    fn list(&mut self, name: &str) {
+        self.line(&format!("\n[[{name}]]"));
+    }
+    fn key(&mut self, key: &str, value: impl std::fmt::Display, comment: &str) {
+        let mut line = format!("{key} = {value}");
+        if !comment.is_empty() {
+            let _ = write!(line, "  # {comment}");
+        }
+        self.line(&line);
+    }
+    fn maybe(&mut self, key: &str, value: Option<impl std::fmt::Display>, comment: &str) {
+        match value {
+            Some(value) => self.key(key, value, comment),
+            None => self.line(&format!("# {key}: {comment}")),
+        }
+    }
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+/// A float with its point, in the shortest form that reads back the same.
+fn float(value: f64) -> String {
+    format!("{value:?}")
+}
+
+fn triple(values: &[f64; 3]) -> String {
+    format!("[{}]", values.map(float).join(", "))
+}
+
+fn corners(values: &[[f64; 3]; 2]) -> String {
+    format!("[{}]", values.each_ref().map(triple).join(", "))
+}
+
+/// An enum as its file name.
+fn serialized(value: &impl serde::Serialize) -> String {
+    toml::Value::try_from(value).map_or_else(|_| String::new(), |v| v.to_string())
+}

@@ -1,0 +1,118 @@
+//! Regions that were painted: where touches come, where no gauge goes, what is held.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use hapdef::budget::{Quality, unwatched};
+use hapdef::cli;
+use hapdef::design::{self, DesignError, Inputs};
+use hapdef::feasible::Filter;
+use hapdef::mesh::unroll::Axis;
+use hapdef::project::{SupportKeys, SupportKind};
+
+/// A mask of the part's vertices by their places (m).
+fn mask(inputs: &Inputs, set: impl Fn(DVec3) -> bool) -> Arc<Vec<bool>> {
+    Arc::new(inputs.part.positions().iter().map(|&p| set(p)).collect())
+}
+
+fn limb() -> Inputs {
+    let mut inputs = cli::bundled().unwrap().inputs;
+    inputs.project.budget.quality = Quality::Draft;
+    inputs.project.touch.count = 200;
+    inputs
+}
+
+#[test]
+fn touches_come_only_where_they_are_painted_and_gauges_only_where_they_are_not_kept_out() {
+    let mut inputs = limb();
+    let budget = Quality::Draft.budget();
+    let upper = mask(&inputs, |p| p.z > 0.06);
+    let side = mask(&inputs, |p| p.y > 0.0);
+    inputs.masks.insert("grip".into(), upper);
+    inputs.masks.insert("cable".into(), side);
+    inputs.project.touch.region = Some("grip".into());
+    inputs.project.feasible.keep_out = Some("cable".into());
+    let simulated = design::simulate(&inputs, &budget, &unwatched).unwrap();
+    let touches = &simulated.dataset.touches;
+    assert_eq!(touches.len(), 200);
+    // A mask ends between vertices 2.7 mm apart.
+    assert!(touches.iter().all(|t| t.position.z > 0.057));
+    let feasible = design::filter(&inputs, &simulated);
+    let sites = &simulated.dataset.sites;
+    assert!(feasible.sites().iter().all(|&s| sites[s].position.y < 2e-3));
+    let taken = feasible.taken();
+    let kept_out = taken.iter().find(|(f, _)| *f == Filter::KeptOut).unwrap().1;
+    assert!(kept_out > 500, "{kept_out}");
+    // The judge touches the same region.
+    let truth = design::truth(
+        &inputs,
+        &simulated,
+        &feasible.sites()[..4],
+        &budget,
+        &unwatched,
+    )
+    .unwrap();
+    assert!(truth.touches.iter().all(|t| t.position.z > 0.057));
+    assert!(truth.touches.len() > 200);
+}
+
+#[test]
+fn a_painted_support_holds_like_the_box_it_covers() {
+    let budget = Quality::Draft.budget();
+    let boxed = limb();
+    let mut painted = limb();
+    painted.project.supports.clear();
+    for (k, support) in boxed.project.supports.iter().enumerate() {
+        let [a, b] = support
+            .box_mm
+            .unwrap()
+            .map(|c| DVec3::from_array(c) / 1000.0);
+        let (lower, upper) = (a.min(b) - 1e-9, a.max(b) + 1e-9);
+        let name = format!("support-{k}");
+        let held = mask(&painted, |p| p.cmpge(lower).all() && p.cmple(upper).all());
+        assert!(held.contains(&true));
+        painted.masks.insert(name.clone(), held);
+        painted.project.supports.push(SupportKeys {
+            kind: SupportKind::Clamped,
+            box_mm: None,
+            vertices: Some(name),
+            normal: Axis::Z,
+        });
+    }
+    let stiffness = |inputs: &Inputs| {
+        let simulated = design::simulate(inputs, &budget, &unwatched).unwrap();
+        let rms: Vec<f64> = simulated
+            .dataset
+            .sites
+            .iter()
+            .map(|s| s.rms_strain)
+            .collect();
+        rms.iter().sum::<f64>() / rms.len() as f64
+    };
+    let (a, b) = (stiffness(&boxed), stiffness(&painted));
+    // The mask ends at the last vertices inside: it holds a little less.
+    assert!((b / a - 1.0).abs() < 0.06, "{a} {b}");
+}
+
+#[test]
+fn a_region_that_is_not_there_is_named() {
+    let mut inputs = limb();
+    inputs.project.touch.region = Some("grip".into());
+    let error = design::simulate(&inputs, &Quality::Draft.budget(), &unwatched).err();
+    let Some(DesignError::Value(bad)) = error else {
+        panic!("it cannot be simulated")
+    };
+    assert_eq!(bad.key, "touch.region");
+    assert!(bad.to_string().contains("grip"), "{bad}");
+    inputs.project.feasible.keep_out = inputs.project.touch.region.replace("touch".into());
+    inputs.masks.insert("touch".into(), mask(&inputs, |_| true));
+    let error = design::simulate(&inputs, &Quality::Draft.budget(), &unwatched).err();
+    assert!(matches!(error, Some(DesignError::Value(bad)) if bad.key == "feasible.keep_out"));
+    inputs.project.feasible.keep_out = None;
+    inputs.project.touch.region = Some("grip".into());
+    // And one without a vertex leaves no touch.
+    let none = mask(&inputs, |_| false);
+    inputs.masks.insert("grip".into(), none);
+    let error = design::simulate(&inputs, &Quality::Draft.budget(), &unwatched).err();
+    assert!(matches!(error, Some(DesignError::NoTouches { .. })));
+}
