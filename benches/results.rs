@@ -79,6 +79,7 @@ fn assembled() -> String {
         "### The criterion by scikit-learn\n\n60 sites × 800 touches of the bundled limb on strain, every step and every other site, by `benches/sklearn_criterion.py` (its commands are in the file); fits to a tolerance of 0.001 mm.\n\n```\n{}```\n",
         read("benches/sklearn.txt")
     );
+    let _ = writeln!(text, "{}", read("benches/studio.md"));
     let _ = writeln!(
         text,
         "## Build times\n\n{}",

@@ -111,7 +111,7 @@ fn main() {
     let mut page = String::new();
     let _ = writeln!(
         page,
-        "The window's figures are remade by `cargo bench --bench studio` (a minute). Processor milliseconds of the whole process, the software adapter's threads among them, 1440 × 900 pixels; a 4000 × 4000 matrix product on one core took {:.1} s beside them. A bare frame draws the same triangles anew, with the whole window around them. Steps are what the window's own thread does beside drawing, over those of a frame in which nothing happens.\n",
+        "## The window\n\nThe figures of the window are remade by `cargo bench --bench studio` (a minute). Processor milliseconds of the whole process, the software adapter's threads among them, 1440 × 900 pixels; a 4000 × 4000 matrix product on one core took {:.1} s beside them. A bare frame draws the same triangles anew, with the whole window around them. Steps are what the window's own thread does beside drawing, over those of a frame in which nothing happens.\n",
         reference_seconds()
     );
     start(&mut page);
@@ -183,7 +183,7 @@ fn bare_frame(window: &mut Window) -> f64 {
 fn steps(page: &mut String, state: &RenderState) {
     let _ = writeln!(
         page,
-        "| triangles | bare frame | a frame's steps without an event | brush step | with the unrolled view | box of 1000 vertices | pick | plots with eight curves |\n|---|---|---|---|---|---|---|---|"
+        "\n| triangles | bare frame | a frame's steps without an event | brush step | with the unrolled view | box of 1000 vertices | pick | plots with eight curves |\n|---|---|---|---|---|---|---|---|"
     );
     for triangles in [4_560, 50_000, 200_000] {
         let mut window = Window::open(state, tube(triangles));

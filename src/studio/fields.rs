@@ -248,7 +248,7 @@ impl Studio {
             Field::Uncertainty => {
                 let variances = self.slow_field(ctx, key)?;
                 let map = ColorMap::Viridis;
-                let title = "variance left (1: nothing known)";
+                let title = "variance left";
                 Some((variances.to_vec(), legend(title, 0.0, 1.0, map)))
             }
         }
