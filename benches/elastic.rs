@@ -204,12 +204,8 @@ fn trade(text: &mut String) {
     let inputs = inputs(Signal::Strain);
     let ground = design::ground(&inputs).expect("the limb is held");
     let (force, tip) = inputs.project.tip();
-    let touches =
-        dataset::spread_touches(&inputs.part, 64, 99, 2.4e-3, false, (force, tip), &|_| true);
-    let many =
-        dataset::spread_touches(&inputs.part, 1000, 98, 2.4e-3, false, (force, tip), &|_| {
-            true
-        });
+    let touches = dataset::spread_touches(&inputs.part, 64, 99, 2.4e-3, false, (force, tip), None);
+    let many = dataset::spread_touches(&inputs.part, 1000, 98, 2.4e-3, false, (force, tip), None);
     let draft = design::simulate(&inputs, &Quality::Draft.budget(), &unwatched).expect("simulates");
     let places: Vec<DVec3> = draft.dataset.sites.iter().map(|s| s.position).collect();
     let chosen: Vec<_> = sample::random(&inputs.part, 300, 97, |_| true)

@@ -194,15 +194,7 @@ fn limb(text: &mut String) {
 }
 
 fn touches(part: &TriMesh, inputs: &Inputs, count: usize) -> Vec<Touch> {
-    let all = dataset::spread_touches(
-        part,
-        count,
-        77,
-        2.4e-3,
-        false,
-        inputs.project.tip(),
-        &|_| true,
-    );
+    let all = dataset::spread_touches(part, count, 77, 2.4e-3, false, inputs.project.tip(), None);
     all.into_iter()
         .filter(|t| (0.012..=0.108).contains(&t.position.z))
         .collect()

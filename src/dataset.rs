@@ -145,6 +145,14 @@ impl Dataset {
     }
 }
 
+/// Where touches come, where that is not everywhere.
+pub struct TouchRegion<'a> {
+    /// For each triangle of the mesh whether any of the region may lie in it.
+    pub triangles: Vec<bool>,
+    /// Whether a place (m) belongs to it.
+    pub contains: &'a dyn Fn(DVec3) -> bool,
+}
+
 /// `count` touches spread over the surface, at least `margin` (m) from free edges: evenly for a model
 /// to learn from, uniformly at random for tests.
 #[must_use]
@@ -155,7 +163,7 @@ pub fn spread_touches(
     margin: f64,
     even: bool,
     tip: (f64, f64),
-    allowed: &dyn Fn(DVec3) -> bool,
+    region: Option<&TouchRegion>,
 ) -> Vec<Touch> {
     let rims: Vec<u32> = (0..)
         .zip(mesh.boundary_vertices())
@@ -165,12 +173,14 @@ pub fn spread_touches(
     let far = |v: f64| if v.is_finite() { v } else { 1e3 };
     let edge: Vec<f64> = edge.into_iter().map(far).collect();
     let inside = |at: SurfacePoint| {
-        (rims.is_empty() || mesh.interpolate(&edge, at) >= margin) && allowed(mesh.point(at))
+        (rims.is_empty() || mesh.interpolate(&edge, at) >= margin)
+            && region.is_none_or(|region| (region.contains)(mesh.point(at)))
     };
+    let among = |t: u32| region.is_none_or(|region| region.triangles[t as usize]);
     let points = if even {
-        sample::even(mesh, count, seed, inside)
+        sample::even_among(mesh, &among, count, seed, inside)
     } else {
-        sample::random(mesh, count, seed, inside)
+        sample::random_among(mesh, &among, count, seed, inside)
     };
     let (force, tip_radius) = tip;
     points

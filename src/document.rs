@@ -13,7 +13,7 @@ use crate::mesh::geodesic::{March, Scratch};
 use crate::mesh::repair::Repair;
 use crate::mesh::{RepairReport, TriMesh};
 use crate::placement::SelectorKind;
-use crate::project::{Masks, Project, SelectionKeys, SupportKeys};
+use crate::project::{ChosenSite, Masks, Project, SelectionKeys, SupportKeys};
 
 pub use paint::{Brush, Layer};
 
@@ -99,6 +99,12 @@ impl Document {
             painted: self.state.painted.clone(),
             masks: self.state.masks.clone(),
         }
+    }
+
+    /// Gauges that a computation found: they belong to no step of undo, and end no redo.
+    pub fn adopt_sites(&mut self, sites: Vec<ChosenSite>) {
+        self.settled.project.selection.sites.clone_from(&sites);
+        self.state.project.selection.sites = sites;
     }
 
     /// Ends a gesture: what changed since the last one becomes one undo step.
@@ -205,13 +211,18 @@ impl Document {
     pub fn simulation_key_at(&self, quality: Quality) -> String {
         let p = &self.state.project;
         format!(
-            "{} {:?} {:?} {:?} {:?} {:?}",
+            "{} {:?} {:?} {:?} {:?} {:?} {:?}",
             self.model_key(),
             p.touch,
             p.touch.region.as_ref().map(|name| self.mask_key(name)),
             p.sites,
             (p.gauge.signal, p.gauge.directions),
-            (quality, p.budget.seed)
+            (quality, p.budget.seed),
+            // A region that is not there cannot be computed with.
+            p.feasible
+                .keep_out
+                .as_ref()
+                .is_some_and(|name| !self.state.masks.contains_key(name))
         )
     }
 

@@ -37,8 +37,10 @@ pub struct Trial<'a> {
     pub workshop: &'a SignalMatrix,
     pub test_targets: &'a [[f64; 3]],
     pub regions: &'a [Region],
-    /// Standard deviation of the noise added to training and test strain.
+    /// Standard deviation of the noise added to training and test strain, and the numbers of the streams it
+    /// is drawn from, one a site: the same stream gives the same noise in every trial.
     pub noise: f64,
+    pub streams: &'a [u64],
     pub seed: u64,
 }
 
@@ -73,9 +75,12 @@ pub const BASELINE: &str = "all-candidates";
 pub struct Candidate {
     pub selector: String,
     pub rows: Vec<usize>,
+    /// Settings of its regression; searched where there are none.
+    pub hyper: Option<Hyper>,
 }
 
 /// The outcome: rows by set and region, and each set's errors touch by touch (mm).
+#[derive(Clone)]
 pub struct Evaluation {
     pub rows: Vec<EvaluationRow>,
     pub errors: Vec<Vec<f64>>,
@@ -190,10 +195,14 @@ impl<'a> Noisy<'a> {
         } else {
             0.0
         };
+        let add = |x: &'a SignalMatrix, draw: u64| {
+            let stream = |row: usize| trial.streams[row];
+            add_noise_by(x, noise, trial.seed.wrapping_add(draw), &stream)
+        };
         Self {
-            train: add_noise(trial.train, noise, trial.seed.wrapping_add(1)),
-            test: add_noise(trial.test, noise, trial.seed.wrapping_add(2)),
-            workshop: add_noise(trial.workshop, noise, trial.seed.wrapping_add(3)),
+            train: add(trial.train, 1),
+            test: add(trial.test, 2),
+            workshop: add(trial.workshop, 3),
         }
     }
 }
@@ -201,13 +210,22 @@ impl<'a> Noisy<'a> {
 /// Adds Gaussian noise of a standard deviation; every site has a stream of its own.
 #[must_use]
 pub fn add_noise(x: &SignalMatrix, deviation: f64, seed: u64) -> Cow<'_, SignalMatrix> {
+    add_noise_by(x, deviation, seed, &|row| row as u64)
+}
+
+fn add_noise_by<'a>(
+    x: &'a SignalMatrix,
+    deviation: f64,
+    seed: u64,
+    stream: &dyn Fn(usize) -> u64,
+) -> Cow<'a, SignalMatrix> {
     if deviation == 0.0 {
         return Cow::Borrowed(x);
     }
     let values = (0..x.rows())
         .flat_map(|row| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            rng.set_stream(row as u64);
+            rng.set_stream(stream(row));
             x.row(row)
                 .iter()
                 .map(move |v| v + deviation * normal(&mut rng))
@@ -251,7 +269,9 @@ fn tune_sets(
         let reuse = known
             .iter()
             .find(|k| k.0 == set.selector && k.1 == tuned && size != tuned);
-        let hyper = if let Some((_, _, hyper)) = reuse {
+        let hyper = if let Some(hyper) = set.hyper {
+            hyper
+        } else if let Some((_, _, hyper)) = reuse {
             Hyper {
                 gamma: hyper.gamma * tuned as f64 / size as f64,
                 ..*hyper

@@ -27,6 +27,7 @@ mod tools;
 mod touching;
 mod viewport;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -92,13 +93,13 @@ pub struct Studio {
     recent: recent::Recent,
     jobs: jobs::Jobs,
     drive: drive::Drive,
-    /// The last drafts: what is asked for again after a change is often there.
-    drafts: (Option<SimulationResult>, Option<DesignResult>),
+    /// The last results of each quality: what is asked for again after a change is often there.
+    last: BTreeMap<Quality, drive::Last>,
     /// Numbers of the gauges that are picked, from zero.
     pub picked: Vec<usize>,
     by_hand: gauges::ByHand,
-    /// Numbers of the kept selections that are shown.
-    shown_kept: std::collections::BTreeSet<usize>,
+    /// Names of the kept selections that are shown.
+    shown_kept: BTreeSet<String>,
     slow: fields::Slow,
     /// The stage whose settings are shown.
     pub stage: Stage,
@@ -106,6 +107,8 @@ pub struct Studio {
     ask_quit: bool,
     quit: bool,
     title: String,
+    /// What had the keyboard in the last frame.
+    focused: Option<egui::Id>,
 }
 
 impl Studio {
@@ -149,10 +152,11 @@ impl Studio {
             recent: recent::Recent::default(),
             jobs: jobs::Jobs::default(),
             drive: drive::Drive::following(true),
-            drafts: (None, None),
+            last: BTreeMap::new(),
             picked: Vec::new(),
             by_hand: gauges::ByHand::default(),
-            shown_kept: std::collections::BTreeSet::new(),
+            shown_kept: BTreeSet::new(),
+            focused: None,
             slow: None,
             stage: Stage::default(),
             results: results::Tab::default(),
@@ -194,7 +198,6 @@ impl Studio {
         if let Some(error) = self.touching.collect(&self.document) {
             self.complain(error);
         }
-        self.follow_lead();
         self.advance(ctx);
         self.refresh_feasibility(ctx);
         self.refresh_by_hand(ctx);
@@ -255,8 +258,13 @@ impl eframe::App for Studio {
         self.dialogs(&ctx);
         self.palette(&ctx);
         self.recovery_dialog(&ctx);
+        // Another selector and its gauges are one step of undo.
+        self.follow_lead();
         // A gesture has ended when nothing is held down any more.
-        if !ctx.input(|i| i.pointer.any_down()) && !ctx.egui_wants_keyboard_input() {
+        let focused = ctx.memory(egui::Memory::focused);
+        let typing = ctx.egui_wants_keyboard_input() && focused == self.focused;
+        self.focused = focused;
+        if !ctx.input(|i| i.pointer.any_down()) && !typing {
             self.document.settle();
         }
         self.update_title(&ctx);

@@ -95,6 +95,24 @@ fn a_painted_support_holds_like_the_box_it_covers() {
 }
 
 #[test]
+fn a_single_spot_takes_all_touches_without_a_long_search() {
+    let mut inputs = limb();
+    inputs.project.touch.count = 4000;
+    // About half a percent of the part.
+    let spot = mask(&inputs, |p| {
+        p.distance(DVec3::new(0.0318, 0.0, 0.06)) < 6e-3
+    });
+    inputs.masks.insert("spot".into(), spot);
+    inputs.project.touch.region = Some("spot".into());
+    let budget = Quality::Draft.budget();
+    let simulated = design::simulate(&inputs, &budget, &unwatched).unwrap();
+    let touches = &simulated.dataset.touches;
+    assert_eq!(touches.len(), 800);
+    let centre = DVec3::new(0.0318, 0.0, 0.06);
+    assert!(touches.iter().all(|t| t.position.distance(centre) < 9e-3));
+}
+
+#[test]
 fn a_region_that_is_not_there_is_named() {
     let mut inputs = limb();
     inputs.project.touch.region = Some("grip".into());

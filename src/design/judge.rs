@@ -5,7 +5,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::layout::touches_on;
-use super::{DesignError, Inputs, NOISE_SEED, Reduced, Simulated, TEST_SEED, WORKSHOP_SEED};
+use super::{
+    Design, DesignError, Inputs, NOISE_SEED, Reduced, Simulated, TEST_SEED, WORKSHOP_SEED,
+};
 use crate::budget::{Budget, Cancelled, Watch, Work};
 use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
 use crate::elasticity::load::Touch;
@@ -171,38 +173,60 @@ pub fn evaluate(
             sets.push(Candidate {
                 selector: selection.selector.name().to_owned(),
                 rows: set.sites.iter().filter_map(row_of).collect(),
+                hyper: None,
             });
         }
     }
     sets.push(Candidate {
         selector: evaluation::BASELINE.to_owned(),
         rows: reduced.sites.iter().filter_map(row_of).collect(),
+        hyper: None,
     });
-    judge(inputs, simulated, truth, &sets, budget, watch)
+    let streams: Vec<u64> = (0..truth.sites.len() as u64).collect();
+    judge(inputs, simulated, truth, &sets, &streams, budget, watch)
 }
 
-/// Judges one set of sites (as numbered in the dataset) that nobody selected, with the seeds and touches
-/// of every other set; its name in the rows is `name`.
+/// Judges one set of sites (as numbered in the dataset) that nobody selected, as a design's own sets were:
+/// with its test touches, its noise and, where it has a set of as many gauges by the selector in the lead,
+/// the settings of that set's regression. Its name in the rows is `name`.
 ///
 /// # Errors
 /// As [`truth`].
 pub fn judge_set(
     inputs: &Inputs,
-    simulated: &Simulated,
+    design: &Design,
     sites: &[usize],
     name: &str,
-    budget: &Budget,
     watch: Watch,
 ) -> Result<Evaluation, DesignError> {
+    let (simulated, budget) = (&design.simulated, &design.budget);
     let truth = truth(inputs, simulated, sites, budget, watch)?;
     let rows = sites
         .iter()
         .filter_map(|s| truth.sites.binary_search(s).ok());
+    let own = (design.evaluation.rows.iter())
+        .find(|r| r.selector == design.lead.name() && r.sensors == sites.len());
     let set = Candidate {
         selector: name.to_owned(),
         rows: rows.collect(),
+        hyper: own.map(|r| r.hyper),
     };
-    Ok(judge(inputs, simulated, &truth, &[set], budget, watch)?)
+    // Sites that the design has measured keep their noise; others have streams beyond all of its own.
+    let known = &design.truth.sites;
+    let stream = |s: &usize| match known.binary_search(s) {
+        Ok(row) => row as u64,
+        Err(_) => (known.len() + s) as u64,
+    };
+    let streams: Vec<u64> = truth.sites.iter().map(stream).collect();
+    Ok(judge(
+        inputs,
+        simulated,
+        &truth,
+        &[set],
+        &streams,
+        budget,
+        watch,
+    )?)
 }
 
 fn judge(
@@ -210,6 +234,7 @@ fn judge(
     simulated: &Simulated,
     truth: &Truth,
     sets: &[Candidate],
+    streams: &[u64],
     budget: &Budget,
     watch: Watch,
 ) -> Result<Evaluation, Cancelled> {
@@ -229,6 +254,7 @@ fn judge(
             test_targets: &test_targets,
             regions: &truth.regions,
             noise: inputs.project.gauge.noise_microstrain * 1e-6,
+            streams,
             seed: inputs.project.budget.seed.wrapping_add(NOISE_SEED),
         },
         sets,

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{DesignError, Inputs, MOST_GB, MOST_SITES};
 use crate::budget::Budget;
-use crate::dataset::{self};
+use crate::dataset::{self, TouchRegion};
 use crate::elasticity::load::Touch;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::unroll::Unrolling;
@@ -71,12 +71,16 @@ pub(super) fn touches_on(
     let project = &inputs.project;
     let margin = project.touch.edge_margin_mm * 1e-3;
     let region = Project::mask("touch.region", project.touch.region.as_ref(), &inputs.masks)?;
-    let index = region.map(|_| SurfaceIndex::new(&inputs.part));
-    let allowed = |p: DVec3| match (&index, region) {
-        (Some(index), Some(mask)) => inputs.part.mostly_in(mask, index.nearest(p).0),
-        _ => true,
+    let index = region.map(|mask| (SurfaceIndex::new(&inputs.part), mask));
+    let contains = |p: DVec3| {
+        (index.as_ref()).is_none_or(|(index, mask)| inputs.part.mostly_in(mask, index.nearest(p).0))
     };
-    let touches = dataset::spread_touches(mesh, count, seed, margin, even, project.tip(), &allowed);
+    let region = index.as_ref().map(|(index, mask)| TouchRegion {
+        triangles: near_mask(mesh, &inputs.part, index, mask),
+        contains: &contains,
+    });
+    let tip = project.tip();
+    let touches = dataset::spread_touches(mesh, count, seed, margin, even, tip, region.as_ref());
     if touches.is_empty() {
         return Err(DesignError::NoTouches {
             margin_mm: project.touch.edge_margin_mm,
@@ -84,6 +88,23 @@ pub(super) fn touches_on(
         });
     }
     Ok(touches)
+}
+
+/// For each triangle of a mesh whether a mask of the part's vertices may reach into it: whether any of its
+/// corners, middles of sides and centre lies on a triangle of the part with a vertex that is set.
+fn near_mask(mesh: &TriMesh, part: &TriMesh, index: &SurfaceIndex, mask: &[bool]) -> Vec<bool> {
+    let near = |p: DVec3| {
+        let corners = part.triangles()[index.nearest(p).0.triangle as usize];
+        corners.iter().any(|&v| mask[v as usize])
+    };
+    (0..mesh.triangles().len() as u32)
+        .map(|t| {
+            let [a, b, c] = mesh.corners(t);
+            let sides = [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0];
+            let places = [a, b, c, (a + b + c) / 3.0].into_iter().chain(sides);
+            { places }.any(near)
+        })
+        .collect()
 }
 
 pub(super) fn check_memory(sites: usize, touches: usize) -> Result<(), DesignError> {

@@ -66,6 +66,57 @@ pub struct StageTime {
 }
 
 impl Design {
+    /// The same with other sites for its chosen set, put there by hand, and what they were judged to do
+    /// ([`super::judge_set`]).
+    #[must_use]
+    pub fn with_hand(&self, sites: Vec<usize>, judged: &Evaluation) -> Self {
+        let mut design = self.clone();
+        let (name, old) = (self.lead.name(), self.chosen().len());
+        let set = (self.selections.iter())
+            .flat_map(|s| s.sets.iter().map(move |set| (s.selector, set.sites.len())))
+            .position(|set| set == (self.lead, old));
+        let count = sites.len();
+        let selections = Arc::make_mut(&mut design.selections);
+        if let Some(led) = selections.iter_mut().find(|s| s.selector == self.lead) {
+            led.achieved.notes.push(
+                "Gauges were moved by hand: the chosen set and its errors are those of the gauges as they are, not of the selector.".into(),
+            );
+            if let Some(last) = led.sets.last_mut() {
+                last.sites = sites;
+            }
+        }
+        let evaluation = Arc::make_mut(&mut design.evaluation);
+        let at = (evaluation.rows.iter())
+            .position(|r| r.selector == name && r.sensors == old)
+            .unwrap_or(evaluation.rows.len());
+        evaluation
+            .rows
+            .retain(|r| !(r.selector == name && r.sensors == old));
+        let rows = judged
+            .rows
+            .iter()
+            .map(|r| crate::evaluation::EvaluationRow {
+                selector: name.to_owned(),
+                sensors: count,
+                ..r.clone()
+            });
+        evaluation.rows.splice(at..at, rows);
+        if let (Some(k), Some(errors)) = (set, judged.errors.first()) {
+            evaluation.errors[k].clone_from(errors);
+        }
+        if let Some(failed) = judged.failures.first() {
+            for own in evaluation
+                .failures
+                .iter_mut()
+                .filter(|f| f.selector == name)
+            {
+                own.sensors = count;
+                own.rows.clone_from(&failed.rows);
+            }
+        }
+        design
+    }
+
     /// The selection that is shown and reported.
     #[must_use]
     pub fn led(&self) -> Option<&Selection> {

@@ -95,12 +95,14 @@ impl Document {
                 return Arc::make_mut(mask);
             }
             Layer::KeepOut => {
-                let keys = &mut self.state.project.feasible;
-                keys.keep_out.get_or_insert_with(|| KEEP_OUT.into()).clone()
+                let name = self.own_name(self.state.project.feasible.keep_out.clone(), KEEP_OUT);
+                self.state.project.feasible.keep_out = Some(name.clone());
+                name
             }
             Layer::Touch => {
-                let keys = &mut self.state.project.touch;
-                keys.region.get_or_insert_with(|| TOUCH.into()).clone()
+                let name = self.own_name(self.state.project.touch.region.clone(), TOUCH);
+                self.state.project.touch.region = Some(name.clone());
+                name
             }
             Layer::Support => {
                 if self.painted_support().is_none() {
@@ -111,6 +113,26 @@ impl Document {
         };
         let mask = self.state.masks.entry(name);
         Arc::make_mut(mask.or_insert_with(|| Arc::new(vec![false; vertices])))
+    }
+
+    /// A name for the mask of a layer that nothing else goes by: what two keys of a project share is copied
+    /// before one of them changes.
+    fn own_name(&mut self, name: Option<String>, wanted: &str) -> String {
+        let project = &mut self.state.project;
+        let others = usize::from(name.is_some());
+        let wish = name.as_deref().unwrap_or(wanted);
+        if project.mask_names().filter(|n| *n == wish).count() <= others {
+            return wish.to_owned();
+        }
+        let taken: Vec<String> = project.mask_names().map(|n| n.clone()).collect();
+        let numbered = (2..).map(|k| format!("{wanted}-{k}"));
+        let fresh = { numbered }
+            .find(|n| !taken.contains(n))
+            .unwrap_or_default();
+        if let Some(mask) = name.and_then(|name| self.state.masks.get(&name).cloned()) {
+            self.state.masks.insert(fresh.clone(), mask);
+        }
+        fresh
     }
 
     /// Nothing is painted on a layer any more: it is as if it had never been.
@@ -221,15 +243,16 @@ impl Document {
 
     /// Vertices near those that are `painted` become so too.
     fn spread(&self, mask: &mut [bool], painted: bool, by: f64) {
-        let from: Vec<u32> = (0..)
-            .zip(&*mask)
-            .filter_map(|(v, &m)| (m == painted).then_some(v))
-            .collect();
         let beside: Vec<u32> = (self.part.edges().iter())
             .filter(|e| mask[e.a as usize] != mask[e.b as usize])
             .flat_map(|e| [e.a, e.b])
             .collect();
-        let reached = self.march.from_set(&from, by);
+        // From the rim: what lies behind it is painted already.
+        let rim = beside
+            .iter()
+            .copied()
+            .filter(|&v| mask[v as usize] == painted);
+        let reached = self.march.from_set(&rim.collect::<Vec<_>>(), by);
         for (m, d) in mask.iter_mut().zip(reached) {
             if d <= by {
                 *m = painted;

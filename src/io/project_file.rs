@@ -104,7 +104,7 @@ fn read_masks(
 /// The name without its fingerprint.
 fn plain(name: &str) -> &str {
     match name.rsplit_once(MARK) {
-        Some((plain, mark)) if !mark.is_empty() && mark.bytes().all(|b| b.is_ascii_hexdigit()) => {
+        Some((plain, mark)) if mark.len() == 16 && mark.bytes().all(|b| b.is_ascii_hexdigit()) => {
             plain
         }
         _ => name,

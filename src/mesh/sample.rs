@@ -26,10 +26,24 @@ pub fn random(
     seed: u64,
     accept: impl Fn(SurfacePoint) -> bool,
 ) -> Vec<SurfacePoint> {
+    random_among(mesh, &|_| true, count, seed, accept)
+}
+
+/// As [`random`], drawing only from some triangles: where what is accepted is small and known.
+#[must_use]
+pub fn random_among(
+    mesh: &TriMesh,
+    among: &dyn Fn(u32) -> bool,
+    count: usize,
+    seed: u64,
+    accept: impl Fn(SurfacePoint) -> bool,
+) -> Vec<SurfacePoint> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let cumulative: Vec<f64> = (0..mesh.triangles().len() as u32)
         .scan(0.0, |sum, t| {
-            *sum += mesh.facet_area(t);
+            if among(t) {
+                *sum += mesh.facet_area(t);
+            }
             Some(*sum)
         })
         .collect();
@@ -61,14 +75,32 @@ pub fn even(
     seed: u64,
     accept: impl Fn(SurfacePoint) -> bool,
 ) -> Vec<SurfacePoint> {
-    let pool = random(mesh, count.saturating_mul(OVERSAMPLING), seed, accept);
+    even_among(mesh, &|_| true, count, seed, accept)
+}
+
+/// As [`even`], drawing only from some triangles.
+#[must_use]
+pub fn even_among(
+    mesh: &TriMesh,
+    among: &dyn Fn(u32) -> bool,
+    count: usize,
+    seed: u64,
+    accept: impl Fn(SurfacePoint) -> bool,
+) -> Vec<SurfacePoint> {
+    let many = count.saturating_mul(OVERSAMPLING);
+    let pool = random_among(mesh, among, many, seed, accept);
     if pool.len() <= count {
         return pool;
     }
     let positions: Vec<DVec3> = pool.iter().map(|&p| mesh.point(p)).collect();
-    // The share of the surface that was accepted is not known in closed form; the whole area is an
+    // The share of the surface that was accepted is not known in closed form; all that was drawn from is an
     // upper bound that only makes the weights reach a little further.
-    let radius = (mesh.area() / (2.0 * 3f64.sqrt() * count as f64)).sqrt();
+    let triangles = 0..mesh.triangles().len() as u32;
+    let area: f64 = triangles
+        .filter(|&t| among(t))
+        .map(|t| mesh.facet_area(t))
+        .sum();
+    let radius = (area / (2.0 * 3f64.sqrt() * count as f64)).sqrt();
     let kept = eliminate(&positions, count, radius);
     kept.into_iter().map(|i| pool[i]).collect()
 }

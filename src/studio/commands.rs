@@ -300,7 +300,7 @@ impl Studio {
         match command {
             Command::Undo => self.document.can_undo(),
             Command::Redo => self.document.can_redo(),
-            Command::ClearPaint | Command::GrowPaint | Command::ShrinkPaint => {
+            Command::GrowPaint | Command::ShrinkPaint => {
                 self.document.layer(self.view.layer).is_some()
             }
             Command::Cancel => self.busy(),
@@ -349,8 +349,14 @@ impl Studio {
             Command::SaveAs => self.dialog = Some(Dialog::save_as(&self.document)),
             Command::Export => self.dialog = Some(Dialog::export(&self.document)),
             Command::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
-            Command::Undo => self.document.undo(),
-            Command::Redo => self.document.redo(),
+            Command::Undo => {
+                self.document.undo();
+                self.drive.take = self.as_designed();
+            }
+            Command::Redo => {
+                self.document.redo();
+                self.drive.take = self.as_designed();
+            }
             Command::SavePicture => self.dialog = Some(Dialog::picture(&self.document)),
             Command::ClearPaint => self.document.clear(self.view.layer),
             Command::FillPaint => self.document.fill(self.view.layer),
@@ -398,7 +404,12 @@ impl Studio {
                     }),
                 };
             }
-            Command::Unrolled => self.view.unrolled_shown = !self.view.unrolled_shown,
+            Command::Unrolled => {
+                self.view.unrolled_shown = !self.view.unrolled_shown;
+                // What was begun in a view that goes ends with it.
+                self.view.drop_gesture();
+                self.document.settle();
+            }
             Command::DarkLight => ctx.set_theme(match ctx.theme() {
                 egui::Theme::Dark => egui::Theme::Light,
                 egui::Theme::Light => egui::Theme::Dark,
@@ -425,12 +436,17 @@ impl Studio {
             return;
         }
         let typing = ctx.egui_wants_keyboard_input();
+        // Escape closes what has opened, or ends what is under way, before it ends jobs.
+        let closing = egui::Popup::is_any_open(ctx) || !self.view.is_idle();
         for command in Command::all() {
             let Some(shortcut) = command.shortcut() else {
                 continue;
             };
             // Single keys belong to a text field while it has the focus.
             let single = shortcut.modifiers == Modifiers::NONE;
+            if !self.enabled(command) || command == Command::Cancel && closing {
+                continue;
+            }
             if !(typing && single) && ctx.input_mut(|i| i.consume_shortcut(&shortcut)) {
                 self.execute(ctx, command);
             }

@@ -38,6 +38,13 @@ pub(super) enum Finished {
     Opened(Box<opening::Opened>),
 }
 
+/// The last results of a quality.
+#[derive(Default)]
+pub(super) struct Last {
+    simulation: Option<SimulationResult>,
+    design: Option<DesignResult>,
+}
+
 /// How far the road is to be kept computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Goal {
@@ -59,6 +66,8 @@ pub(super) struct Drive {
     pub follow: bool,
     /// Whether what a selection finds becomes the project's gauges: until one is moved by hand.
     pub take: bool,
+    /// Whether a selection was asked for by hand and has not come yet.
+    pressed: bool,
     /// What cannot be computed, from which inputs, and why.
     failed: Vec<(Task, String, String)>,
     seen: String,
@@ -73,6 +82,7 @@ impl Drive {
             goal: None,
             follow,
             take: false,
+            pressed: false,
             failed: Vec::new(),
             seen: String::new(),
             still_since: None,
@@ -106,6 +116,7 @@ impl Studio {
     /// Selects and evaluates, simulating first where that is stale.
     pub fn select(&mut self, ctx: &Context) {
         self.drive.take = true;
+        self.drive.pressed = true;
         self.ask(ctx, Goal::Design);
         // Where nothing is left to do, the gauges are at least those that were selected.
         if self.design_stands(self.quality()) {
@@ -128,12 +139,9 @@ impl Studio {
 
     /// The simulation of a quality, where it holds for the project as it is.
     fn simulation_at(&self, quality: Quality) -> Option<Arc<Simulated>> {
-        let key = self.document.simulation_key_at(quality);
-        [&self.simulation, &self.drafts.0]
-            .into_iter()
-            .flatten()
-            .find(|s| s.quality == quality && s.key == key)
-            .map(|s| Arc::clone(&s.simulated))
+        let last = self.last.get(&quality)?.simulation.as_ref()?;
+        let holds = last.key == self.document.simulation_key_at(quality);
+        holds.then(|| Arc::clone(&last.simulated))
     }
 
     /// Whether the shown simulation holds for the project as it is, in whatever quality it has.
@@ -171,11 +179,16 @@ impl Studio {
             self.drive.seen = key;
             self.drive.still_since = Some(Instant::now());
             self.end_outdated();
+            self.show_last();
         }
         if let Some(since) = self.drive.still_since {
             let rest = STILL.saturating_sub(since.elapsed());
-            if !rest.is_zero() || is_moving(ctx) {
-                ctx.request_repaint_after(rest.max(Duration::from_millis(50)));
+            if !rest.is_zero() {
+                ctx.request_repaint_after(rest);
+                return;
+            }
+            // Whatever ends the gesture is an event of its own.
+            if is_moving(ctx) {
                 return;
             }
             self.drive.still_since = None;
@@ -246,9 +259,11 @@ impl Studio {
         let inputs = self.document.inputs();
         let key = self.document.design_key_at(quality);
         let known = self.known(quality, &simulated);
-        let seconds = (self.simulation.iter().chain(&self.drafts.0))
-            .find(|s| Arc::ptr_eq(&s.simulated, &simulated))
-            .map_or(0.0, |s| s.seconds);
+        let last = self
+            .last
+            .get(&quality)
+            .and_then(|last| last.simulation.as_ref());
+        let seconds = last.map_or(0.0, |s| s.seconds);
         let making = Shared::<Making>::default();
         self.drive.making = Arc::clone(&making);
         self.jobs.start(ctx, Task::Design(quality), key, move |r| {
@@ -267,10 +282,12 @@ impl Studio {
 
     /// What of the last design of a quality still holds.
     fn known(&self, quality: Quality, simulated: &Arc<Simulated>) -> Known {
-        let last = [&self.design, &self.drafts.1].into_iter().flatten();
-        let same =
-            |d: &&DesignResult| d.quality == quality && Arc::ptr_eq(&d.design.simulated, simulated);
-        let Some(last) = { last }.find(same) else {
+        let last = self
+            .last
+            .get(&quality)
+            .and_then(|last| last.design.as_ref());
+        let same = |d: &&DesignResult| Arc::ptr_eq(&d.design.simulated, simulated);
+        let Some(last) = last.filter(same) else {
             return Known::default();
         };
         let design = &last.design;
@@ -359,9 +376,7 @@ impl Studio {
             quality,
             seconds,
         };
-        if quality == Quality::Draft {
-            self.drafts.0 = Some(result.clone());
-        }
+        self.last.entry(quality).or_default().simulation = Some(result.clone());
         let better = self
             .simulation
             .as_ref()
@@ -386,9 +401,7 @@ impl Studio {
             quality,
             seconds,
         };
-        if quality == Quality::Draft {
-            self.drafts.1 = Some(result.clone());
-        }
+        self.last.entry(quality).or_default().design = Some(result.clone());
         self.design = Some(result);
         if self.shown_feasible_key() == Some(self.document.feasible_key_at(quality)) {
             self.feasibility = Some((self.document.feasible_key_at(quality), feasibility));
@@ -397,8 +410,39 @@ impl Studio {
             self.results = super::results::Tab::Error;
         }
         self.follow_lead();
+        // Gauges that undo has brought back may be those of this very design.
+        self.drive.take |= self.as_designed();
         if self.drive.take {
             self.take_sites();
+        }
+    }
+
+    /// Shows what is there already of the project as it is: after a change was taken back, most often.
+    fn show_last(&mut self) {
+        for quality in Quality::ALL {
+            let Some(last) = self.last.get(&quality) else {
+                continue;
+            };
+            let (simulation, design) = (last.simulation.clone(), last.design.clone());
+            let shown = |q: Quality| q > quality;
+            if let Some(s) = simulation
+                && s.key == self.document.simulation_key_at(quality)
+                && !(self.simulation_holds() == Some(true)
+                    && self.simulation.as_ref().is_some_and(|s| shown(s.quality)))
+            {
+                self.simulation = Some(s);
+            }
+            if let Some(d) = design
+                && d.key == self.document.design_key_at(quality)
+                && !(self.design_holds() == Some(true)
+                    && self.design.as_ref().is_some_and(|d| shown(d.quality)))
+            {
+                self.design = Some(d);
+                self.follow_lead();
+                if self.drive.take {
+                    self.take_sites();
+                }
+            }
         }
     }
 
@@ -410,9 +454,15 @@ impl Studio {
         let design = &result.design;
         let sites = as_chosen(&design.simulated.dataset.sites, design.chosen());
         if self.document.state.project.selection.sites != sites {
-            self.document.state.project.selection.sites = sites;
+            if std::mem::take(&mut self.drive.pressed) {
+                // Somebody asked for them: what was there before can be had back.
+                self.document.settle();
+                self.document.state.project.selection.sites = sites;
+                self.document.settle();
+            } else {
+                self.document.adopt_sites(sites);
+            }
             self.picked.clear();
-            self.document.settle();
         }
         self.drive.take = true;
     }
@@ -489,7 +539,16 @@ impl Studio {
             self.complain("There is no design to report yet. Press “Select gauges” first");
             return;
         };
-        let design = Arc::clone(&result.design);
+        let design = if self.as_designed() || self.document.state.project.selection.sites.is_empty()
+        {
+            Arc::clone(&result.design)
+        } else if let Some(design) = self.design_by_hand() {
+            Arc::new(design)
+        } else {
+            return self.complain(
+                "The gauges are not those that were selected, and are not judged yet: wait until their error is shown, or press “Select gauges”, and export again",
+            );
+        };
         let inputs = result.inputs.clone();
         let mesh_path = match self.settled_mesh(&folder) {
             Ok(path) => path,
@@ -515,17 +574,24 @@ impl Studio {
         cli::write_bundled_mesh(folder).map_err(|e| format!("{e:#}"))
     }
 
-    /// Ends whatever runs, at once.
+    /// Ends whatever runs, at once; what is over before anybody notices goes on.
     pub fn cancel(&mut self) {
-        self.drive.rest();
-        let ended = self.jobs.cancel(|_| true);
-        if ended > 0 {
-            let name = self.jobs.ended.last().map(|e| e.name.clone());
-            self.tell(format!(
-                "{} was cancelled",
-                name.unwrap_or_else(|| "The job".into())
-            ));
+        let ended = self.end_jobs(|task| !matches!(task, Task::Filter | Task::Field));
+        if !ended.is_empty() {
+            self.tell(format!("Cancelled: {}", ended.join(", ")));
         }
+    }
+
+    /// Ends some jobs, and does not begin them again by itself; their names.
+    pub(super) fn end_jobs(&mut self, which: impl Fn(Task) -> bool) -> Vec<String> {
+        let ended = self.jobs.cancel(which);
+        for (task, key) in &ended {
+            match task {
+                Task::Simulate(_) | Task::Design(_) => self.drive.rest(),
+                task => self.drive.fail(*task, key.clone(), "cancelled".into()),
+            }
+        }
+        ended.into_iter().map(|(task, _)| task.name()).collect()
     }
 }
 
@@ -566,7 +632,7 @@ fn make(
 
 /// Whether a hand is at the settings.
 fn is_moving(ctx: &Context) -> bool {
-    ctx.input(|i| i.pointer.any_down()) || ctx.egui_wants_keyboard_input()
+    ctx.input(|i| i.pointer.any_down())
 }
 
 /// A stage's error as a job's end.

@@ -28,6 +28,8 @@ const SAME_MM: f64 = 1e-3;
 /// What is known of gauges that no selector put where they are.
 #[derive(Default)]
 pub(super) struct ByHand {
+    /// What the design that they were judged like was computed from.
+    of: String,
     pub sites: Vec<ChosenSite>,
     /// Mean error (mm), quickly.
     pub estimate: Option<f64>,
@@ -64,11 +66,18 @@ impl Studio {
         Some(DVec3::from_array(site.position_mm) / 1000.0)
     }
 
-    pub(super) fn is_pinned(&self, site: &ChosenSite) -> bool {
-        let at = DVec3::from_array(site.position_mm);
-        let pins = &self.document.state.project.selection.required_mm;
-        pins.iter()
-            .any(|p| DVec3::from_array(*p).distance(at) < SAME_MM)
+    /// The pin that holds a gauge: each pin holds the gauge nearest to it, not farther than sites lie apart.
+    pub(super) fn pin_of(&self, number: usize) -> Option<usize> {
+        let selection = &self.document.state.project.selection;
+        let within = self.document.state.project.sites.spacing_mm.max(SAME_MM);
+        let at = |site: &ChosenSite| DVec3::from_array(site.position_mm);
+        let held_by = |pin: &[f64; 3]| {
+            let off = |n: &usize| at(&selection.sites[*n]).distance(DVec3::from_array(*pin));
+            let nearest = (0..selection.sites.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
+            nearest.filter(|n| off(n) <= within)
+        };
+        let mut pins = selection.required_mm.iter();
+        pins.position(|pin| held_by(pin) == Some(number))
     }
 
     /// The pointer goes down with the gauges in hand: on one it is picked and may be moved, beside them none
@@ -117,18 +126,15 @@ impl Studio {
     }
 
     fn put_gauge(&mut self, number: usize, site: &ChosenSite) {
-        let sites = &mut self.document.state.project.selection.sites;
-        if sites[number] == *site {
+        if self.document.state.project.selection.sites[number] == *site {
             return;
         }
-        let old = std::mem::replace(&mut sites[number], site.clone());
+        let pin = self.pin_of(number);
+        self.document.state.project.selection.sites[number] = site.clone();
         self.drive.take = false;
         // A pin goes with its gauge.
-        let from = DVec3::from_array(old.position_mm);
-        for pin in &mut self.document.state.project.selection.required_mm {
-            if DVec3::from_array(*pin).distance(from) < SAME_MM {
-                *pin = site.position_mm;
-            }
+        if let Some(pin) = pin {
+            self.document.state.project.selection.required_mm[pin] = site.position_mm;
         }
     }
 
@@ -137,7 +143,7 @@ impl Studio {
     fn site_at(&self, pane: Pane, at: Pos2, number: usize) -> Option<ChosenSite> {
         let place = self.view.pick(pane, at)?;
         let p = self.document.part.point(place);
-        if self.simulation_holds() != Some(true) {
+        if self.simulation.is_none() {
             let frame = tangent_frame(self.document.part.normal(place));
             let old = self.document.state.project.selection.sites.get(number);
             let along = old.map_or(frame.x_axis, |s| DVec3::from_array(s.direction));
@@ -160,7 +166,9 @@ impl Studio {
 
     /// Feasible sites (of the dataset) that no gauge other than one has.
     fn free_sites(&self, number: usize) -> Vec<usize> {
-        let Some(simulation) = &self.simulation else {
+        // On a layout or by verdicts that no longer hold nothing is moved.
+        let current = self.shown_feasible_key();
+        let (Some(simulation), Some(key)) = (&self.simulation, current) else {
             return Vec::new();
         };
         let sites = &simulation.simulated.dataset.sites;
@@ -172,8 +180,8 @@ impl Studio {
             others.iter().any(|o| o.distance(p) < SAME_MM * 1e-3)
         };
         let feasible = match &self.feasibility {
-            Some((_, f)) if f.verdicts.len() == sites.len() => f.sites(),
-            _ => (0..sites.len()).collect(),
+            Some((of, f)) if *of == key => f.sites(),
+            _ => Vec::new(),
         };
         feasible.into_iter().filter(|s| !taken(s)).collect()
     }
@@ -222,17 +230,24 @@ impl Studio {
 
     /// Pins the picked gauges, or lets them go where all are pinned.
     pub(super) fn pin_picked(&mut self) {
-        let selection = &self.document.state.project.selection;
-        let picked: Vec<ChosenSite> = (self.picked.iter())
-            .filter_map(|&n| selection.sites.get(n).cloned())
-            .collect();
-        let all = picked.iter().all(|site| self.is_pinned(site));
-        for site in picked {
-            let at = DVec3::from_array(site.position_mm);
-            let pins = &mut self.document.state.project.selection.required_mm;
-            pins.retain(|p| DVec3::from_array(*p).distance(at) >= SAME_MM);
-            if !all {
-                pins.push(site.position_mm);
+        let all = self.picked.iter().all(|&n| self.pin_of(n).is_some());
+        for number in self.picked.clone() {
+            match (self.pin_of(number), all) {
+                (Some(pin), true) => {
+                    self.document
+                        .state
+                        .project
+                        .selection
+                        .required_mm
+                        .remove(pin);
+                }
+                (None, false) => {
+                    let selection = &mut self.document.state.project.selection;
+                    if let Some(site) = selection.sites.get(number) {
+                        selection.required_mm.push(site.position_mm);
+                    }
+                }
+                _ => {}
             }
         }
         self.document.settle();
@@ -240,6 +255,17 @@ impl Studio {
 
     /// Takes the picked gauges away.
     pub(super) fn remove_picked(&mut self) {
+        // Their pins go with them.
+        let mut pins: Vec<usize> = self.picked.iter().filter_map(|&n| self.pin_of(n)).collect();
+        pins.sort_unstable();
+        for pin in pins.into_iter().rev() {
+            self.document
+                .state
+                .project
+                .selection
+                .required_mm
+                .remove(pin);
+        }
         let picked = std::mem::take(&mut self.picked);
         let mut number = 0;
         self.document.state.project.selection.sites.retain(|_| {
@@ -272,10 +298,31 @@ impl Studio {
         sites.iter().map(find).collect()
     }
 
+    /// Which design it is that is shown: by what it was computed from.
+    fn design_mark(&self) -> String {
+        self.design
+            .as_ref()
+            .map_or_else(String::new, |d| d.key.clone())
+    }
+
+    /// Whether what is known of gauges put by hand is of these very ones and of the design that is shown.
+    pub(super) fn knows_hand(&self) -> bool {
+        self.by_hand.sites == self.document.state.project.selection.sites
+            && self.by_hand.of == self.design_mark()
+            && self.design_holds() == Some(true)
+    }
+
+    /// The design with the gauges as they were put by hand, once they are judged.
+    pub(super) fn design_by_hand(&self) -> Option<design::Design> {
+        let judged = self.by_hand.exact.as_ref().filter(|_| self.knows_hand())?;
+        let design = &self.design.as_ref()?.design;
+        Some(design.with_hand(self.gauge_sites()?, judged))
+    }
+
     /// Mean errors (mm) of gauges that were put somewhere by hand: estimated, and on unseen touches.
     #[must_use]
     pub fn by_hand_error(&self) -> (Option<f64>, Option<f64>) {
-        if self.by_hand.sites != self.document.state.project.selection.sites {
+        if !self.knows_hand() {
             return (None, None);
         }
         let exact = self.by_hand.exact.as_ref();
@@ -298,16 +345,19 @@ impl Studio {
         if self.design_holds() != Some(true) || sites.is_empty() || self.as_designed() {
             return;
         }
-        if self.by_hand.sites != *sites {
+        let of = self.design_mark();
+        if self.by_hand.sites != *sites || self.by_hand.of != of {
             self.by_hand = ByHand {
+                of,
                 sites: sites.clone(),
                 ..ByHand::default()
             };
             self.start_estimate(ctx);
         }
         let resting = !ctx.input(|i| i.pointer.any_down()) && self.view.gesture == Gesture::None;
-        let known =
-            self.by_hand.exact.is_some() || self.jobs.running.iter().any(|r| r.task == Task::Judge);
+        let key = self.by_hand_key();
+        let judging = |r: &super::jobs::Running| r.task == Task::Judge && r.job.key == key;
+        let known = self.by_hand.exact.is_some() || self.jobs.running.iter().any(judging);
         if resting
             && !known
             && self
@@ -320,7 +370,7 @@ impl Studio {
     }
 
     pub(super) fn by_hand_key(&self) -> String {
-        format!("{:?}", self.by_hand.sites)
+        format!("{:?} {}", self.by_hand.sites, self.by_hand.of)
     }
 
     fn start_estimate(&mut self, ctx: &Context) {
@@ -355,9 +405,7 @@ impl Studio {
         self.jobs.start(ctx, Task::Judge, key, move |r| {
             let start = Instant::now();
             let watch = |p| r.report(p);
-            let simulated = &design.simulated;
-            let found =
-                design::judge_set(&inputs, simulated, &sites, BY_HAND, &design.budget, &watch);
+            let found = design::judge_set(&inputs, &design, &sites, BY_HAND, &watch);
             let found = found.map_err(|e: DesignError| super::drive::stop(&e))?;
             if found.rows.is_empty() {
                 return Err(Stop::Failed("no test touch lies in any region".into()));

@@ -43,6 +43,7 @@ impl Studio {
                     Stage::Selection => {
                         let project = &mut self.document.state.project;
                         rows(ui, "Gauges", |ui| selection(ui, project));
+                        pins(ui, project);
                         rows(ui, "Regression of greedy SVR", |ui| regression(ui, project));
                     }
                     Stage::Evaluation => self.evaluation_form(ui),
@@ -544,6 +545,20 @@ fn candidates(ui: &mut Ui, project: &mut Project) {
             "How many of the feasible sites are kept",
         );
     }
+}
+
+/// Places that must have a gauge, and the way to be rid of them.
+fn pins(ui: &mut Ui, project: &mut Project) {
+    let pinned = project.selection.required_mm.len();
+    if pinned == 0 {
+        return;
+    }
+    ui.horizontal(|ui| {
+        ui.label(format!("{pinned} places must have a gauge"));
+        if ui.button("Release all pins").clicked() {
+            project.selection.required_mm.clear();
+        }
+    });
 }
 
 fn selection(ui: &mut Ui, project: &mut Project) {

@@ -145,20 +145,19 @@ impl Jobs {
     }
 
     /// Ends jobs at once: what they still bring is dropped, and they stop at their next report.
-    pub fn cancel(&mut self, which: impl Fn(Task) -> bool) -> usize {
-        let before = self.running.len();
+    pub fn cancel(&mut self, which: impl Fn(Task) -> bool) -> Vec<(Task, String)> {
         let (gone, kept): (Vec<Running>, Vec<Running>) = self
             .running
             .drain(..)
             .partition(|r| which(r.task) && !r.task.writes());
         self.running = kept;
-        for r in gone {
+        for r in &gone {
             r.job.cancel();
             if !r.task.is_quiet() {
-                self.remember(&r, "cancelled".into(), false);
+                self.remember(r, "cancelled".into(), false);
             }
         }
-        before - self.running.len()
+        gone.into_iter().map(|r| (r.task, r.job.key)).collect()
     }
 
     fn remember(&mut self, r: &Running, how: String, failed: bool) {
@@ -217,16 +216,16 @@ impl Studio {
                     .desired_width((width - 180.0).max(60.0));
                 ui.add(bar);
                 let name = format!("Cancel: {}", r.job.name);
-                let button = ui.button("Cancel").accessible_name(name);
-                if button.clicked() {
+                let button = ui.add_enabled(!r.task.writes(), egui::Button::new("Cancel"));
+                let button = button.on_disabled_hover_text("A file is being written");
+                if button.accessible_name(name).clicked() {
                     cancel = Some(r.task);
                 }
             });
             ui.ctx().request_repaint_after(Duration::from_millis(100));
         }
         if let Some(task) = cancel {
-            self.drive.rest();
-            self.jobs.cancel(|t| t == task);
+            self.end_jobs(|t| t == task);
         }
     }
 
@@ -304,7 +303,7 @@ mod tests {
         assert_eq!(jobs.running.len(), 2);
         assert!(jobs.runs(Task::Simulate(Quality::Standard)));
         // Gone at once, whatever the thread still does.
-        assert_eq!(jobs.cancel(|_| true), 2);
+        assert_eq!(jobs.cancel(|_| true).len(), 2);
         assert!(jobs.running.is_empty() && jobs.collect().is_empty());
         assert!(jobs.ended.iter().all(|e| e.how == "cancelled"));
     }

@@ -47,7 +47,7 @@ impl Studio {
             .map(|s| self.cost_of(DVec3::from_array(s.position_mm)))
             .sum();
         let designed = self.as_designed() && self.design_holds() == Some(true);
-        let known = self.by_hand.sites == sites;
+        let known = self.knows_hand();
         let (selector, evaluation, seconds): (_, Option<&Evaluation>, f64) = match &self.design {
             Some(d) if designed => {
                 let name = d.design.lead.name();
@@ -73,7 +73,7 @@ impl Studio {
             errors: evaluation.map_or_else(Vec::new, |e| errors_of(e, selector)),
             failures: evaluation.map_or_else(Vec::new, |e| failures_of(e, selector)),
         };
-        self.shown_kept.insert(project.kept.len());
+        self.shown_kept.insert(kept.name.clone());
         self.document.state.project.kept.push(kept);
         self.document.settle();
         self.results = super::results::Tab::Compare;
@@ -148,11 +148,8 @@ impl Studio {
                 self.document.settle();
             }
             Asked::Delete(k) => {
+                // Its name stays among those shown: when the deletion is taken back, so is this.
                 self.document.state.project.kept.remove(k);
-                self.shown_kept = (self.shown_kept.iter())
-                    .filter(|s| **s != k)
-                    .map(|&s| if s > k { s - 1 } else { s })
-                    .collect();
                 self.document.settle();
             }
         }
@@ -160,13 +157,17 @@ impl Studio {
 
     /// Shows kept selections by their numbers, beside those that are shown already.
     pub fn show_kept(&mut self, numbers: impl IntoIterator<Item = usize>) {
-        self.shown_kept.extend(numbers);
+        let kept = &self.document.state.project.kept;
+        let names = numbers
+            .into_iter()
+            .filter_map(|n| Some(kept.get(n)?.name.clone()));
+        self.shown_kept.extend(names);
     }
 
     /// Kept selections that are shown, with their numbers.
     pub(super) fn compared(&self) -> impl Iterator<Item = (usize, &Kept)> {
         let kept = self.document.state.project.kept.iter().enumerate();
-        kept.filter(|(k, _)| self.shown_kept.contains(k))
+        kept.filter(|(_, kept)| self.shown_kept.contains(&kept.name))
     }
 
     /// The sites of the kept selections that are shown, as rhombs.
@@ -204,18 +205,18 @@ fn kept_row(
     ui: &mut Ui,
     k: usize,
     kept: &mut Kept,
-    shown: &mut BTreeSet<usize>,
+    shown: &mut BTreeSet<String>,
     asked: &mut Asked,
 ) {
     let name = kept.name.clone();
-    let mut on = shown.contains(&k);
+    let mut on = shown.contains(&name);
     ui.horizontal(|ui| {
         let tick = ui.checkbox(&mut on, "");
         if tick.accessible_name(format!("Show {name}")).changed() {
             if on {
-                shown.insert(k);
+                shown.insert(name.clone());
             } else {
-                shown.remove(&k);
+                shown.remove(&name);
             }
         }
         let (rect, _) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::hover());
@@ -224,6 +225,9 @@ fn kept_row(
     let height = ui.spacing().interact_size.y;
     ui.add_sized([160.0, height], TextEdit::singleline(&mut kept.name))
         .accessible_name(format!("Name of kept selection {}", k + 1));
+    if kept.name != name && shown.remove(&name) {
+        shown.insert(kept.name.clone());
+    }
     ui.label(title(&kept.selector));
     ui.label(quality_name(kept.quality));
     ui.monospace(format!("{:>3}", kept.sites.len()));

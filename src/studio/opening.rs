@@ -84,11 +84,16 @@ impl Studio {
                 masks.extend(before.masks.clone());
             }
             let mut project = before.project.clone();
+            let before_painted = before.painted.is_some();
             let supports = project.supports.len();
             project.supports.retain(|s| {
                 (s.vertices.as_ref()).is_none_or(|name| masks.contains_key(name))
             });
             let lost = supports - project.supports.len();
+            let gone = |name: &mut Option<String>| {
+                name.take_if(|name| !masks.contains_key(name)).is_some()
+            };
+            let regions = gone(&mut project.feasible.keep_out) | gone(&mut project.touch.region);
             let inputs = Inputs {
                 project,
                 part: Arc::new(mesh.mesh),
@@ -104,6 +109,10 @@ impl Studio {
             };
             let mut opened = Opened::new(loaded, path, before);
             opened.document.compare_with(saved);
+            if regions || (before_painted && !same) {
+                let said = "What was painted was on other vertices, and is gone";
+                opened.said.push(said.into());
+            }
             if lost > 0 {
                 opened.said.push(format!(
                     "{lost} supports were on painted vertices that this mesh does not have: they are gone. Hold the part anew"
@@ -155,7 +164,11 @@ impl Studio {
 
     /// Replaces the open project; what was computed for the old one goes with it.
     pub(super) fn take_opened(&mut self, opened: Opened) {
-        if self.document.state != opened.before {
+        // A selection that ends meanwhile is nobody's change.
+        let mut before = opened.before.clone();
+        let sites = self.document.state.project.selection.sites.clone();
+        before.project.selection.sites = sites;
+        if self.document.state != before {
             self.complain(
                 "The project was changed while the file was read, and nothing was opened: open it again",
             );
@@ -167,7 +180,7 @@ impl Studio {
         self.touching = touching::Touching::default();
         self.drive = drive::Drive::following(self.drive.follow);
         self.simulation = None;
-        self.drafts = (None, None);
+        self.last.clear();
         self.feasibility = None;
         self.design = None;
         self.picked.clear();

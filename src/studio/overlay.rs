@@ -206,7 +206,7 @@ impl Studio {
             at,
             near,
             picked: self.picked.contains(&number),
-            pinned: self.is_pinned(site),
+            pinned: self.pin_of(number).is_some(),
         })
     }
 

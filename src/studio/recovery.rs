@@ -179,7 +179,9 @@ impl Studio {
             _ => None,
         };
         recovery.writing = None;
-        if !self.document.is_dirty() {
+        if self.document.asks_for_another_part() {
+            // Masks of this mesh beside settings for another would be read by nobody.
+        } else if !self.document.is_dirty() {
             if recovery.kept.is_some() {
                 recovery.forget();
             }

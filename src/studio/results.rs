@@ -127,7 +127,7 @@ impl Studio {
     /// What gauges that were moved by hand do to the error.
     fn by_hand_label(&self, ui: &mut Ui) {
         let sites = &self.document.state.project.selection.sites;
-        if self.by_hand.sites != *sites || sites.is_empty() || self.as_designed() {
+        if !self.knows_hand() || sites.is_empty() || self.as_designed() {
             return;
         }
         let text = match self.by_hand_error() {
@@ -336,7 +336,7 @@ impl Studio {
             (_, true) => Some(Row::Pick),
             _ => None,
         };
-        let mut pinned = self.is_pinned(site);
+        let mut pinned = self.pin_of(k).is_some();
         let tick = ui
             .checkbox(&mut pinned, "")
             .on_hover_text("Selections must have a gauge here");

@@ -92,6 +92,9 @@ impl Studio {
                 for stage in Stage::ALL {
                     self.stage_row(ui, stage);
                 }
+                ui.add_space(8.0);
+                ui.checkbox(&mut self.drive.follow, Command::Follow.name())
+                    .on_hover_text(Command::Follow.tooltip());
             });
     }
 

@@ -42,7 +42,7 @@ impl Studio {
     }
 
     /// What the chosen tool and the section need, over the view: nothing moves when it comes and goes.
-    pub(super) fn options(&mut self, ui: &mut Ui, view: egui::Rect) {
+    pub(super) fn options(&mut self, ui: &Ui, view: egui::Rect) {
         let has = self.view.section.is_some()
             || self.view.tool.paints()
             || self.view.ranges.of(self.view.field).is_some()
@@ -50,12 +50,12 @@ impl Studio {
         if !has {
             return;
         }
-        let room = egui::Rect::from_min_max(
-            view.left_top() + egui::vec2(10.0, 10.0),
-            view.right_bottom() - egui::vec2(10.0, 10.0),
-        );
-        let builder = egui::UiBuilder::new().max_rect(room);
-        ui.scope_builder(builder, |ui| {
+        // In a layer of its own: what is pressed there is not pressed on the limb beneath.
+        let id = egui::Id::unique("tool options");
+        let area = egui::Area::new(id)
+            .order(egui::Order::Middle)
+            .fixed_pos(view.left_top() + egui::vec2(10.0, 10.0));
+        area.show(ui.ctx(), |ui| {
             let fill = ui.visuals().panel_fill.gamma_multiply(0.92);
             egui::Frame::new()
                 .fill(fill)

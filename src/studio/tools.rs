@@ -2,12 +2,13 @@
 
 use egui::{PointerButton, Pos2, Response, Ui};
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::Studio;
 use super::fields::Field;
-use super::viewport::Pane;
+use super::viewport::{Pane, Viewport};
 use crate::document::Brush;
-use crate::mesh::SurfacePoint;
+use crate::mesh::{SurfacePoint, TriMesh};
 
 /// What the pointer does on the limb.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -297,21 +298,24 @@ impl Studio {
                 let at = place(part.positions()[v as usize]);
                 at.is_some_and(|at| bounds.contains(at) && encloses(&outline, at))
             })
-            .filter(|&v| pane == Pane::Unrolled || self.view.see_through || self.is_seen(v))
+            .collect();
+        let through = pane == Pane::Unrolled || self.view.see_through;
+        let inside: Vec<u32> = (inside.into_par_iter())
+            .filter(|&v| through || is_seen(&self.view, &part, v))
             .collect();
         self.document.mark(self.view.layer, brush, inside);
     }
+}
 
-    /// Whether nothing of the part lies between the eye and one of its vertices.
-    fn is_seen(&self, vertex: u32) -> bool {
-        let part = &self.document.part;
-        let p = part.positions()[vertex as usize];
-        let Some(at) = self.view.place(p) else {
-            return false;
-        };
-        let near = 1e-3 * self.view.camera.distance + part.mean_edge();
-        (self.view.pick(Pane::Limb, at)).is_none_or(|hit| part.point(hit).distance(p) < near)
-    }
+/// Whether nothing of the part lies between the eye and one of its vertices.
+fn is_seen(view: &Viewport, part: &TriMesh, vertex: u32) -> bool {
+    let p = part.positions()[vertex as usize];
+    let Some(at) = view.place(p) else {
+        return false;
+    };
+    let near = 1e-3 * view.camera.distance + part.mean_edge();
+    let hit = view.pick(Pane::Limb, at);
+    hit.is_none_or(|hit| part.point(hit).distance(p) < near)
 }
 
 /// Where the left button went down in this frame.

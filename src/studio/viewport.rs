@@ -172,6 +172,15 @@ impl Viewport {
         }
     }
 
+    pub(super) fn drop_gesture(&mut self) {
+        self.gesture = Gesture::None;
+    }
+
+    /// Whether no hand is at work in the views.
+    pub(super) fn is_idle(&self) -> bool {
+        self.gesture == Gesture::None
+    }
+
     #[must_use]
     pub fn is_stroking(&self) -> bool {
         matches!(self.gesture, Gesture::Stroke(..))
@@ -294,7 +303,7 @@ impl Studio {
         ui.reset_style();
         self.view.hover = None;
         let axis = self.document.state.project.part.axis;
-        if self.view.unrolled.axis != axis {
+        if self.view.unrolled_shown && self.view.unrolled.axis != axis {
             self.view.unrolled = Unrolled::of(&self.document.part, axis);
             self.view.flat_view.1 = 0.0;
             self.view.built = None;
