@@ -47,6 +47,7 @@ impl Studio {
             || self.view.tool.paints()
             || self.view.ranges.of(self.view.field).is_some()
             || self.view.tool == Tool::Gauges;
+        self.view.covered = egui::Rect::NOTHING;
         if !has {
             return;
         }
@@ -55,7 +56,7 @@ impl Studio {
         let area = egui::Area::new(id)
             .order(egui::Order::Middle)
             .fixed_pos(view.left_top() + egui::vec2(10.0, 10.0));
-        area.show(ui.ctx(), |ui| {
+        let shown = area.show(ui.ctx(), |ui| {
             let fill = ui.visuals().panel_fill.gamma_multiply(0.92);
             egui::Frame::new()
                 .fill(fill)
@@ -69,6 +70,7 @@ impl Studio {
                     self.range_controls(ui);
                 });
         });
+        self.view.covered = shown.response.rect;
     }
 
     fn gauge_controls(&mut self, ui: &mut Ui) {

@@ -122,21 +122,25 @@ impl Studio {
     }
 
     pub(super) fn use_tool(&mut self, ui: &Ui, response: &Response, pane: Pane) {
-        if let Some(at) = response.hover_pos() {
+        let covered = self.view.covered;
+        let free = |at: &Pos2| !covered.contains(*at);
+        if let Some(at) = response.hover_pos().filter(free) {
             self.view.hover = self.view.pick(pane, at);
         }
         let at = response.interact_pointer_pos().or(response.hover_pos());
+        let clicked = response.clicked() && at.as_ref().is_none_or(free);
         match self.view.tool {
-            Tool::Touch if response.clicked() => {
+            Tool::Touch if clicked => {
                 self.press(ui, pane, response.interact_pointer_pos());
             }
-            Tool::Measure if response.clicked() => {
+            Tool::Measure if clicked => {
                 let place = at.and_then(|at| self.view.pick(pane, at));
                 self.measure_to(ui.ctx(), place);
             }
             _ => {}
         }
-        if let Some(from) = pressed_at(ui).filter(|_| response.contains_pointer()) {
+        let from = pressed_at(ui).filter(free);
+        if let Some(from) = from.filter(|_| response.contains_pointer()) {
             self.begin(ui, pane, from);
         }
         // In the same frame too: where frames are slow, a hand has pressed and moved on in one.

@@ -107,6 +107,8 @@ pub struct Viewport {
     /// Where the view was last shown, in points: what a place on it means.
     pub rect: Rect,
     pub flat_rect: Rect,
+    /// What lies over the view, as last shown: it is not the limb that is pressed there.
+    pub(super) covered: Rect,
 }
 
 impl Viewport {
@@ -135,6 +137,7 @@ impl Viewport {
             measure: Measure::default(),
             rect: Rect::NOTHING,
             flat_rect: Rect::NOTHING,
+            covered: Rect::NOTHING,
         }
     }
 
