@@ -163,10 +163,16 @@ impl Document {
         self.saved = saved;
     }
 
-    /// The state on disk is now this one.
-    pub fn mark_saved(&mut self, path: PathBuf) {
+    /// What lies on disk now is this state, in a project and with a mesh at these paths. The name of the mesh
+    /// belongs to no step of undo.
+    pub fn saved_as(&mut self, path: PathBuf, mesh: PathBuf, saved: State) {
+        let name = &saved.project.part.mesh;
+        self.state.project.part.mesh.clone_from(name);
+        self.settled.project.part.mesh.clone_from(name);
         self.path = Some(path);
-        self.saved = self.state.clone();
+        self.mesh_path = mesh;
+        self.bundled = false;
+        self.saved = saved;
     }
 
     /// Name for the title and the reports.

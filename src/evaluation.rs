@@ -79,11 +79,13 @@ pub struct Candidate {
     pub hyper: Option<Hyper>,
 }
 
-/// The outcome: rows by set and region, and each set's errors touch by touch (mm).
+/// The outcome: rows by set and region, and each set's errors touch by touch (mm), as drawn and as a
+/// workshop would build it.
 #[derive(Clone)]
 pub struct Evaluation {
     pub rows: Vec<EvaluationRow>,
     pub errors: Vec<Vec<f64>>,
+    pub built: Vec<Vec<f64>>,
     /// What is left of each selector's largest set when gauges fail.
     pub failures: Vec<Failures>,
     pub work: Work,
@@ -113,6 +115,7 @@ pub fn evaluate(
     let mut evaluation = Evaluation {
         rows: Vec::new(),
         errors: Vec::new(),
+        built: Vec::new(),
         failures: Vec::new(),
         work: Work::default(),
     };
@@ -127,9 +130,10 @@ pub fn evaluate(
             Ok(judge(&noisy, trial, set, hyper, budget))
         })
         .collect();
-    for (rows, errors, work) in results? {
+    for (rows, [errors, built], work) in results? {
         evaluation.rows.extend(rows);
         evaluation.errors.push(errors);
+        evaluation.built.push(built);
         evaluation.work += work;
     }
     evaluation.failures = fail(&noisy, trial, sets, &hypers, budget, watch)?;
@@ -302,7 +306,7 @@ fn judge(
     set: &Candidate,
     hyper: &Hyper,
     budget: &Budget,
-) -> (Vec<EvaluationRow>, Vec<f64>, Work) {
+) -> (Vec<EvaluationRow>, [Vec<f64>; 2], Work) {
     let effort = Effort {
         tolerance: budget.svr_tolerance_mm,
         max_steps: budget.svr_steps,
@@ -313,25 +317,65 @@ fn judge(
     let errors = distances(&predicted, trial.test_targets);
     let built = model.predict(&noisy.workshop.select_rows(&set.rows));
     let built = distances(&built, trial.test_targets);
-    let everywhere = Region {
-        name: "all touches".into(),
-        contains: vec![true; errors.len()],
+    let said = Said {
+        selector: &set.selector,
+        sensors: set.rows.len(),
+        hyper,
+        converged: model.converged().0,
     };
-    let rows = std::iter::once(&everywhere)
-        .chain(trial.regions)
-        .filter(|region| region.contains.contains(&true))
-        .map(|region| row(set, region, [&errors, &built], hyper, model.converged().0))
-        .collect();
-    (rows, errors, model.work)
+    let rows = said.rows(trial.regions, [&errors, &built]);
+    (rows, [errors, built], model.work)
 }
 
-fn row(
-    set: &Candidate,
-    region: &Region,
-    [errors, built]: [&[f64]; 2],
-    hyper: &Hyper,
+/// The region of all touches.
+pub const EVERYWHERE: &str = "all touches";
+
+impl Evaluation {
+    /// The same errors, quoted for other regions of the same test touches.
+    #[must_use]
+    pub fn in_regions(&self, regions: &[Region]) -> Self {
+        let whole = self.rows.iter().filter(|r| r.region == EVERYWHERE);
+        let rows = whole.zip(self.errors.iter().zip(&self.built));
+        let rows = rows.flat_map(|(row, (errors, built))| {
+            let said = Said {
+                selector: &row.selector,
+                sensors: row.sensors,
+                hyper: &row.hyper,
+                converged: row.converged,
+            };
+            said.rows(regions, [errors, built])
+        });
+        Self {
+            rows: rows.collect(),
+            ..self.clone()
+        }
+    }
+}
+
+/// What all rows of a set have in common.
+struct Said<'a> {
+    selector: &'a str,
+    sensors: usize,
+    hyper: &'a Hyper,
     converged: bool,
-) -> EvaluationRow {
+}
+
+impl Said<'_> {
+    /// A row for all touches, and one for each region that has any.
+    fn rows(&self, regions: &[Region], errors: [&[f64]; 2]) -> Vec<EvaluationRow> {
+        let everywhere = Region {
+            name: EVERYWHERE.into(),
+            contains: vec![true; errors[0].len()],
+        };
+        std::iter::once(&everywhere)
+            .chain(regions)
+            .filter(|region| region.contains.contains(&true))
+            .map(|region| row(self, region, errors))
+            .collect()
+    }
+}
+
+fn row(set: &Said, region: &Region, [errors, built]: [&[f64]; 2]) -> EvaluationRow {
     let within = |errors: &[f64]| -> Vec<f64> {
         (errors.iter().zip(&region.contains))
             .filter_map(|(&e, &inside)| inside.then_some(e))
@@ -347,15 +391,15 @@ fn row(
             .unwrap_or(f64::NAN)
     };
     EvaluationRow {
-        selector: set.selector.clone(),
-        sensors: set.rows.len(),
+        selector: set.selector.to_owned(),
+        sensors: set.sensors,
         region: region.name.clone(),
         error_mm: inside.iter().sum::<f64>() / inside.len() as f64,
         median_mm: quantile(0.5),
         p95_mm: quantile(0.95),
         workshop_mm: built.iter().sum::<f64>() / built.len() as f64,
         touches: inside.len(),
-        hyper: *hyper,
-        converged,
+        hyper: *set.hyper,
+        converged: set.converged,
     }
 }

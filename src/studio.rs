@@ -20,6 +20,7 @@ pub mod picture;
 mod recent;
 mod recovery;
 mod results;
+mod saving;
 mod stages;
 mod theme;
 mod toolbar;
@@ -104,6 +105,8 @@ pub struct Studio {
     /// The stage whose settings are shown.
     pub stage: Stage,
     results: results::Tab,
+    /// Where to save once what is being saved is.
+    save_next: Option<PathBuf>,
     ask_quit: bool,
     quit: bool,
     title: String,
@@ -160,6 +163,7 @@ impl Studio {
             slow: None,
             stage: Stage::default(),
             results: results::Tab::default(),
+            save_next: None,
             ask_quit: false,
             quit: false,
             title: String::new(),

@@ -134,3 +134,47 @@ fn a_region_that_is_not_there_is_named() {
     let error = design::simulate(&inputs, &Quality::Draft.budget(), &unwatched).err();
     assert!(matches!(error, Some(DesignError::NoTouches { .. })));
 }
+
+#[test]
+fn other_regions_are_quoted_from_the_same_errors() {
+    use hapdef::design::{Hooks, Known};
+    use hapdef::placement::SelectorKind;
+    use hapdef::project::RegionKeys;
+    let mut inputs = limb();
+    inputs.project.selection.sensors = 3;
+    let budget = Quality::Draft.budget();
+    let kinds = [SelectorKind::PcaQr];
+    inputs.project.selection.selector = SelectorKind::PcaQr;
+    let hooks = Hooks {
+        clock: &|| 0.0,
+        watch: &unwatched,
+        found: &|_, _, _| (),
+        entered: &|_| (),
+    };
+    let simulated = Arc::new(design::simulate(&inputs, &budget, &unwatched).unwrap());
+    let run = |inputs: &Inputs, known: Known| {
+        let simulated = Arc::clone(&simulated);
+        design::run_step_by_step(inputs, simulated, &kinds, &budget, known, &hooks).unwrap()
+    };
+    let first = run(&inputs, Known::default());
+    inputs.project.evaluation.regions = vec![RegionKeys {
+        name: "upper half".into(),
+        box_mm: [[-100.0, -100.0, 60.0], [100.0, 100.0, 200.0]],
+    }];
+    let known = Known {
+        reduced: Some((Arc::clone(&first.feasibility), Arc::clone(&first.reduced))),
+        selections: Some(Arc::clone(&first.selections)),
+        truth: Some(Arc::clone(&first.truth)),
+        evaluation: Some(Arc::clone(&first.evaluation)),
+    };
+    let (quoted, anew) = (run(&inputs, known), run(&inputs, Known::default()));
+    assert_eq!(quoted.evaluation.rows, anew.evaluation.rows);
+    assert!(
+        quoted
+            .evaluation
+            .rows
+            .iter()
+            .any(|r| r.region == "upper half")
+    );
+    assert_eq!(quoted.evaluation.errors, anew.evaluation.errors);
+}

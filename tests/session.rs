@@ -298,7 +298,7 @@ fn out(w: &mut Window, home: &std::path::Path) {
     let path = folder.path().join("arm.hapdef.toml");
     w.key(Modifiers::COMMAND, Key::S);
     w.type_path(&path);
-    w.press("Save file");
+    w.save_file();
     assert!(
         !w.harness.state().document.is_dirty(),
         "{:?}",

@@ -276,7 +276,7 @@ fn results_survive_saving_and_undo_is_not_mistaken_for_them() {
         .key_press_modifiers(Modifiers::COMMAND, egui::Key::S);
     w.harness.run_ok();
     w.type_path(&path);
-    w.press("Save file");
+    w.save_file();
     assert!(
         w.harness
             .state()
@@ -305,7 +305,7 @@ fn a_saved_project_opens_again() {
         .key_press_modifiers(Modifiers::COMMAND, egui::Key::S);
     w.harness.run_ok();
     w.type_path(&path);
-    w.press("Save file");
+    w.save_file();
     assert!(
         !w.harness.state().document.is_dirty(),
         "{:?}",

@@ -38,6 +38,8 @@ pub struct Known {
     pub selections: Option<Arc<Vec<Selection>>>,
     /// Of the same simulation.
     pub truth: Option<Arc<Truth>>,
+    /// Of these selections on this truth, in whatever regions.
+    pub evaluation: Option<Arc<Evaluation>>,
 }
 
 /// The steps of a design after its simulation.
@@ -101,8 +103,11 @@ impl Design {
                 ..r.clone()
             });
         evaluation.rows.splice(at..at, rows);
-        if let (Some(k), Some(errors)) = (set, judged.errors.first()) {
+        if let (Some(k), Some(errors), Some(built)) =
+            (set, judged.errors.first(), judged.built.first())
+        {
             evaluation.errors[k].clone_from(errors);
+            evaluation.built[k].clone_from(built);
         }
         if let Some(failed) = judged.failures.first() {
             for own in evaluation
@@ -278,20 +283,25 @@ pub fn run_step_by_step(
     };
     (hooks.entered)(Step::Evaluate);
     let judged = sites_to_judge(&reduced, &selections);
-    let truth = match known.truth.filter(|t| t.measures(&judged)) {
+    let measured = known.truth.filter(|t| t.measures(&judged));
+    let known = known.evaluation.filter(|_| measured.is_some());
+    let truth = match measured {
         Some(known) => Arc::new(known.in_regions_of(&inputs.project)),
         None => Arc::new(truth(inputs, &simulated, &judged, budget, watch)?),
     };
     times.lap("truth");
-    let evaluation = evaluate(
-        inputs,
-        &simulated,
-        &reduced,
-        &selections,
-        &truth,
-        budget,
-        watch,
-    )?;
+    let evaluation = match known {
+        Some(known) => known.in_regions(&truth.regions),
+        None => evaluate(
+            inputs,
+            &simulated,
+            &reduced,
+            &selections,
+            &truth,
+            budget,
+            watch,
+        )?,
+    };
     times.lap("evaluate");
     Ok(Design {
         budget: *budget,

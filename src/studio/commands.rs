@@ -343,7 +343,7 @@ impl Studio {
         match command {
             Command::Open => self.dialog = Some(Dialog::open(&self.document)),
             Command::Save => match self.document.path.clone() {
-                Some(path) => self.save_to(&path),
+                Some(path) => self.save_to(ctx, &path),
                 None => self.dialog = Some(Dialog::save_as(&self.document)),
             },
             Command::SaveAs => self.dialog = Some(Dialog::save_as(&self.document)),

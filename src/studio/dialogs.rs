@@ -250,37 +250,12 @@ impl Studio {
                 let unit = dialog.needs_unit().then_some(dialog.unit);
                 self.open_path(ctx, &path, unit);
             }
-            Purpose::SaveAs => self.save_to(&path),
+            Purpose::SaveAs => self.save_to(ctx, &path),
             Purpose::Export => self.export(ctx, path),
             Purpose::Picture => {
                 let path = path.with_extension("png");
                 self.save_picture(ctx, path, dialog.size, dialog.transparent);
             }
-        }
-    }
-
-    pub(super) fn save_to(&mut self, path: &Path) {
-        let path = &project_file::with_ending(path);
-        self.document.settle();
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let saved = self.settled_mesh(&folder).and_then(|mesh| {
-            let mut project = self.document.state.project.clone();
-            project.part.mesh = project_file::relative_to(path, &mesh);
-            let painted = self.document.state.painted.as_ref().map(|m| m.as_slice());
-            project_file::save(path, &project, painted, &self.document.state.masks)
-                .map_err(|e| e.to_string())?;
-            Ok((project.part.mesh, mesh))
-        });
-        match saved {
-            Ok((name, mesh)) => {
-                self.document.state.project.part.mesh = name;
-                self.document.mesh_path = mesh;
-                self.document.bundled = false;
-                self.document.settle();
-                self.document.mark_saved(path.to_owned());
-                self.recent.push(path);
-            }
-            Err(message) => self.complain(message),
         }
     }
 

@@ -1,16 +1,15 @@
 //! What is kept computed: a goal, and the jobs that lead there. Draft answers come first, finer ones
 //! follow while nothing moves; what no longer holds is ended, and only that is computed again.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use egui::Context;
 
 use super::jobs::{Shared, Task};
-use super::{DesignResult, SimulationResult, Studio, opening};
+use super::{DesignResult, SimulationResult, Studio, opening, saving};
 use crate::budget::{Progress, Quality};
-use crate::cli;
 use crate::dataset::Site;
 use crate::design::{self, Design, DesignError, Hooks, Inputs, Known, Simulated, StageTime, Step};
 use crate::evaluation::Evaluation;
@@ -35,6 +34,7 @@ pub(super) enum Finished {
     /// Metres over the surface.
     Measured(f64),
     Pictured(PathBuf),
+    Saved(Box<saving::Saved>),
     Opened(Box<opening::Opened>),
 }
 
@@ -298,6 +298,7 @@ impl Studio {
                 .then(|| (Arc::clone(&design.feasibility), Arc::clone(&design.reduced))),
             selections: selections.then(|| Arc::clone(&design.selections)),
             truth: Some(Arc::clone(&design.truth)),
+            evaluation: selections.then(|| Arc::clone(&design.evaluation)),
         }
     }
 
@@ -313,6 +314,11 @@ impl Studio {
                 Outcome::Cancelled => {}
             }
             ctx.request_repaint();
+        }
+        if !self.jobs.runs(Task::Save)
+            && let Some(path) = self.save_next.take()
+        {
+            self.save_to(ctx, &path);
         }
     }
 
@@ -342,6 +348,7 @@ impl Studio {
                 self.tell(format!("The report is in {}", report.display()));
             }
             Finished::Opened(opened) => self.take_opened(*opened),
+            Finished::Saved(saved) => self.take_saved(*saved),
             Finished::Estimate(mm) if key == self.by_hand_key() => {
                 self.by_hand.estimate = Some(mm);
             }
@@ -563,15 +570,6 @@ impl Studio {
                 .map_err(|e| Stop::Failed(e.to_string()))?;
             Ok(Finished::Exported(folder))
         });
-    }
-
-    /// A path under which a saved project finds its mesh: the bundled limb is written beside it.
-    pub(crate) fn settled_mesh(&self, folder: &Path) -> Result<PathBuf, String> {
-        if !self.document.bundled {
-            return Ok(self.document.mesh_path.clone());
-        }
-        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        cli::write_bundled_mesh(folder).map_err(|e| format!("{e:#}"))
     }
 
     /// Ends whatever runs, at once; what is over before anybody notices goes on.

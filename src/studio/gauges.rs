@@ -13,7 +13,7 @@ use super::tools::Gesture;
 use super::viewport::Pane;
 use crate::design::{self, DesignError};
 use crate::elasticity::observe::tangent_frame;
-use crate::evaluation::Evaluation;
+use crate::evaluation::{EVERYWHERE, Evaluation};
 use crate::io::artifacts::as_chosen;
 use crate::job::Stop;
 use crate::project::ChosenSite;
@@ -326,7 +326,7 @@ impl Studio {
             return (None, None);
         }
         let exact = self.by_hand.exact.as_ref();
-        let row = exact.and_then(|e| e.rows.iter().find(|r| r.region == "all touches"));
+        let row = exact.and_then(|e| e.rows.iter().find(|r| r.region == EVERYWHERE));
         (self.by_hand.estimate, row.map(|r| r.error_mm))
     }
 

@@ -27,6 +27,7 @@ pub enum Task {
     Field,
     Measure,
     Picture,
+    Save,
 }
 
 impl Task {
@@ -46,19 +47,20 @@ impl Task {
             Self::Field => "Compute the field".into(),
             Self::Measure => "Measure".into(),
             Self::Picture => "Save the picture".into(),
+            Self::Save => "Save".into(),
         }
     }
 
     /// Whether it writes a file, and is not ended on the way.
     fn writes(self) -> bool {
-        matches!(self, Self::Export | Self::Picture)
+        matches!(self, Self::Export | Self::Picture | Self::Save)
     }
 
     /// Whether it is over before anybody needs to hear of it.
     fn is_quiet(self) -> bool {
         matches!(
             self,
-            Self::Filter | Self::Open | Self::Estimate | Self::Field | Self::Measure
+            Self::Filter | Self::Open | Self::Estimate | Self::Field | Self::Measure | Self::Save
         )
     }
 }

@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::gauges::BY_HAND;
 use super::viewport::Pane;
 use super::{Studio, quality_name};
-use crate::evaluation::Evaluation;
+use crate::evaluation::{EVERYWHERE, Evaluation};
 use crate::placement::SelectorKind;
 use crate::project::{Kept, KeptError, KeptFailure};
 
@@ -231,9 +231,7 @@ fn kept_row(
     ui.label(title(&kept.selector));
     ui.label(quality_name(kept.quality));
     ui.monospace(format!("{:>3}", kept.sites.len()));
-    let last = (kept.errors.iter())
-        .rev()
-        .find(|e| e.region == "all touches");
+    let last = (kept.errors.iter()).rev().find(|e| e.region == EVERYWHERE);
     let number = |value: Option<f64>| value.map_or("–".into(), |v| format!("{v:6.2}"));
     ui.monospace(number(last.map(|e| e.mean_mm)));
     ui.monospace(number(last.map(|e| e.median_mm)));

@@ -4,7 +4,7 @@ use egui::{Color32, Response, RichText, Role, Ui, WidgetInfo};
 use egui_plot::{Corner, HLine, Legend, Line, LineStyle, Plot, PlotPoints, PlotUi, Points};
 
 use super::Studio;
-use crate::evaluation::BASELINE;
+use crate::evaluation::{BASELINE, EVERYWHERE};
 use crate::io::artifacts::{range, signal_to_noise, signal_unit};
 use crate::io::report::{curve, failure_curve, failure_name, failure_title};
 
@@ -138,7 +138,7 @@ impl Studio {
         let chosen = self.design.as_ref().and_then(|d| {
             let (lead, count) = (d.design.lead.name(), d.design.chosen().len());
             let mut rows = d.design.evaluation.rows.iter();
-            rows.find(|r| r.selector == lead && r.sensors == count && r.region == "all touches")
+            rows.find(|r| r.selector == lead && r.sensors == count && r.region == EVERYWHERE)
         });
         let beside = chosen.map_or(String::new(), |r| {
             format!("; as selected {:.2} mm", r.error_mm)

@@ -53,6 +53,12 @@ impl Window {
         Some(Self { harness })
     }
 
+    /// Presses “Save file” and waits until it is done, or refused.
+    pub fn save_file(&mut self) {
+        self.press("Save file");
+        self.wait("the file", 60, |s| !s.busy());
+    }
+
     pub fn press(&mut self, name: &str) {
         self.harness
             .get_by_role_and_label(egui::Role::Button, name)

@@ -1,0 +1,68 @@
+//! Saving in the background: what is changed meanwhile is not saved yet, and is known not to be.
+
+use std::path::{Path, PathBuf};
+
+use egui::Context;
+
+use super::Studio;
+use super::drive::Finished;
+use super::jobs::Task;
+use crate::cli;
+use crate::document::State;
+use crate::io::project_file;
+use crate::job::Stop;
+
+/// What lies on disk now.
+pub(super) struct Saved {
+    path: PathBuf,
+    mesh: PathBuf,
+    state: State,
+}
+
+impl Studio {
+    pub(super) fn save_to(&mut self, ctx: &Context, path: &Path) {
+        self.document.settle();
+        let path = project_file::with_ending(path);
+        if self.jobs.runs(Task::Save) {
+            // One after the other: the later must not be overtaken.
+            self.save_next = Some(path);
+            return;
+        }
+        let mut state = self.document.state.clone();
+        let own_mesh = (!self.document.bundled).then(|| self.document.mesh_path.clone());
+        self.jobs.start(ctx, Task::Save, String::new(), move |_| {
+            let folder = path.parent().unwrap_or(Path::new(""));
+            let mesh = match own_mesh {
+                Some(mesh) => mesh,
+                None => bundled_mesh_in(folder).map_err(Stop::Failed)?,
+            };
+            state.project.part.mesh = project_file::relative_to(&path, &mesh);
+            let painted = state.painted.as_ref().map(|m| m.as_slice());
+            project_file::save(&path, &state.project, painted, &state.masks)
+                .map_err(|e| Stop::Failed(e.to_string()))?;
+            Ok(Finished::Saved(Box::new(Saved { path, mesh, state })))
+        });
+    }
+
+    pub(super) fn take_saved(&mut self, saved: Saved) {
+        self.recent.push(&saved.path);
+        self.document.saved_as(saved.path, saved.mesh, saved.state);
+    }
+
+    /// A path under which a saved project finds its mesh: the bundled limb is written beside it.
+    pub(crate) fn settled_mesh(&self, folder: &Path) -> Result<PathBuf, String> {
+        if self.document.bundled {
+            bundled_mesh_in(folder)
+        } else {
+            Ok(self.document.mesh_path.clone())
+        }
+    }
+}
+
+/// Writes the bundled limb into a folder, which is made where it is missing.
+fn bundled_mesh_in(folder: &Path) -> Result<PathBuf, String> {
+    if !folder.as_os_str().is_empty() {
+        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    }
+    cli::write_bundled_mesh(folder).map_err(|e| format!("{e:#}"))
+}
