@@ -28,3 +28,4 @@ pub mod render;
 #[cfg(feature = "studio")]
 pub mod studio;
 pub mod study;
+pub mod wire;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 /// From the bottom up; a module may use those above it in this list, itself included.
 const ORDER: [&[&str]; 12] = [
-    &["budget", "colormap", "eigen", "lanes"],
+    &["budget", "colormap", "eigen", "lanes", "wire"],
     &["mesh"],
     &["limb", "elasticity"],
     &["dataset"],

@@ -1,0 +1,127 @@
+//! Plain lines of numbers, so that any sketch that prints its readings works.
+
+/// The longest line that is looked at.
+const LONGEST: usize = 1024;
+
+/// What a line says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reading {
+    /// One number a channel.
+    Values(Vec<f64>),
+    /// Not a row of numbers, or not as many as in the lines before.
+    Other,
+}
+
+/// Takes bytes in as they come and finds lines of numbers divided by commas, semicolons, tabs or spaces.
+#[derive(Clone, Debug, Default)]
+pub struct LineReader {
+    line: Vec<u8>,
+    overlong: bool,
+    /// Numbers in a line, as in most lines so far.
+    channels: Option<usize>,
+    /// Lines in a row with another count.
+    others: usize,
+}
+
+impl LineReader {
+    /// Takes in bytes and tells of every line. No more than one line is held, however long it is.
+    pub fn push(&mut self, bytes: &[u8], mut tell: impl FnMut(Reading)) {
+        for &byte in bytes {
+            if byte != b'\n' && byte != b'\r' {
+                self.overlong |= self.line.len() >= LONGEST;
+                if !self.overlong {
+                    self.line.push(byte);
+                }
+                continue;
+            }
+            if self.overlong {
+                tell(Reading::Other);
+            } else if self.line.iter().any(|b| !b.is_ascii_whitespace()) {
+                let reading = self.read();
+                tell(reading);
+            }
+            self.line.clear();
+            self.overlong = false;
+        }
+    }
+
+    fn read(&mut self) -> Reading {
+        /// So many lines of another length are the new length.
+        const CHANGED: usize = 3;
+        let Some(values) = numbers(&self.line) else {
+            return Reading::Other;
+        };
+        match self.channels {
+            Some(known) if known != values.len() && self.others + 1 < CHANGED => {
+                // Half a line, most likely: as when a port is opened in the middle of one.
+                self.others += 1;
+                Reading::Other
+            }
+            _ => {
+                (self.channels, self.others) = (Some(values.len()), 0);
+                Reading::Values(values)
+            }
+        }
+    }
+}
+
+fn numbers(line: &[u8]) -> Option<Vec<f64>> {
+    let text = std::str::from_utf8(line).ok()?;
+    let divided = |c: char| matches!(c, ',' | ';' | '\t' | ' ');
+    let values: Option<Vec<f64>> = text
+        .split(divided)
+        .filter(|word| !word.is_empty())
+        .map(|word| word.parse().ok().filter(|v: &f64| v.is_finite()))
+        .collect();
+    values.filter(|v| !v.is_empty() && v.len() <= super::MOST_CHANNELS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn readings(bytes: &[u8]) -> Vec<Reading> {
+        let mut reader = LineReader::default();
+        let mut all = Vec::new();
+        for piece in bytes.chunks(3) {
+            reader.push(piece, |r| all.push(r));
+        }
+        all
+    }
+
+    #[test]
+    fn rows_of_numbers_are_found_among_anything() {
+        let said = readings(b"hello\r\n1,2,3\n4; 5;\t6\r\n7 8\n-1.5e3,0,2\n\n,,\n1,2,nan\n");
+        let values = |v: &[f64]| Reading::Values(v.to_vec());
+        let expected = [
+            Reading::Other,
+            values(&[1.0, 2.0, 3.0]),
+            values(&[4.0, 5.0, 6.0]),
+            Reading::Other,
+            values(&[-1500.0, 0.0, 2.0]),
+            Reading::Other,
+            Reading::Other,
+        ];
+        assert_eq!(said, expected);
+    }
+
+    #[test]
+    fn another_number_of_channels_is_believed_when_it_stays() {
+        let said = readings(b"1,2\n1,2,3\n1,2,3\n1,2,3\n1,2,3\n");
+        let kinds: Vec<bool> = said
+            .iter()
+            .map(|r| matches!(r, Reading::Values(_)))
+            .collect();
+        assert_eq!(kinds, [true, false, false, true, true]);
+    }
+
+    #[test]
+    fn a_line_without_an_end_is_not_kept() {
+        let mut reader = LineReader::default();
+        reader.push(&vec![b'1'; 1_000_000], |r| panic!("{r:?}"));
+        assert!(reader.line.capacity() <= 2 * LONGEST);
+        let mut told = Vec::new();
+        reader.push(b"\n1,2\n", |r| told.push(r));
+        assert_eq!(told, [Reading::Other, Reading::Values(vec![1.0, 2.0])]);
+    }
+}
