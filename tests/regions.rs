@@ -178,3 +178,51 @@ fn other_regions_are_quoted_from_the_same_errors() {
     );
     assert_eq!(quoted.evaluation.errors, anew.evaluation.errors);
 }
+
+#[test]
+fn gauges_put_by_hand_are_what_the_report_shows() {
+    use hapdef::io::artifacts;
+    use hapdef::placement::SelectorKind;
+    let mut inputs = limb();
+    inputs.project.selection.sensors = 3;
+    inputs.project.selection.selector = SelectorKind::PcaQr;
+    let budget = Quality::Draft.budget();
+    let kinds = [SelectorKind::PcaQr, SelectorKind::Entropy];
+    let design = design::run(&inputs, &kinds, &budget, &|| 0.0, &unwatched).unwrap();
+    let row = |design: &design::Design, sensors: usize| {
+        let mut rows = design.evaluation.rows.iter();
+        let found = rows.find(|r| r.selector == "pca-qr" && r.sensors == sensors);
+        found.map(|r| r.error_mm)
+    };
+    // One moved; and one more.
+    let free: Vec<usize> = (design.reduced.feasible.iter().copied())
+        .filter(|s| !design.chosen().contains(s))
+        .collect();
+    for extra in [0, 1] {
+        let mut sites = design.chosen().to_vec();
+        sites[1] = free[free.len() / 2];
+        sites.extend(&free[..extra]);
+        let judged = design::judge_set(&inputs, &design, &sites, "by-hand", &unwatched).unwrap();
+        let hand = design.with_hand(sites.clone(), &judged);
+        assert_eq!(hand.chosen(), sites);
+        assert_eq!(row(&hand, sites.len()), Some(judged.rows[0].error_mm));
+        assert_eq!(row(&hand, 2), row(&design, 2));
+        assert_eq!(hand.evaluation.errors.len(), design.evaluation.errors.len());
+        let table = artifacts::sites_csv(&hand);
+        assert_eq!(table.lines().count(), 1 + sites.len());
+        assert!(table.contains(&format!(",{},2,", sites[1])), "{table}");
+        assert!(hand.notes().iter().any(|n| n.contains("by hand")));
+        assert!(design.notes().iter().all(|n| !n.contains("by hand")));
+        let summary = artifacts::summary(&inputs, &hand);
+        assert_eq!(summary["sites"].as_array().unwrap().len(), sites.len());
+        assert!(hand.error_map(&hand.simulated.mesh).is_some());
+        let folder = tempfile::tempdir().unwrap();
+        let provenance = artifacts::Provenance {
+            mesh_path: std::path::Path::new("limb.glb"),
+            version: "test",
+        };
+        artifacts::write_all(folder.path(), &inputs, &hand, &provenance).unwrap();
+        let report = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+        assert!(report.contains("moved by hand"));
+    }
+}
