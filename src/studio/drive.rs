@@ -29,7 +29,7 @@ pub(super) enum Finished {
     Design(Arc<Design>, Box<Inputs>, Quality, f64),
     Exported(PathBuf),
     Estimate(f64),
-    Judged(Arc<Evaluation>, f64),
+    Judged(Arc<Evaluation>),
     Field(Vec<f64>),
     /// Metres over the surface.
     Measured(f64),
@@ -101,7 +101,7 @@ impl Drive {
         failed.map(|f| f.2.as_str())
     }
 
-    fn fail(&mut self, task: Task, key: String, message: String) {
+    pub fn fail(&mut self, task: Task, key: String, message: String) {
         self.failed.retain(|(t, _, _)| *t != task);
         self.failed.push((task, key, message));
     }
@@ -121,6 +121,7 @@ impl Studio {
         // Where nothing is left to do, the gauges are at least those that were selected.
         if self.design_stands(self.quality()) {
             self.take_sites();
+            self.drive.pressed = false;
         }
     }
 
@@ -352,9 +353,8 @@ impl Studio {
             Finished::Estimate(mm) if key == self.by_hand_key() => {
                 self.by_hand.estimate = Some(mm);
             }
-            Finished::Judged(found, seconds) if key == self.by_hand_key() => {
+            Finished::Judged(found) if key == self.by_hand_key() => {
                 self.by_hand.exact = Some(found);
-                self.by_hand.seconds = seconds;
             }
             // Of gauges that have moved on.
             Finished::Estimate(_) | Finished::Judged(..) => {}
@@ -557,11 +557,12 @@ impl Studio {
             );
         };
         let inputs = result.inputs.clone();
-        let mesh_path = match self.settled_mesh(&folder) {
-            Ok(path) => path,
-            Err(message) => return self.complain(message),
-        };
+        let own_mesh = (!self.document.bundled).then(|| self.document.mesh_path.clone());
         self.jobs.start(ctx, Task::Export, String::new(), move |_| {
+            let mesh_path = match own_mesh {
+                Some(mesh) => mesh,
+                None => saving::bundled_mesh_in(&folder).map_err(Stop::Failed)?,
+            };
             let provenance = artifacts::Provenance {
                 mesh_path: &mesh_path,
                 version: env!("CARGO_PKG_VERSION"),

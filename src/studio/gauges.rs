@@ -1,7 +1,6 @@
 //! The gauges in hand: picked, moved, pinned, added and taken away, with what that does to the error.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use egui::{Context, Pos2, Ui, Vec2};
 use glam::DVec3;
@@ -34,7 +33,6 @@ pub(super) struct ByHand {
     /// Mean error (mm), quickly.
     pub estimate: Option<f64>,
     pub exact: Option<Arc<Evaluation>>,
-    pub seconds: f64,
 }
 
 /// A way on the screen.
@@ -298,11 +296,11 @@ impl Studio {
         sites.iter().map(find).collect()
     }
 
-    /// Which design it is that is shown: by what it was computed from.
+    /// Which design it is that is shown: by what it was computed from, and whose gauges lead.
     fn design_mark(&self) -> String {
-        self.design
-            .as_ref()
-            .map_or_else(String::new, |d| d.key.clone())
+        (self.design.as_ref()).map_or_else(String::new, |d| {
+            format!("{} {}", d.design.lead.name(), d.key)
+        })
     }
 
     /// Whether what is known of gauges put by hand is of these very ones and of the design that is shown.
@@ -352,6 +350,11 @@ impl Studio {
                 sites: sites.clone(),
                 ..ByHand::default()
             };
+            if self.gauge_sites().is_none() {
+                let key = self.by_hand_key();
+                self.drive.fail(Task::Judge, key, "no site".into());
+                self.complain("A gauge lies at none of the sites that were simulated, and its error cannot be told: move it with the tool “Gauges”, or press “Select gauges”");
+            }
             self.start_estimate(ctx);
         }
         let resting = !ctx.input(|i| i.pointer.any_down()) && self.view.gesture == Gesture::None;
@@ -403,15 +406,13 @@ impl Studio {
         let design = Arc::clone(&result.design);
         let inputs = result.inputs.clone();
         self.jobs.start(ctx, Task::Judge, key, move |r| {
-            let start = Instant::now();
             let watch = |p| r.report(p);
             let found = design::judge_set(&inputs, &design, &sites, BY_HAND, &watch);
             let found = found.map_err(|e: DesignError| super::drive::stop(&e))?;
             if found.rows.is_empty() {
                 return Err(Stop::Failed("no test touch lies in any region".into()));
             }
-            let seconds = start.elapsed().as_secs_f64();
-            Ok(Finished::Judged(Arc::new(found), seconds))
+            Ok(Finished::Judged(Arc::new(found)))
         });
     }
 }

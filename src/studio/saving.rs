@@ -1,6 +1,7 @@
 //! Saving in the background: what is changed meanwhile is not saved yet, and is known not to be.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use egui::Context;
 
@@ -11,12 +12,15 @@ use crate::cli;
 use crate::document::State;
 use crate::io::project_file;
 use crate::job::Stop;
+use crate::mesh::TriMesh;
 
 /// What lies on disk now.
 pub(super) struct Saved {
     path: PathBuf,
     mesh: PathBuf,
     state: State,
+    /// What was open: another file may have been opened meanwhile.
+    part: Arc<TriMesh>,
 }
 
 impl Studio {
@@ -29,6 +33,7 @@ impl Studio {
             return;
         }
         let mut state = self.document.state.clone();
+        let part = Arc::clone(&self.document.part);
         let own_mesh = (!self.document.bundled).then(|| self.document.mesh_path.clone());
         self.jobs.start(ctx, Task::Save, String::new(), move |_| {
             let folder = path.parent().unwrap_or(Path::new(""));
@@ -40,27 +45,25 @@ impl Studio {
             let painted = state.painted.as_ref().map(|m| m.as_slice());
             project_file::save(&path, &state.project, painted, &state.masks)
                 .map_err(|e| Stop::Failed(e.to_string()))?;
-            Ok(Finished::Saved(Box::new(Saved { path, mesh, state })))
+            Ok(Finished::Saved(Box::new(Saved {
+                path,
+                mesh,
+                state,
+                part,
+            })))
         });
     }
 
     pub(super) fn take_saved(&mut self, saved: Saved) {
         self.recent.push(&saved.path);
-        self.document.saved_as(saved.path, saved.mesh, saved.state);
-    }
-
-    /// A path under which a saved project finds its mesh: the bundled limb is written beside it.
-    pub(crate) fn settled_mesh(&self, folder: &Path) -> Result<PathBuf, String> {
-        if self.document.bundled {
-            bundled_mesh_in(folder)
-        } else {
-            Ok(self.document.mesh_path.clone())
+        if Arc::ptr_eq(&saved.part, &self.document.part) {
+            self.document.saved_as(saved.path, saved.mesh, saved.state);
         }
     }
 }
 
 /// Writes the bundled limb into a folder, which is made where it is missing.
-fn bundled_mesh_in(folder: &Path) -> Result<PathBuf, String> {
+pub(super) fn bundled_mesh_in(folder: &Path) -> Result<PathBuf, String> {
     if !folder.as_os_str().is_empty() {
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     }
