@@ -1,9 +1,11 @@
 //! The command line: everything the studio computes, without a display.
 
+pub mod board;
 pub mod data;
 pub mod design;
 pub mod evaluate;
 pub mod limb;
+pub mod listen;
 pub mod progress;
 pub mod render;
 pub mod select;
@@ -51,6 +53,10 @@ pub enum Command {
     Evaluate(evaluate::EvaluateArgs),
     /// A picture of the limb with its gauges.
     Render(render::RenderArgs),
+    /// A simulated board, at a pseudo-terminal or a socket.
+    Board(board::BoardArgs),
+    /// Where a board's part is touched, one JSON object a line.
+    Listen(listen::ListenArgs),
     /// Writes the bundled limb, or another of its family.
     Limb(limb::LimbArgs),
 }

@@ -6,6 +6,7 @@ mod choose;
 mod judge;
 mod layout;
 mod road;
+mod sense;
 mod simulate;
 
 use std::sync::Arc;
@@ -20,6 +21,7 @@ pub use self::choose::*;
 pub use self::judge::*;
 pub use self::layout::*;
 pub use self::road::*;
+pub use self::sense::*;
 pub use self::simulate::*;
 
 /// Why a stage ended without a result.
@@ -74,6 +76,10 @@ pub enum DesignError {
         sites: usize,
         touches: usize,
     },
+    #[error(
+        "the project has no gauges yet: place them in the studio, or with `hapdef design`, whose design.hapdef.toml has them"
+    )]
+    NoGauges,
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

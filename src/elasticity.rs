@@ -17,6 +17,7 @@ mod recover;
 pub mod respond;
 mod rows;
 pub mod scope;
+pub mod sensitivity;
 mod solver;
 pub mod support;
 

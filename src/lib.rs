@@ -3,6 +3,7 @@
 //! The core (everything but `io`, `job`, `document`, `cli`, `render` and `studio`) is pure: no file, no
 //! clock, no thread of its own, no global random state. SI units throughout (m, N, Pa, strain as a ratio).
 
+pub mod board;
 pub mod budget;
 pub mod cli;
 pub mod colormap;
@@ -15,10 +16,13 @@ pub mod evaluation;
 pub mod feasible;
 pub mod gaussian_process;
 pub mod given;
+pub mod inference;
 pub mod io;
 pub mod job;
 mod lanes;
 pub mod limb;
+pub mod link;
+pub mod live;
 pub mod mesh;
 pub mod pca;
 pub mod placement;

@@ -13,6 +13,8 @@ fn main() -> ExitCode {
         Some(Command::Select(args)) => cli::select::run(args),
         Some(Command::Evaluate(args)) => cli::evaluate::run(args),
         Some(Command::Render(args)) => render(args),
+        Some(Command::Board(args)) => cli::board::run(args),
+        Some(Command::Listen(args)) => cli::listen::run(args),
         Some(Command::Limb(args)) => cli::limb::run(args),
         None => open_studio(&cli),
     };

@@ -1,5 +1,7 @@
 //! A project: everything a design depends on, as plain data in the units of its file.
 
+mod live;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -18,6 +20,8 @@ use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
 use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
+
+pub use live::{GluedKeys, LiveKeys};
 
 /// Version of the file format this program writes and the newest it reads.
 pub const FORMAT: u32 = 1;
@@ -60,6 +64,8 @@ pub struct Project {
     pub evaluation: EvaluationKeys,
     #[serde(default)]
     pub budget: BudgetKeys,
+    #[serde(default)]
+    pub live: LiveKeys,
     /// Selections that were kept to be compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub kept: Vec<Kept>,
@@ -539,6 +545,7 @@ impl Project {
             selection: SelectionKeys::default(),
             evaluation: EvaluationKeys::default(),
             budget: BudgetKeys::default(),
+            live: LiveKeys::default(),
             kept: Vec::new(),
         }
     }
@@ -742,6 +749,7 @@ impl Project {
     pub fn check(&self) -> Result<(), BadValue> {
         self.check_signs()?;
         self.check_selection()?;
+        self.check_live()?;
         let nu = self.material.poissons_ratio;
         check(
             "material.poissons_ratio",

@@ -5,6 +5,7 @@ pub mod features;
 pub mod folds;
 pub mod kernel;
 pub mod lowrank;
+pub mod predictor;
 pub mod svr;
 pub mod tune;
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// From the bottom up; a module may use those above it in this list, itself included.
-const ORDER: [&[&str]; 12] = [
+const ORDER: [&[&str]; 14] = [
     &["budget", "colormap", "eigen", "lanes", "wire"],
     &["mesh"],
     &["limb", "elasticity"],
@@ -12,20 +12,26 @@ const ORDER: [&[&str]; 12] = [
     &["pca"],
     &["gaussian_process"],
     &["placement", "evaluation"],
+    &["inference"],
+    &["live", "board"],
     &["project"],
     &["design", "study"],
     &["given"],
-    &["io", "job", "document", "render", "cli", "studio"],
+    &["io", "job", "link", "document", "render", "cli", "studio"],
 ];
 
 /// Among the outer modules, who may use whom.
-const OUTER: [(&str, &[&str]); 6] = [
+const OUTER: [(&str, &[&str]); 7] = [
     ("io", &[]),
     ("job", &[]),
+    ("link", &[]),
     ("render", &[]),
     ("document", &["io"]),
-    ("cli", &["io"]),
-    ("studio", &["io", "job", "document", "render", "cli"]),
+    ("cli", &["io", "link"]),
+    (
+        "studio",
+        &["io", "job", "link", "document", "render", "cli"],
+    ),
 ];
 
 fn level(module: &str) -> usize {

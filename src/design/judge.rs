@@ -99,15 +99,15 @@ pub fn truth(
 
 /// What a workshop does to one gauge: where it is moved to and how far it is turned (radians), and its
 /// gain.
-struct WorkshopDraw {
+pub(super) struct WorkshopDraw {
     toward: f64,
     turned: f64,
-    gain: f64,
+    pub gain: f64,
 }
 
 /// Off by 1 mm in any direction, by 3° either way, and by 3 % either way: the same for a site in whatever
 /// set it is.
-fn workshop_draw(seed: u64, site: usize) -> WorkshopDraw {
+pub(super) fn workshop_draw(seed: u64, site: usize) -> WorkshopDraw {
     const TURN: f64 = 3.0 * std::f64::consts::PI / 180.0;
     const GAIN: f64 = 0.03;
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(WORKSHOP_SEED));
@@ -121,7 +121,7 @@ fn workshop_draw(seed: u64, site: usize) -> WorkshopDraw {
     }
 }
 
-fn as_built(site: &Site, seed: u64, number: usize) -> Site {
+pub(super) fn as_built(site: &Site, seed: u64, number: usize) -> Site {
     const OFF: f64 = 1e-3;
     let draw = workshop_draw(seed, number);
     let across = site.normal.cross(site.direction);

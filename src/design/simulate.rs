@@ -242,7 +242,7 @@ pub fn ground(inputs: &Inputs) -> Result<Ground, DesignError> {
 
 /// The mesh that sites and touches are laid out on, the same for every quality: the part, or where its
 /// triangles are too thin to measure distances on, even ones on its surface.
-fn layout(inputs: &Inputs, ground: &Ground) -> Arc<TriMesh> {
+pub(super) fn layout(inputs: &Inputs, ground: &Ground) -> Arc<TriMesh> {
     /// Height over length of a triangle, and the share of the area that may be thinner.
     const THIN: f64 = 0.1;
     const SHARE: f64 = 0.02;

@@ -114,6 +114,18 @@ impl Ground {
         remesh(&self.surface, &|_| size)
     }
 
+    /// A mesh of about one edge length (m) on the part's surface, whatever its elements are.
+    #[must_use]
+    pub fn of_size(&self, size: f64) -> Remeshed {
+        remesh(&self.surface, &|_| size)
+    }
+
+    /// Area of the surface (m²).
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        self.held.mesh.area()
+    }
+
     fn length(&self, edge: &crate::mesh::Edge) -> f64 {
         let p = self.held.mesh.positions();
         p[edge.a as usize].distance(p[edge.b as usize])

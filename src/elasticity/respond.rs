@@ -226,7 +226,7 @@ fn touch_rows(model: &ShellModel, touches: &[Touch]) -> Rows {
     rows
 }
 
-fn output_rows(observer: &Observer, reading: Reading) -> Rows {
+pub(super) fn output_rows(observer: &Observer, reading: Reading) -> Rows {
     let gauge = |angles: &[f64]| {
         let mut along = Rows::default();
         for (i, &angle) in (0u32..).zip(angles) {

@@ -339,6 +339,13 @@ mod tests {
                 mean_mm: 5.5,
             }],
         });
+        p.live.channels = vec![3, 1, 2];
+        p.live.glued.push(crate::project::GluedKeys {
+            gain: 1.03,
+            along_mm: -0.25,
+            across_mm: 1.5,
+            turned_degrees: -3.25,
+        });
         p.evaluation.regions.push(RegionKeys {
             name: "middle".into(),
             box_mm: [[-1.0; 3], [1.0; 3]],

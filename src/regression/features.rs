@@ -54,6 +54,22 @@ impl Standardizer {
         SignalMatrix::new(x.columns(), values)
     }
 
+    /// The same for one sample (a value a row).
+    #[must_use]
+    pub fn apply_to(&self, sample: &[f64]) -> Vec<f64> {
+        let standard = |((v, mean), deviation): ((&f64, &f64), &f64)| {
+            let scale = if *deviation > 0.0 {
+                deviation.recip()
+            } else {
+                0.0
+            };
+            (v - mean) * scale
+        };
+        (sample.iter().zip(&self.mean).zip(&self.deviation))
+            .map(standard)
+            .collect()
+    }
+
     /// Rows whose signal is constant.
     #[must_use]
     pub fn constant_rows(&self) -> Vec<usize> {

@@ -16,6 +16,7 @@ pub fn to_text(project: &Project) -> String {
     feasible(&mut t, project);
     selection(&mut t, project);
     evaluation(&mut t, project);
+    live(&mut t, project);
     for selection in &project.kept {
         kept(&mut t, selection);
     }
@@ -308,6 +309,52 @@ fn selection(t: &mut Text, project: &Project) {
         t.list("selection.site");
         t.key("position_mm", triple(&site.position_mm), "");
         t.key("direction", triple(&site.direction), "");
+    }
+}
+
+fn live(t: &mut Text, project: &Project) {
+    t.table("live");
+    let live = &project.live;
+    t.maybe(
+        "channels",
+        (!live.channels.is_empty()).then(|| format!("{:?}", live.channels)),
+        "the board's channel (from 0) of each gauge, [0, 1, …]; in their order when left out",
+    );
+    t.key(
+        "gauge_factor",
+        float(live.gauge_factor),
+        "change of resistance over strain",
+    );
+    t.key(
+        "active_arms",
+        live.active_arms,
+        "of each bridge; a gauge with a dummy is 1",
+    );
+    t.key(
+        "model_error",
+        float(live.model_error),
+        "what model and gluing are off by, as a share of the reading; a calibration finds it",
+    );
+    t.key(
+        "largest_force_n",
+        float(live.largest_force_n),
+        "nobody presses harder",
+    );
+    t.key(
+        "drift_s",
+        float(live.drift_s),
+        "seconds in which the rest follows a drift; 0: never",
+    );
+    for glued in &live.glued {
+        t.list("live.glued");
+        t.key(
+            "gain",
+            float(glued.gain),
+            "a gauge as known touches found it to be glued",
+        );
+        t.key("along_mm", float(glued.along_mm), "");
+        t.key("across_mm", float(glued.across_mm), "");
+        t.key("turned_degrees", float(glued.turned_degrees), "");
     }
 }
 

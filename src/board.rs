@@ -1,0 +1,314 @@
+//! A simulated board: the protocol byte for byte, driven by an elastic model finer than any estimator's.
+//!
+//! It has no clock and no port of its own: whoever runs it says what time it is and carries its bytes.
+
+mod fault;
+mod script;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::elasticity::Touch;
+use crate::elasticity::sensitivity::Sensitivity;
+use crate::evaluation::normal;
+use crate::inference::Chain;
+use crate::wire::{Decoder, Event, Hello, Message, VERSION, encode};
+
+pub use fault::{ChannelFault, Fault, Faults, Illness};
+pub use script::{Press, Script};
+
+/// How the board measures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    pub seed: u64,
+    /// Of the data at first (Hz).
+    pub rate_hz: u16,
+    pub chain: Chain,
+    /// Channels that the board has; those beyond the gauges read noise.
+    pub channels: usize,
+    /// Standard deviation of a reading (strain), and of what it drifts by in a second's walk.
+    pub noise: f64,
+    pub drift: f64,
+    /// Standard deviation of what bridges are off balance by (strain).
+    pub offset: f64,
+    pub name: String,
+}
+
+/// What really happened at one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// On the board's clock (µs).
+    pub time_us: u64,
+    pub touch: Option<Touch>,
+}
+
+/// The board between two calls.
+pub struct SimulatedBoard {
+    options: Options,
+    faults: Faults,
+    sensitivity: Sensitivity,
+    gains: Vec<f64>,
+    script: Script,
+    offsets: Vec<f64>,
+    drift: Vec<f64>,
+    held: Vec<u32>,
+    ears: Decoder,
+    rng: ChaCha8Rng,
+    sequence: u16,
+    streaming: bool,
+    rate_hz: u16,
+    next_us: u64,
+    next_hello_us: u64,
+    /// Readings a newton under the press that is on.
+    pressed: Option<(usize, Vec<f64>)>,
+    /// Frames that nobody took.
+    pub overruns: u32,
+}
+
+/// Between two HELLOs while nothing is sent, and between two STATUSes (µs).
+const HELLO_EVERY: u64 = 1_000_000;
+const STATUS_EVERY: u64 = 5_000_000;
+/// The fastest that is simulated (Hz).
+const FASTEST: u16 = 10_000;
+
+impl SimulatedBoard {
+    /// A board whose gauges read `sensitivity`, with these gains.
+    #[must_use]
+    pub fn new(
+        sensitivity: Sensitivity,
+        gains: Vec<f64>,
+        script: Script,
+        options: Options,
+        faults: Faults,
+    ) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+        let offsets = (0..options.channels)
+            .map(|_| options.offset * normal(&mut rng))
+            .collect();
+        Self {
+            drift: vec![0.0; options.channels],
+            held: vec![0; options.channels],
+            rate_hz: options.rate_hz.clamp(1, FASTEST),
+            offsets,
+            options,
+            faults,
+            sensitivity,
+            gains,
+            script,
+            ears: Decoder::default(),
+            rng,
+            sequence: 0,
+            streaming: false,
+            next_us: 0,
+            next_hello_us: 0,
+            pressed: None,
+            overruns: 0,
+        }
+    }
+
+    /// What it says of itself.
+    #[must_use]
+    pub fn hello(&self) -> Hello {
+        let chain = &self.options.chain;
+        Hello {
+            version: VERSION,
+            board: 0x5151_0000 | (self.options.seed as u32 & 0xFFFF),
+            channels: self.options.channels as u8,
+            bits: chain.bits,
+            reference_mv: (chain.reference_v * 1e3).round() as u16,
+            supply_mv: (chain.supply_v * 1e3).round() as u16,
+            gain_milli: (chain.gain * 1e3).round() as u32,
+            rate_hz: self.rate_hz,
+            name: self.options.name.clone(),
+        }
+    }
+
+    /// Whether the plug is out at a time.
+    #[must_use]
+    pub fn is_unplugged(&self, now_us: u64) -> bool {
+        self.faults.is_unplugged(now_us as f64 * 1e-6)
+    }
+
+    /// Begins anew after the plug was out: nothing is sent until somebody asks.
+    pub fn restart(&mut self, now_us: u64) {
+        self.streaming = false;
+        self.next_hello_us = now_us;
+        self.ears.reset();
+    }
+
+    pub fn faults_mut(&mut self) -> &mut Faults {
+        &mut self.faults
+    }
+
+    /// Bytes from the studio.
+    pub fn hear(&mut self, bytes: &[u8], now_us: u64, out: &mut Vec<u8>) {
+        let mut heard = Vec::new();
+        self.ears.push(bytes, |event| {
+            if let Event::Message { message, .. } = event {
+                heard.push(message);
+            }
+        });
+        for message in heard {
+            match message {
+                Message::AskHello => self.send(&Message::Hello(self.hello()), now_us, out),
+                Message::Start => {
+                    self.streaming = true;
+                    self.next_us = self.next_us.max(now_us);
+                }
+                Message::Stop => {
+                    self.streaming = false;
+                    self.next_hello_us = now_us + HELLO_EVERY;
+                }
+                Message::Rate(hertz) => {
+                    self.rate_hz = hertz.clamp(1, FASTEST);
+                    self.send(&Message::Hello(self.hello()), now_us, out);
+                }
+                Message::Ping(token) => self.send(&Message::Pong(token), now_us, out),
+                _ => {}
+            }
+        }
+    }
+
+    /// Everything that is to be sent until a time, with what really happened at each sample.
+    pub fn say(&mut self, now_us: u64, out: &mut Vec<u8>, mut tell: impl FnMut(Truth)) {
+        if !self.streaming {
+            if now_us >= self.next_hello_us {
+                self.next_hello_us = now_us + HELLO_EVERY;
+                self.send(&Message::Hello(self.hello()), now_us, out);
+            }
+            return;
+        }
+        while self.next_us <= now_us {
+            let time_us = self.next_us;
+            let (counts, touch) = self.sample(time_us);
+            self.send(&Message::Data(counts), time_us, out);
+            tell(Truth { time_us, touch });
+            self.next_us += 1_000_000 / u64::from(self.rate_hz);
+            if time_us / STATUS_EVERY != self.next_us / STATUS_EVERY {
+                let status = Message::Status {
+                    overruns: self.overruns,
+                    temperature_centi: Some(2300),
+                };
+                self.send(&status, time_us, out);
+            }
+        }
+    }
+
+    fn send(&mut self, message: &Message, time_us: u64, out: &mut Vec<u8>) {
+        let mut frame = Vec::new();
+        encode(
+            message,
+            self.sequence,
+            time_us as u32,
+            self.options.chain.bits,
+            &mut frame,
+        );
+        self.sequence = self.sequence.wrapping_add(1);
+        let data = matches!(message, Message::Data(_));
+        self.faults.spoil(frame, data, &mut self.rng, out);
+    }
+
+    /// All channels at a time: strain, gain, noise, drift, offset, quantization, clipping.
+    fn sample(&mut self, time_us: u64) -> (Vec<u32>, Option<Touch>) {
+        let seconds = time_us as f64 * 1e-6;
+        let touch = self.script.at(seconds);
+        let strain = self.strain(touch);
+        let touch = touch.map(|(_, touch)| touch);
+        let step = f64::from(self.rate_hz).sqrt().recip();
+        let middle = f64::from(self.options.chain.highest_count()) / 2.0;
+        let counts = (0..self.options.channels)
+            .map(|c| {
+                self.drift[c] += self.options.drift * step * normal(&mut self.rng);
+                let illness = self.faults.illness(c, seconds);
+                let felt = strain.get(c).map_or(0.0, |s| s * self.gains[c]);
+                let felt = if illness == Some(Illness::Dead) {
+                    0.0
+                } else {
+                    felt
+                };
+                let louder = if illness == Some(Illness::Noisy) {
+                    40.0
+                } else {
+                    1.0
+                };
+                let noise = louder * self.options.noise * normal(&mut self.rng);
+                let read = felt + self.offsets[c] + self.drift[c] + noise;
+                let count = middle + read * self.options.chain.counts_per_strain();
+                let count = match illness {
+                    Some(Illness::Stuck) => self.held[c],
+                    Some(Illness::Saturated) => self.options.chain.highest_count(),
+                    _ => count
+                        .round()
+                        .clamp(0.0, f64::from(self.options.chain.highest_count()))
+                        as u32,
+                };
+                self.held[c] = count;
+                count
+            })
+            .collect();
+        (counts, touch)
+    }
+
+    /// Strains of the gauges; the readings a newton are worked out once a press.
+    fn strain(&mut self, touch: Option<(usize, Touch)>) -> Vec<f64> {
+        let Some((press, touch)) = touch else {
+            return Vec::new();
+        };
+        if self
+            .pressed
+            .as_ref()
+            .is_none_or(|(known, _)| *known != press)
+        {
+            let unit = Touch {
+                force: 1.0,
+                ..touch
+            };
+            self.pressed = Some((press, self.sensitivity.read(&unit)));
+        }
+        let per_newton = self.pressed.as_ref().map_or(&[][..], |p| &p.1);
+        per_newton.iter().map(|g| g * touch.force).collect()
+    }
+}
+
+/// A gain (of the amplifier) with which most touches of a force at these places stay within the range.
+#[must_use]
+pub fn fitting_gain(
+    sensitivity: &Sensitivity,
+    gains: &[f64],
+    touches: &[Touch],
+    most_force: f64,
+    chain: &Chain,
+) -> f64 {
+    /// Of the touches, and of half the range.
+    const MOST: f64 = 0.95;
+    const FILLED: f64 = 0.8;
+    let largest = |t: &Touch| {
+        let read = sensitivity.read(&Touch {
+            force: most_force,
+            ..*t
+        });
+        read.iter()
+            .zip(gains)
+            .fold(0.0_f64, |m, (s, g)| m.max((s * g).abs()))
+    };
+    let mut strains: Vec<f64> = touches.iter().map(largest).collect();
+    strains.sort_by(f64::total_cmp);
+    let strain = strains
+        .get((strains.len() as f64 * MOST) as usize)
+        .copied()
+        .unwrap_or(1e-3);
+    let half_range = FILLED * f64::from(chain.highest_count()) / 2.0;
+    let unit = Chain {
+        gain: 1.0,
+        ..*chain
+    };
+    (half_range / (strain.max(1e-6) * unit.counts_per_strain()))
+        .clamp(1.0, 5000.0)
+        .round()
+}
+
+/// Draws the seed of a simulated board's script from its own.
+#[must_use]
+pub fn script_seed(seed: u64) -> u64 {
+    ChaCha8Rng::seed_from_u64(seed ^ 0x5c21).random()
+}

@@ -1,0 +1,272 @@
+//! `hapdef listen`: live touch without a window.
+
+use std::io::{BufWriter, Write};
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
+
+use clap::Args;
+use serde_json::json;
+
+use super::{Common, progress::Bar};
+use crate::design;
+use crate::link::{Address, BAUD, Command, Heard, Listener, Pace, State};
+use crate::live::{Pipeline, Update};
+
+#[derive(Args, Debug, Clone)]
+pub struct ListenArgs {
+    /// A serial port, HOST:PORT, or a recording (.hapdrec).
+    pub port: String,
+    /// Project with the chosen gauges, or a mesh; the bundled limb when left out.
+    #[arg(long = "project")]
+    pub from: Option<PathBuf>,
+    #[command(flatten)]
+    pub common: Common,
+    #[arg(long, default_value_t = BAUD)]
+    pub baud: u32,
+    /// Samples a second that the board is asked for.
+    #[arg(long)]
+    pub rate: Option<u16>,
+    /// At most so many lines a second; all samples when left out.
+    #[arg(long)]
+    pub every: Option<f64>,
+    /// Record the raw counts here (.hapdrec).
+    #[arg(long)]
+    pub record: Option<PathBuf>,
+    /// Replay a recording as fast as it can be read.
+    #[arg(long)]
+    pub fast: bool,
+    /// Write a table of counts and touches here too (.csv), with the truth where a recording has it.
+    #[arg(long)]
+    pub csv: Option<PathBuf>,
+    /// Serve the same lines to whoever connects to HOST:PORT.
+    #[arg(long)]
+    pub serve: Option<String>,
+    /// End after so many seconds.
+    #[arg(long)]
+    pub seconds: Option<f64>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
+    let pace = if args.fast { Pace::Fast } else { Pace::Real };
+    let address = Address::parse(&args.port, args.baud, pace);
+    let pipeline = pipeline(args)?;
+    let stop = AtomicBool::new(false);
+    let (commands, inbox) = channel();
+    if let Some(path) = &args.record {
+        let _ = commands.send(Command::Record(path.clone()));
+    }
+    let mut out = Output::new(args)?;
+    let begun = std::time::Instant::now();
+    let listener = Listener::new(address, pipeline).at_rate(args.rate);
+    listener
+        .run(&stop, &inbox, |heard| {
+            if args
+                .seconds
+                .is_some_and(|s| begun.elapsed().as_secs_f64() >= s)
+                || !out.hear(&heard)
+            {
+                stop.store(true, Ordering::Relaxed);
+            }
+        })
+        .map_err(anyhow::Error::msg)
+}
+
+fn pipeline(args: &ListenArgs) -> anyhow::Result<Pipeline> {
+    anyhow::ensure!(
+        args.from.is_none() || args.common.project.is_none(),
+        "name the project once: --project {}",
+        args.from
+            .as_deref()
+            .unwrap_or(std::path::Path::new("FILE"))
+            .display()
+    );
+    let mut common = args.common.clone();
+    common.project = args.from.clone().or(common.project);
+    let loaded = common.load()?;
+    let project = &loaded.inputs.project;
+    let bar = Bar::default();
+    let sensing = common.in_pool(|| {
+        let watch = |p| bar.show(p);
+        Ok(design::sense(
+            &loaded.inputs,
+            &project.budget.quality.budget(),
+            &watch,
+        )?)
+    });
+    bar.finish();
+    let sensing = sensing?;
+    let gauges = sensing.gauges.len();
+    Ok(Pipeline::new(
+        sensing.map_for(&project.live),
+        project.live.settings(gauges),
+    ))
+}
+
+/// Where lines go.
+struct Output {
+    stdout: BufWriter<std::io::Stdout>,
+    csv: Option<BufWriter<std::fs::File>>,
+    served: Option<(TcpListener, Vec<std::net::TcpStream>)>,
+    period_us: u64,
+    last_us: Option<u64>,
+    truth: Option<(glam::DVec3, f64)>,
+    headed: bool,
+}
+
+impl Output {
+    fn new(args: &ListenArgs) -> anyhow::Result<Self> {
+        let csv = match &args.csv {
+            Some(path) => {
+                let file = std::fs::File::create(path).map_err(|e| {
+                    anyhow::anyhow!(
+                        "{}: the table cannot be written there ({e})",
+                        path.display()
+                    )
+                })?;
+                Some(BufWriter::new(file))
+            }
+            None => None,
+        };
+        let served = match &args.serve {
+            Some(address) => {
+                let listener = TcpListener::bind(address)
+                    .map_err(|e| anyhow::anyhow!("--serve {address}: nothing can be served there ({e}). Choose another address"))?;
+                listener.set_nonblocking(true)?;
+                Some((listener, Vec::new()))
+            }
+            None => None,
+        };
+        let period_us = args
+            .every
+            .filter(|r| *r > 0.0)
+            .map_or(0, |r| (1e6 / r) as u64);
+        Ok(Self {
+            stdout: BufWriter::new(std::io::stdout()),
+            csv,
+            served,
+            period_us,
+            last_us: None,
+            truth: None,
+            headed: false,
+        })
+    }
+
+    /// Whether anybody still wants to know.
+    fn hear(&mut self, heard: &Heard) -> bool {
+        match heard {
+            Heard::State(state) => {
+                let said = match state {
+                    State::Waiting => "waiting for the board",
+                    State::Live => "live",
+                    State::Silent => "the board has fallen silent",
+                    State::Gone => "unplugged; waiting for the board to come back",
+                    State::Ended => "the recording is over",
+                };
+                eprintln!("hapdef: {said}");
+                true
+            }
+            Heard::Hello(hello) => {
+                eprintln!(
+                    "hapdef: {} ({:08x}), {} channels, {} bits, {} Hz",
+                    hello.name, hello.board, hello.channels, hello.bits, hello.rate_hz
+                );
+                true
+            }
+            Heard::Message(text) => {
+                eprintln!("hapdef: {text}");
+                true
+            }
+            Heard::Truth(touch) => {
+                self.truth = *touch;
+                true
+            }
+            Heard::Sample { sample, update, .. } => {
+                self.table(sample, update);
+                self.line(update)
+            }
+            // Lines that wait are written as soon as nothing more is there.
+            Heard::Turn { .. } => self.stdout.flush().is_ok(),
+        }
+    }
+
+    fn line(&mut self, update: &Update) -> bool {
+        if self
+            .last_us
+            .is_some_and(|last| update.time_us.abs_diff(last) < self.period_us)
+        {
+            return true;
+        }
+        self.last_us = Some(update.time_us);
+        let line = line(update).to_string();
+        if let Some((listener, clients)) = &mut self.served {
+            while let Ok((client, _)) = listener.accept() {
+                let _ = client.set_nonblocking(true);
+                clients.push(client);
+            }
+            // One who does not keep up is let go rather than waited for.
+            clients.retain_mut(|c| c.write_all(format!("{line}\n").as_bytes()).is_ok());
+        }
+        writeln!(self.stdout, "{line}").is_ok()
+    }
+
+    fn table(&mut self, sample: &crate::live::Sample, update: &Update) {
+        let Some(csv) = &mut self.csv else {
+            return;
+        };
+        if !self.headed {
+            self.headed = true;
+            let counts: String =
+                (0..sample.counts.len()).fold(String::new(), |s, k| s + &format!("count_{k},"));
+            let _ = writeln!(
+                csv,
+                "t_us,{counts}x_mm,y_mm,z_mm,force_n,uncertainty_mm,channels_ok,true_x_mm,true_y_mm,true_z_mm,true_force_n"
+            );
+        }
+        let counts: String = sample
+            .counts
+            .iter()
+            .fold(String::new(), |s, c| s + &format!("{c},"));
+        let contact = update.contact.map_or(",,,,".into(), |c| {
+            let p = c.position * 1e3;
+            format!(
+                "{:.3},{:.3},{:.3},{:.4},{:.3}",
+                p.x,
+                p.y,
+                p.z,
+                c.force,
+                c.region.radius * 1e3
+            )
+        });
+        let truth = self.truth.map_or(",,,".into(), |(p, f)| {
+            let p = p * 1e3;
+            format!("{:.3},{:.3},{:.3},{f:.4}", p.x, p.y, p.z)
+        });
+        let _ = writeln!(
+            csv,
+            "{},{counts}{contact},{},{truth}",
+            sample.time_us, update.good
+        );
+    }
+}
+
+/// One sample as JSON: nulls where nothing touches. `uncertainty_mm` is the radius within which the touch lies
+/// with a probability of 90 %.
+fn line(update: &Update) -> serde_json::Value {
+    let round = |v: f64, digits: i32| (v * 10f64.powi(digits)).round() / 10f64.powi(digits);
+    let p = update.contact.map(|c| c.position * 1e3);
+    json!({
+        "t_us": update.time_us,
+        "x_mm": p.map(|p| round(p.x, 3)),
+        "y_mm": p.map(|p| round(p.y, 3)),
+        "z_mm": p.map(|p| round(p.z, 3)),
+        "force_n": update.contact.map(|c| round(c.force, 4)),
+        "uncertainty_mm": update.contact.map(|c| round(c.region.radius * 1e3, 3)),
+        "channels_ok": update.good,
+    })
+}

@@ -1,0 +1,229 @@
+//! The project's model as live touch needs it: what its chosen gauges read of any touch.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::layout::{lay_out_sites, lay_out_touches, touches_on};
+use super::{DesignError, Inputs, as_built, ground, layout, workshop_draw};
+use crate::budget::{Budget, Watch};
+use crate::dataset::Site;
+use crate::elasticity::Touch;
+use crate::elasticity::grade::Ground;
+use crate::elasticity::sensitivity::{Gauge, Sensitivity};
+use crate::inference::{AsDrawn, ResponseMap};
+use crate::mesh::remesh::Remeshed;
+use crate::project::{LiveKeys, Project};
+
+/// A model of the chosen gauges, without the stiffness it came from.
+pub struct Sensing {
+    pub gauges: Vec<Gauge>,
+    pub sensitivity: Arc<Sensitivity>,
+    /// Readings everywhere, as drawn and as they change with the way gauges are glued.
+    pub drawn: Arc<AsDrawn>,
+    /// Mean edge of the elements (mm).
+    pub element_mm: f64,
+    ground: Ground,
+    laid: Remeshed,
+}
+
+/// What a workshop does to a gauge, for the truth of a simulated board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Workshop {
+    /// Glued exactly as drawn.
+    Exact,
+    /// Gains off by 3 %.
+    Gains,
+    /// Gains off by 3 %, places by 1 mm, directions by 3°.
+    #[default]
+    All,
+}
+
+/// The model of a project's chosen gauges, on the same elements as a design of the same quality.
+///
+/// # Errors
+/// [`DesignError`] as for a simulation, and where no gauges are chosen.
+pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, DesignError> {
+    let project = &inputs.project;
+    project.check()?;
+    if project.selection.sites.is_empty() {
+        return Err(DesignError::NoGauges);
+    }
+    let ground = ground(inputs)?;
+    let even = layout(inputs, &ground);
+    crate::elasticity::model::check_section(&project.section())?;
+    crate::elasticity::model::check_held(&ground.held.mesh, &ground.held.held)?;
+    let touches = lay_out_touches(&even, inputs, budget)?;
+    let sites = lay_out_sites(&even, project)?;
+    let places: Vec<DVec3> = sites.iter().map(|&at| even.point(at)).collect();
+    let graded = ground.grade(&touches, &places, &budget.elements, watch)?;
+    let gauges = chosen_gauges(project, &graded.model);
+    let sensitivity = Sensitivity::new(&graded.model, &gauges, watch)?;
+    let tip_radius = project.tip().1;
+    let mesh = ground.of_size(map_size(&ground, tip_radius)).mesh;
+    let moved: Vec<Gauge> = gauges.iter().flat_map(moved).collect();
+    let all = Sensitivity::new(&graded.model, &moved, watch)?;
+    let drawn = as_drawn(
+        &ResponseMap::new(&all, mesh, tip_radius, watch)?,
+        gauges.len(),
+    );
+    Ok(Sensing {
+        gauges,
+        sensitivity: Arc::new(sensitivity),
+        drawn: Arc::new(drawn),
+        element_mm: graded.laid.mesh.mean_edge() * 1e3,
+        ground,
+        laid: graded.laid,
+    })
+}
+
+/// A gauge as drawn, and moved and turned either way.
+fn moved(gauge: &Gauge) -> [Gauge; MOVES] {
+    let across = gauge.normal.cross(gauge.direction);
+    let at = |along: f64, aside: f64, degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Gauge {
+            position: gauge.position + gauge.direction * along + across * aside,
+            direction: gauge.direction * cos + across * sin,
+            ..*gauge
+        }
+    };
+    let (s, t) = (STEP_MM * 1e-3, STEP_DEGREES);
+    [
+        at(0.0, 0.0, 0.0),
+        at(s, 0.0, 0.0),
+        at(-s, 0.0, 0.0),
+        at(0.0, s, 0.0),
+        at(0.0, -s, 0.0),
+        at(0.0, 0.0, t),
+        at(0.0, 0.0, -t),
+    ]
+}
+
+/// Of central differences: as far as a workshop is off.
+const STEP_MM: f64 = 0.75;
+const STEP_DEGREES: f64 = 3.0;
+const MOVES: usize = 7;
+
+fn as_drawn(all: &ResponseMap, gauges: usize) -> AsDrawn {
+    let change = |forth: usize, step: f64| {
+        let difference = |g: usize| {
+            let first = MOVES * g + forth;
+            vec![(first, 0.5 / step), (first + 1, -0.5 / step)]
+        };
+        all.mixed(&(0..gauges).map(difference).collect::<Vec<_>>())
+    };
+    let drawn: Vec<_> = (0..gauges).map(|g| vec![(MOVES * g, 1.0)]).collect();
+    AsDrawn {
+        map: Arc::new(all.mixed(&drawn)),
+        changes: [
+            change(1, STEP_MM),
+            change(3, STEP_MM),
+            change(5, STEP_DEGREES),
+        ],
+    }
+}
+
+/// Edge length (m) of the mesh that readings are known on: fine enough for the tip, which smooths them, and
+/// no more than so many triangles.
+fn map_size(ground: &Ground, tip_radius: f64) -> f64 {
+    const OF_THE_TIP: f64 = 0.32;
+    const TRIANGLES: f64 = 30_000.0;
+    let coarsest = (ground.area() / TRIANGLES / 0.433).sqrt();
+    (OF_THE_TIP * tip_radius).max(coarsest)
+}
+
+/// The chosen gauges on the model's own surface.
+fn chosen_gauges(project: &Project, model: &crate::elasticity::ShellModel) -> Vec<Gauge> {
+    let keys = &project.gauge;
+    (project.selection.sites.iter())
+        .map(|site| {
+            let (at, _) = model
+                .index
+                .nearest(DVec3::from_array(site.position_mm) * 1e-3);
+            let normal = model.mesh.normal(at);
+            let direction = DVec3::from_array(site.direction);
+            let flat = (direction - normal * direction.dot(normal)).try_normalize();
+            Gauge {
+                position: model.mesh.point(at),
+                direction: flat.unwrap_or_else(|| normal.any_orthonormal_vector()),
+                normal,
+                length: keys.grid_length_mm * 1e-3,
+                width: keys.grid_width_mm * 1e-3,
+            }
+        })
+        .collect()
+}
+
+impl Sensing {
+    /// The truth of a simulated board: elements of half the size, and gauges as a workshop glues them, with
+    /// the gains they ended up with.
+    ///
+    /// # Errors
+    /// [`DesignError`] as for a simulation.
+    pub fn truth(
+        &self,
+        workshop: Workshop,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<(Sensitivity, Vec<f64>), DesignError> {
+        let laid = self.ground.halved(&self.laid);
+        let model = self.ground.model(&laid, watch)?;
+        let gauges: Vec<Gauge> = (self.gauges.iter().enumerate())
+            .map(|(k, gauge)| {
+                if workshop == Workshop::All {
+                    glued(gauge, seed, k)
+                } else {
+                    *gauge
+                }
+            })
+            .collect();
+        let gain = |k: usize| match workshop {
+            Workshop::Exact => 1.0,
+            Workshop::Gains | Workshop::All => workshop_draw(seed, k).gain,
+        };
+        let gains = (0..gauges.len()).map(gain).collect();
+        Ok((Sensitivity::new(&model, &gauges, watch)?, gains))
+    }
+
+    /// Touches on the part's surface for training, evenly spread, or for tests, at random.
+    ///
+    /// # Errors
+    /// [`DesignError`] where none lands on the part.
+    pub fn touches(
+        &self,
+        inputs: &Inputs,
+        count: usize,
+        seed: u64,
+        even: bool,
+    ) -> Result<Vec<Touch>, DesignError> {
+        touches_on(&self.drawn.map.mesh, inputs, count, seed, even)
+    }
+}
+
+impl Sensing {
+    /// What gauges read as the project knows them to be glued.
+    #[must_use]
+    pub fn map_for(&self, live: &LiveKeys) -> Arc<ResponseMap> {
+        match live.glued(self.gauges.len()) {
+            Some(glued) => Arc::new(self.drawn.glued(&glued)),
+            None => Arc::clone(&self.drawn.map),
+        }
+    }
+}
+
+fn glued(gauge: &Gauge, seed: u64, number: usize) -> Gauge {
+    let drawn = Site {
+        position: gauge.position,
+        normal: gauge.normal,
+        direction: gauge.direction,
+        rms_strain: 0.0,
+        peak_strain: 0.0,
+    };
+    let built = as_built(&drawn, seed, number);
+    Gauge {
+        position: built.position,
+        direction: built.direction,
+        ..*gauge
+    }
+}

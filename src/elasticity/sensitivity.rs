@@ -1,0 +1,220 @@
+//! What glued gauges read under any touch, from one solution a gauge.
+//!
+//! K is symmetric, so with b the row that reads a gauge from the displacements, u = K⁻¹ b is the field that
+//! weighs the nodal forces of a touch (Maxwell–Betti): after one solve a gauge, any touch costs its own
+//! quadrature and no solve at all. The factored model is not needed any more.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::ShellModel;
+use super::load::{Touch, nodal_forces};
+use super::observe::{Face, Observer};
+use super::respond::{Reading, output_rows};
+use super::rows::Rows;
+use super::solver::BLOCK;
+use crate::budget::{Cancelled, Watch};
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::{SurfacePoint, TriMesh};
+
+/// A strain gauge as it is glued: it reads the mean strain over its grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gauge {
+    /// Of the grid's centre (m), on the mid-surface.
+    pub position: DVec3,
+    /// In the surface, along the grid.
+    pub direction: DVec3,
+    /// Outward.
+    pub normal: DVec3,
+    /// Along and across the direction (m).
+    pub length: f64,
+    pub width: f64,
+}
+
+/// Gauss points over the half length and half width, with their weights: exact for quintics along the grid and
+/// for cubics across it.
+const ALONG: [(f64, f64); 3] = [
+    (-0.774_596_669_241_483_4, 5.0 / 18.0),
+    (0.0, 8.0 / 18.0),
+    (0.774_596_669_241_483_4, 5.0 / 18.0),
+];
+const ACROSS: [(f64, f64); 2] = [
+    (-0.577_350_269_189_625_8, 0.5),
+    (0.577_350_269_189_625_8, 0.5),
+];
+
+impl Gauge {
+    /// Places over the grid, and what each weighs in the mean.
+    fn grid(&self) -> impl Iterator<Item = (DVec3, f64)> {
+        let across = self.normal.cross(self.direction);
+        ALONG.into_iter().flat_map(move |(s, v)| {
+            ACROSS.into_iter().map(move |(t, w)| {
+                let off = self.direction * (s * self.length) + across * (t * self.width);
+                (self.position + off / 2.0, v * w)
+            })
+        })
+    }
+}
+
+/// The weights of nodal forces in every gauge's strain.
+pub struct Sensitivity {
+    pub mesh: Arc<TriMesh>,
+    index: SurfaceIndex,
+    gauges: usize,
+    /// Vertices × gauges: strain a newton along x, y and z there.
+    weights: Vec<DVec3>,
+}
+
+impl Sensitivity {
+    /// Solves for the gauges on a model.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn new(model: &ShellModel, gauges: &[Gauge], watch: Watch) -> Result<Self, Cancelled> {
+        let rows = mean_rows(model, gauges);
+        let blocks = model.solve_rows(&rows, "Solving gauges", watch, |_, rows, solved| {
+            let fields: Vec<Vec<DVec3>> =
+                (0..rows.len()).map(|k| field(model, solved, k)).collect();
+            (rows.to_vec(), fields)
+        })?;
+        let vertices = model.mesh.positions().len();
+        let mut weights = vec![DVec3::ZERO; vertices * gauges.len()];
+        for (rows, fields) in blocks {
+            for (&gauge, field) in rows.iter().zip(&fields) {
+                for (v, &w) in field.iter().enumerate() {
+                    weights[v * gauges.len() + gauge as usize] = w;
+                }
+            }
+        }
+        Ok(Self {
+            mesh: Arc::clone(&model.mesh),
+            index: SurfaceIndex::new(&model.mesh),
+            gauges: gauges.len(),
+            weights,
+        })
+    }
+
+    #[must_use]
+    pub fn gauges(&self) -> usize {
+        self.gauges
+    }
+
+    /// Strains of all gauges under a touch.
+    #[must_use]
+    pub fn read(&self, touch: &Touch) -> Vec<f64> {
+        let mut strains = vec![0.0; self.gauges];
+        for (vertex, force) in nodal_forces(&self.mesh, &self.index, touch) {
+            let row = &self.weights[vertex as usize * self.gauges..][..self.gauges];
+            for (strain, weight) in strains.iter_mut().zip(row) {
+                *strain += weight.dot(force);
+            }
+        }
+        strains
+    }
+
+    /// The outward normal and the nearest point of the surface to a place (m).
+    #[must_use]
+    pub fn nearest(&self, place: DVec3) -> (DVec3, DVec3) {
+        let (at, _) = self.index.nearest(place);
+        (self.mesh.point(at), self.mesh.normal(at))
+    }
+}
+
+/// Mean strain over each gauge's grid, as rows over solved blocks.
+fn mean_rows(model: &ShellModel, gauges: &[Gauge]) -> Rows {
+    let (mut points, mut directions) = (Vec::<SurfacePoint>::new(), Vec::new());
+    let mut means = Rows::default();
+    for gauge in gauges {
+        let first = points.len() as u32;
+        let grid: Vec<(DVec3, f64)> = gauge.grid().collect();
+        means.push((first..).zip(&grid).map(|(i, (_, weight))| (i, *weight)));
+        for (place, _) in grid {
+            points.push(model.index.nearest(place).0);
+            directions.push(gauge.direction);
+        }
+    }
+    let observer = Observer::new(model, &points, Face::Inside);
+    let angles: Vec<f64> = (directions.iter().zip(observer.frames()))
+        .map(|(d, f)| d.dot(f.y_axis).atan2(d.dot(f.x_axis)))
+        .collect();
+    means.times(&output_rows(&observer, Reading::Gauge(&angles)))
+}
+
+/// Translations at every vertex of one solved column.
+fn field(model: &ShellModel, solved: &[f64], column: usize) -> Vec<DVec3> {
+    let at = |freedom: usize| {
+        let place = model.place(freedom);
+        place.map_or(0.0, |(row, scale)| {
+            solved[row as usize * BLOCK + column] * scale
+        })
+    };
+    (0..model.mesh.positions().len())
+        .map(|v| DVec3::new(at(6 * v), at(6 * v + 1), at(6 * v + 2)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+    use crate::elasticity::Freedoms;
+    use crate::elasticity::respond::respond;
+    use crate::limb::LimbSpec;
+    use crate::mesh::sample;
+
+    /// Against a solution of every touch, for a gauge so small that it is a point.
+    #[test]
+    fn what_gauges_read_is_what_the_model_says() {
+        let (mesh, _) = LimbSpec::default().build().unwrap();
+        let mesh = Arc::new(mesh);
+        let low = |p: &DVec3| {
+            if p.z < 5e-3 {
+                Freedoms::ALL
+            } else {
+                Freedoms::default()
+            }
+        };
+        let held: Vec<Freedoms> = mesh.positions().iter().map(low).collect();
+        let section = crate::project::Project::around("", None).section();
+        let model = ShellModel::new(&mesh, section, &held, &unwatched).unwrap();
+        let points = sample::random(&mesh, 5, 3, |_| true);
+        let observer = Observer::new(&model, &points, Face::Inside);
+        let gauges: Vec<Gauge> = (points.iter().zip(observer.frames()))
+            .map(|(&at, frame)| Gauge {
+                position: mesh.point(at),
+                direction: frame.x_axis,
+                normal: frame.z_axis,
+                length: 1e-7,
+                width: 1e-7,
+            })
+            .collect();
+        let touches: Vec<Touch> = (sample::random(&mesh, 9, 4, |_| true).into_iter())
+            .map(|at| Touch {
+                position: mesh.point(at),
+                normal: mesh.normal(at),
+                force: 7.0,
+                tip_radius: 5e-3,
+            })
+            .collect();
+        let sensitivity = Sensitivity::new(&model, &gauges, &unwatched).unwrap();
+        let angles = vec![0.0; 5];
+        let solved = respond(
+            &model,
+            &touches,
+            &observer,
+            Reading::Gauge(&angles),
+            &unwatched,
+        );
+        let solved = solved.unwrap();
+        let mut row = vec![0.0; touches.len()];
+        for gauge in 0..5 {
+            solved.row_into(gauge, &mut row);
+            let largest = row.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            for (t, touch) in touches.iter().enumerate() {
+                let read = sensitivity.read(touch)[gauge];
+                assert!((read - row[t]).abs() < 1e-4 * largest, "{read} {}", row[t]);
+            }
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! From what gauges read to a touch: where, how hard, and how sure.
+
+pub mod bound;
+pub mod calibration;
+pub mod chain;
+pub mod map;
+pub mod matching;
+pub mod region;
+pub mod trained;
+
+pub use bound::cramer_rao;
+pub use calibration::{AsDrawn, Calibration, Known, calibrate};
+pub use chain::Chain;
+pub use map::ResponseMap;
+pub use matching::{Contact, Errors, Matching};
+pub use region::Region;
+pub use trained::{Features, Lessons, Trained};

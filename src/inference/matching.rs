@@ -1,0 +1,493 @@
+//! Model matching: which touch, anywhere on the surface, makes the readings that were measured.
+//!
+//! A touch of force f at p makes x = f·g(p) + noise, with g known from the elastic model. For any p the best
+//! force has a closed form, f = (x·W g)/(g·W g) with the noise's weights W, so that only the surface is
+//! searched: all templates at once, then Gauss–Newton on the quadratic pieces of g from the best few. Where
+//! the readings hardly tell places apart, the mean over the posterior of the templates is taken instead, with
+//! flat priors on area and on force. It needs no training.
+
+use std::sync::Arc;
+
+use glam::{DMat2, DVec3};
+use nalgebra::{Matrix3, Vector3};
+
+use super::map::{LANES, ResponseMap};
+use super::region::{DEVIATIONS, Region};
+use crate::lanes::wide;
+use crate::mesh::SurfacePoint;
+
+/// A touch as it was inferred.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// On the surface (m), and the outward normal there: a touch presses against it.
+    pub position: DVec3,
+    pub normal: DVec3,
+    /// N, and its standard deviation.
+    pub force: f64,
+    pub force_deviation: f64,
+    /// Where it may be.
+    pub region: Region,
+    /// Twice the gain in log-likelihood over no touch at all.
+    pub strength: f64,
+    /// Weighted squares that no touch explains; about channels - 3 where model and noise are right.
+    pub unexplained: f64,
+}
+
+/// What is known of the readings' errors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Errors {
+    /// Standard deviation of each channel's noise (strain).
+    pub noise: Vec<f64>,
+    /// Standard deviation of what gains, places and model are off by, over the reading: half of it from the
+    /// channel's own reading, half from the mean square of all.
+    pub relative: f64,
+}
+
+impl Errors {
+    #[must_use]
+    pub fn of_noise(noise: f64, channels: usize) -> Self {
+        Self {
+            noise: vec![noise; channels],
+            relative: 0.0,
+        }
+    }
+
+    /// One over the variance of every channel for this reading; zero for a channel that is left out.
+    #[must_use]
+    pub fn weights(&self, reading: &[f64], used: &[bool]) -> Vec<f64> {
+        let count = used.iter().filter(|u| **u).count().max(1) as f64;
+        let squares = reading
+            .iter()
+            .zip(used)
+            .filter(|(_, u)| **u)
+            .map(|(x, _)| x * x);
+        let mean = squares.sum::<f64>() / count;
+        let weight = |((x, u), n): ((&f64, &bool), &f64)| {
+            let off = self.relative.powi(2) * f64::midpoint(x * x, mean);
+            if *u { (n * n + off).recip() } else { 0.0 }
+        };
+        reading
+            .iter()
+            .zip(used)
+            .zip(&self.noise)
+            .map(weight)
+            .collect()
+    }
+}
+
+/// The estimator, with its own working memory.
+pub struct Matching {
+    pub map: Arc<ResponseMap>,
+    pub errors: Errors,
+    /// Channels that are trusted.
+    pub used: Vec<bool>,
+    /// The largest force that anybody presses with (N).
+    pub most_force: f64,
+    scores: Vec<f32>,
+    /// The highest score of each block of templates.
+    highest: Vec<f32>,
+}
+
+/// Places from which Gauss–Newton begins, and how far they are apart in templates.
+const STARTS: usize = 4;
+const APART: f64 = 3.0;
+const STEPS: usize = 8;
+/// Log-likelihoods so far below the best count for nothing.
+const NOTHING: f64 = 14.0;
+/// Beyond this deviation, in templates, their posterior takes the place of Gauss–Newton's normal one.
+const BROAD: f64 = 1.0;
+/// One place with this share of the probability is the answer; below it, the mean is.
+const CLEAR: f64 = 0.9;
+
+/// A most likely place, and the normal distribution around it.
+#[derive(Clone, Copy)]
+struct Mode {
+    at: SurfacePoint,
+    position: DVec3,
+    force: f64,
+    force_variance: f64,
+    covariance: DMat2,
+    plane: [DVec3; 2],
+    /// Half the weighted squares left over.
+    cost: f64,
+    /// Of the integral over its surroundings.
+    log_evidence: f64,
+}
+
+/// A reading with its weights, ready to be compared.
+pub(super) struct Measured<'a> {
+    pub x: &'a [f64],
+    pub w: &'a [f64],
+    pub squares: f64,
+}
+
+impl Measured<'_> {
+    /// Best force and half the squares left over at a place with these readings per newton.
+    fn fit(&self, g: &[f64], most_force: f64) -> (f64, f64) {
+        let (mut s, mut d) = (0.0, 0.0);
+        for ((x, w), g) in self.x.iter().zip(self.w).zip(g) {
+            s += w * x * g;
+            d += w * g * g;
+        }
+        let force = if d > 0.0 {
+            (s / d).clamp(0.0, most_force)
+        } else {
+            0.0
+        };
+        (force, 0.5 * self.squares - force * (s - 0.5 * force * d))
+    }
+}
+
+impl Matching {
+    #[must_use]
+    pub fn new(map: Arc<ResponseMap>, errors: Errors, most_force: f64) -> Self {
+        Self {
+            used: vec![true; map.channels()],
+            scores: vec![0.0; map.templates.len() / map.channels().max(1)],
+            highest: vec![0.0; map.templates.len() / map.channels().max(1) / LANES],
+            map,
+            errors,
+            most_force,
+        }
+    }
+
+    /// The touch that explains a reading (strain, a channel each) best.
+    pub fn find(&mut self, reading: &[f64]) -> Contact {
+        let weights = self.errors.weights(reading, &self.used);
+        let squares = reading.iter().zip(&weights).map(|(x, w)| w * x * x).sum();
+        let measured = Measured {
+            x: reading,
+            w: &weights,
+            squares,
+        };
+        self.score(&measured);
+        let mut modes = self.modes(&measured);
+        modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        let best = modes[0];
+        let broad = BROAD * self.map.spacing();
+        if widest(best.covariance) > broad * broad {
+            return self.mean_of_templates(&measured, &best);
+        }
+        self.mean_of_modes(&measured, &modes)
+    }
+
+    /// As [`Self::find`] for a touch that goes on: from the place where it was, without looking everywhere.
+    /// Nothing where that does not explain the reading, or not clearly.
+    pub fn track(&self, reading: &[f64], last: &Contact) -> Option<Contact> {
+        let weights = self.errors.weights(reading, &self.used);
+        let squares = reading.iter().zip(&weights).map(|(x, w)| w * x * x).sum();
+        let measured = Measured {
+            x: reading,
+            w: &weights,
+            squares,
+        };
+        let mode = self.follow(&measured, self.map.index.nearest(last.position).0);
+        let broad = BROAD * self.map.spacing();
+        let explained = 2.0 * mode.cost <= 2.0 * last.unexplained + 3.0 * self.used.len() as f64;
+        (explained && widest(mode.covariance) <= broad * broad).then(|| {
+            let region = Region::of_normal(mode.covariance, mode.plane);
+            self.contact(
+                &measured,
+                mode.at,
+                (mode.force, mode.force_variance),
+                region,
+                mode.cost,
+            )
+        })
+    }
+
+    /// How much better than nothing a touch at each template explains the reading.
+    fn score(&mut self, measured: &Measured) {
+        let scaled: Vec<f32> = (measured.x.iter().zip(measured.w))
+            .map(|(x, w)| (w * x * 1e-6) as f32)
+            .collect();
+        let weights: Vec<f32> = measured.w.iter().map(|w| (w * 1e-12) as f32).collect();
+        let most = self.most_force as f32;
+        score_templates(
+            &self.map.templates,
+            &scaled,
+            &weights,
+            most,
+            &mut self.scores,
+            &mut self.highest,
+        );
+    }
+
+    /// The best templates, apart from each other, each followed to the best place near it.
+    fn modes(&self, measured: &Measured) -> Vec<Mode> {
+        let reach = APART * self.map.spacing();
+        let mut starts: Vec<usize> = Vec::with_capacity(STARTS);
+        for _ in 0..STARTS {
+            let best = self.best_template(&|place| {
+                let near = |&s: &usize| self.map.places[s].distance_squared(place) < reach * reach;
+                !starts.iter().any(near)
+            });
+            starts.extend(best);
+        }
+        let mut modes: Vec<Mode> = Vec::with_capacity(STARTS);
+        for start in starts {
+            let mode = self.follow(measured, self.map.index.nearest(self.map.places[start]).0);
+            // Two starts may end at the same place.
+            let same = |m: &Mode| m.position.distance(mode.position) < 0.5 * self.map.spacing();
+            if !modes.iter().any(same) {
+                modes.push(mode);
+            }
+        }
+        modes
+    }
+
+    /// The template with the highest score among those at places that are `allowed`.
+    fn best_template(&self, allowed: &dyn Fn(DVec3) -> bool) -> Option<usize> {
+        let nodes = self.map.places.len();
+        let (mut best, mut highest) = (None, f32::NEG_INFINITY);
+        for (block, _) in self.highest.iter().enumerate() {
+            if self.highest[block] <= highest {
+                continue;
+            }
+            for node in block * LANES..((block + 1) * LANES).min(nodes) {
+                if self.scores[node] > highest && allowed(self.map.places[node]) {
+                    (best, highest) = (Some(node), self.scores[node]);
+                }
+            }
+        }
+        best
+    }
+
+    /// Gauss–Newton on place and force, with Levenberg's damping.
+    fn follow(&self, measured: &Measured, start: SurfacePoint) -> Mode {
+        let map = &self.map;
+        let mut at = start;
+        let mut slope = map.slope(at);
+        let (mut force, mut cost) = measured.fit(&slope.reading, self.most_force);
+        let mut damping = 1e-4;
+        for _ in 0..STEPS {
+            let (normal, gradient) = equations(measured, &slope, force);
+            let mut damped = normal;
+            for k in 0..3 {
+                damped[(k, k)] *= 1.0 + damping;
+            }
+            let Some(step) = damped.cholesky().map(|c| c.solve(&gradient)) else {
+                break;
+            };
+            let length = step[0].hypot(step[1]);
+            // No farther than the quadratic pieces can be trusted.
+            let within = (3.0 * map.spacing() / length.max(f64::MIN_POSITIVE)).min(1.0);
+            let moved = slope.plane[0] * (step[0] * within) + slope.plane[1] * (step[1] * within);
+            let there = map.index.nearest(map.mesh.point(at) + moved).0;
+            let next = map.slope(there);
+            let (next_force, next_cost) = measured.fit(&next.reading, self.most_force);
+            if next_cost < cost {
+                let gained = cost - next_cost;
+                (at, slope, force, cost) = (there, next, next_force, next_cost);
+                damping *= 0.1;
+                if gained < 1e-4 {
+                    break;
+                }
+            } else {
+                // Nothing left to gain by going on.
+                if length < 1e-6 {
+                    break;
+                }
+                damping = (damping * 20.0).max(1e-3);
+            }
+        }
+        self.mode(measured, at, &slope, force, cost)
+    }
+
+    fn mode(
+        &self,
+        measured: &Measured,
+        at: SurfacePoint,
+        slope: &super::map::Slope,
+        force: f64,
+        cost: f64,
+    ) -> Mode {
+        let (mut normal, _) = equations(measured, slope, force);
+        // What is known before anything is measured: the touch is on the part, and nobody presses harder.
+        let (lower, upper) = self.map.mesh.bounds();
+        let size = (upper - lower).length_squared() / 4.0;
+        normal[(0, 0)] += size.recip();
+        normal[(1, 1)] += size.recip();
+        normal[(2, 2)] += self.most_force.powi(-2);
+        let covariance = normal.try_inverse().unwrap_or_else(Matrix3::identity);
+        Mode {
+            at,
+            position: self.map.mesh.point(at),
+            force,
+            force_variance: covariance[(2, 2)],
+            covariance: DMat2::from_cols_array(&[
+                covariance[(0, 0)],
+                covariance[(1, 0)],
+                covariance[(0, 1)],
+                covariance[(1, 1)],
+            ]),
+            plane: slope.plane,
+            cost,
+            log_evidence: -cost + 0.5 * covariance.determinant().max(f64::MIN_POSITIVE).ln(),
+        }
+    }
+
+    /// Where one narrow place is far likelier than all others, that one; otherwise their mean.
+    fn mean_of_modes(&self, measured: &Measured, modes: &[Mode]) -> Contact {
+        let best = modes[0];
+        let weight = |m: &Mode| (m.log_evidence - best.log_evidence).exp();
+        let total: f64 = modes.iter().map(weight).sum();
+        if 1.0 / total >= CLEAR {
+            let region = Region::of_normal(best.covariance, best.plane);
+            return self.contact(
+                measured,
+                best.at,
+                (best.force, best.force_variance),
+                region,
+                best.cost,
+            );
+        }
+        let mean = |value: &dyn Fn(&Mode) -> f64| {
+            modes.iter().map(|m| weight(m) * value(m)).sum::<f64>() / total
+        };
+        let centre: DVec3 = modes.iter().map(|m| m.position * (weight(m) / total)).sum();
+        let at = self.map.index.nearest(centre).0;
+        let force = mean(&|m| m.force);
+        let variance = mean(&|m| m.force_variance + (m.force - force).powi(2));
+        let places: Vec<(DVec3, f64)> = modes.iter().flat_map(|m| spread(m, weight(m))).collect();
+        let region = Region::of_places(&places, self.map.mesh.point(at), self.map.mesh.normal(at));
+        self.contact(measured, at, (force, variance), region, best.cost)
+    }
+
+    /// Mean, spread and region over all templates, each with the area it stands for.
+    fn mean_of_templates(&self, measured: &Measured, best: &Mode) -> Contact {
+        let map = &self.map;
+        let highest = self.highest.iter().fold(0.0_f32, |m, s| m.max(*s));
+        let highest = f64::from(highest).max(0.5 * measured.squares - best.cost);
+        let floor = (highest - NOTHING - 1e-5 * highest) as f32;
+        let mut places = Vec::new();
+        let (mut total, mut centre, mut force, mut squares) = (0.0, DVec3::ZERO, 0.0, 0.0);
+        for (node, _) in self.scores[..map.places.len()]
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| **s >= floor)
+        {
+            let (mean, variance, log_likelihood) = self.force_at(measured, map.node(node));
+            let weight = map.areas[node] * (log_likelihood - highest).exp();
+            places.push((map.places[node], weight));
+            total += weight;
+            centre += map.places[node] * weight;
+            force += weight * mean;
+            squares += weight * (mean * mean + variance);
+        }
+        if total <= 0.0 {
+            let region = Region::of_normal(best.covariance, best.plane);
+            return self.contact(
+                measured,
+                best.at,
+                (best.force, best.force_variance),
+                region,
+                best.cost,
+            );
+        }
+        let at = map.index.nearest(centre / total).0;
+        let force = force / total;
+        let variance = (squares / total - force * force).max(0.0);
+        let region = Region::of_places(&places, map.mesh.point(at), map.mesh.normal(at));
+        self.contact(measured, at, (force, variance), region, best.cost)
+    }
+
+    /// Mean and variance of the force at a place, and the log-likelihood with the force integrated out.
+    fn force_at(&self, measured: &Measured, g: &[f64]) -> (f64, f64, f64) {
+        let d: f64 = g.iter().zip(measured.w).map(|(g, w)| w * g * g).sum();
+        let (force, cost) = measured.fit(g, self.most_force);
+        // A force is never known worse than that it lies between nothing and the most.
+        let variance = d.max(12.0 * self.most_force.powi(-2)).recip();
+        (
+            force,
+            variance,
+            0.5 * measured.squares - cost + 0.5 * variance.ln(),
+        )
+    }
+
+    fn contact(
+        &self,
+        measured: &Measured,
+        at: SurfacePoint,
+        force: (f64, f64),
+        region: Region,
+        cost: f64,
+    ) -> Contact {
+        Contact {
+            position: self.map.mesh.point(at),
+            normal: self.map.mesh.normal(at),
+            force: force.0,
+            force_deviation: force.1.sqrt(),
+            region,
+            strength: measured.squares - 2.0 * cost,
+            unexplained: 2.0 * cost,
+        }
+    }
+}
+
+/// Normal equations of place (two directions) and force, and their right side.
+pub(super) fn equations(
+    measured: &Measured,
+    slope: &super::map::Slope,
+    force: f64,
+) -> (Matrix3<f64>, Vector3<f64>) {
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for (c, (x, w)) in measured.x.iter().zip(measured.w).enumerate() {
+        let change = slope.change[c] * force;
+        let row = Vector3::new(change.x, change.y, slope.reading[c]);
+        normal += row * row.transpose() * *w;
+        right += row * (w * (x - force * slope.reading[c]));
+    }
+    (normal, right)
+}
+
+/// Four places that stand for a mode: one deviation of √2 along each principal direction, either way.
+fn spread(mode: &Mode, weight: f64) -> impl Iterator<Item = (DVec3, f64)> {
+    let region = Region::of_normal(mode.covariance, mode.plane);
+    let scale = std::f64::consts::SQRT_2 / DEVIATIONS;
+    let position = mode.position;
+    region.axes.into_iter().flat_map(move |axis| {
+        [1.0, -1.0].map(|sign| (position + axis * (sign * scale), weight / 4.0))
+    })
+}
+
+/// The larger eigenvalue (m²).
+fn widest(covariance: DMat2) -> f64 {
+    let (a, b, c) = (
+        covariance.x_axis.x,
+        covariance.x_axis.y,
+        covariance.y_axis.y,
+    );
+    f64::midpoint(a, c) + ((a - c) / 2.0).hypot(b)
+}
+
+wide! {
+    fn score_templates<'a>(
+        templates: &'a [f32],
+        scaled: &'a [f32],
+        weights: &'a [f32],
+        most: f32,
+        scores: &'a mut [f32],
+        highest: &'a mut [f32],
+    ) {
+        let channels = scaled.len();
+        let blocks = templates.chunks_exact(LANES * channels).zip(scores.chunks_exact_mut(LANES));
+        for ((block, out), highest) in blocks.zip(highest) {
+            let (mut s, mut d) = ([0.0_f32; LANES], [f32::MIN_POSITIVE; LANES]);
+            for (row, (&a, &w)) in block.chunks_exact(LANES).zip(scaled.iter().zip(weights)) {
+                for k in 0..LANES {
+                    s[k] += a * row[k];
+                    d[k] += w * row[k] * row[k];
+                }
+            }
+            for k in 0..LANES {
+                let force = (s[k] / d[k]).max(0.0).min(most);
+                out[k] = force * (s[k] - 0.5 * force * d[k]);
+            }
+            *highest = 0.0;
+            for k in 0..LANES {
+                *highest = highest.max(out[k]);
+            }
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Ports: serial lines, sockets and recordings behind one small trait, and the thread that listens.
+
+mod host;
+mod recording;
+mod replay;
+mod serial;
+mod session;
+mod socket;
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+pub use host::{Doorway, Hosted, host};
+pub use recording::{Recorder, note};
+pub use serial::{PortInfo, ports};
+pub use session::{Command, Connection, Heard, Listener, State, Timing};
+
+/// What one look at a port brought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Got {
+    Bytes(usize),
+    /// Not yet.
+    Nothing,
+    /// The other side is gone: unplugged, or the end of a recording.
+    Gone,
+}
+
+/// Somewhere that bytes come from and go to.
+pub trait Port: Send {
+    /// Waits a few milliseconds at most.
+    fn read(&mut self, buffer: &mut [u8]) -> Got;
+    /// Best effort: a port that takes nothing is found out by reading.
+    fn write(&mut self, bytes: &[u8]);
+}
+
+/// Where a board is found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Address {
+    Serial {
+        path: String,
+        baud: u32,
+    },
+    /// host:port
+    Socket(String),
+    Recording {
+        path: PathBuf,
+        pace: Pace,
+    },
+}
+
+/// How fast a recording is replayed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// As it was.
+    #[default]
+    Real,
+    /// As fast as it can be read.
+    Fast,
+}
+
+/// What native USB ports and most sketches are opened with; USB itself does not care.
+pub const BAUD: u32 = 115_200;
+/// The ending of recordings.
+pub const ENDING: &str = "hapdrec";
+
+impl Address {
+    /// Understands what a person writes: a file of the recordings' ending, host:port, or the name of a port.
+    #[must_use]
+    pub fn parse(text: &str, baud: u32, pace: Pace) -> Self {
+        if Path::new(text).extension().is_some_and(|e| e == ENDING) {
+            return Self::Recording {
+                path: text.into(),
+                pace,
+            };
+        }
+        let is_socket = text.rsplit_once(':').is_some_and(|(host, port)| {
+            !host.is_empty() && !host.starts_with('/') && port.parse::<u16>().is_ok()
+        });
+        if is_socket {
+            Self::Socket(text.to_owned())
+        } else {
+            Self::Serial {
+                path: text.to_owned(),
+                baud,
+            }
+        }
+    }
+
+    fn open(&self) -> Result<Box<dyn Port>, String> {
+        match self {
+            Self::Serial { path, baud } => serial::open(path, *baud),
+            Self::Socket(address) => socket::open(address),
+            Self::Recording { path, pace } => replay::open(path, *pace),
+        }
+    }
+
+    /// Whether it has an end.
+    #[must_use]
+    pub fn is_recording(&self) -> bool {
+        matches!(self, Self::Recording { .. })
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Serial { path, .. } => write!(f, "{path}"),
+            Self::Socket(address) => write!(f, "{address}"),
+            Self::Recording { path, .. } => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_people_write_is_understood() {
+        let parse = |text: &str| Address::parse(text, 9600, Pace::Real);
+        let serial = |path: &str| Address::Serial {
+            path: path.into(),
+            baud: 9600,
+        };
+        assert_eq!(parse("/dev/ttyACM0"), serial("/dev/ttyACM0"));
+        assert_eq!(parse("COM3"), serial("COM3"));
+        assert_eq!(
+            parse("/dev/serial/by-path/pci-0:1"),
+            serial("/dev/serial/by-path/pci-0:1")
+        );
+        assert_eq!(
+            parse("robot.local:5000"),
+            Address::Socket("robot.local:5000".into())
+        );
+        assert_eq!(parse("[::1]:5000"), Address::Socket("[::1]:5000".into()));
+        assert!(parse("/tmp/a:1.hapdrec").is_recording());
+    }
+}

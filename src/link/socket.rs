@@ -1,0 +1,55 @@
+//! Boards behind TCP: a network bridge, or a simulated board.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::Duration;
+
+use super::{Got, Port};
+
+struct Socket(TcpStream);
+
+const WAIT: Duration = Duration::from_millis(5);
+const CONNECT: Duration = Duration::from_millis(800);
+
+pub(super) fn open(address: &str) -> Result<Box<dyn Port>, String> {
+    let all = address
+        .to_socket_addrs()
+        .map_err(|e| format!("{address}: no such host ({e}). Write host:port"))?;
+    let mut last = String::from("no address");
+    for one in all {
+        match TcpStream::connect_timeout(&one, CONNECT) {
+            Ok(stream) => {
+                let _ = stream.set_nodelay(true);
+                let _ = stream.set_read_timeout(Some(WAIT));
+                let _ = stream.set_write_timeout(Some(Duration::from_millis(100)));
+                return Ok(Box::new(Socket(stream)));
+            }
+            Err(e) => last = e.to_string(),
+        }
+    }
+    Err(format!(
+        "{address} does not answer ({last}): is the board's program running?"
+    ))
+}
+
+impl Port for Socket {
+    fn read(&mut self, buffer: &mut [u8]) -> Got {
+        match self.0.read(buffer) {
+            Ok(0) => Got::Gone,
+            Ok(count) => Got::Bytes(count),
+            Err(e)
+                if matches!(
+                    e.kind(),
+                    ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
+                ) =>
+            {
+                Got::Nothing
+            }
+            Err(_) => Got::Gone,
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        let _ = self.0.write_all(bytes);
+    }
+}

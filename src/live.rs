@@ -1,0 +1,11 @@
+//! Live touch, without any port: from a board's bytes to a place on the part.
+
+pub mod health;
+pub mod pipeline;
+pub mod receiver;
+pub mod tare;
+
+pub use health::Health;
+pub use pipeline::{Estimator, Guess, Pipeline, Settings, UNCALIBRATED, Update};
+pub use receiver::{Input, Receiver, Sample, Traffic};
+pub use tare::Rest;

@@ -1,0 +1,478 @@
+//! From counts to a touch: rest, strain, health, and the estimators, one sample at a time.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::health::{Expected, Health, Watcher};
+use super::receiver::Sample;
+use super::tare::{Rest, Taring};
+use crate::inference::{Chain, Contact, Errors, Matching, Region, ResponseMap, Trained};
+use crate::wire::Hello;
+
+/// Which estimator is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimator {
+    /// Model matching.
+    #[default]
+    Matching,
+    /// Regression on the readings over their norm.
+    Normalized,
+    /// Regression on the readings as they are: as in the paper.
+    Raw,
+}
+
+impl Estimator {
+    pub const ALL: [Self; 3] = [Self::Matching, Self::Normalized, Self::Raw];
+
+    /// For people.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Matching => "Model matching",
+            Self::Normalized => "SVR on the normalized signal",
+            Self::Raw => "SVR on the raw signal (paper)",
+        }
+    }
+}
+
+/// What the pipeline must know beside the samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Gauge factor and active arms; what the board says of itself takes the place of the rest.
+    pub chain: Chain,
+    /// The board's channel of each gauge.
+    pub channels: Vec<usize>,
+    /// What model and gauges are off by, over the reading; see [`Errors::relative`].
+    pub relative: f64,
+    /// Noise of a reading below which it is never taken to be (strain).
+    pub least_noise: f64,
+    /// The largest force that anybody presses with (N).
+    pub most_force: f64,
+    /// Seconds in which the rest follows what channels read without a touch; nothing: never.
+    pub drift_s: Option<f64>,
+    /// Seconds of rest that a tare takes.
+    pub tare_s: f64,
+}
+
+impl Settings {
+    /// For so many gauges, the first channel for the first of them.
+    #[must_use]
+    pub fn of(gauges: usize) -> Self {
+        Self {
+            chain: Chain::default(),
+            channels: (0..gauges).collect(),
+            relative: UNCALIBRATED,
+            least_noise: 0.3e-6,
+            most_force: 60.0,
+            drift_s: Some(20.0),
+            tare_s: 0.5,
+        }
+    }
+}
+
+/// What gauges glued by hand are off by over the reading: a millimetre, three degrees and 3 % of gain are about
+/// this much on a compliant part.
+pub const UNCALIBRATED: f64 = 0.2;
+
+/// Where and how hard, by an estimator that says no more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guess {
+    /// m.
+    pub position: DVec3,
+    pub force: f64,
+}
+
+/// What one sample said.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Update {
+    pub time_us: u64,
+    /// Strain of each gauge since the tare; nothing before it.
+    pub strain: Option<Vec<f64>>,
+    /// By matching, while there is a touch.
+    pub contact: Option<Contact>,
+    /// By the trained estimators, where they are trained and there is a touch: normalized, raw.
+    pub guesses: [Option<Guess>; 2],
+    /// Gauges that are trusted.
+    pub good: usize,
+}
+
+impl Update {
+    /// Where and how hard, by one of the estimators.
+    #[must_use]
+    pub fn by(&self, estimator: Estimator) -> Option<Guess> {
+        match estimator {
+            Estimator::Matching => self.contact.map(|c| Guess {
+                position: c.position,
+                force: c.force,
+            }),
+            Estimator::Normalized => self.guesses[0],
+            Estimator::Raw => self.guesses[1],
+        }
+    }
+}
+
+/// Samples in a row that make or end a touch.
+const BEGINS: u32 = 3;
+const ENDS: u32 = 6;
+/// Samples between two searches everywhere, and seconds between two looks at who felt a touch.
+const SEARCH_EVERY: u32 = 20;
+const LOOK_S: f64 = 0.08;
+/// A sample rate until it is known (Hz).
+const RATE: f64 = 1000.0;
+
+/// The state between samples.
+pub struct Pipeline {
+    pub settings: Settings,
+    matching: Matching,
+    trained: [Option<Arc<Trained>>; 2],
+    /// What the trained ones were trained with: with other channels they say nothing.
+    trained_for: Vec<bool>,
+    taring: Option<Taring>,
+    pub rest: Option<Rest>,
+    watchers: Vec<Watcher>,
+    health: Vec<Health>,
+    hello: Option<Hello>,
+    last_time: Option<u64>,
+    /// Samples a second, as measured.
+    pub rate: f64,
+    above: u32,
+    below: u32,
+    touching: bool,
+    searched: u32,
+    last: Option<Contact>,
+    last_look: u64,
+}
+
+impl Pipeline {
+    #[must_use]
+    pub fn new(map: Arc<ResponseMap>, settings: Settings) -> Self {
+        let gauges = map.channels();
+        let errors = Errors {
+            noise: vec![settings.least_noise.max(1e-9); gauges],
+            relative: settings.relative,
+        };
+        Self {
+            matching: Matching::new(map, errors, settings.most_force),
+            settings,
+            trained: [None, None],
+            trained_for: Vec::new(),
+            taring: None,
+            rest: None,
+            watchers: vec![Watcher::default(); gauges],
+            health: vec![Health::Good; gauges],
+            hello: None,
+            last_time: None,
+            rate: RATE,
+            above: 0,
+            below: 0,
+            touching: false,
+            searched: 0,
+            last: None,
+            last_look: 0,
+        }
+    }
+
+    /// Another model of the same gauges: after a calibration.
+    pub fn set_map(&mut self, map: Arc<ResponseMap>, relative: f64) {
+        let errors = Errors {
+            noise: self.matching.errors.noise.clone(),
+            relative,
+        };
+        let used = self.matching.used.clone();
+        self.matching = Matching::new(map, errors, self.settings.most_force);
+        self.matching.used = used;
+        self.settings.relative = relative;
+        self.last = None;
+    }
+
+    /// The trained estimators (normalized, raw) and which gauges they were trained with.
+    pub fn set_trained(&mut self, trained: [Option<Arc<Trained>>; 2], used: Vec<bool>) {
+        (self.trained, self.trained_for) = (trained, used);
+    }
+
+    /// What a board says of itself. Another board, or another gain, needs another tare.
+    pub fn hello(&mut self, hello: &Hello) {
+        let same = |h: &Hello| {
+            Hello {
+                rate_hz: 0,
+                ..h.clone()
+            } == Hello {
+                rate_hz: 0,
+                ..hello.clone()
+            }
+        };
+        if !self.hello.as_ref().is_some_and(same) {
+            self.rest = None;
+        }
+        self.settings.chain = self.settings.chain.of_board(hello);
+        self.hello = Some(hello.clone());
+        // What comes has nothing to do with what was.
+        self.last_time = None;
+        self.end_touch();
+    }
+
+    /// Takes what is read from now on for rest.
+    pub fn tare(&mut self) {
+        let samples = (self.settings.tare_s * self.rate).clamp(8.0, 1e5);
+        self.taring = Some(Taring::over(samples as usize));
+        self.end_touch();
+    }
+
+    #[must_use]
+    pub fn is_taring(&self) -> bool {
+        self.taring.is_some()
+    }
+
+    #[must_use]
+    pub fn health(&self) -> &[Health] {
+        &self.health
+    }
+
+    #[must_use]
+    pub fn used(&self) -> Vec<bool> {
+        self.health.iter().map(|h| h.is_good()).collect()
+    }
+
+    /// Noise of each gauge (strain).
+    #[must_use]
+    pub fn noise(&self) -> &[f64] {
+        &self.matching.errors.noise
+    }
+
+    fn end_touch(&mut self) {
+        (self.above, self.below, self.touching) = (0, 0, false);
+        (self.last, self.searched) = (None, 0);
+    }
+
+    /// Takes a sample in and says what it means.
+    pub fn push(&mut self, sample: &Sample) -> Update {
+        let step_s = self.step(sample.time_us);
+        let counts: Option<Vec<f64>> = (self.settings.channels.iter())
+            .map(|&c| sample.counts.get(c).copied())
+            .collect();
+        let nothing = Update {
+            time_us: sample.time_us,
+            strain: None,
+            contact: None,
+            guesses: [None; 2],
+            good: 0,
+        };
+        // A board with fewer channels than the project has gauges.
+        let Some(counts) = counts else {
+            return nothing;
+        };
+        self.watch(&counts);
+        if let Some(taring) = &mut self.taring {
+            if let Some(rest) = taring.push(&counts) {
+                self.take_rest(rest);
+            }
+            return nothing;
+        }
+        let Some(rest) = &self.rest else {
+            return nothing;
+        };
+        let per_strain = self.settings.chain.counts_per_strain();
+        let strain: Vec<f64> = counts
+            .iter()
+            .zip(&rest.level)
+            .map(|(c, r)| (c - r) / per_strain)
+            .collect();
+        for (used, health) in self.matching.used.iter_mut().zip(&self.health) {
+            *used = health.is_good();
+        }
+        self.feel(&strain);
+        let contact = self.touching.then(|| self.find(&strain));
+        self.last = contact;
+        let guesses = if contact.is_some() {
+            self.guess(&strain)
+        } else {
+            [None; 2]
+        };
+        if contact.is_some() {
+            self.look(sample.time_us, &strain);
+        } else {
+            self.follow_drift(&counts, step_s);
+        }
+        Update {
+            time_us: sample.time_us,
+            strain: Some(strain),
+            contact,
+            guesses,
+            good: self.matching.used.iter().filter(|u| **u).count(),
+        }
+    }
+
+    /// Seconds since the last sample; also keeps the rate.
+    fn step(&mut self, time_us: u64) -> f64 {
+        let step = self
+            .last_time
+            .map(|last| time_us.saturating_sub(last) as f64 * 1e-6);
+        self.last_time = Some(time_us);
+        match step {
+            Some(step) if step > 0.0 && step < 1.0 => {
+                // By the step, so that two samples that came together do not look like a fast board.
+                let mean = self.rate.recip() + (step - self.rate.recip()) * 0.02;
+                self.rate = mean.recip().clamp(1.0, 1e5);
+                step
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn watch(&mut self, counts: &[f64]) {
+        let noise = self.rest.as_ref().map(|r| &r.noise);
+        let usual = noise.map_or(1.0, |n| median(n));
+        let highest = f64::from(self.settings.chain.highest_count());
+        let known = self.hello.is_some();
+        for (k, (watcher, &count)) in self.watchers.iter_mut().zip(counts).enumerate() {
+            let expected = Expected {
+                // Of plain lines nobody knows the range.
+                lowest: if known { 1.0 } else { f64::NEG_INFINITY },
+                highest: if known { highest - 1.0 } else { f64::INFINITY },
+                own_noise: noise.map_or(0.0, |n| n[k]),
+                usual_noise: usual,
+                rate: self.rate,
+            };
+            watcher.push(count, &expected);
+            self.health[k] = watcher.health(&expected);
+        }
+    }
+
+    /// Takes a rest that is known for what channels read untouched.
+    pub fn set_rest(&mut self, rest: Rest) {
+        self.take_rest(rest);
+        self.end_touch();
+    }
+
+    fn take_rest(&mut self, rest: Rest) {
+        let per_strain = self.settings.chain.counts_per_strain();
+        // Quantization alone is 0.29 counts.
+        let strain = |n: &f64| (n.max(0.3) / per_strain).max(self.settings.least_noise);
+        self.matching.errors.noise = rest.noise.iter().map(strain).collect();
+        self.rest = Some(rest);
+        self.taring = None;
+    }
+
+    /// Whether anything touches: weighted squares against χ² of the channels, with a few samples of patience.
+    fn feel(&mut self, strain: &[f64]) {
+        let used = strain
+            .iter()
+            .zip(&self.matching.errors.noise)
+            .zip(&self.matching.used);
+        let (mut squares, mut channels) = (0.0, 0.0_f64);
+        for ((x, noise), _) in used.filter(|(_, u)| **u) {
+            squares += (x / noise).powi(2);
+            channels += 1.0;
+        }
+        let spread = (2.0 * channels).sqrt();
+        // Too few gauges to tell anything: place and force are three numbers.
+        let begins = channels >= 3.0 && squares > channels + 8.0 * spread;
+        let ends = channels < 3.0 || squares < channels + 4.0 * spread;
+        self.above = if begins { self.above + 1 } else { 0 };
+        self.below = if ends { self.below + 1 } else { 0 };
+        if !self.touching && self.above >= BEGINS {
+            (self.touching, self.searched) = (true, 0);
+        } else if self.touching && (self.below >= ENDS || channels < 3.0) {
+            self.end_touch();
+        }
+    }
+
+    fn find(&mut self, strain: &[f64]) -> Contact {
+        let tracked = self
+            .last
+            .filter(|_| self.searched > 0 && self.searched < SEARCH_EVERY);
+        if let Some(contact) = tracked.and_then(|last| self.matching.track(strain, &last)) {
+            self.searched += 1;
+            return contact;
+        }
+        self.searched = 1;
+        self.matching.find(strain)
+    }
+
+    fn guess(&self, strain: &[f64]) -> [Option<Guess>; 2] {
+        if self.trained_for != self.matching.used {
+            return [None; 2];
+        }
+        self.trained.each_ref().map(|trained| {
+            trained.as_ref().map(|t| {
+                let (place, force) = t.find(strain);
+                Guess {
+                    position: DVec3::from_array(place) * 1e-3,
+                    force,
+                }
+            })
+        })
+    }
+
+    /// Holds every gauge against what the others say of the touch.
+    fn look(&mut self, time_us: u64, strain: &[f64]) {
+        /// A reading of less than this share of what it should be is none; one that should be less than this
+        /// share of the others' rms proves nothing, nor one that is near the noise.
+        const NONE: f64 = 0.2;
+        const CLEAR: f64 = 0.5;
+        const ABOVE_NOISE: f64 = 15.0;
+        if (time_us.saturating_sub(self.last_look) as f64) < LOOK_S * 1e6 {
+            return;
+        }
+        self.last_look = time_us;
+        let used = self.matching.used.clone();
+        let count = used.iter().filter(|u| **u).count();
+        if count < 5 {
+            return;
+        }
+        let rms = (strain
+            .iter()
+            .zip(&used)
+            .filter(|(_, u)| **u)
+            .map(|(x, _)| x * x)
+            .sum::<f64>()
+            / count as f64)
+            .sqrt();
+        for k in 0..strain.len() {
+            let trusted = matches!(self.health[k], Health::Good | Health::Dead);
+            if !trusted || strain[k].abs() > 3.0 * rms {
+                continue;
+            }
+            let suspicious =
+                strain[k].abs() < ABOVE_NOISE * self.matching.errors.noise[k] + 0.1 * rms;
+            // Only one that says nothing, or was found dead, is worth asking the others about.
+            if !suspicious && used[k] {
+                self.watchers[k].look(true, true);
+                continue;
+            }
+            self.matching.used[k] = false;
+            let others = self.matching.find(strain);
+            self.matching.used.clone_from(&used);
+            let (at, _) = self.matching.map.index.nearest(others.position);
+            let should = self.matching.map.at(at)[k] * others.force;
+            let clear = should.abs() > ABOVE_NOISE * self.matching.errors.noise[k]
+                && should.abs() > CLEAR * rms;
+            let explained = others.unexplained < 4.0 * count as f64 + 20.0;
+            self.watchers[k].look(clear && explained, (strain[k] / should) > NONE);
+        }
+    }
+
+    fn follow_drift(&mut self, counts: &[f64], step_s: f64) {
+        if let (Some(drift_s), Some(rest)) = (self.settings.drift_s, &mut self.rest)
+            && self.above == 0
+        {
+            rest.follow(counts, (step_s / drift_s).min(0.1));
+        }
+    }
+}
+
+impl Contact {
+    /// Half the longer and half the shorter axis of the 90 % region (mm).
+    #[must_use]
+    pub fn region_mm(&self) -> [f64; 2] {
+        let Region { axes, .. } = self.region;
+        axes.map(|a| a.length() * 1e3)
+    }
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,92 @@
+//! What channels read at rest, how much they tremble, and how that drifts.
+
+/// Rest of every channel: counts and the standard deviation of their noise.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rest {
+    pub level: Vec<f64>,
+    pub noise: Vec<f64>,
+}
+
+/// Gathers samples at rest.
+#[derive(Clone, Debug)]
+pub struct Taring {
+    wanted: usize,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Taring {
+    #[must_use]
+    pub fn over(samples: usize) -> Self {
+        Self {
+            wanted: samples.max(2),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Takes a sample in; the rest when there are enough.
+    pub fn push(&mut self, counts: &[f64]) -> Option<Rest> {
+        self.rows.push(counts.to_vec());
+        (self.rows.len() >= self.wanted).then(|| rest(&self.rows))
+    }
+}
+
+/// Medians, so that a few wild samples count for nothing, and noise from differences of neighbours, so that a
+/// drift counts for nothing.
+fn rest(rows: &[Vec<f64>]) -> Rest {
+    let channels = rows[0].len();
+    let column = |c: usize| rows.iter().map(move |row| row[c]);
+    let level = |c: usize| {
+        let mut values: Vec<f64> = column(c).collect();
+        let middle = values.len() / 2;
+        let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+        let median = *median;
+        // Finer than a count: the mean of what lies near the median.
+        let near: Vec<f64> = column(c)
+            .filter(|v| (v - median).abs() <= 4.0 * spread(rows, c).max(1.0))
+            .collect();
+        near.iter().sum::<f64>() / near.len() as f64
+    };
+    Rest {
+        level: (0..channels).map(level).collect(),
+        noise: (0..channels).map(|c| spread(rows, c)).collect(),
+    }
+}
+
+/// Standard deviation of the noise by differences of neighbours.
+fn spread(rows: &[Vec<f64>], channel: usize) -> f64 {
+    let squares: f64 = rows
+        .windows(2)
+        .map(|w| (w[1][channel] - w[0][channel]).powi(2))
+        .sum();
+    (squares / (2.0 * (rows.len() - 1) as f64)).sqrt()
+}
+
+impl Rest {
+    /// Follows a slow drift: by the share of a time step in a time constant.
+    pub fn follow(&mut self, counts: &[f64], share: f64) {
+        for (level, count) in self.level.iter_mut().zip(counts) {
+            *level += share * (count - *level);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rest_is_found_among_wild_samples_and_drift() {
+        let mut taring = Taring::over(400);
+        let mut rest = None;
+        for k in 0..400_u32 {
+            let noise = f64::from((k * 7919) % 13) - 6.0;
+            let wild = if k % 97 == 5 { 3000.0 } else { 0.0 };
+            rest = taring.push(&[100.0 + noise, 50.0 + 0.05 * f64::from(k), 7.0 + wild]);
+        }
+        let rest = rest.unwrap();
+        assert!((rest.level[0] - 100.0).abs() < 0.2, "{rest:?}");
+        assert!((rest.noise[0] - 3.74).abs() < 0.6, "{rest:?}");
+        assert!(rest.noise[1] < 0.1);
+        assert!((rest.level[2] - 7.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,159 @@
+//! What live touch needs to know beside the design.
+
+use serde::{Deserialize, Serialize};
+
+use super::{BadValue, Project, check};
+use crate::inference::{Calibration, Chain};
+use crate::live::{Settings, UNCALIBRATED};
+
+/// Keys of the table `live`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LiveKeys {
+    /// The board's channel (from 0) of each gauge; in their order when empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub channels: Vec<usize>,
+    pub gauge_factor: f64,
+    /// Arms of each bridge that the strain changes.
+    pub active_arms: u8,
+    /// What model and gauges are off by, as a share of the reading.
+    pub model_error: f64,
+    /// The hardest press that is thought possible.
+    pub largest_force_n: f64,
+    /// Seconds in which the rest follows a drift; zero: never.
+    pub drift_s: f64,
+    /// How the gauges were found to be glued, one each, by known touches.
+    #[serde(rename = "glued", skip_serializing_if = "Vec::is_empty")]
+    pub glued: Vec<GluedKeys>,
+}
+
+/// One gauge as it was found to be glued.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GluedKeys {
+    pub gain: f64,
+    pub along_mm: f64,
+    pub across_mm: f64,
+    pub turned_degrees: f64,
+}
+
+impl Default for LiveKeys {
+    fn default() -> Self {
+        let chain = Chain::default();
+        Self {
+            channels: Vec::new(),
+            gauge_factor: chain.gauge_factor,
+            active_arms: chain.active_arms,
+            model_error: UNCALIBRATED,
+            largest_force_n: 60.0,
+            drift_s: 20.0,
+            glued: Vec::new(),
+        }
+    }
+}
+
+impl LiveKeys {
+    /// Takes over what known touches have shown.
+    pub fn take(&mut self, calibration: &Calibration) {
+        let keys = |&[gain, along_mm, across_mm, turned_degrees]: &[f64; 4]| GluedKeys {
+            gain,
+            along_mm,
+            across_mm,
+            turned_degrees,
+        };
+        self.glued = calibration.glued.iter().map(keys).collect();
+        self.model_error = calibration.relative;
+    }
+
+    /// Forgets it.
+    pub fn forget(&mut self) {
+        self.glued.clear();
+        self.model_error = UNCALIBRATED;
+    }
+
+    /// For each gauge its gain, millimetres along and across, and degrees; nothing without a calibration of
+    /// as many gauges.
+    #[must_use]
+    pub fn glued(&self, gauges: usize) -> Option<Vec<[f64; 4]>> {
+        let values = |g: &GluedKeys| [g.gain, g.along_mm, g.across_mm, g.turned_degrees];
+        (self.glued.len() == gauges && gauges > 0).then(|| self.glued.iter().map(values).collect())
+    }
+
+    /// Settings of the pipeline for so many gauges.
+    #[must_use]
+    pub fn settings(&self, gauges: usize) -> Settings {
+        let plain = Settings::of(gauges);
+        Settings {
+            chain: Chain {
+                gauge_factor: self.gauge_factor,
+                active_arms: self.active_arms,
+                ..plain.chain
+            },
+            channels: if self.channels.len() == gauges {
+                self.channels.clone()
+            } else {
+                plain.channels.clone()
+            },
+            relative: self.model_error,
+            most_force: self.largest_force_n,
+            drift_s: (self.drift_s > 0.0).then_some(self.drift_s),
+            ..plain
+        }
+    }
+}
+
+impl Project {
+    pub(super) fn check_live(&self) -> Result<(), BadValue> {
+        let live = &self.live;
+        for (key, value) in [
+            ("live.gauge_factor", live.gauge_factor),
+            ("live.largest_force_n", live.largest_force_n),
+        ] {
+            check(key, "a number above zero", value, value > 0.0)?;
+        }
+        let arms = f64::from(live.active_arms);
+        check(
+            "live.active_arms",
+            "between 1 and 4",
+            arms,
+            (1.0..=4.0).contains(&arms),
+        )?;
+        let error = live.model_error;
+        check(
+            "live.model_error",
+            "between 0 and 1",
+            error,
+            (0.0..=1.0).contains(&error),
+        )?;
+        check(
+            "live.drift_s",
+            "zero or more",
+            live.drift_s,
+            live.drift_s >= 0.0,
+        )?;
+        let most = crate::wire::MOST_CHANNELS;
+        for &channel in &live.channels {
+            check(
+                "live.channels",
+                "channels between 0 and 63",
+                channel as f64,
+                channel < most,
+            )?;
+        }
+        for glued in &live.glued {
+            let sound = [
+                glued.gain,
+                glued.along_mm,
+                glued.across_mm,
+                glued.turned_degrees,
+            ];
+            check(
+                "live.glued.gain",
+                "a number above zero",
+                glued.gain,
+                glued.gain > 0.0 && sound.iter().all(|v| v.is_finite()),
+            )?;
+        }
+        Ok(())
+    }
+}
