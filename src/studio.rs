@@ -12,6 +12,7 @@ mod inspector;
 mod jobs;
 mod kept;
 mod labels;
+mod live;
 mod measure;
 mod opening;
 mod overlay;
@@ -93,6 +94,7 @@ pub struct Studio {
     recovery: Option<recovery::Recovery>,
     recent: recent::Recent,
     jobs: jobs::Jobs,
+    live: live::Live,
     drive: drive::Drive,
     /// The last results of each quality: what is asked for again after a change is often there.
     last: BTreeMap<Quality, drive::Last>,
@@ -154,6 +156,7 @@ impl Studio {
             recovery: None,
             recent: recent::Recent::default(),
             jobs: jobs::Jobs::default(),
+            live: live::Live::default(),
             drive: drive::Drive::following(true),
             last: BTreeMap::new(),
             picked: Vec::new(),
@@ -205,6 +208,7 @@ impl Studio {
         self.advance(ctx);
         self.refresh_feasibility(ctx);
         self.refresh_by_hand(ctx);
+        self.refresh_live(ctx);
     }
 
     fn update_title(&mut self, ctx: &egui::Context) {

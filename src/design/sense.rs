@@ -3,11 +3,14 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 use super::layout::{lay_out_sites, lay_out_touches, touches_on};
 use super::{DesignError, Inputs, as_built, ground, layout, workshop_draw};
 use crate::budget::{Budget, Watch};
-use crate::dataset::Site;
+use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::Touch;
 use crate::elasticity::grade::Ground;
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
@@ -25,6 +28,14 @@ pub struct Sensing {
     pub element_mm: f64,
     ground: Ground,
     laid: Remeshed,
+}
+
+/// Readings of the model under touches of many forces: what the trained estimators learn from.
+pub struct Lesson {
+    /// Channels × touches, strain.
+    pub x: SignalMatrix,
+    pub places_mm: Vec<[f64; 3]>,
+    pub forces: Vec<f64>,
 }
 
 /// What a workshop does to a gauge, for the truth of a simulated board.
@@ -184,6 +195,32 @@ impl Sensing {
         };
         let gains = (0..gauges.len()).map(gain).collect();
         Ok((Sensitivity::new(&model, &gauges, watch)?, gains))
+    }
+
+    /// Evenly spread touches with forces drawn evenly from half a newton to the hardest of the paper's.
+    ///
+    /// # Errors
+    /// [`DesignError`] where no touch lands on the part.
+    pub fn lessons(&self, inputs: &Inputs, count: usize, seed: u64) -> Result<Lesson, DesignError> {
+        const FORCES: [f64; 2] = [0.5, 34.3];
+        const SEED: u64 = 0x1e55;
+        let touches = self.touches(inputs, count, seed.wrapping_add(SEED), true)?;
+        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(SEED));
+        let forces: Vec<f64> = (touches.iter())
+            .map(|_| FORCES[0] + (FORCES[1] - FORCES[0]) * rng.random::<f64>())
+            .collect();
+        let read =
+            |(touch, &force): (&Touch, &f64)| self.sensitivity.read(&Touch { force, ..*touch });
+        let columns: Vec<Vec<f64>> = touches.par_iter().zip(&forces).map(read).collect();
+        let values = (0..self.gauges.len()).flat_map(|c| columns.iter().map(move |x| x[c]));
+        Ok(Lesson {
+            x: SignalMatrix::new(touches.len(), values.collect()),
+            places_mm: touches
+                .iter()
+                .map(|t| (t.position * 1e3).to_array())
+                .collect(),
+            forces,
+        })
     }
 
     /// Touches on the part's surface for training, evenly spread, or for tests, at random.

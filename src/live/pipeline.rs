@@ -173,16 +173,26 @@ impl Pipeline {
         }
     }
 
-    /// Another model of the same gauges: after a calibration.
-    pub fn set_map(&mut self, map: Arc<ResponseMap>, relative: f64) {
+    /// Another model of the same gauges, or other settings: after a calibration. What the board has said of
+    /// itself stays.
+    pub fn set_model(&mut self, map: Arc<ResponseMap>, settings: Settings) {
+        if settings.channels != self.settings.channels {
+            // Other channels have another rest.
+            self.rest = None;
+        }
+        let mut chain = settings.chain;
+        if let Some(hello) = &self.hello {
+            chain = chain.of_board(hello);
+        }
+        let noise = self.matching.errors.noise.clone();
         let errors = Errors {
-            noise: self.matching.errors.noise.clone(),
-            relative,
+            noise,
+            relative: settings.relative,
         };
+        self.settings = Settings { chain, ..settings };
         let used = self.matching.used.clone();
         self.matching = Matching::new(map, errors, self.settings.most_force);
         self.matching.used = used;
-        self.settings.relative = relative;
         self.last = None;
     }
 

@@ -116,6 +116,7 @@ impl Command {
             Self::Stage(Stage::Selection) => "Go to selection",
             Self::Stage(Stage::Evaluation) => "Go to evaluation",
             Self::Stage(Stage::Report) => "Go to report",
+            Self::Stage(Stage::Live) => "Go to live touch",
         }
     }
 

@@ -36,6 +36,7 @@ pub(super) enum Finished {
     Pictured(PathBuf),
     Saved(Box<saving::Saved>),
     Opened(Box<opening::Opened>),
+    Live(super::live::Brought),
 }
 
 /// The last results of a quality.
@@ -307,7 +308,7 @@ impl Studio {
     pub(super) fn collect_jobs(&mut self, ctx: &Context) {
         for (task, key, outcome) in self.jobs.collect() {
             match outcome {
-                Outcome::Done(finished) => self.finished(finished, key),
+                Outcome::Done(finished) => self.finished(ctx, finished, key),
                 Outcome::Failed(message) => {
                     self.complain(format!("{}: {message}", task.name()));
                     self.drive.fail(task, key, message);
@@ -323,7 +324,7 @@ impl Studio {
         }
     }
 
-    fn finished(&mut self, finished: Finished, key: String) {
+    fn finished(&mut self, ctx: &egui::Context, finished: Finished, key: String) {
         match finished {
             Finished::Simulation(simulated, quality, seconds) => {
                 if key == self.document.simulation_key_at(quality) {
@@ -350,6 +351,7 @@ impl Studio {
             }
             Finished::Opened(opened) => self.take_opened(*opened),
             Finished::Saved(saved) => self.take_saved(*saved),
+            Finished::Live(brought) => self.take_live(ctx, brought, key),
             Finished::Estimate(mm) if key == self.by_hand_key() => {
                 self.by_hand.estimate = Some(mm);
             }

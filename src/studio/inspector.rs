@@ -48,6 +48,7 @@ impl Studio {
                     }
                     Stage::Evaluation => self.evaluation_form(ui),
                     Stage::Report => self.button(ui, super::Command::Export),
+                    Stage::Live => self.live_form(ui),
                 }
             });
     }
@@ -107,6 +108,7 @@ fn purpose(stage: Stage) -> &'static str {
         Stage::Selection => "Which of the candidates get a gauge",
         Stage::Evaluation => "How well touches that nobody trained on are found",
         Stage::Report => "What a workshop needs to build it",
+        Stage::Live => "Where and how hard the part is touched, now",
     }
 }
 

@@ -28,6 +28,11 @@ pub enum Task {
     Measure,
     Picture,
     Save,
+    /// Of the live stage: the model of the gauges, a simulated board, the trained estimators, a calibration.
+    Sense,
+    Board,
+    Train,
+    Calibrate,
 }
 
 impl Task {
@@ -48,6 +53,10 @@ impl Task {
             Self::Measure => "Measure".into(),
             Self::Picture => "Save the picture".into(),
             Self::Save => "Save".into(),
+            Self::Sense => "Model the gauges".into(),
+            Self::Board => "Make a simulated board".into(),
+            Self::Train => "Train the estimators".into(),
+            Self::Calibrate => "Calibrate".into(),
         }
     }
 

@@ -30,6 +30,7 @@ impl Studio {
         self.paint_kept(&painter, Pane::Limb);
         self.paint_gauges(&painter, Pane::Limb);
         self.paint_touch(&painter, Pane::Limb);
+        self.paint_live(&painter, Pane::Limb);
         self.paint_legend(&painter, rect);
     }
 

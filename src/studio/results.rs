@@ -17,16 +17,18 @@ pub(super) enum Tab {
     Compare,
     Gauges,
     Reduction,
+    Live,
     Jobs,
 }
 
 impl Tab {
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 7] = [
         Self::Error,
         Self::Failures,
         Self::Compare,
         Self::Gauges,
         Self::Reduction,
+        Self::Live,
         Self::Jobs,
     ];
 
@@ -37,6 +39,7 @@ impl Tab {
             Self::Compare => "Compare",
             Self::Gauges => "Gauge table",
             Self::Reduction => "Reduction",
+            Self::Live => "Strains",
             Self::Jobs => "Jobs",
         }
     }
@@ -120,6 +123,7 @@ impl Studio {
             Tab::Gauges => self.gauge_table(ui),
             Tab::Compare => self.compare_tab(ui),
             Tab::Reduction => self.reduction_plot(ui),
+            Tab::Live => self.live_tab(ui),
             Tab::Jobs => self.jobs_tab(ui),
         }
     }

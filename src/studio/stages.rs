@@ -18,10 +18,11 @@ pub enum Stage {
     Selection,
     Evaluation,
     Report,
+    Live,
 }
 
 impl Stage {
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Part,
         Self::Supports,
         Self::Simulation,
@@ -30,6 +31,7 @@ impl Stage {
         Self::Selection,
         Self::Evaluation,
         Self::Report,
+        Self::Live,
     ];
 
     #[must_use]
@@ -43,6 +45,7 @@ impl Stage {
             Self::Selection => "Selection",
             Self::Evaluation => "Evaluation",
             Self::Report => "Report",
+            Self::Live => "Live",
         }
     }
 }
@@ -157,11 +160,29 @@ impl Studio {
             Stage::Candidates => self.design_standing(Step::Reduce),
             Stage::Selection => self.design_standing(Step::Select),
             Stage::Evaluation => self.design_standing(Step::Evaluate),
+            Stage::Live => self.live_standing(),
             Stage::Report if self.design.is_none() => Standing::Open,
             Stage::Report => match self.design_standing(Step::Evaluate) {
                 Standing::Failed(_) | Standing::Running => Standing::Stale,
                 other => other,
             },
+        }
+    }
+
+    fn live_standing(&self) -> Standing {
+        use crate::link::State;
+        match self.live_state() {
+            _ if [Task::Sense, Task::Board]
+                .iter()
+                .any(|t| self.jobs.runs(*t)) =>
+            {
+                Standing::Running
+            }
+            Some(State::Live | State::Ended) => Standing::Current,
+            Some(State::Waiting) => Standing::Running,
+            Some(State::Silent) => Standing::Failed("the board has fallen silent".into()),
+            Some(State::Gone) => Standing::Failed("unplugged".into()),
+            None => Standing::Open,
         }
     }
 
@@ -261,6 +282,8 @@ impl Studio {
             Stage::Selection => self.selection_lines(),
             Stage::Evaluation => self.evaluation_lines(),
             Stage::Report => Vec::new(),
+            Stage::Live if self.live_standing() == Standing::Open => Vec::new(),
+            Stage::Live => vec![self.live_in_words().0],
         }
     }
 

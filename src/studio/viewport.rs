@@ -366,6 +366,7 @@ impl Studio {
         self.paint_kept(&painter, pane);
         self.paint_gauges(&painter, pane);
         self.paint_touch(&painter, pane);
+        self.paint_live(&painter, pane);
         self.paint_measure(&painter, pane);
         self.paint_brush(&painter, pane);
         self.paint_outline(&painter, pane);

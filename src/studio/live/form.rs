@@ -1,0 +1,425 @@
+//! Settings of the live stage.
+
+use egui::{ComboBox, DragValue, RichText, TextEdit, Ui};
+
+use super::super::form::{choice, number, percentage, rows};
+use super::super::{Studio, theme};
+use super::known::{LEAST, WANTED};
+use crate::board::{ChannelFault, Illness};
+use crate::link::{State, ports};
+use crate::live::Estimator;
+use crate::project::LiveKeys;
+
+impl Studio {
+    pub(in super::super) fn live_form(&mut self, ui: &mut Ui) {
+        self.board_form(ui);
+        if self.live.is_connected() {
+            self.connected_form(ui);
+        }
+        let gauges = self.document.state.project.selection.sites.len();
+        let live = &mut self.document.state.project.live;
+        rows(ui, "Measurement", |ui| measurement(ui, live));
+        ui.collapsing("Channels of the gauges", |ui| channels(ui, live, gauges));
+        ui.collapsing("Known touches", |ui| self.known_form(ui));
+    }
+
+    fn board_form(&mut self, ui: &mut Ui) {
+        let ctx = ui.ctx().clone();
+        let mut connect = false;
+        rows(ui, "Board", |ui| {
+            let name = ui.label("Port");
+            ui.horizontal(|ui| {
+                let field = TextEdit::singleline(&mut self.live.port)
+                    .desired_width(130.0)
+                    .hint_text("port, host:port or file");
+                let field = ui.add(field).labelled_by(name.id);
+                connect |= field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+                self.port_list(ui);
+            });
+            ui.end_row();
+            let name = ui.label("Baud");
+            ui.add(
+                DragValue::new(&mut self.live.baud)
+                    .range(300..=4_000_000)
+                    .speed(100.0),
+            )
+            .labelled_by(name.id)
+            .on_hover_text("Native USB does not care");
+            ui.end_row();
+            ui.label("");
+            connect |= ui
+                .add_enabled(
+                    !self.live.port.trim().is_empty(),
+                    egui::Button::new("Connect"),
+                )
+                .on_hover_text(
+                    "Listen to the board at this port, or replay this recording (.hapdrec)",
+                )
+                .clicked();
+            ui.end_row();
+        });
+        if connect {
+            let port = self.live.port.clone();
+            self.connect(&ctx, &port);
+        }
+        ui.horizontal(|ui| {
+            let start = ui
+                .button("Start a simulated board")
+                .on_hover_text("A board that needs no hardware: its truth has elements of half the size, and gauges as a workshop glues them");
+            if start.clicked() {
+                self.start_simulated_board(&ctx);
+            }
+            let connected = self.live.is_connected();
+            if ui.add_enabled(connected, egui::Button::new("Disconnect")).clicked() {
+                self.disconnect();
+            }
+        });
+        self.state_lines(ui);
+    }
+
+    fn port_list(&mut self, ui: &mut Ui) {
+        let shown = ComboBox::from_id_salt("ports")
+            .selected_text("")
+            .width(20.0);
+        let answer = shown.show_ui(ui, |ui| {
+            if self.live.ports.is_empty() {
+                ui.weak("No port was found");
+            }
+            for port in &self.live.ports {
+                let text = format!("{}  {}", port.path, port.product);
+                let text = if port.likely {
+                    RichText::new(text).strong()
+                } else {
+                    RichText::new(text)
+                };
+                if ui
+                    .selectable_label(self.live.port == port.path, text)
+                    .clicked()
+                {
+                    self.live.port.clone_from(&port.path);
+                }
+            }
+        });
+        let opened = answer
+            .response
+            .accessible_name("Ports")
+            .on_hover_text("Ports of this machine, the likeliest board first");
+        if opened.clicked() {
+            self.live.ports = ports();
+        }
+    }
+
+    fn state_lines(&self, ui: &mut Ui) {
+        let (text, colour) = self.live_in_words();
+        let text = RichText::new(text);
+        ui.label(match colour {
+            Some(colour) => text.color(colour),
+            None => text,
+        });
+        let said = self.live.look(|feed| {
+            let hello = feed.hello.as_ref()?;
+            Some(format!(
+                "{}, {} channels of {} bits, gain {}",
+                hello.name,
+                hello.channels,
+                hello.bits,
+                hello.gain_milli / 1000
+            ))
+        });
+        if let Some(said) = said.flatten() {
+            ui.weak(said);
+        }
+    }
+
+    /// How the connection stands.
+    pub(in super::super) fn live_in_words(&self) -> (String, Option<egui::Color32>) {
+        if self.live.wish.is_some() {
+            return ("Making the model of the gauges …".into(), None);
+        }
+        let (state, taring, tared) = self
+            .live
+            .look(|f| (f.state.clone(), f.taring, f.tared))
+            .unwrap_or_default();
+        match state {
+            None => ("Not connected".into(), None),
+            Some(State::Waiting) => ("Waiting for the board".into(), None),
+            Some(State::Live) if taring => ("Taring: do not touch".into(), Some(theme::TOUCHED)),
+            Some(State::Live) if !tared => ("Live, not tared".into(), Some(theme::STALE)),
+            Some(State::Live) => ("Live".into(), None),
+            Some(State::Silent) => ("The board has fallen silent".into(), Some(theme::ERROR)),
+            Some(State::Gone) => (
+                "Unplugged: waiting for the board".into(),
+                Some(theme::ERROR),
+            ),
+            Some(State::Ended) => ("The recording is over".into(), None),
+        }
+    }
+
+    fn connected_form(&mut self, ui: &mut Ui) {
+        ui.add_space(4.0);
+        ui.horizontal(|ui| {
+            let tare = ui
+                .button("Tare")
+                .on_hover_text("Take what is read now for rest: nothing may touch the part");
+            if tare.clicked() {
+                self.tare();
+            }
+            if self.live.hosted.is_some() {
+                self.faults(ui);
+            }
+        });
+        let mut estimator = self.live.estimator;
+        rows(ui, "Touch", |ui| {
+            let help = "Model matching needs no training and says how sure it is; the others learn from the model first";
+            choice(
+                ui,
+                "Estimator",
+                &mut estimator,
+                &Estimator::ALL,
+                Estimator::label,
+                help,
+            );
+            ui.label("");
+            ui.checkbox(&mut self.live.compare, "Compare all")
+                .on_hover_text("Show what the others say too");
+            ui.end_row();
+        });
+        if estimator != self.live.estimator {
+            self.show_estimator(estimator);
+        }
+        self.recording_form(ui);
+    }
+
+    fn faults(&mut self, ui: &mut Ui) {
+        let Some(hosted) = &self.live.hosted else {
+            return;
+        };
+        let now = hosted.seconds();
+        ui.menu_button("Faults", |ui| {
+            let Ok(mut board) = hosted.board.lock() else {
+                return;
+            };
+            let faults = board.faults_mut();
+            if ui.button("Unplug for 2 s").clicked() {
+                faults.unplugged.push((now, now + 2.0));
+                ui.close();
+            }
+            for (name, illness) in [
+                ("Gauge 1 dies", Illness::Dead),
+                ("Gauge 2 sticks", Illness::Stuck),
+                ("Gauge 3 saturates", Illness::Saturated),
+                ("Gauge 4 gets noisy", Illness::Noisy),
+            ] {
+                if ui.button(name).clicked() {
+                    let channel = illness as usize;
+                    faults.channels.push(ChannelFault {
+                        channel,
+                        illness,
+                        from_s: now,
+                        until_s: f64::INFINITY,
+                    });
+                    ui.close();
+                }
+            }
+            if ui.button("All gauges recover").clicked() {
+                faults.channels.clear();
+                ui.close();
+            }
+        })
+        .response
+        .on_hover_text("What goes wrong at the simulated board");
+    }
+
+    fn recording_form(&mut self, ui: &mut Ui) {
+        let recording = self.live.look(|f| f.recording.clone()).flatten();
+        rows(ui, "Recording", |ui| {
+            let name = ui.label("File");
+            let field = TextEdit::singleline(&mut self.live.record_to)
+                .desired_width(150.0)
+                .hint_text("touches.hapdrec");
+            ui.add(field).labelled_by(name.id);
+            ui.end_row();
+            ui.label("");
+            match &recording {
+                None => {
+                    if ui
+                        .button("Record")
+                        .on_hover_text("Raw counts, appended as they come")
+                        .clicked()
+                    {
+                        let path = self.recording_path();
+                        self.record(&path);
+                    }
+                }
+                Some(_) => {
+                    if ui.button("Stop recording").clicked() {
+                        self.stop_recording();
+                    }
+                }
+            }
+            ui.end_row();
+        });
+        if let Some(recording) = recording {
+            let text = format!(
+                "{}: {} samples, {:.0} kB",
+                recording.path.display(),
+                recording.samples,
+                recording.bytes as f64 / 1e3
+            );
+            ui.add(egui::Label::new(RichText::new(text).small()).wrap());
+        }
+    }
+
+    /// Where the recording goes: as typed, with the ending, or a new name beside the project.
+    fn recording_path(&self) -> std::path::PathBuf {
+        let typed = self.live.record_to.trim();
+        let folder = self
+            .document
+            .path
+            .as_ref()
+            .and_then(|p| p.parent())
+            .map_or_else(std::env::temp_dir, std::path::Path::to_path_buf);
+        if !typed.is_empty() {
+            return folder.join(typed).with_extension(crate::link::ENDING);
+        }
+        let free = |n: &usize| {
+            !folder
+                .join(format!("touches-{n}.{}", crate::link::ENDING))
+                .exists()
+        };
+        let number = (1..).find(free).unwrap_or(1);
+        folder.join(format!("touches-{number}.{}", crate::link::ENDING))
+    }
+
+    fn known_form(&mut self, ui: &mut Ui) {
+        ui.add(egui::Label::new("Press where the limb shows a cross, as hard as it says here, and take it. The gauges then show how they are really glued.").wrap());
+        let ctx = ui.ctx().clone();
+        rows(ui, "Next touch", |ui| {
+            number(
+                ui,
+                "Force",
+                &mut self.live.known_force,
+                0.1..=100.0,
+                0.1,
+                " N",
+                "That the next known touch is pressed with",
+            );
+        });
+        let (count, connected) = (self.live.known.len(), self.live.is_connected());
+        ui.label(format!("{count} known touches of {WANTED}"));
+        ui.horizontal(|ui| {
+            let waiting = self.live.gathering.at.is_some() || self.live.gathering.from_board;
+            if ui
+                .add_enabled(connected && !waiting, egui::Button::new("Take this press"))
+                .clicked()
+            {
+                self.take_known();
+            }
+            if ui
+                .add_enabled(connected && count >= LEAST, egui::Button::new("Calibrate"))
+                .clicked()
+            {
+                self.start_calibration(&ctx);
+            }
+        });
+        if self.live.hosted.is_some() {
+            let help = "The next touches of the simulated board, whose places and forces are known";
+            let waiting = self.live.gathering.from_board;
+            if ui
+                .add_enabled(
+                    !waiting,
+                    egui::Button::new("Calibrate from the simulated board"),
+                )
+                .on_hover_text(help)
+                .clicked()
+            {
+                self.calibrate_from_board();
+            }
+        }
+        let live = &mut self.document.state.project.live;
+        if !live.glued.is_empty() {
+            ui.label(format!(
+                "Calibrated: still off by about {:.1} %",
+                100.0 * live.model_error
+            ));
+            if ui.button("Forget the calibration").clicked() {
+                live.forget();
+            }
+        }
+    }
+}
+
+fn measurement(ui: &mut Ui, live: &mut LiveKeys) {
+    number(
+        ui,
+        "Gauge factor",
+        &mut live.gauge_factor,
+        0.1..=500.0,
+        0.01,
+        "",
+        "Relative change of resistance over strain",
+    );
+    let mut arms = f64::from(live.active_arms);
+    number(
+        ui,
+        "Active arms",
+        &mut arms,
+        1.0..=4.0,
+        0.1,
+        "",
+        "Of each bridge, that the strain changes; a gauge with a dummy is 1",
+    );
+    live.active_arms = arms.round() as u8;
+    percentage(
+        ui,
+        "Model error",
+        &mut live.model_error,
+        0.0..=100.0,
+        "What model and gluing are off by, over the reading; a calibration finds it",
+    );
+    number(
+        ui,
+        "Largest force",
+        &mut live.largest_force_n,
+        0.1..=1e4,
+        0.5,
+        " N",
+        "Nobody presses harder",
+    );
+    number(
+        ui,
+        "Drift",
+        &mut live.drift_s,
+        0.0..=1e4,
+        0.5,
+        " s",
+        "Time in which the rest follows what is read without a touch; 0: never",
+    );
+}
+
+fn channels(ui: &mut Ui, live: &mut LiveKeys, gauges: usize) {
+    let mut channels = if live.channels.len() == gauges {
+        live.channels.clone()
+    } else {
+        (0..gauges).collect()
+    };
+    let before = channels.clone();
+    egui::Grid::new("channels").num_columns(4).show(ui, |ui| {
+        for (k, channel) in channels.iter_mut().enumerate() {
+            let name = ui.label(format!("Gauge {}", k + 1));
+            ui.add(
+                DragValue::new(channel)
+                    .range(0..=crate::wire::MOST_CHANNELS - 1)
+                    .prefix("channel "),
+            )
+            .labelled_by(name.id)
+            .on_hover_text("Of the board, from 0");
+            if k % 2 == 1 {
+                ui.end_row();
+            }
+        }
+    });
+    if channels != before {
+        live.channels = channels;
+    }
+}

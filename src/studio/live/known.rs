@@ -1,0 +1,183 @@
+//! Known touches: pressed where and as hard as was asked for, so that the gauges show how they are glued.
+
+use std::sync::Arc;
+
+use egui::Context;
+use glam::DVec3;
+
+use super::super::Studio;
+use super::super::drive::Finished;
+use super::super::jobs::Task;
+use super::Brought;
+use crate::design::Sensing;
+use crate::inference::{Calibration, Known, calibrate};
+
+/// How many are proposed, and how many a calibration takes at least.
+pub const WANTED: usize = 12;
+pub const LEAST: usize = 4;
+/// Pictures that a reading is averaged over.
+const FRAMES: usize = 10;
+
+/// A known touch that is being read.
+#[derive(Default)]
+pub struct Gathering {
+    /// From the touches of a simulated board, until there are enough.
+    pub from_board: bool,
+    /// At a place that was proposed.
+    pub at: Option<DVec3>,
+    rows: Vec<Vec<f64>>,
+    truth: Option<(DVec3, f64)>,
+    /// The last touch that was read: each only once.
+    read: Option<DVec3>,
+    last_us: u64,
+    /// Places that are proposed (m), for the model they were drawn on.
+    proposed: Option<(usize, Vec<DVec3>)>,
+}
+
+impl Gathering {
+    /// Where the next known touch is to be pressed (m), after so many.
+    pub fn next(&self, known: usize) -> Option<DVec3> {
+        let (_, places) = self.proposed.as_ref()?;
+        places.get(known % places.len().max(1)).copied()
+    }
+}
+
+impl Studio {
+    /// Where the next known touch is proposed (m).
+    pub(super) fn proposed_touch(&mut self) -> Option<DVec3> {
+        let sensing = Arc::clone(self.sensing()?);
+        let mark = Arc::as_ptr(&sensing) as usize;
+        if self
+            .live
+            .gathering
+            .proposed
+            .as_ref()
+            .is_none_or(|(m, _)| *m != mark)
+        {
+            const SEED: u64 = 0xca11;
+            let touches = sensing
+                .touches(&self.document.inputs(), WANTED, SEED, true)
+                .ok()?;
+            let places = touches.iter().map(|t| t.position).collect();
+            self.live.gathering.proposed = Some((mark, places));
+        }
+        self.live.gathering.next(self.live.known.len())
+    }
+
+    /// Reads the press that is on as one at the proposed place.
+    pub fn take_known(&mut self) {
+        self.live.gathering.rows.clear();
+        self.live.gathering.at = self.proposed_touch();
+    }
+
+    /// Takes the next touches of a simulated board as known ones, and calibrates with them.
+    pub fn calibrate_from_board(&mut self) {
+        self.live.known.clear();
+        self.live.gathering.from_board = true;
+        self.live.gathering.rows.clear();
+        self.live.gathering.truth = None;
+    }
+
+    /// How many known touches there are.
+    #[must_use]
+    pub fn known_touches(&self) -> usize {
+        self.live.known.len()
+    }
+
+    /// Takes in what is read meanwhile.
+    pub(super) fn gather_known(&mut self, ctx: &Context) {
+        let Some(sensing) = self.sensing().map(Arc::clone) else {
+            return;
+        };
+        let Some((update, truth)) = self.live.look(|f| (f.update.clone(), f.truth)) else {
+            return;
+        };
+        let Some(update) = update.filter(|u| u.time_us != self.live.gathering.last_us) else {
+            return;
+        };
+        self.live.gathering.last_us = update.time_us;
+        let Some(strain) = update.strain else {
+            return;
+        };
+        if let Some(at) = self.live.gathering.at {
+            self.live.gathering.rows.push(strain);
+            if self.live.gathering.rows.len() >= FRAMES {
+                self.live.gathering.at = None;
+                let force = self.live.known_force;
+                self.keep_known(&sensing, at, force);
+            }
+        } else if self.live.gathering.from_board {
+            self.gather_from_board(ctx, &sensing, strain, truth);
+        }
+    }
+
+    /// A touch whose force stands still is read as long as it does; each once.
+    fn gather_from_board(
+        &mut self,
+        ctx: &Context,
+        sensing: &Sensing,
+        strain: Vec<f64>,
+        truth: Option<(DVec3, f64)>,
+    ) {
+        let gathering = &mut self.live.gathering;
+        let same = truth.is_some() && truth == gathering.truth;
+        if same {
+            if gathering.rows.len() < FRAMES {
+                gathering.rows.push(strain);
+            }
+        } else {
+            gathering.rows.clear();
+            gathering.truth = truth;
+        }
+        // The first picture of a plateau may still show the rise.
+        let Some((place, force)) = truth.filter(|_| gathering.rows.len() >= FRAMES) else {
+            return;
+        };
+        if gathering.read == Some(place) {
+            return;
+        }
+        gathering.read = Some(place);
+        self.keep_known(sensing, place, force);
+        if self.live.known.len() >= WANTED {
+            self.live.gathering.from_board = false;
+            self.start_calibration(ctx);
+        }
+    }
+
+    fn keep_known(&mut self, sensing: &Sensing, place: DVec3, force: f64) {
+        let rows = std::mem::take(&mut self.live.gathering.rows);
+        let mean =
+            |c: usize| rows.iter().skip(1).map(|r| r[c]).sum::<f64>() / (rows.len() - 1) as f64;
+        let reading = (0..sensing.gauges.len()).map(mean).collect();
+        let at = sensing.drawn.map.index.nearest(place).0;
+        self.live.known.push(Known { at, force, reading });
+    }
+
+    /// Fits how the gauges are glued.
+    pub(super) fn start_calibration(&mut self, ctx: &Context) {
+        let Some(sensing) = self.sensing().map(Arc::clone) else {
+            return;
+        };
+        let known = self.live.known.clone();
+        let noise = self.live.look(|f| f.noise.clone()).unwrap_or_default();
+        if known.len() < LEAST || noise.len() != sensing.gauges.len() {
+            return self.complain(format!(
+                "A calibration takes at least {LEAST} known touches"
+            ));
+        }
+        self.jobs
+            .start(ctx, Task::Calibrate, self.sensing_key(), move |_| {
+                let found = calibrate(&sensing.drawn, &known, &noise);
+                Ok(Finished::Live(Brought::Calibrated(found)))
+            });
+    }
+
+    pub(super) fn take_calibration(&mut self, found: &Calibration) {
+        self.document.state.project.live.take(found);
+        self.tell(format!(
+            "Calibrated with {} known touches; what is still off is about {:.1} % of a reading",
+            found.touches,
+            100.0 * found.relative
+        ));
+    }
+}

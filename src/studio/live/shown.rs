@@ -1,0 +1,300 @@
+//! What is seen of a touch: over the limb, and as strips below it.
+
+use std::fmt::Write as _;
+
+use egui::{
+    Align2, Color32, Painter, Rect, RichText, Role, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
+};
+use glam::DVec3;
+
+use super::super::overlay::label;
+use super::super::viewport::Pane;
+use super::super::{Stage, Studio, theme};
+use super::feed::{Feed, STRIPS_S, Strip};
+use crate::inference::Contact;
+use crate::live::{Estimator, Health};
+
+/// Of the estimators, apart for colour-blind eyes too.
+const COLOURS: [Color32; 3] = [
+    Color32::from_rgb(240, 228, 66),
+    Color32::from_rgb(86, 180, 233),
+    Color32::from_rgb(213, 94, 0),
+];
+
+fn colour(estimator: Estimator) -> Color32 {
+    COLOURS[Estimator::ALL
+        .iter()
+        .position(|e| *e == estimator)
+        .unwrap_or(0)]
+}
+
+impl Studio {
+    pub(in super::super) fn paint_live(&self, painter: &Painter, pane: Pane) {
+        self.paint_proposed(painter, pane);
+        let Ok(feed) = self.live.feed.lock() else {
+            return;
+        };
+        let Some(update) = &feed.update else {
+            return;
+        };
+        self.paint_trail(painter, pane, &feed);
+        if let Some((place, _)) = feed.truth
+            && let Some(at) = self.view.place_in(pane, place)
+        {
+            painter.circle_stroke(at, 9.0, Stroke::new(1.5, Color32::WHITE));
+        }
+        for estimator in Estimator::ALL {
+            let shown = estimator == self.live.estimator;
+            let Some(guess) = update.by(estimator).filter(|_| shown || self.live.compare) else {
+                continue;
+            };
+            let Some(at) = self.view.place_in(pane, guess.position) else {
+                continue;
+            };
+            let colour = colour(estimator);
+            if !shown {
+                painter.circle(at, 4.0, colour, Stroke::new(1.0, Color32::BLACK));
+                continue;
+            }
+            if let Some(contact) = update.contact.filter(|_| estimator == Estimator::Matching) {
+                self.paint_region(painter, pane, &contact, colour);
+            }
+            painter.circle(at, 6.0, colour, Stroke::new(1.5, Color32::BLACK));
+            if pane == Pane::Limb {
+                self.paint_press(
+                    painter,
+                    guess.position,
+                    guess.force,
+                    update.contact.as_ref(),
+                    colour,
+                );
+            }
+        }
+    }
+
+    /// The press as an arrow against the surface, with how hard and how sure.
+    fn paint_press(
+        &self,
+        painter: &Painter,
+        place: DVec3,
+        force: f64,
+        contact: Option<&Contact>,
+        colour: Color32,
+    ) {
+        /// Force (N) at which the arrow is as long as it gets, and that length over the view.
+        const FULL: f64 = 30.0;
+        const LENGTH: f64 = 0.22;
+        let (on, _) = self.view.index.nearest(place);
+        let normal = self.document.part.normal(on);
+        let share = 0.25 + 0.75 * (force / FULL).clamp(0.0, 1.0);
+        let length = LENGTH * share * self.view.camera.distance;
+        let ends = [place, place + normal * length].map(|p| self.view.place(p));
+        let [Some(tip), Some(tail)] = ends else {
+            return;
+        };
+        painter.arrow(tail, tip - tail, Stroke::new(4.0, Color32::BLACK));
+        painter.arrow(tail, tip - tail, Stroke::new(2.5, colour));
+        let mut text = format!("{force:.1} N");
+        if let Some(c) = contact.filter(|_| self.live.estimator == Estimator::Matching) {
+            let _ = write!(
+                text,
+                " ± {:.1} · ± {:.1} mm",
+                c.force_deviation,
+                c.region.radius * 1e3
+            );
+        }
+        label(painter, tail, Align2::CENTER_BOTTOM, &text, colour);
+    }
+
+    /// The 90 % region, laid onto the surface.
+    fn paint_region(&self, painter: &Painter, pane: Pane, contact: &Contact, colour: Color32) {
+        const POINTS: usize = 48;
+        let [a, b] = contact.region.axes;
+        let on_surface = |k: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / POINTS as f64).sin_cos();
+            let (at, _) = self
+                .view
+                .index
+                .nearest(contact.position + a * cos + b * sin);
+            self.view.place_in(pane, self.document.part.point(at))
+        };
+        let points: Option<Vec<egui::Pos2>> = (0..POINTS).map(on_surface).collect();
+        if let Some(points) = points {
+            painter.add(Shape::closed_line(
+                points.clone(),
+                Stroke::new(3.0, Color32::from_black_alpha(120)),
+            ));
+            painter.add(Shape::closed_line(points, Stroke::new(1.5, colour)));
+        }
+    }
+
+    fn paint_trail(&self, painter: &Painter, pane: Pane, feed: &Feed) {
+        let Some(&(now, _, _)) = feed.trail.back() else {
+            return;
+        };
+        let placed: Vec<_> = feed
+            .trail
+            .iter()
+            .filter_map(|&(t, e, p)| Some((t, e, self.view.place_in(pane, p)?)))
+            .collect();
+        for pair in placed.windows(2) {
+            let ((t, e, from), (_, _, to)) = (pair[0], pair[1]);
+            // Over the seam of the unrolled view no line is drawn.
+            if from.distance(to) < 60.0 {
+                let fade = (1.0 - (now - t)).clamp(0.0, 1.0) as f32;
+                painter.line_segment(
+                    [from, to],
+                    Stroke::new(3.0, colour(e).gamma_multiply(0.6 * fade)),
+                );
+            }
+        }
+    }
+
+    /// Where the next known touch is to be pressed.
+    fn paint_proposed(&self, painter: &Painter, pane: Pane) {
+        let shown =
+            self.stage == Stage::Live && self.live.is_connected() && self.live.hosted.is_none();
+        let Some(place) = self
+            .live
+            .gathering
+            .next(self.live.known.len())
+            .filter(|_| shown)
+        else {
+            return;
+        };
+        if let Some(at) = self.view.place_in(pane, place) {
+            for d in [vec2(7.0, 7.0), vec2(7.0, -7.0)] {
+                painter.line_segment([at - d, at + d], Stroke::new(4.0, Color32::BLACK));
+                painter.line_segment([at - d, at + d], Stroke::new(2.0, theme::TOUCHED));
+            }
+        }
+    }
+
+    /// Strips of all gauges with their health, and how the line does.
+    pub(in super::super) fn live_tab(&mut self, ui: &mut Ui) {
+        let (words, warning) = self.live_in_words();
+        let Ok(feed) = self.live.feed.lock() else {
+            return;
+        };
+        ui.horizontal_wrapped(|ui| {
+            let words = RichText::new(words).strong();
+            ui.label(warning.map_or(words.clone(), |c| words.color(c)));
+            facts(ui, &feed);
+        });
+        let gauges = feed.health.len();
+        if gauges == 0 {
+            drop(feed);
+            ui.add_space(8.0);
+            ui.weak("Start a simulated board or connect one at the stage “Live”, and every gauge is drawn here");
+            return;
+        }
+        let (rect, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::hover());
+        response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, "Strains of the gauges"));
+        strips(ui.painter(), rect, &feed, ui.visuals().weak_text_color());
+    }
+}
+
+/// Rate, losses, delay, touch.
+fn facts(ui: &mut Ui, feed: &Feed) {
+    let traffic = feed.traffic;
+    let mut facts = vec![format!("{:.0} samples/s", feed.rate)];
+    facts.push(format!("{} lost", traffic.lost));
+    facts.push(format!("{} refused", traffic.refused));
+    if let Some([half, most]) = feed.delays {
+        facts.push(format!(
+            "{:.2} ms from byte to touch (99 %: {:.2} ms)",
+            half / 1e3,
+            most / 1e3
+        ));
+    }
+    if let Some(update) = &feed.update {
+        facts.push(format!(
+            "{} of {} gauges good",
+            update.good,
+            feed.health.len()
+        ));
+    }
+    for fact in facts {
+        ui.separator();
+        ui.label(fact);
+    }
+}
+
+/// One strip a gauge, in columns where there are many.
+fn strips(painter: &Painter, rect: Rect, feed: &Feed, weak: Color32) {
+    const LEAST_HEIGHT: f32 = 22.0;
+    let gauges = feed.health.len();
+    let rows = ((rect.height() / LEAST_HEIGHT) as usize).clamp(1, gauges);
+    let columns = gauges.div_ceil(rows);
+    let rows = gauges.div_ceil(columns);
+    let size = vec2(rect.width() / columns as f32, rect.height() / rows as f32);
+    let now = feed.strips.back().map_or(0.0, |s| s.seconds);
+    let largest = |s: &Strip| s.range.iter().fold(0.0_f32, |m, (l, h)| m.max(-l).max(*h));
+    // All on one scale, so that levels can be compared; never finer than the noise.
+    let scale = feed.strips.iter().map(largest).fold(20.0, f32::max);
+    for gauge in 0..gauges {
+        let corner = rect.min
+            + vec2(
+                size.x * (gauge / rows) as f32,
+                size.y * (gauge % rows) as f32,
+            );
+        let cell = Rect::from_min_size(corner, size).shrink2(vec2(6.0, 1.0));
+        let health = feed.health[gauge];
+        strip(painter, cell, feed, gauge, (now, scale), weak);
+        let colour = if health.is_good() { weak } else { theme::ERROR };
+        let level = feed
+            .update
+            .as_ref()
+            .and_then(|u| u.strain.as_ref()?.get(gauge).copied());
+        let level = level.map_or(String::new(), |s| format!("{:+.0} µε", s * 1e6));
+        let mut name = format!("{}  {level}", gauge + 1);
+        if health != Health::Good {
+            let _ = write!(name, "  {}", health.in_words());
+        }
+        let font = egui::FontId::proportional(11.0);
+        painter.text(
+            pos2(cell.min.x, cell.center().y),
+            Align2::LEFT_CENTER,
+            name,
+            font,
+            colour,
+        );
+    }
+}
+
+fn strip(
+    painter: &Painter,
+    cell: Rect,
+    feed: &Feed,
+    gauge: usize,
+    (now, scale): (f64, f32),
+    weak: Color32,
+) {
+    const NAMES: f32 = 118.0;
+    let plot = Rect::from_min_max(pos2(cell.min.x + NAMES, cell.min.y), cell.max);
+    painter.hline(
+        plot.x_range(),
+        plot.center().y,
+        Stroke::new(0.5, weak.gamma_multiply(0.5)),
+    );
+    let colour = if feed.health[gauge].is_good() {
+        COLOURS[1]
+    } else {
+        theme::ERROR
+    };
+    let y = |v: f32| plot.center().y - v / scale * plot.height() / 2.0;
+    let mut last = None;
+    for strip in &feed.strips {
+        let Some(&(low, high)) = strip.range.get(gauge) else {
+            continue;
+        };
+        let x = plot.max.x - ((now - strip.seconds) / STRIPS_S) as f32 * plot.width();
+        let (top, bottom) = (pos2(x, y(high)), pos2(x, y(low)));
+        painter.line_segment([top, bottom], Stroke::new(1.0, colour));
+        let middle = top.lerp(bottom, 0.5);
+        if let Some(before) = last {
+            painter.line_segment([before, middle], Stroke::new(1.0, colour));
+        }
+        last = Some(middle);
+    }
+}

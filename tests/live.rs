@@ -1,0 +1,198 @@
+//! Live touch in the real window: a simulated board from start to replay.
+#![cfg(feature = "studio")]
+
+mod window;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::channel;
+use std::time::Instant;
+
+use glam::DVec3;
+use hapdef::budget::unwatched;
+use hapdef::design;
+use hapdef::link::{Address, BAUD, Heard, Listener, Pace, State};
+use hapdef::live::{Pipeline, Update};
+use hapdef::studio::Studio;
+
+use window::Window;
+
+/// One look at a touch whose force stands still: what was said, and the truth.
+fn next_touch(w: &mut Window, after: Option<DVec3>) -> (Update, DVec3, f64) {
+    let found = std::cell::RefCell::new(None);
+    w.wait("a touch", 40, |s: &Studio| {
+        let truth = s.live_truth();
+        if let (Some((place, force)), Some(update)) = (truth, s.live_update())
+            && Some(place) != after
+            && update.contact.is_some_and(|c| c.force > 0.9 * 0.3 * force)
+            && force > 2.0
+        {
+            let mut seen = found.borrow_mut();
+            let seen: &mut Vec<(Update, DVec3, f64)> = seen.get_or_insert_with(Vec::new);
+            seen.push((update, place, force));
+            // The same force a few looks in a row: neither rising nor falling.
+            return seen.len() > 6
+                && seen
+                    .iter()
+                    .rev()
+                    .take(6)
+                    .all(|(_, p, f)| *p == place && (*f - force).abs() < 1e-9);
+        }
+        false
+    });
+    let seen = found.into_inner().unwrap();
+    seen.into_iter().next_back().unwrap()
+}
+
+#[test]
+fn a_simulated_board_from_start_to_replay() {
+    let Some(mut w) = Window::open() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    w.stage("Live");
+    w.press("Start a simulated board");
+    w.wait("the board", 120, |s| s.live_state() == Some(State::Live));
+    w.wait("the tare", 20, |s| {
+        s.live_update().is_some_and(|u| u.strain.is_some())
+    });
+    w.press("Tare");
+    w.wait("another tare", 20, |s| {
+        s.live_update().is_some_and(|u| u.strain.is_none())
+    });
+    w.wait("its end", 20, |s| {
+        s.live_update().is_some_and(|u| u.strain.is_some())
+    });
+
+    // As drawn, the gauges are known as well as a workshop glues; known touches show how they really are.
+    w.harness.state_mut().calibrate_from_board();
+    w.wait("known touches", 90, |s| {
+        s.known_touches() >= 12 && !s.document.state.project.live.glued.is_empty()
+    });
+    let off = w.harness.state().document.state.project.live.model_error;
+    assert!(off < 0.1, "still off by {off}");
+    let (mut errors, mut held, mut before) = (Vec::new(), 0, None);
+    for _ in 0..6 {
+        let (update, place, force) = next_touch(&mut w, before);
+        before = Some(place);
+        let contact = update.contact.unwrap();
+        let error = contact.position.distance(place);
+        errors.push(error * 1e3);
+        held += usize::from(error <= 1.5 * contact.region.radius);
+        assert!(
+            (contact.force - force).abs() < 0.25 * force + 1.0,
+            "{} for {force} N",
+            contact.force
+        );
+    }
+    errors.sort_by(f64::total_cmp);
+    assert!(
+        errors[3] < 3.0 && held >= 4,
+        "{errors:?} mm, {held} of 6 within the region"
+    );
+    if let Some(path) = std::env::var_os("HAPDEF_PICTURES") {
+        w.picture().save(Path::new(&path).join("live.png")).unwrap();
+    }
+
+    unplug(&mut w);
+    let seen = record(&mut w, &folder.path().join("touches.hapdrec"));
+    replay(&mut w, &folder.path().join("touches.hapdrec"), &seen);
+}
+
+/// Noticed within a second, and found again within two of being plugged in.
+fn unplug(w: &mut Window) {
+    let at = {
+        let hosted = w.harness.state().simulated_board().unwrap();
+        let now = hosted.seconds();
+        hosted
+            .board
+            .lock()
+            .unwrap()
+            .faults_mut()
+            .unplugged
+            .push((now, now + 1.5));
+        now
+    };
+    let begun = Instant::now();
+    w.wait("the unplug", 10, |s| s.live_state() == Some(State::Gone));
+    let noticed = begun.elapsed().as_secs_f64();
+    assert!(
+        w.harness.state().live_update().is_none(),
+        "no touch is shown of a board that is gone"
+    );
+    w.wait("the plug", 10, |s| s.live_state() == Some(State::Live));
+    let back = w.harness.state().simulated_board().unwrap().seconds() - at - 1.5;
+    assert!(
+        noticed < 1.0 && back < 2.0,
+        "noticed after {noticed} s, back after {back} s"
+    );
+    // The rest is still known.
+    w.wait("strains", 5, |s| {
+        s.live_update().is_some_and(|u| u.strain.is_some())
+    });
+}
+
+/// What the window saw while it was recording.
+fn record(w: &mut Window, path: &Path) -> BTreeMap<u64, Update> {
+    w.wait("no touch", 20, |s| {
+        s.live_update().is_some_and(|u| u.contact.is_none()) && s.live_truth().is_none()
+    });
+    w.harness.state_mut().record(path);
+    let seen = std::cell::RefCell::new(BTreeMap::new());
+    let begun = Instant::now();
+    w.wait("a few touches", 30, |s| {
+        if let Some(update) = s.live_update() {
+            seen.borrow_mut().insert(update.time_us, update);
+        }
+        begun.elapsed().as_secs_f64() > 4.0
+    });
+    w.harness.state_mut().stop_recording();
+    w.wait("the file", 10, |_| {
+        std::fs::metadata(path).is_ok_and(|m| m.len() > 50_000)
+    });
+    seen.into_inner()
+}
+
+/// The recording says the very same, in the window's own thread and in another.
+fn replay(w: &mut Window, path: &Path, seen: &BTreeMap<u64, Update>) {
+    let inputs = w.harness.state().document.inputs();
+    let budget = inputs.project.budget.quality.budget();
+    let sensing = design::sense(&inputs, &budget, &unwatched).unwrap();
+    let live = &inputs.project.live;
+    let pipeline = Pipeline::new(sensing.map_for(live), live.settings(sensing.gauges.len()));
+    let address = Address::parse(&path.display().to_string(), BAUD, Pace::Fast);
+    let mut again = BTreeMap::new();
+    let mut truths = 0;
+    let (_commands, inbox) = channel();
+    Listener::new(address, pipeline)
+        .run(&AtomicBool::new(false), &inbox, |heard| match heard {
+            Heard::Sample { update, .. } => {
+                again.insert(update.time_us, update.clone());
+            }
+            Heard::Truth(Some(_)) => truths += 1,
+            _ => {}
+        })
+        .unwrap();
+    let (mut compared, mut touches) = (0, 0);
+    for (time, update) in seen {
+        let Some(other) = again.get(time) else {
+            continue;
+        };
+        assert_eq!(update.contact, other.contact, "at {time} µs");
+        assert_eq!(update.strain, other.strain);
+        compared += 1;
+        touches += usize::from(update.contact.is_some());
+    }
+    assert!(
+        compared > 50 && touches > 10 && truths > 0,
+        "{compared} compared, {touches} of them touches, {truths} truths"
+    );
+
+    let ctx = w.harness.ctx.clone();
+    w.harness
+        .state_mut()
+        .connect(&ctx, &path.display().to_string());
+    w.wait("the replay", 60, |s| {
+        s.live_update().is_some_and(|u| u.contact.is_some())
+    });
+    w.wait("its end", 60, |s| s.live_state().is_none());
+}
