@@ -31,8 +31,12 @@ impl Timeline {
         let base = last - last % TURN + u64::from(time_us);
         // The nearest of the times that look like this.
         let near = |t: &u64| t.abs_diff(last);
-        let candidates = [base.saturating_sub(TURN), base, base + TURN];
-        let time = candidates.into_iter().min_by_key(near).unwrap_or(base);
+        let candidates = [base.checked_sub(TURN), Some(base), Some(base + TURN)];
+        let time = candidates
+            .into_iter()
+            .flatten()
+            .min_by_key(near)
+            .unwrap_or(base);
         self.last = Some(time.max(last));
         time
     }
@@ -51,6 +55,11 @@ mod tests {
         // One that came late.
         assert_eq!(line.extend(top - 10), u64::from(top - 10));
         assert_eq!(line.extend(1499), u64::from(top) + 1500);
+        // From the very beginning.
+        let mut young = Timeline::default();
+        for time in [0, 1000, 43_000_000, 44_000_000] {
+            assert_eq!(young.extend(time), u64::from(time));
+        }
         // Turn after turn.
         let mut now = line.extend(2_000_000_000);
         for _ in 0..10 {

@@ -269,12 +269,19 @@ impl Listener {
 
     /// A recording can be replayed on its own: it begins with the board and its rest.
     fn begin_recording(&mut self) {
+        self.pipeline.begin_anew();
         if let (Some(recorder), Some(hello)) = (&mut self.recorder, &self.hello) {
             recorder.hello(hello);
         }
         if let (Some(recorder), Some(rest)) = (&mut self.recorder, &self.pipeline.rest) {
             recorder.rest(rest);
         }
+        let dead: Vec<usize> = self.pipeline.dead().collect();
+        self.record(|r| {
+            for k in dead {
+                r.own(&format!("dead {k}"));
+            }
+        });
     }
 
     fn take(
@@ -351,6 +358,11 @@ impl Listener {
                 }
                 if self.rest.level.len() == self.pipeline.settings.channels.len() {
                     self.pipeline.set_rest(std::mem::take(&mut self.rest));
+                }
+            }
+            ["dead", k] => {
+                if let Ok(k) = k.parse() {
+                    self.pipeline.mark_dead(&[k]);
                 }
             }
             ["truth", "none"] => tell(Heard::Truth(None)),

@@ -112,6 +112,16 @@ impl Watcher {
     }
 
     #[must_use]
+    pub fn is_dead(&self) -> bool {
+        self.dead
+    }
+
+    /// It is known to be dead.
+    pub fn mark_dead(&mut self) {
+        (self.dead, self.silent) = (true, SILENT);
+    }
+
+    #[must_use]
     pub fn health(&self, expected: &Expected) -> Health {
         let within = |samples: u64, seconds: f64| (samples as f64) < seconds * expected.rate;
         if self.off_scale.is_some_and(|n| n == 0 || within(n, HOLD_S)) {

@@ -201,6 +201,31 @@ impl Pipeline {
         (self.trained, self.trained_for) = (trained, used);
     }
 
+    /// Forgets everything but the rest and which gauges were found dead, so that what follows depends on what
+    /// follows alone: a recording that begins here says the same when it is replayed.
+    pub fn begin_anew(&mut self) {
+        let dead: Vec<usize> = self.dead().collect();
+        self.watchers.fill(Watcher::default());
+        self.health.fill(Health::Good);
+        self.mark_dead(&dead);
+        (self.last_time, self.last_look, self.rate) = (None, 0, RATE);
+        self.end_touch();
+    }
+
+    /// Gauges that were found dead.
+    pub fn dead(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.watchers.len()).filter(|&k| self.watchers[k].is_dead())
+    }
+
+    /// Takes gauges for dead until they are felt again.
+    pub fn mark_dead(&mut self, gauges: &[usize]) {
+        for &k in gauges {
+            if let Some(watcher) = self.watchers.get_mut(k) {
+                watcher.mark_dead();
+            }
+        }
+    }
+
     /// What a board says of itself. Another board, or another gain, needs another tare.
     pub fn hello(&mut self, hello: &Hello) {
         let same = |h: &Hello| {
@@ -422,6 +447,8 @@ impl Pipeline {
         const NONE: f64 = 0.2;
         const CLEAR: f64 = 0.5;
         const ABOVE_NOISE: f64 = 15.0;
+        /// Weighted squares more than without it: χ² of one degree of freedom in one of a million cases.
+        const CONTRADICTS: f64 = 24.0;
         if (time_us.saturating_sub(self.last_look) as f64) < LOOK_S * 1e6 {
             return;
         }
@@ -453,13 +480,17 @@ impl Pipeline {
             }
             self.matching.used[k] = false;
             let others = self.matching.find(strain);
+            self.matching.used[k] = true;
+            let all = self.matching.find(strain);
             self.matching.used.clone_from(&used);
             let (at, _) = self.matching.map.index.nearest(others.position);
             let should = self.matching.map.at(at)[k] * others.force;
-            let clear = should.abs() > ABOVE_NOISE * self.matching.errors.noise[k]
-                && should.abs() > CLEAR * rms;
-            let explained = others.unexplained < 4.0 * count as f64 + 20.0;
-            self.watchers[k].look(clear && explained, (strain[k] / should) > NONE);
+            let noise = self.matching.errors.noise[k];
+            let clear = should.abs() > ABOVE_NOISE * noise && should.abs() > CLEAR * rms;
+            // Some touch may well leave it alone: only where none explains its silence is it ill.
+            let explained = others.unexplained < 2.0 * count as f64 + 10.0;
+            let contradicts = all.unexplained > others.unexplained + CONTRADICTS;
+            self.watchers[k].look(clear && explained && contradicts, strain[k] / should > NONE);
         }
     }
 

@@ -2,9 +2,7 @@
 
 use std::fmt::Write as _;
 
-use egui::{
-    Align2, Color32, Painter, Rect, RichText, Role, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
-};
+use egui::{Align2, Color32, Painter, Rect, RichText, Role, Stroke, Ui, WidgetInfo, pos2, vec2};
 use glam::DVec3;
 
 use super::super::overlay::label;
@@ -103,28 +101,41 @@ impl Studio {
                 c.region.radius * 1e3
             );
         }
-        label(painter, tail, Align2::CENTER_BOTTOM, &text, colour);
+        // Above the hint and within the view.
+        let room = self.view.rect.shrink2(vec2(90.0, 44.0));
+        label(
+            painter,
+            room.clamp(tail),
+            Align2::CENTER_BOTTOM,
+            &text,
+            colour,
+        );
     }
 
     /// The 90 % region, laid onto the surface.
     fn paint_region(&self, painter: &Painter, pane: Pane, contact: &Contact, colour: Color32) {
         const POINTS: usize = 48;
         let [a, b] = contact.region.axes;
+        // How far the surface may fall away from the tangent plane before it is another part of it.
+        let near = 2e-3 + 0.4 * contact.region.radius.min(0.02);
         let on_surface = |k: usize| {
             let (sin, cos) = (std::f64::consts::TAU * k as f64 / POINTS as f64).sin_cos();
-            let (at, _) = self
-                .view
-                .index
-                .nearest(contact.position + a * cos + b * sin);
-            self.view.place_in(pane, self.document.part.point(at))
+            let place = contact.position + a * cos + b * sin;
+            let (at, away) = self.view.index.nearest(place);
+            let shown = (away < near).then(|| self.document.part.point(at))?;
+            self.view.place_in(pane, shown)
         };
-        let points: Option<Vec<egui::Pos2>> = (0..POINTS).map(on_surface).collect();
-        if let Some(points) = points {
-            painter.add(Shape::closed_line(
-                points.clone(),
-                Stroke::new(3.0, Color32::from_black_alpha(120)),
-            ));
-            painter.add(Shape::closed_line(points, Stroke::new(1.5, colour)));
+        let points: Vec<Option<egui::Pos2>> = (0..=POINTS).map(on_surface).collect();
+        // Where the surface has an edge or a slot, the outline has a gap.
+        let longest = 0.35 * self.view.rect_of(pane).height();
+        for (width, colour) in [(3.5, Color32::from_black_alpha(140)), (1.5, colour)] {
+            for pair in points.windows(2) {
+                if let [Some(from), Some(to)] = *pair
+                    && from.distance(to) < longest
+                {
+                    painter.line_segment([from, to], Stroke::new(width, colour));
+                }
+            }
         }
     }
 
