@@ -205,7 +205,7 @@ impl SimulatedBoard {
         );
         self.sequence = self.sequence.wrapping_add(1);
         let data = matches!(message, Message::Data(_));
-        self.faults.spoil(frame, data, &mut self.rng, out);
+        self.faults.spoil(&frame, data, &mut self.rng, out);
     }
 
     /// All channels at a time: strain, gain, noise, drift, offset, quantization, clipping.

@@ -120,23 +120,17 @@ impl Faults {
     }
 
     /// Sends a frame as a bad line would.
-    pub(super) fn spoil(
-        &self,
-        frame: Vec<u8>,
-        data: bool,
-        rng: &mut ChaCha8Rng,
-        out: &mut Vec<u8>,
-    ) {
+    pub(super) fn spoil(&self, frame: &[u8], data: bool, rng: &mut ChaCha8Rng, out: &mut Vec<u8>) {
         if data && self.lose > 0.0 && rng.random::<f64>() < self.lose {
             return;
         }
         let twice = data && self.duplicate > 0.0 && rng.random::<f64>() < self.duplicate;
         for _ in 0..=usize::from(twice) {
             if self.flip == 0.0 && self.drop == 0.0 {
-                out.extend_from_slice(&frame);
+                out.extend_from_slice(frame);
                 continue;
             }
-            for &byte in &frame {
+            for &byte in frame {
                 if rng.random::<f64>() < self.drop {
                     continue;
                 }

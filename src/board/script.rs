@@ -19,7 +19,7 @@ pub struct Press {
 pub enum Script {
     Given(Vec<Press>),
     /// Places in the order given, again and again, with drawn forces and pauses.
-    Random(Random),
+    Random(Box<Random>),
 }
 
 /// Presses without end.
@@ -56,7 +56,7 @@ impl Script {
             number: 0,
         };
         random.draw(FIRST_S);
-        Self::Random(random)
+        Self::Random(Box::new(random))
     }
 
     /// The press that is on at a time, by its number, with its force at that moment. Times must not fall.

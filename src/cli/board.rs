@@ -82,7 +82,8 @@ pub struct BoardArgs {
 /// A message in the user's terms.
 pub fn run(args: &BoardArgs) -> anyhow::Result<()> {
     if !args.simulate {
-        return list(args.common.json);
+        list(args.common.json);
+        return Ok(());
     }
     let loaded = args.common.load()?;
     let bar = Bar::default();
@@ -112,7 +113,7 @@ pub fn run(args: &BoardArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn list(as_json: bool) -> anyhow::Result<()> {
+fn list(as_json: bool) {
     let all = ports();
     for port in &all {
         if as_json {
@@ -132,10 +133,10 @@ fn list(as_json: bool) -> anyhow::Result<()> {
     if all.is_empty() {
         eprintln!("There is no serial port. `hapdef board --simulate` starts a simulated board.");
     }
-    Ok(())
 }
 
 #[cfg(unix)]
+#[allow(clippy::unnecessary_wraps, reason = "elsewhere it may fail")]
 fn doorway(args: &BoardArgs) -> anyhow::Result<Doorway> {
     Ok(args.tcp.clone().map_or(Doorway::Terminal, Doorway::Socket))
 }

@@ -36,7 +36,7 @@ impl Default for Chain {
 }
 
 impl Chain {
-    /// Counts per strain: V_ex · GF · n/4 · G · 2^bits / V_ref.
+    /// Counts per strain: `V_ex` · GF · n/4 · G · 2^bits / `V_ref`.
     #[must_use]
     pub fn counts_per_strain(&self) -> f64 {
         let volts =

@@ -173,6 +173,7 @@ impl Matching {
 
     /// As [`Self::find`] for a touch that goes on: from the place where it was, without looking everywhere.
     /// Nothing where that does not explain the reading, or not clearly.
+    #[must_use]
     pub fn track(&self, reading: &[f64], last: &Contact) -> Option<Contact> {
         let weights = self.errors.weights(reading, &self.used);
         let squares = reading.iter().zip(&weights).map(|(x, w)| w * x * x).sum();
@@ -183,7 +184,9 @@ impl Matching {
         };
         let mode = self.follow(&measured, self.map.index.nearest(last.position).0);
         let broad = BROAD * self.map.spacing();
-        let explained = 2.0 * mode.cost <= 2.0 * last.unexplained + 3.0 * self.used.len() as f64;
+        // Noise alone makes them differ by a few deviations of χ².
+        let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
+        let explained = 2.0 * mode.cost <= last.unexplained + differs;
         (explained && widest(mode.covariance) <= broad * broad).then(|| {
             let region = Region::of_normal(mode.covariance, mode.plane);
             self.contact(

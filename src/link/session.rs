@@ -199,7 +199,7 @@ impl Listener {
             match port.read(&mut buffer) {
                 Got::Gone => return,
                 Got::Nothing if live && heard.elapsed() > SILENCE => {
-                    self.enter(State::Silent, tell)
+                    self.enter(State::Silent, tell);
                 }
                 Got::Nothing => {}
                 Got::Bytes(count) => {

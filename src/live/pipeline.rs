@@ -65,7 +65,7 @@ impl Settings {
             relative: UNCALIBRATED,
             least_noise: 0.3e-6,
             most_force: 60.0,
-            drift_s: Some(20.0),
+            drift_s: Some(3.0),
             tare_s: 0.5,
         }
     }
@@ -118,6 +118,8 @@ const ENDS: u32 = 6;
 /// Samples between two searches everywhere, and seconds between two looks at who felt a touch.
 const SEARCH_EVERY: u32 = 20;
 const LOOK_S: f64 = 0.08;
+/// A touch of which so much is left unexplained, over what it explains, is none.
+const DOUBTFUL: f64 = 0.5;
 /// A sample rate until it is known (Hz).
 const RATE: f64 = 1000.0;
 
@@ -249,8 +251,7 @@ impl Pipeline {
 
     /// Takes what is read from now on for rest.
     pub fn tare(&mut self) {
-        let samples = (self.settings.tare_s * self.rate).clamp(8.0, 1e5);
-        self.taring = Some(Taring::over(samples as usize));
+        self.taring = Some(Taring::over(self.settings.tare_s));
         self.end_touch();
     }
 
@@ -299,7 +300,7 @@ impl Pipeline {
         };
         self.watch(&counts);
         if let Some(taring) = &mut self.taring {
-            if let Some(rest) = taring.push(&counts) {
+            if let Some(rest) = taring.push(sample.time_us, &counts) {
                 self.take_rest(rest);
             }
             return nothing;
@@ -317,8 +318,10 @@ impl Pipeline {
             *used = health.is_good();
         }
         self.feel(&strain);
-        let contact = self.touching.then(|| self.find(&strain));
-        self.last = contact;
+        let found = self.touching.then(|| self.find(&strain));
+        self.last = found;
+        // What no touch explains is a drift, and the rest follows it.
+        let contact = found.filter(|c| c.unexplained < DOUBTFUL * c.strength);
         let guesses = if contact.is_some() {
             self.guess(&strain)
         } else {
@@ -326,7 +329,7 @@ impl Pipeline {
         };
         if contact.is_some() {
             self.look(sample.time_us, &strain);
-        } else {
+        } else if found.is_some() || self.above == 0 {
             self.follow_drift(&counts, step_s);
         }
         Update {
@@ -495,9 +498,7 @@ impl Pipeline {
     }
 
     fn follow_drift(&mut self, counts: &[f64], step_s: f64) {
-        if let (Some(drift_s), Some(rest)) = (self.settings.drift_s, &mut self.rest)
-            && self.above == 0
-        {
+        if let (Some(drift_s), Some(rest)) = (self.settings.drift_s, &mut self.rest) {
             rest.follow(counts, (step_s / drift_s).min(0.1));
         }
     }

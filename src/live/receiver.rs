@@ -176,9 +176,8 @@ mod tests {
 
     #[test]
     fn lines_are_found_by_themselves() {
-        let text: String = (0..10)
-            .map(|k| format!("{k},{},{}\r\n", 2 * k, 3 * k))
-            .collect();
+        let row = |text: String, k: u32| text + &format!("{k},{},{}\r\n", 2 * k, 3 * k);
+        let text = (0..10).fold(String::new(), row);
         let (all, traffic) = inputs(format!("booting\nok\n{text}").as_bytes());
         assert_eq!(traffic.samples, 7);
         let first = Sample {

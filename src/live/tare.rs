@@ -10,23 +10,33 @@ pub struct Rest {
 /// Gathers samples at rest.
 #[derive(Clone, Debug)]
 pub struct Taring {
-    wanted: usize,
+    seconds: f64,
+    begun_us: Option<u64>,
     rows: Vec<Vec<f64>>,
 }
 
+/// Fewer samples say nothing of the noise, and more are not needed.
+const FEWEST: usize = 12;
+const MOST: usize = 100_000;
+
 impl Taring {
+    /// For so many seconds of the samples' own time.
     #[must_use]
-    pub fn over(samples: usize) -> Self {
+    pub fn over(seconds: f64) -> Self {
         Self {
-            wanted: samples.max(2),
+            seconds,
+            begun_us: None,
             rows: Vec::new(),
         }
     }
 
     /// Takes a sample in; the rest when there are enough.
-    pub fn push(&mut self, counts: &[f64]) -> Option<Rest> {
+    pub fn push(&mut self, time_us: u64, counts: &[f64]) -> Option<Rest> {
+        let begun = *self.begun_us.get_or_insert(time_us);
         self.rows.push(counts.to_vec());
-        (self.rows.len() >= self.wanted).then(|| rest(&self.rows))
+        let lasted = time_us.abs_diff(begun) as f64 * 1e-6 >= self.seconds;
+        let enough = lasted && self.rows.len() >= FEWEST;
+        (enough || self.rows.len() >= MOST).then(|| rest(&self.rows))
     }
 }
 
@@ -76,12 +86,15 @@ mod tests {
 
     #[test]
     fn rest_is_found_among_wild_samples_and_drift() {
-        let mut taring = Taring::over(400);
+        let mut taring = Taring::over(0.399);
         let mut rest = None;
         for k in 0..400_u32 {
             let noise = f64::from((k * 7919) % 13) - 6.0;
             let wild = if k % 97 == 5 { 3000.0 } else { 0.0 };
-            rest = taring.push(&[100.0 + noise, 50.0 + 0.05 * f64::from(k), 7.0 + wild]);
+            rest = taring.push(
+                1000 * u64::from(k),
+                &[100.0 + noise, 50.0 + 0.05 * f64::from(k), 7.0 + wild],
+            );
         }
         let rest = rest.unwrap();
         assert!((rest.level[0] - 100.0).abs() < 0.2, "{rest:?}");

@@ -46,7 +46,7 @@ impl Default for LiveKeys {
             active_arms: chain.active_arms,
             model_error: UNCALIBRATED,
             largest_force_n: 60.0,
-            drift_s: 20.0,
+            drift_s: 3.0,
             glued: Vec::new(),
         }
     }

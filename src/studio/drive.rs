@@ -36,7 +36,7 @@ pub(super) enum Finished {
     Pictured(PathBuf),
     Saved(Box<saving::Saved>),
     Opened(Box<opening::Opened>),
-    Live(super::live::Brought),
+    Live(Box<super::live::Brought>),
 }
 
 /// The last results of a quality.
@@ -351,7 +351,7 @@ impl Studio {
             }
             Finished::Opened(opened) => self.take_opened(*opened),
             Finished::Saved(saved) => self.take_saved(*saved),
-            Finished::Live(brought) => self.take_live(ctx, brought, key),
+            Finished::Live(brought) => self.take_live(ctx, *brought, key),
             Finished::Estimate(mm) if key == self.by_hand_key() => {
                 self.by_hand.estimate = Some(mm);
             }

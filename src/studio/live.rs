@@ -51,7 +51,7 @@ pub(super) struct Live {
     known: Vec<Known>,
     known_force: f64,
     gathering: known::Gathering,
-    trained: Option<(Vec<bool>, [Option<Arc<Trained>>; 2])>,
+    trained: Option<(Vec<bool>, Pair)>,
     /// For which gauges training was begun.
     training_for: Option<Vec<bool>>,
     forces: [f64; 2],
@@ -84,11 +84,14 @@ impl Default for Live {
     }
 }
 
+/// The trained estimators: normalized, raw.
+type Pair = [Option<Arc<Trained>>; 2];
+
 /// What jobs of the live stage bring.
 pub(super) enum Brought {
     Sensing(Arc<Sensing>),
-    Board(Arc<Sensing>, Mutex<Option<SimulatedBoard>>),
-    Trained(Vec<bool>, [Option<Arc<Trained>>; 2]),
+    Board(Arc<Sensing>, Box<Mutex<Option<SimulatedBoard>>>),
+    Trained(Vec<bool>, Pair),
     Calibrated(Calibration),
 }
 
@@ -209,8 +212,8 @@ impl Studio {
                 let watch = |p| r.report(p);
                 let sensing =
                     design::sense(&inputs, &budget, &watch).map_err(|e| super::drive::stop(&e))?;
-                Ok(super::drive::Finished::Live(Brought::Sensing(Arc::new(
-                    sensing,
+                Ok(super::drive::Finished::Live(Box::new(Brought::Sensing(
+                    Arc::new(sensing),
                 ))))
             });
     }
@@ -240,8 +243,10 @@ impl Studio {
                     Faults::default(),
                     &watch,
                 );
-                let made = Mutex::new(Some(made.map_err(stop)?));
-                Ok(super::drive::Finished::Live(Brought::Board(sensing, made)))
+                let made = Box::new(Mutex::new(Some(made.map_err(stop)?)));
+                Ok(super::drive::Finished::Live(Box::new(Brought::Board(
+                    sensing, made,
+                ))))
             });
     }
 
@@ -404,9 +409,9 @@ impl Studio {
                 let watch = |p| r.report(p);
                 let trained = train(&sensing, &inputs, &used, noise, count, &watch)
                     .map_err(|e| super::drive::stop(&e))?;
-                Ok(super::drive::Finished::Live(Brought::Trained(
+                Ok(super::drive::Finished::Live(Box::new(Brought::Trained(
                     used, trained,
-                )))
+                ))))
             });
     }
 

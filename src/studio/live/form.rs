@@ -287,7 +287,7 @@ impl Studio {
                 .join(format!("touches-{n}.{}", crate::link::ENDING))
                 .exists()
         };
-        let number = (1..).find(free).unwrap_or(1);
+        let number = (1..10_000).find(free).unwrap_or(1);
         folder.join(format!("touches-{number}.{}", crate::link::ENDING))
     }
 

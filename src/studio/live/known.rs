@@ -168,7 +168,7 @@ impl Studio {
         self.jobs
             .start(ctx, Task::Calibrate, self.sensing_key(), move |_| {
                 let found = calibrate(&sensing.drawn, &known, &noise);
-                Ok(Finished::Live(Brought::Calibrated(found)))
+                Ok(Finished::Live(Box::new(Brought::Calibrated(found))))
             });
     }
 

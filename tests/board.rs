@@ -1,0 +1,351 @@
+//! The real program at real ports: a simulated board, and boards that speak in lines, garbage and floods.
+#![cfg(unix)]
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use hapdef::wire::{Decoder, Event, Message, encode};
+use serde_json::Value;
+
+/// A program that ends with the test.
+struct Running {
+    child: Child,
+    out: Receiver<String>,
+    err: Receiver<String>,
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn lines(source: impl Read + Send + 'static) -> Receiver<String> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        for line in BufReader::new(source).lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
+fn start(args: &[&str]) -> Running {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_hapdef"))
+        .args(args)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let out = lines(child.stdout.take().unwrap());
+    let err = lines(child.stderr.take().unwrap());
+    Running { child, out, err }
+}
+
+impl Running {
+    fn line(&self) -> String {
+        self.out
+            .recv_timeout(Duration::from_secs(60))
+            .expect("a line")
+    }
+
+    fn json(&self) -> Value {
+        serde_json::from_str(&self.line()).unwrap()
+    }
+
+    /// Waits until it says something on stderr.
+    fn says(&self, what: &str) {
+        let begun = Instant::now();
+        while begun.elapsed() < Duration::from_secs(60) {
+            if self
+                .err
+                .recv_timeout(Duration::from_secs(60))
+                .expect(what)
+                .contains(what)
+            {
+                return;
+            }
+        }
+        panic!("it never said “{what}”");
+    }
+}
+
+fn board(more: &[&str]) -> (Running, String) {
+    let args = [&["board", "--simulate", "--quality", "draft"], more].concat();
+    let running = start(&args);
+    let first = running.json();
+    let port = first["port"].as_str().unwrap().to_owned();
+    (running, port)
+}
+
+fn listen(port: &str, more: &[&str]) -> Running {
+    start(&[&["listen", port, "--quality", "draft"], more].concat())
+}
+
+#[test]
+fn a_simulated_board_speaks_the_protocol() {
+    let (_board, port) = board(&[
+        "--tcp",
+        "--channels",
+        "12",
+        "--rate",
+        "500",
+        "--truth",
+        "/dev/null",
+    ]);
+    let mut stream = TcpStream::connect(&port).unwrap();
+    stream
+        .set_read_timeout(Some(Duration::from_millis(50)))
+        .unwrap();
+    let mut decoder = Decoder::default();
+    let mut bytes = Vec::new();
+    encode(&Message::AskHello, 0, 0, 12, &mut bytes);
+    encode(&Message::Ping(77), 1, 0, 12, &mut bytes);
+    encode(&Message::Start, 2, 0, 12, &mut bytes);
+    stream.write_all(&bytes).unwrap();
+    let (mut hello, mut pong, mut times) = (None, None, Vec::new());
+    let begun = Instant::now();
+    let mut buffer = [0; 4096];
+    while times.len() < 300 && begun.elapsed() < Duration::from_secs(20) {
+        let Ok(count) = stream.read(&mut buffer) else {
+            continue;
+        };
+        decoder.push(&buffer[..count], |event| match event {
+            Event::Message {
+                message: Message::Hello(h),
+                ..
+            } => hello = Some(h),
+            Event::Message {
+                message: Message::Pong(p),
+                ..
+            } => pong = Some(p),
+            Event::Message {
+                message: Message::Data(counts),
+                time_us,
+                ..
+            } => {
+                assert!(counts.len() == 12 && counts.iter().all(|c| *c < 4096));
+                times.push(time_us);
+            }
+            Event::Message { .. } => {}
+            other => panic!("{other:?}"),
+        });
+    }
+    let hello = hello.unwrap();
+    assert_eq!(
+        (hello.channels, hello.bits, hello.rate_hz, pong),
+        (12, 12, 500, Some(77))
+    );
+    assert!(
+        times.windows(2).all(|w| w[1] - w[0] == 2000),
+        "{:?}",
+        &times[..5]
+    );
+}
+
+/// Scripted touches at known places, gauges exactly as drawn: each is found where it is, and nothing between them.
+#[test]
+fn touches_are_found_where_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = folder.path().join("touches.csv");
+    let truth = folder.path().join("truth.csv");
+    std::fs::write(
+        &script,
+        "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n3,1,22.5,22.5,60,8\n5,1,-22.5,22.5,40,12\n7,1,22.5,-22.5,80,6\n",
+    )
+    .unwrap();
+    let (script, truth) = (script.to_str().unwrap(), truth.to_str().unwrap());
+    let (_board, port) = board(&["--workshop", "exact", "--script", script, "--truth", truth]);
+    let listening = listen(&port, &["--every", "200"]);
+    let mut found: Vec<Value> = Vec::new();
+    loop {
+        let line = listening.json();
+        let keys: Vec<&String> = line.as_object().unwrap().keys().collect();
+        assert_eq!(
+            keys,
+            [
+                "channels_ok",
+                "force_n",
+                "t_us",
+                "uncertainty_mm",
+                "x_mm",
+                "y_mm",
+                "z_mm"
+            ]
+        );
+        let time = line["t_us"].as_u64().unwrap();
+        found.push(line);
+        if time > 8_500_000 {
+            break;
+        }
+    }
+    let rows: Vec<Vec<f64>> = std::fs::read_to_string(truth)
+        .unwrap()
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').filter_map(|w| w.parse().ok()).collect())
+        .collect();
+    let at = |time: u64| rows.iter().find(|r| r.first() == Some(&(time as f64)));
+    let (mut pressed, mut quiet, mut errors) = (0, 0, Vec::new());
+    for line in &found {
+        let Some(row) = at(line["t_us"].as_u64().unwrap()) else {
+            continue;
+        };
+        let value = |key: &str| line[key].as_f64();
+        match (row.len(), value("x_mm")) {
+            (5, Some(x)) if row[4] > 3.0 => {
+                let off = (x - row[1])
+                    .hypot(value("y_mm").unwrap() - row[2])
+                    .hypot(value("z_mm").unwrap() - row[3]);
+                let sure = value("uncertainty_mm").unwrap();
+                assert!(off < 2.0 * sure, "{off} mm off: {line} {row:?}");
+                assert!(
+                    (value("force_n").unwrap() - row[4]).abs() < 0.25 * row[4],
+                    "{line} {row:?}"
+                );
+                errors.push(off);
+                pressed += 1;
+            }
+            (5, None) if row[4] > 3.0 => panic!("not felt: {line} {row:?}"),
+            (1, None) => quiet += 1,
+            // A few samples of patience at the end of a touch.
+            _ => {}
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    let median = errors[errors.len() / 2];
+    assert!(
+        pressed > 300 && quiet > 300 && median < 4.0,
+        "{pressed} {quiet} {median} mm"
+    );
+}
+
+#[test]
+fn an_unplugged_board_is_found_again() {
+    let (_board, port) = board(&["--fault", "unplug@4+1", "--flip", "1e-4", "--drop", "1e-4"]);
+    let listening = listen(&port, &["--every", "100"]);
+    listening.says("live");
+    listening.says("unplugged");
+    listening.says("live");
+    let before = listening.json()["t_us"].as_u64().unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    let last = listening
+        .out
+        .try_iter()
+        .last()
+        .map(|l| serde_json::from_str::<Value>(&l).unwrap());
+    assert!(last.unwrap()["t_us"].as_u64().unwrap() > before);
+}
+
+/// A recording outlives the program that is killed while it writes it, and says the same each time.
+#[test]
+fn a_recording_survives_a_kill() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("killed.hapdrec");
+    let (_board, port) = board(&["--tcp"]);
+    let mut listening = listen(
+        &port,
+        &["--every", "50", "--record", file.to_str().unwrap()],
+    );
+    let end = Instant::now() + Duration::from_secs(6);
+    listening.says("live");
+    while Instant::now() < end {
+        listening.line();
+    }
+    listening.child.kill().unwrap();
+    let table = |name: &str| {
+        let csv = folder.path().join(name);
+        let replay = listen(
+            file.to_str().unwrap(),
+            &["--fast", "--csv", csv.to_str().unwrap()],
+        );
+        replay.says("the recording is over");
+        let lines: Vec<String> = replay.out.iter().collect();
+        (lines, std::fs::read_to_string(csv).unwrap())
+    };
+    let (first, csv) = table("a.csv");
+    let (second, again) = table("b.csv");
+    assert!(first.len() > 2000, "{}", first.len());
+    assert_eq!(first, second);
+    assert_eq!(csv, again);
+    assert_eq!(csv.lines().count(), first.len() + 1);
+    assert!(csv.starts_with("t_us,count_0,count_1,"));
+    // Nothing is written over.
+    let refused = listen(
+        &port,
+        &["--record", file.to_str().unwrap(), "--seconds", "2"],
+    );
+    refused.says("already");
+}
+
+/// A board of another kind: what it sends, to whoever connects.
+fn other_board(send: impl Fn(&mut TcpStream) -> std::io::Result<()> + Send + 'static) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            let _ = send(&mut stream.unwrap());
+        }
+    });
+    address
+}
+
+#[test]
+fn plain_lines_are_understood_behind_any_garbage() {
+    let address = other_board(|stream| {
+        let noise: Vec<u8> = (0..3_000_000_u32)
+            .map(|k| (k.wrapping_mul(2_654_435_761) >> 13) as u8)
+            .collect();
+        stream.write_all(&noise)?;
+        stream.write_all(b"\r\nHello from a sketch\r\n")?;
+        for k in 0..u32::MAX {
+            let row: Vec<String> = (0..10)
+                .map(|c| (2000 + c + (k * 7 + c * 3) % 5).to_string())
+                .collect();
+            stream.write_all(format!("{}\r\n", row.join(",")).as_bytes())?;
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        Ok(())
+    });
+    let listening = listen(&address, &[]);
+    listening.says("live");
+    let mut good = 0;
+    for _ in 0..500 {
+        let line = listening.json();
+        assert!(line["x_mm"].is_null(), "nothing touches: {line}");
+        good = good.max(line["channels_ok"].as_u64().unwrap());
+    }
+    assert_eq!(good, 10);
+}
+
+#[test]
+fn what_is_no_board_is_said() {
+    let refused = |args: &[&str], said: &str| {
+        let running = start(args);
+        running.says(said);
+    };
+    refused(
+        &["listen", "/dev/no-such-port", "--quality", "draft"],
+        "plug the board in",
+    );
+    refused(
+        &["listen", "127.0.0.1:1", "--quality", "draft"],
+        "does not answer",
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let empty = folder.path().join("empty.hapdrec");
+    std::fs::write(&empty, b"no recording").unwrap();
+    refused(
+        &["listen", empty.to_str().unwrap(), "--quality", "draft"],
+        "no recording",
+    );
+    refused(&["board", "--simulate", "--fault", "deaf:3"], "is no fault");
+    assert!(!Path::new("/dev/no-such-port").exists());
+}
