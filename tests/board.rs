@@ -52,7 +52,7 @@ fn start(args: &[&str]) -> Running {
 impl Running {
     fn line(&self) -> String {
         self.out
-            .recv_timeout(Duration::from_secs(60))
+            .recv_timeout(Duration::from_mins(1))
             .expect("a line")
     }
 
@@ -63,10 +63,10 @@ impl Running {
     /// Waits until it says something on stderr.
     fn says(&self, what: &str) {
         let begun = Instant::now();
-        while begun.elapsed() < Duration::from_secs(60) {
+        while begun.elapsed() < Duration::from_mins(1) {
             if self
                 .err
-                .recv_timeout(Duration::from_secs(60))
+                .recv_timeout(Duration::from_mins(1))
                 .expect(what)
                 .contains(what)
             {

@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 
 use clap::Args;
-use serde_json::json;
 
 use super::{Common, progress::Bar};
 use crate::design;
@@ -203,7 +202,7 @@ impl Output {
             return true;
         }
         self.last_us = Some(update.time_us);
-        let line = line(update).to_string();
+        let line = line(update);
         if let Some((listener, clients)) = &mut self.served {
             while let Ok((client, _)) = listener.accept() {
                 let _ = client.set_nonblocking(true);
@@ -256,17 +255,22 @@ impl Output {
 }
 
 /// One sample as JSON: nulls where nothing touches. `uncertainty_mm` is the radius within which the touch lies
-/// with a probability of 90 %.
-fn line(update: &Update) -> serde_json::Value {
-    let round = |v: f64, digits: i32| (v * 10f64.powi(digits)).round() / 10f64.powi(digits);
-    let p = update.contact.map(|c| c.position * 1e3);
-    json!({
-        "t_us": update.time_us,
-        "x_mm": p.map(|p| round(p.x, 3)),
-        "y_mm": p.map(|p| round(p.y, 3)),
-        "z_mm": p.map(|p| round(p.z, 3)),
-        "force_n": update.contact.map(|c| round(c.force, 4)),
-        "uncertainty_mm": update.contact.map(|c| round(c.region.radius * 1e3, 3)),
-        "channels_ok": update.good,
-    })
+/// with a probability of 90 %. Written by hand, because a thousand of them come in a second.
+fn line(update: &Update) -> String {
+    let time = update.time_us;
+    let good = update.good;
+    let Some(c) = update.contact else {
+        return format!(
+            "{{\"t_us\":{time},\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":null,\"uncertainty_mm\":null,\"channels_ok\":{good}}}"
+        );
+    };
+    let p = c.position * 1e3;
+    format!(
+        "{{\"t_us\":{time},\"x_mm\":{:.3},\"y_mm\":{:.3},\"z_mm\":{:.3},\"force_n\":{:.4},\"uncertainty_mm\":{:.3},\"channels_ok\":{good}}}",
+        p.x,
+        p.y,
+        p.z,
+        c.force,
+        c.region.radius * 1e3
+    )
 }

@@ -105,6 +105,7 @@ pub fn calibrate(drawn: &AsDrawn, known: &[Known], noise: &[f64]) -> Calibration
         fits = fit(known, &bases, &errors);
         relative = still_off(known, &bases, &fits, noise);
     }
+    // From few touches the size of the errors is itself uncertain, as is the fit: a prediction is wider.
     let weighed = Errors {
         noise: noise.to_vec(),
         relative,
@@ -112,7 +113,8 @@ pub fn calibrate(drawn: &AsDrawn, known: &[Known], noise: &[f64]) -> Calibration
     Calibration {
         glued: fits.iter().map(|f| f.glued.into()).collect(),
         deviations: fits.iter().map(|f| f.covariance[(0, 0)].sqrt()).collect(),
-        relative: relative.max(misplaced(drawn, known, &bases, &weighed)),
+        relative: relative.max(misplaced(drawn, known, &bases, &weighed))
+            * (1.0 + 4.0 / known.len() as f64).sqrt(),
         touches: known.len(),
     }
 }

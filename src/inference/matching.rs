@@ -29,6 +29,8 @@ pub struct Contact {
     pub region: Region,
     /// Twice the gain in log-likelihood over no touch at all.
     pub strength: f64,
+    /// Whether it is one narrow place, and not the mean of several or of a wide stretch.
+    pub narrow: bool,
     /// Weighted squares that no touch explains; about channels - 3 where model and noise are right.
     pub unexplained: f64,
 }
@@ -172,7 +174,7 @@ impl Matching {
     }
 
     /// As [`Self::find`] for a touch that goes on: from the place where it was, without looking everywhere.
-    /// Nothing where that does not explain the reading, or not clearly.
+    /// Nothing where that does not explain the reading any more, or no longer clearly.
     #[must_use]
     pub fn track(&self, reading: &[f64], last: &Contact) -> Option<Contact> {
         let weights = self.errors.weights(reading, &self.used);
@@ -182,20 +184,47 @@ impl Matching {
             w: &weights,
             squares,
         };
-        let mode = self.follow(&measured, self.map.index.nearest(last.position).0);
-        let broad = BROAD * self.map.spacing();
         // Noise alone makes them differ by a few deviations of χ².
         let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
-        let explained = 2.0 * mode.cost <= last.unexplained + differs;
-        (explained && widest(mode.covariance) <= broad * broad).then(|| {
+        let explained = |cost: f64| 2.0 * cost <= last.unexplained + differs;
+        let start = self.map.index.nearest(last.position).0;
+        let mode = self.follow(&measured, start);
+        let broad = BROAD * self.map.spacing();
+        (explained(mode.cost) && widest(mode.covariance) <= broad * broad).then(|| {
             let region = Region::of_normal(mode.covariance, mode.plane);
-            self.contact(
-                &measured,
-                mode.at,
-                (mode.force, mode.force_variance),
-                region,
-                mode.cost,
-            )
+            let force = (mode.force, mode.force_variance);
+            self.contact(&measured, mode.at, force, region, mode.cost, true)
+        })
+    }
+
+    /// What was found for another reading, where this one is the same but for its size and the noise of both: a
+    /// wide posterior is worth no second look then.
+    #[must_use]
+    pub fn hold(&self, reading: &[f64], before: &[f64], found: &Contact) -> Option<Contact> {
+        let channels = || {
+            (reading
+                .iter()
+                .zip(before)
+                .zip(&self.errors.noise)
+                .zip(&self.used))
+            .filter(|(_, u)| **u)
+        };
+        let (mut s, mut d) = (0.0, 0.0);
+        for (((x, y), n), _) in channels() {
+            s += x * y / (n * n);
+            d += y * y / (n * n);
+        }
+        let size = s / d;
+        let off = |(((x, y), n), _): (((&f64, &f64), &f64), &bool)| {
+            ((x - size * y) / n).powi(2) / (1.0 + size * size)
+        };
+        let differs: f64 = channels().map(off).sum();
+        let count = channels().count() as f64;
+        let same = (0.5..2.0).contains(&size) && differs < count + 3.0 * (2.0 * count).sqrt();
+        same.then_some(Contact {
+            force: (found.force * size).min(self.most_force),
+            force_deviation: found.force_deviation * size,
+            ..*found
         })
     }
 
@@ -343,6 +372,7 @@ impl Matching {
                 (best.force, best.force_variance),
                 region,
                 best.cost,
+                true,
             );
         }
         let mean = |value: &dyn Fn(&Mode) -> f64| {
@@ -354,7 +384,7 @@ impl Matching {
         let variance = mean(&|m| m.force_variance + (m.force - force).powi(2));
         let places: Vec<(DVec3, f64)> = modes.iter().flat_map(|m| spread(m, weight(m))).collect();
         let region = Region::of_places(&places, self.map.mesh.point(at), self.map.mesh.normal(at));
-        self.contact(measured, at, (force, variance), region, best.cost)
+        self.contact(measured, at, (force, variance), region, best.cost, false)
     }
 
     /// Mean, spread and region over all templates, each with the area it stands for.
@@ -386,13 +416,14 @@ impl Matching {
                 (best.force, best.force_variance),
                 region,
                 best.cost,
+                false,
             );
         }
         let at = map.index.nearest(centre / total).0;
         let force = force / total;
         let variance = (squares / total - force * force).max(0.0);
         let region = Region::of_places(&places, map.mesh.point(at), map.mesh.normal(at));
-        self.contact(measured, at, (force, variance), region, best.cost)
+        self.contact(measured, at, (force, variance), region, best.cost, false)
     }
 
     /// Mean and variance of the force at a place, and the log-likelihood with the force integrated out.
@@ -415,6 +446,7 @@ impl Matching {
         force: (f64, f64),
         region: Region,
         cost: f64,
+        narrow: bool,
     ) -> Contact {
         Contact {
             position: self.map.mesh.point(at),
@@ -423,6 +455,7 @@ impl Matching {
             force_deviation: force.1.sqrt(),
             region,
             strength: measured.squares - 2.0 * cost,
+            narrow,
             unexplained: 2.0 * cost,
         }
     }

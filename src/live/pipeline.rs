@@ -117,7 +117,7 @@ const BEGINS: u32 = 3;
 const ENDS: u32 = 6;
 /// Samples between two searches everywhere, and seconds between two looks at who felt a touch.
 const SEARCH_EVERY: u32 = 20;
-const LOOK_S: f64 = 0.08;
+const LOOK_S: f64 = 0.2;
 /// A touch of which so much is left unexplained, over what it explains, is none.
 const DOUBTFUL: f64 = 0.5;
 /// A sample rate until it is known (Hz).
@@ -143,6 +143,8 @@ pub struct Pipeline {
     touching: bool,
     searched: u32,
     last: Option<Contact>,
+    /// The reading of the last search everywhere, and what it found.
+    search: Option<(Vec<f64>, Contact)>,
     last_look: u64,
 }
 
@@ -171,6 +173,7 @@ impl Pipeline {
             touching: false,
             searched: 0,
             last: None,
+            search: None,
             last_look: 0,
         }
     }
@@ -329,7 +332,7 @@ impl Pipeline {
         };
         if contact.is_some() {
             self.look(sample.time_us, &strain);
-        } else if found.is_some() || self.above == 0 {
+        } else if self.above == 0 || found.is_some() {
             self.follow_drift(&counts, step_s);
         }
         Update {
@@ -384,12 +387,9 @@ impl Pipeline {
     }
 
     fn take_rest(&mut self, rest: Rest) {
-        let per_strain = self.settings.chain.counts_per_strain();
-        // Quantization alone is 0.29 counts.
-        let strain = |n: &f64| (n.max(0.3) / per_strain).max(self.settings.least_noise);
-        self.matching.errors.noise = rest.noise.iter().map(strain).collect();
         self.rest = Some(rest);
         self.taring = None;
+        self.take_noise();
     }
 
     /// Whether anything touches: weighted squares against χ² of the channels, with a few samples of patience.
@@ -417,15 +417,25 @@ impl Pipeline {
     }
 
     fn find(&mut self, strain: &[f64]) -> Contact {
-        let tracked = self
+        let last = self
             .last
             .filter(|_| self.searched > 0 && self.searched < SEARCH_EVERY);
-        if let Some(contact) = tracked.and_then(|last| self.matching.track(strain, &last)) {
+        let known = last.and_then(|last| {
+            if last.narrow {
+                self.matching.track(strain, &last)
+            } else {
+                let (reading, found) = self.search.as_ref()?;
+                self.matching.hold(strain, reading, found)
+            }
+        });
+        if let Some(contact) = known {
             self.searched += 1;
             return contact;
         }
         self.searched = 1;
-        self.matching.find(strain)
+        let found = self.matching.find(strain);
+        self.search = Some((strain.to_vec(), found));
+        found
     }
 
     fn guess(&self, strain: &[f64]) -> [Option<Guess>; 2] {
@@ -498,8 +508,25 @@ impl Pipeline {
     }
 
     fn follow_drift(&mut self, counts: &[f64], step_s: f64) {
-        if let (Some(drift_s), Some(rest)) = (self.settings.drift_s, &mut self.rest) {
-            rest.follow(counts, (step_s / drift_s).min(0.1));
+        /// Seconds over which noise is told.
+        const NOISE_S: f64 = 8.0;
+        let (Some(drift_s), Some(rest)) = (self.settings.drift_s, &mut self.rest) else {
+            return;
+        };
+        let shares = [drift_s, NOISE_S].map(|s| (step_s / s).min(0.1));
+        rest.follow(counts, shares, &self.matching.used);
+        self.take_noise();
+    }
+
+    /// The noise of the rest, as strain.
+    fn take_noise(&mut self) {
+        let Some(rest) = &self.rest else {
+            return;
+        };
+        let per_strain = self.settings.chain.counts_per_strain();
+        for (noise, counts) in self.matching.errors.noise.iter_mut().zip(&rest.noise) {
+            // Quantization alone is 0.29 counts.
+            *noise = (counts.max(0.3) / per_strain).max(self.settings.least_noise);
         }
     }
 }

@@ -72,10 +72,16 @@ fn spread(rows: &[Vec<f64>], channel: usize) -> f64 {
 }
 
 impl Rest {
-    /// Follows a slow drift: by the share of a time step in a time constant.
-    pub fn follow(&mut self, counts: &[f64], share: f64) {
-        for (level, count) in self.level.iter_mut().zip(counts) {
-            *level += share * (count - *level);
+    /// Follows a slow drift by a share of what channels are off, and takes what they wander for noise by
+    /// another share: what has drifted lately will go on drifting. Channels that are not `trusted` stay.
+    pub fn follow(&mut self, counts: &[f64], shares: [f64; 2], trusted: &[bool]) {
+        for (k, count) in counts.iter().enumerate().filter(|(k, _)| trusted[*k]) {
+            let off = count - self.level[k];
+            let variance = self.noise[k] * self.noise[k];
+            self.noise[k] = (variance + shares[1] * (off * off - variance))
+                .max(0.0)
+                .sqrt();
+            self.level[k] += shares[0] * off;
         }
     }
 }
