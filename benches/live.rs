@@ -350,16 +350,14 @@ impl Lab {
         let contacts: Vec<_> = samples.iter().map(|x| matching.find(x)).collect();
         let [raw, normalized] = &self.trained[0];
         let everywhere = micros(samples.len(), |k| {
-            drop(std::hint::black_box(matching.find(&samples[k])))
+            std::hint::black_box(matching.find(&samples[k]));
         });
         let tracking = micros(samples.len(), |k| {
-            drop(std::hint::black_box(
-                matching.track(&again[k], &contacts[k]),
-            ))
+            std::hint::black_box(matching.track(&again[k], &contacts[k]));
         });
         let svr = [raw, normalized].map(|t| {
             micros(samples.len(), |k| {
-                drop(std::hint::black_box(t.find(&samples[k])))
+                std::hint::black_box(t.find(&samples[k]));
             })
         });
         let _ = writeln!(

@@ -80,6 +80,7 @@ fn assembled() -> String {
         read("benches/sklearn.txt")
     );
     let _ = writeln!(text, "{}", read("benches/studio.md"));
+    let _ = writeln!(text, "{}", read("benches/live.md"));
     let _ = writeln!(
         text,
         "## Build times\n\n{}",

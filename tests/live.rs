@@ -189,6 +189,10 @@ fn replay(w: &mut Window, path: &Path, seen: &BTreeMap<u64, Update>) {
     );
 
     let ctx = w.harness.ctx.clone();
+    w.harness.state_mut().write_table(&ctx, path);
+    w.wait("the table", 60, |s| !s.busy());
+    let table = std::fs::read_to_string(path.with_extension("csv")).unwrap();
+    assert_eq!(table.lines().count(), again.len() + 1);
     w.harness
         .state_mut()
         .connect(&ctx, &path.display().to_string());

@@ -1,17 +1,19 @@
 //! `hapdef listen`: live touch without a window.
 
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::net::TcpListener;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 
+use anyhow::Context as _;
 use clap::Args;
 
 use super::{Common, progress::Bar};
 use crate::design;
 use crate::link::{Address, BAUD, Command, Heard, Listener, Pace, State};
-use crate::live::{Pipeline, Update};
+use crate::live::{Pipeline, Sample, Update};
 
 #[derive(Args, Debug, Clone)]
 pub struct ListenArgs {
@@ -110,28 +112,15 @@ fn pipeline(args: &ListenArgs) -> anyhow::Result<Pipeline> {
 /// Where lines go.
 struct Output {
     stdout: BufWriter<std::io::Stdout>,
-    csv: Option<BufWriter<std::fs::File>>,
+    csv: Option<Table>,
     served: Option<(TcpListener, Vec<std::net::TcpStream>)>,
     period_us: u64,
     last_us: Option<u64>,
-    truth: Option<(glam::DVec3, f64)>,
-    headed: bool,
 }
 
 impl Output {
     fn new(args: &ListenArgs) -> anyhow::Result<Self> {
-        let csv = match &args.csv {
-            Some(path) => {
-                let file = std::fs::File::create(path).map_err(|e| {
-                    anyhow::anyhow!(
-                        "{}: the table cannot be written there ({e})",
-                        path.display()
-                    )
-                })?;
-                Some(BufWriter::new(file))
-            }
-            None => None,
-        };
+        let csv = args.csv.as_deref().map(Table::create).transpose()?;
         let served = match &args.serve {
             Some(address) => {
                 let listener = TcpListener::bind(address)
@@ -151,8 +140,6 @@ impl Output {
             served,
             period_us,
             last_us: None,
-            truth: None,
-            headed: false,
         })
     }
 
@@ -182,12 +169,17 @@ impl Output {
                 true
             }
             Heard::Truth(touch) => {
-                self.truth = *touch;
+                if let Some(csv) = &mut self.csv {
+                    csv.truth = *touch;
+                }
                 true
             }
             Heard::Sample { sample, update, .. } => {
-                self.table(sample, update);
-                self.line(update)
+                let written = self
+                    .csv
+                    .as_mut()
+                    .is_none_or(|t| t.row(sample, update).is_ok());
+                written && self.line(update)
             }
             // Lines that wait are written as soon as nothing more is there.
             Heard::Turn { .. } => self.stdout.flush().is_ok(),
@@ -213,45 +205,93 @@ impl Output {
         }
         writeln!(self.stdout, "{line}").is_ok()
     }
+}
 
-    fn table(&mut self, sample: &crate::live::Sample, update: &Update) {
-        let Some(csv) = &mut self.csv else {
-            return;
-        };
+/// A table of samples, with the truth where a simulated board has told it.
+struct Table {
+    file: BufWriter<File>,
+    truth: Option<(glam::DVec3, f64)>,
+    headed: bool,
+}
+
+impl Table {
+    fn create(path: &Path) -> anyhow::Result<Self> {
+        let file = File::create(path)
+            .with_context(|| format!("{}: the table cannot be written there", path.display()))?;
+        Ok(Self {
+            file: BufWriter::new(file),
+            truth: None,
+            headed: false,
+        })
+    }
+
+    fn head(&mut self, channels: usize) -> std::io::Result<()> {
+        write!(self.file, "t_us")?;
+        for k in 0..channels {
+            write!(self.file, ",count_{k}")?;
+        }
+        writeln!(
+            self.file,
+            ",x_mm,y_mm,z_mm,force_n,uncertainty_mm,channels_ok,true_x_mm,true_y_mm,true_z_mm,true_force_n"
+        )
+    }
+
+    fn row(&mut self, sample: &Sample, update: &Update) -> std::io::Result<()> {
         if !self.headed {
             self.headed = true;
-            let counts: String =
-                (0..sample.counts.len()).fold(String::new(), |s, k| s + &format!("count_{k},"));
-            let _ = writeln!(
-                csv,
-                "t_us,{counts}x_mm,y_mm,z_mm,force_n,uncertainty_mm,channels_ok,true_x_mm,true_y_mm,true_z_mm,true_force_n"
-            );
+            self.head(sample.counts.len())?;
         }
-        let counts: String = sample
-            .counts
-            .iter()
-            .fold(String::new(), |s, c| s + &format!("{c},"));
-        let contact = update.contact.map_or(",,,,".into(), |c| {
-            let p = c.position * 1e3;
-            format!(
-                "{:.3},{:.3},{:.3},{:.4},{:.3}",
-                p.x,
-                p.y,
-                p.z,
-                c.force,
-                c.region.radius * 1e3
-            )
-        });
-        let truth = self.truth.map_or(",,,".into(), |(p, f)| {
-            let p = p * 1e3;
-            format!("{:.3},{:.3},{:.3},{f:.4}", p.x, p.y, p.z)
-        });
-        let _ = writeln!(
-            csv,
-            "{},{counts}{contact},{},{truth}",
-            sample.time_us, update.good
-        );
+        write!(self.file, "{}", sample.time_us)?;
+        for count in &sample.counts {
+            write!(self.file, ",{count}")?;
+        }
+        match update.contact {
+            Some(c) => {
+                let (p, radius) = (c.position * 1e3, c.region.radius * 1e3);
+                write!(
+                    self.file,
+                    ",{:.3},{:.3},{:.3},{:.4},{radius:.3}",
+                    p.x, p.y, p.z, c.force
+                )?;
+            }
+            None => write!(self.file, ",,,,,")?,
+        }
+        write!(self.file, ",{}", update.good)?;
+        match self.truth {
+            Some((p, force)) => {
+                let p = p * 1e3;
+                writeln!(self.file, ",{:.3},{:.3},{:.3},{force:.4}", p.x, p.y, p.z)
+            }
+            None => writeln!(self.file, ",,,,"),
+        }
     }
+}
+
+/// Replays a recording into a table.
+///
+/// # Errors
+/// When the one cannot be read or the other not written.
+pub fn write_table(recording: &Path, table: &Path, pipeline: Pipeline) -> anyhow::Result<()> {
+    let address = Address::Recording {
+        path: recording.to_owned(),
+        pace: Pace::Fast,
+    };
+    let mut rows = Table::create(table)?;
+    let (_commands, inbox) = channel();
+    let stop = AtomicBool::new(false);
+    let mut written = Ok(());
+    Listener::new(address, pipeline)
+        .run(&stop, &inbox, |heard| match heard {
+            Heard::Truth(touch) => rows.truth = touch,
+            Heard::Sample { sample, update, .. } if written.is_ok() => {
+                written = rows.row(sample, update);
+            }
+            _ => {}
+        })
+        .map_err(anyhow::Error::msg)?;
+    written
+        .and_then(|()| rows.file.flush())
+        .with_context(|| format!("{}: the table could not be written", table.display()))
 }
 
 /// One sample as JSON: nulls where nothing touches. `uncertainty_mm` is the radius within which the touch lies

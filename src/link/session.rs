@@ -329,7 +329,10 @@ impl Listener {
             self.record(|r| r.own("tare"));
         }
         let update = self.pipeline.push(sample);
-        self.timing.push(arrived.elapsed().as_secs_f32() * 1e6);
+        // What nobody touches is soon computed, and would hide the rest.
+        if update.contact.is_some() {
+            self.timing.push(arrived.elapsed().as_secs_f32() * 1e6);
+        }
         self.record(|r| r.sample(sample));
         if let Some(message) = self.recorder.as_mut().and_then(|r| r.failed.take()) {
             self.recorder = None;

@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn rest_is_found_among_wild_samples_and_drift() {
-        let mut taring = Taring::over(0.399);
+        let mut taring = Taring::over(0.3985);
         let mut rest = None;
         for k in 0..400_u32 {
             let noise = f64::from((k * 7919) % 13) - 6.0;

@@ -45,6 +45,10 @@ pub enum Command {
     Keep,
     Cancel,
     Follow,
+    SimulatedBoard,
+    Tare,
+    Record,
+    Disconnect,
     Pin,
     RemoveGauges,
     Nudge(Way),
@@ -87,6 +91,10 @@ impl Command {
             Self::Select => "Select gauges",
             Self::Keep => "Keep this selection",
             Self::Cancel => "Cancel all jobs",
+            Self::SimulatedBoard => "Start a simulated board",
+            Self::Tare => "Tare",
+            Self::Record => "Record",
+            Self::Disconnect => "Disconnect",
             Self::Follow => "Follow changes",
             Self::Pin => "Pin picked gauges",
             Self::RemoveGauges => "Remove picked gauges",
@@ -162,6 +170,12 @@ impl Command {
             Self::Select => "Filter, reduce, choose the gauges and judge them on unseen touches",
             Self::Keep => "Keep the gauges as they are, to compare them with others",
             Self::Cancel => "Stop whatever is being computed",
+            Self::SimulatedBoard => {
+                "Live touch without hardware: a truth of half the element size, and gauges as a workshop glues them"
+            }
+            Self::Tare => "Take what is read now for rest: nothing may touch the part",
+            Self::Record => "Begin to record the raw counts of the board, or end it",
+            Self::Disconnect => "Listen to the board no more",
             Self::Follow => "Compute anew what a change has made stale, a draft first; on or off",
             Self::Pin => "Selections must have a gauge there; pinned ones are let go",
             Self::RemoveGauges => "Take the picked gauges away",
@@ -208,6 +222,9 @@ impl Command {
             Self::Select => plain(Key::F6),
             Self::Keep => ctrl(Key::D),
             Self::Cancel => plain(Key::Escape),
+            Self::SimulatedBoard => plain(Key::F7),
+            Self::Tare => plain(Key::F8),
+            Self::Record => plain(Key::F9),
             Self::Pin => plain(Key::P),
             Self::RemoveGauges => plain(Key::Delete),
             Self::Nudge(Way::Left) => plain(Key::ArrowLeft),
@@ -243,6 +260,7 @@ impl Command {
             | Self::GrowPaint
             | Self::ShrinkPaint
             | Self::Follow
+            | Self::Disconnect
             | Self::DarkLight
             | Self::Paint(_)
             | Self::Stage(_) => None,
@@ -274,6 +292,10 @@ impl Command {
             Self::Keep,
             Self::Cancel,
             Self::Follow,
+            Self::SimulatedBoard,
+            Self::Tare,
+            Self::Record,
+            Self::Disconnect,
             Self::Pin,
             Self::RemoveGauges,
             Self::Frame,
@@ -305,6 +327,7 @@ impl Studio {
                 self.document.layer(self.view.layer).is_some()
             }
             Command::Cancel => self.busy(),
+            Command::Tare | Command::Record | Command::Disconnect => self.live.is_connected(),
             Command::Export => self.design.is_some(),
             Command::Keep => !self.document.state.project.selection.sites.is_empty(),
             Command::Pin | Command::RemoveGauges | Command::FramePicked | Command::Nudge(_) => {
@@ -371,6 +394,13 @@ impl Studio {
             Command::Select => self.select(ctx),
             Command::Keep => self.keep(),
             Command::Cancel => self.cancel(),
+            Command::SimulatedBoard => {
+                self.stage = Stage::Live;
+                self.start_simulated_board(ctx);
+            }
+            Command::Tare => self.tare(),
+            Command::Record => self.toggle_recording(),
+            Command::Disconnect => self.disconnect(),
             Command::Follow => self.drive.follow = !self.drive.follow,
             Command::Pin => self.pin_picked(),
             Command::RemoveGauges => self.remove_picked(),
@@ -548,6 +578,15 @@ impl Studio {
                     Command::Select,
                     Command::Keep,
                     Command::Cancel,
+                ] {
+                    self.button(ui, command);
+                }
+                ui.separator();
+                for command in [
+                    Command::SimulatedBoard,
+                    Command::Tare,
+                    Command::Record,
+                    Command::Disconnect,
                 ] {
                     self.button(ui, command);
                 }

@@ -33,6 +33,7 @@ pub enum Task {
     Board,
     Train,
     Calibrate,
+    Table,
 }
 
 impl Task {
@@ -57,12 +58,16 @@ impl Task {
             Self::Board => "Make a simulated board".into(),
             Self::Train => "Train the estimators".into(),
             Self::Calibrate => "Calibrate".into(),
+            Self::Table => "Write the table".into(),
         }
     }
 
     /// Whether it writes a file, and is not ended on the way.
     fn writes(self) -> bool {
-        matches!(self, Self::Export | Self::Picture | Self::Save)
+        matches!(
+            self,
+            Self::Export | Self::Picture | Self::Save | Self::Table
+        )
     }
 
     /// Whether it is over before anybody needs to hear of it.

@@ -5,7 +5,7 @@ mod form;
 mod known;
 mod shown;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use egui::Context;
@@ -55,6 +55,8 @@ pub(super) struct Live {
     /// For which gauges training was begun.
     training_for: Option<Vec<bool>>,
     forces: [f64; 2],
+    /// The last recording that was begun.
+    recorded: Option<PathBuf>,
     /// The settings that the pipeline has.
     applied: Option<LiveKeys>,
 }
@@ -79,6 +81,7 @@ impl Default for Live {
             trained: None,
             training_for: None,
             forces: [2.0, 15.0],
+            recorded: None,
             applied: None,
         }
     }
@@ -93,6 +96,7 @@ pub(super) enum Brought {
     Board(Arc<Sensing>, Box<Mutex<Option<SimulatedBoard>>>),
     Trained(Vec<bool>, Pair),
     Calibrated(Calibration),
+    Table(PathBuf),
 }
 
 impl Live {
@@ -276,6 +280,7 @@ impl Studio {
                 self.live
                     .send(Command::Do(Box::new(move |p| p.set_trained(trained, used))));
             }
+            Brought::Table(path) => self.tell(format!("The table is in {}", path.display())),
             Brought::Calibrated(calibration) => self.take_calibration(&calibration),
         }
     }
@@ -428,8 +433,29 @@ impl Studio {
         self.live.send(Command::Tare);
     }
 
+    /// Replays a recording into a table beside it.
+    pub fn write_table(&mut self, ctx: &Context, recording: &Path) {
+        let Some(sensing) = self.sensing().map(Arc::clone) else {
+            return self.complain("The table is made by the model of the gauges: connect first");
+        };
+        let live = self.document.state.project.live.clone();
+        let recording = recording.to_owned();
+        self.jobs
+            .start(ctx, Task::Table, self.sensing_key(), move |_| {
+                let settings = live.settings(sensing.gauges.len());
+                let pipeline = Pipeline::new(sensing.map_for(&live), settings);
+                let table = recording.with_extension("csv");
+                crate::cli::listen::write_table(&recording, &table, pipeline)
+                    .map_err(|e| crate::job::Stop::Failed(format!("{e:#}")))?;
+                Ok(super::drive::Finished::Live(Box::new(Brought::Table(
+                    table,
+                ))))
+            });
+    }
+
     /// Begins to record raw counts.
     pub fn record(&mut self, path: &Path) {
+        self.live.recorded = Some(path.to_owned());
         self.live.send(Command::Record(path.to_owned()));
     }
 

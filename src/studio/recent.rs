@@ -81,6 +81,10 @@ impl Studio {
 
     /// Opens a file, or asks where something would be lost or is not known.
     pub(super) fn open_or_ask(&mut self, ctx: &egui::Context, path: &Path) {
+        if path.extension().is_some_and(|e| e == crate::link::ENDING) {
+            self.stage = super::Stage::Live;
+            return self.connect(ctx, &path.display().to_string());
+        }
         let dialog = Dialog::open_dropped(path);
         if dialog.needs_unit() || self.document.is_dirty() {
             self.dialog = Some(dialog);

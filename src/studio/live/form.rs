@@ -3,7 +3,7 @@
 use egui::{ComboBox, DragValue, RichText, TextEdit, Ui};
 
 use super::super::form::{choice, number, percentage, rows};
-use super::super::{Studio, theme};
+use super::super::{Command, Studio, theme};
 use super::known::{LEAST, WANTED};
 use crate::board::{ChannelFault, Illness};
 use crate::link::{State, ports};
@@ -62,18 +62,8 @@ impl Studio {
             let port = self.live.port.clone();
             self.connect(&ctx, &port);
         }
-        ui.horizontal(|ui| {
-            let start = ui
-                .button("Start a simulated board")
-                .on_hover_text("A board that needs no hardware: its truth has elements of half the size, and gauges as a workshop glues them");
-            if start.clicked() {
-                self.start_simulated_board(&ctx);
-            }
-            let connected = self.live.is_connected();
-            if ui.add_enabled(connected, egui::Button::new("Disconnect")).clicked() {
-                self.disconnect();
-            }
-        });
+        self.button(ui, Command::SimulatedBoard);
+        self.button(ui, Command::Disconnect);
         self.state_lines(ui);
     }
 
@@ -158,12 +148,7 @@ impl Studio {
     fn connected_form(&mut self, ui: &mut Ui) {
         ui.add_space(4.0);
         ui.horizontal(|ui| {
-            let tare = ui
-                .button("Tare")
-                .on_hover_text("Take what is read now for rest: nothing may touch the part");
-            if tare.clicked() {
-                self.tare();
-            }
+            self.button(ui, Command::Tare);
             if self.live.hosted.is_some() {
                 self.faults(ui);
             }
@@ -239,25 +224,21 @@ impl Studio {
                 .hint_text("touches.hapdrec");
             ui.add(field).labelled_by(name.id);
             ui.end_row();
-            ui.label("");
-            match &recording {
-                None => {
-                    if ui
-                        .button("Record")
-                        .on_hover_text("Raw counts, appended as they come")
-                        .clicked()
-                    {
-                        let path = self.recording_path();
-                        self.record(&path);
-                    }
-                }
-                Some(_) => {
-                    if ui.button("Stop recording").clicked() {
-                        self.stop_recording();
-                    }
-                }
+        });
+        let ctx = ui.ctx().clone();
+        ui.horizontal(|ui| {
+            let name = if recording.is_some() { "Stop recording" } else { "Record" };
+            if ui.button(name).on_hover_text(Command::Record.tooltip()).clicked() {
+                self.toggle_recording();
             }
-            ui.end_row();
+            let last = self.live.recorded.clone().filter(|_| recording.is_none());
+            let table = egui::Button::new("Write a table");
+            let help = "The last recording as .csv beside it: counts, touches, and the truth of a simulated board";
+            if ui.add_enabled(last.is_some(), table).on_hover_text(help).clicked()
+                && let Some(path) = last
+            {
+                self.write_table(&ctx, &path);
+            }
         });
         if let Some(recording) = recording {
             let text = format!(
@@ -267,6 +248,16 @@ impl Studio {
                 recording.bytes as f64 / 1e3
             );
             ui.add(egui::Label::new(RichText::new(text).small()).wrap());
+        }
+    }
+
+    /// Begins to record, or ends it.
+    pub(in super::super) fn toggle_recording(&mut self) {
+        if self.live.look(|f| f.recording.is_some()) == Some(true) {
+            self.stop_recording();
+        } else {
+            let path = self.recording_path();
+            self.record(&path);
         }
     }
 
