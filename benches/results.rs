@@ -83,6 +83,11 @@ fn assembled() -> String {
     let _ = writeln!(text, "{}", read("benches/live.md"));
     let _ = writeln!(
         text,
+        "A soak with an unplug, a dead and a stuck gauge every minute, bits turned over in 1e-5 of the bytes, 1e-5 of them left out, 1e-3 of the frames twice and as many never (`cargo bench --bench live -- soak 30`):\n\n```\n{}```\n",
+        read("benches/soak.txt")
+    );
+    let _ = writeln!(
+        text,
         "## Build times\n\n{}",
         read("benches/build-times.txt")
     );

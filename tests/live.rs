@@ -16,6 +16,7 @@ use hapdef::link::{Address, BAUD, Heard, Listener, Pace, State};
 use hapdef::live::{Pipeline, Update};
 use hapdef::studio::Studio;
 
+use egui_kittest::kittest::Queryable as _;
 use window::Window;
 
 /// One look at a touch whose force stands still: what was said, and the truth.
@@ -94,9 +95,29 @@ fn a_simulated_board_from_start_to_replay() {
         w.picture().save(Path::new(&path).join("live.png")).unwrap();
     }
 
+    compare(&mut w);
     unplug(&mut w);
     let seen = record(&mut w, &folder.path().join("touches.hapdrec"));
     replay(&mut w, &folder.path().join("touches.hapdrec"), &seen);
+}
+
+/// All three estimators beside each other; the trained ones learn in the background.
+fn compare(w: &mut Window) {
+    w.harness.get_by_label("Compare all").click();
+    w.harness.get_by_label("Known touches").click();
+    w.harness.run_ok();
+    w.wait("the trained ones", 120, |s| {
+        s.live_update()
+            .is_some_and(|u| u.guesses.iter().all(Option::is_some))
+    });
+    if let Some(path) = std::env::var_os("HAPDEF_PICTURES") {
+        w.picture()
+            .save(Path::new(&path).join("live-compare.png"))
+            .unwrap();
+    }
+    w.assert_named("live");
+    w.harness.get_by_label("Compare all").click();
+    w.harness.run_ok();
 }
 
 /// Noticed within a second, and found again within two of being plugged in.

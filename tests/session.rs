@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Key, Modifiers};
-use egui_kittest::kittest::{NodeT as _, Queryable as _};
+
 use glam::DVec3;
 use hapdef::design::Design;
 use hapdef::document::Layer;
@@ -367,40 +367,15 @@ fn every_control_has_a_name() {
     for stage in Stage::ALL {
         w.harness.state_mut().stage = stage;
         w.harness.run_ok();
-        named(&w, &format!("{stage:?}"));
+        w.assert_named(&format!("{stage:?}"));
     }
     for tool in Tool::ALL {
         w.harness.state_mut().view.take(tool);
         w.harness.run_ok();
-        named(&w, &format!("{tool:?}"));
+        w.assert_named(&format!("{tool:?}"));
     }
 }
 
-fn named(w: &Window, place: &str) {
-    let controls = [
-        egui::Role::Button,
-        egui::Role::CheckBox,
-        egui::Role::ComboBox,
-        egui::Role::Slider,
-        egui::Role::SpinButton,
-        egui::Role::TextInput,
-    ];
-    let mut seen = 0;
-    for role in controls {
-        for node in w.harness.query_all_by(|n| n.role() == role) {
-            let node = node.accesskit_node();
-            seen += 1;
-            let label = node.label().or(node.value());
-            assert!(
-                label.is_some_and(|l| !l.trim().is_empty()),
-                "{place}: a {role:?} has no name"
-            );
-        }
-    }
-    assert!(seen > 20);
-}
-
-/// An idle window draws nothing, whatever is shown.
 #[test]
 fn an_idle_window_rests() {
     let Some(mut w) = Window::open() else { return };

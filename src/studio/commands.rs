@@ -500,6 +500,28 @@ impl Studio {
         }
     }
 
+    fn run_menu(&mut self, ui: &mut egui::Ui) {
+        for command in [
+            Command::Simulate,
+            Command::Select,
+            Command::Keep,
+            Command::Cancel,
+        ] {
+            self.button(ui, command);
+        }
+        ui.separator();
+        for command in [
+            Command::SimulatedBoard,
+            Command::Tare,
+            Command::Record,
+            Command::Disconnect,
+        ] {
+            self.button(ui, command);
+        }
+        ui.separator();
+        self.button(ui, Command::Follow);
+    }
+
     pub(super) fn menu(&mut self, ui: &mut egui::Ui) {
         egui::MenuBar::new().ui(ui, |ui| {
             ui.menu_button("File", |ui| {
@@ -572,27 +594,7 @@ impl Studio {
                     self.button(ui, command);
                 }
             });
-            ui.menu_button("Run", |ui| {
-                for command in [
-                    Command::Simulate,
-                    Command::Select,
-                    Command::Keep,
-                    Command::Cancel,
-                ] {
-                    self.button(ui, command);
-                }
-                ui.separator();
-                for command in [
-                    Command::SimulatedBoard,
-                    Command::Tare,
-                    Command::Record,
-                    Command::Disconnect,
-                ] {
-                    self.button(ui, command);
-                }
-                ui.separator();
-                self.button(ui, Command::Follow);
-            });
+            ui.menu_button("Run", |ui| self.run_menu(ui));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 let state = if self.document.is_dirty() {
                     "not saved"

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use eframe::egui_wgpu::wgpu;
 use egui::{Event, Modifiers, PointerButton, Pos2};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use glam::DVec3;
 use hapdef::budget::Quality;
 use hapdef::cli;
@@ -103,6 +103,31 @@ impl Window {
             std::thread::sleep(Duration::from_millis(5));
         }
         self.harness.run_ok();
+    }
+
+    /// Every control that is there has a name.
+    pub fn assert_named(&self, place: &str) {
+        let controls = [
+            egui::Role::Button,
+            egui::Role::CheckBox,
+            egui::Role::ComboBox,
+            egui::Role::Slider,
+            egui::Role::SpinButton,
+            egui::Role::TextInput,
+        ];
+        let mut seen = 0;
+        for role in controls {
+            for node in self.harness.query_all_by(|n| n.role() == role) {
+                let node = node.accesskit_node();
+                seen += 1;
+                let label = node.label().or(node.value());
+                assert!(
+                    label.is_some_and(|l| !l.trim().is_empty()),
+                    "{place}: a {role:?} has no name"
+                );
+            }
+        }
+        assert!(seen > 20);
     }
 
     pub fn picture(&mut self) -> RgbaImage {

@@ -117,7 +117,7 @@ impl Studio {
             ))
         });
         if let Some(said) = said.flatten() {
-            ui.weak(said);
+            ui.add(egui::Label::new(RichText::new(said).weak()).wrap());
         }
     }
 

@@ -192,6 +192,9 @@ impl Studio {
             ui.label(warning.map_or(words.clone(), |c| words.color(c)));
             facts(ui, &feed);
         });
+        if self.live.compare {
+            compared(ui, &feed);
+        }
         let gauges = feed.health.len();
         if gauges == 0 {
             drop(feed);
@@ -229,6 +232,30 @@ fn facts(ui: &mut Ui, feed: &Feed) {
         ui.separator();
         ui.label(fact);
     }
+}
+
+/// What every estimator says, and how far off that is where the truth is known.
+fn compared(ui: &mut Ui, feed: &Feed) {
+    ui.horizontal_wrapped(|ui| {
+        for estimator in Estimator::ALL {
+            ui.label(RichText::new("●").color(colour(estimator)));
+            let guess = feed.update.as_ref().and_then(|u| u.by(estimator));
+            let mut text = format!("{}: ", estimator.label());
+            let _ = match (guess, feed.truth) {
+                (Some(guess), Some((place, force))) => write!(
+                    text,
+                    "{:.1} N ({:+.1} N), {:.1} mm off",
+                    guess.force,
+                    guess.force - force,
+                    guess.position.distance(place) * 1e3
+                ),
+                (Some(guess), None) => write!(text, "{:.1} N", guess.force),
+                (None, _) => write!(text, "–"),
+            };
+            ui.label(text);
+            ui.separator();
+        }
+    });
 }
 
 /// One strip a gauge, in columns where there are many.
