@@ -282,7 +282,7 @@ impl Studio {
             Stage::Selection => self.selection_lines(),
             Stage::Evaluation => self.evaluation_lines(),
             Stage::Report => Vec::new(),
-            Stage::Live if self.live_standing() == Standing::Open => Vec::new(),
+            Stage::Live if self.live_standing() != Standing::Current => Vec::new(),
             Stage::Live => vec![self.live_in_words().0],
         }
     }

@@ -216,9 +216,7 @@ fn facts(ui: &mut Ui, feed: &Feed) {
     facts.push(format!("{} refused", traffic.refused));
     if let Some([half, most]) = feed.delays {
         facts.push(format!(
-            "{:.2} ms from byte to touch (99 %: {:.2} ms)",
-            half / 1e3,
-            most / 1e3
+            "{half:.0} µs from byte to touch (99 %: {most:.0} µs)"
         ));
     }
     if let Some(update) = &feed.update {
