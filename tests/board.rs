@@ -314,13 +314,22 @@ fn plain_lines_are_understood_behind_any_garbage() {
         }
         Ok(())
     });
-    let listening = listen(&address, &[]);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("lines.hapdrec");
+    let file = file.to_str().unwrap();
+    let mut listening = listen(&address, &["--record", file]);
     listening.says("live");
-    let mut good = 0;
+    let (mut good, mut seen) = (0, Vec::new());
     for _ in 0..500 {
         let line = listening.json();
         assert!(line["x_mm"].is_null(), "nothing touches: {line}");
         good = good.max(line["channels_ok"].as_u64().unwrap());
+        seen.push(line);
+    }
+    listening.child.kill().unwrap();
+    let again = listen(file, &["--fast"]);
+    for line in seen.iter().take(400) {
+        assert_eq!(&again.json(), line);
     }
     assert_eq!(good, 10);
 }

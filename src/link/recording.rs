@@ -26,6 +26,8 @@ pub struct Recorder {
     flushed: Instant,
     sequence: u16,
     bits: u8,
+    /// Whether a board has said what its samples look like; one that prints lines never does.
+    greeted: bool,
     time_us: u64,
     pub samples: u64,
     pub bytes: u64,
@@ -53,6 +55,7 @@ impl Recorder {
             flushed: Instant::now(),
             sequence: 0,
             bits: 12,
+            greeted: false,
             time_us: 0,
             samples: 0,
             bytes: 0,
@@ -78,7 +81,7 @@ impl Recorder {
 
     /// What the board says of itself; its samples have this many bits from now on.
     pub fn hello(&mut self, hello: &Hello) {
-        self.bits = hello.bits;
+        (self.bits, self.greeted) = (hello.bits, true);
         self.put(&Message::Hello(hello.clone()));
     }
 
@@ -86,7 +89,7 @@ impl Recorder {
         self.time_us = sample.time_us;
         self.samples += 1;
         let whole = |c: &f64| c.fract() == 0.0 && *c >= 0.0 && *c < f64::from(1_u32 << self.bits);
-        if sample.counts.iter().all(whole) {
+        if self.greeted && sample.counts.iter().all(whole) {
             let counts = sample.counts.iter().map(|c| *c as u32).collect();
             self.put(&Message::Data(counts));
         } else {
