@@ -236,7 +236,9 @@ fn facts(ui: &mut Ui, feed: &Feed) {
 fn compared(ui: &mut Ui, feed: &Feed) {
     ui.horizontal_wrapped(|ui| {
         for estimator in Estimator::ALL {
-            ui.label(RichText::new("●").color(colour(estimator)));
+            let (dot, _) = ui.allocate_exact_size(vec2(9.0, 9.0), egui::Sense::hover());
+            ui.painter()
+                .circle_filled(dot.center(), 4.0, colour(estimator));
             let guess = feed.update.as_ref().and_then(|u| u.by(estimator));
             let mut text = format!("{}: ", estimator.label());
             let _ = match (guess, feed.truth) {
