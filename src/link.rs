@@ -25,6 +25,19 @@ pub enum Got {
     Gone,
 }
 
+impl Got {
+    /// What a read says: a hang-up reads as nothing for ever, and a wait that was in vain is none.
+    fn of(read: std::io::Result<usize>) -> Self {
+        use std::io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
+        match read {
+            Ok(0) => Self::Gone,
+            Ok(count) => Self::Bytes(count),
+            Err(e) if matches!(e.kind(), TimedOut | WouldBlock | Interrupted) => Self::Nothing,
+            Err(_) => Self::Gone,
+        }
+    }
+}
+
 /// Somewhere that bytes come from and go to.
 pub trait Port: Send {
     /// Waits a few milliseconds at most.

@@ -27,7 +27,7 @@ fn next_touch(w: &mut Window, after: Option<DVec3>) -> (Update, DVec3, f64) {
         if let (Some((place, force)), Some(update)) = (truth, s.live_update())
             && Some(place) != after
             && (12e-3..108e-3).contains(&place.z)
-            && update.contact.is_some_and(|c| c.force > 0.9 * 0.3 * force)
+            && update.contact.is_some_and(|c| c.force > 0.25 * force)
             && force > 2.0
         {
             let mut seen = found.borrow_mut();

@@ -61,14 +61,16 @@ pub struct BoardArgs {
     /// A channel (from 0) that fails, or an unplug: `dead:7@5`, `stuck:2@3+4`, `saturated:1`, `noisy:0`, `unplug@10+1`.
     #[arg(long)]
     pub fault: Vec<String>,
-    /// Probability of a byte to have a bit turned over, and to be left out.
+    /// Probability of a byte to have a bit turned over.
     #[arg(long, default_value_t = 0.0)]
     pub flip: f64,
+    /// Probability of a byte to be left out.
     #[arg(long, default_value_t = 0.0)]
     pub drop: f64,
-    /// Probability of a frame to come twice, and never.
+    /// Probability of a frame to come twice.
     #[arg(long, default_value_t = 0.0)]
     pub duplicate: f64,
+    /// Probability of a frame to be lost.
     #[arg(long, default_value_t = 0.0)]
     pub lose: f64,
     /// Seconds after which it ends by itself.

@@ -24,6 +24,7 @@ pub struct ListenArgs {
     pub from: Option<PathBuf>,
     #[command(flatten)]
     pub common: Common,
+    /// Rate of a serial port (baud); native USB does not care.
     #[arg(long, default_value_t = BAUD)]
     pub baud: u32,
     /// Samples a second that the board is asked for.

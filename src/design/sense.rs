@@ -24,11 +24,17 @@ pub struct Sensing {
     pub sensitivity: Arc<Sensitivity>,
     /// Readings everywhere, as drawn and as they change with the way gauges are glued.
     pub drawn: Arc<AsDrawn>,
+    /// Where known touches are best pressed: evenly over the part.
+    pub proposed: Vec<Touch>,
     /// Mean edge of the elements (mm).
     pub element_mm: f64,
     ground: Ground,
     laid: Remeshed,
 }
+
+/// Known touches that are proposed.
+pub const PROPOSED: usize = 12;
+const PROPOSED_SEED: u64 = 0xca11;
 
 /// Readings of the model under touches of many forces: what the trained estimators learn from.
 pub struct Lesson {
@@ -78,10 +84,12 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
         &ResponseMap::new(&all, mesh, tip_radius, watch)?,
         gauges.len(),
     );
+    let proposed = touches_on(&drawn.map.mesh, inputs, PROPOSED, PROPOSED_SEED, true)?;
     Ok(Sensing {
         gauges,
         sensitivity: Arc::new(sensitivity),
         drawn: Arc::new(drawn),
+        proposed,
         element_mm: graded.laid.mesh.mean_edge() * 1e3,
         ground,
         laid: graded.laid,

@@ -112,13 +112,6 @@ impl Sensitivity {
         }
         strains
     }
-
-    /// The outward normal and the nearest point of the surface to a place (m).
-    #[must_use]
-    pub fn nearest(&self, place: DVec3) -> (DVec3, DVec3) {
-        let (at, _) = self.index.nearest(place);
-        (self.mesh.point(at), self.mesh.normal(at))
-    }
 }
 
 /// Mean strain over each gauge's grid, as rows over solved blocks.

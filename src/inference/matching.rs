@@ -190,11 +190,8 @@ impl Matching {
         let start = self.map.index.nearest(last.position).0;
         let mode = self.follow(&measured, start);
         let broad = BROAD * self.map.spacing();
-        (explained(mode.cost) && widest(mode.covariance) <= broad * broad).then(|| {
-            let region = Region::of_normal(mode.covariance, mode.plane);
-            let force = (mode.force, mode.force_variance);
-            self.contact(&measured, mode.at, force, region, mode.cost, true)
-        })
+        (explained(mode.cost) && widest(mode.covariance) <= broad * broad)
+            .then(|| self.contact_at(&measured, &mode, true))
     }
 
     /// What was found for another reading, where this one is the same but for its size and the noise of both: a
@@ -359,21 +356,20 @@ impl Matching {
         }
     }
 
+    /// A mode alone, with its normal distribution.
+    fn contact_at(&self, measured: &Measured, mode: &Mode, narrow: bool) -> Contact {
+        let region = Region::of_normal(mode.covariance, mode.plane);
+        let force = (mode.force, mode.force_variance);
+        self.contact(measured, mode.at, force, region, mode.cost, narrow)
+    }
+
     /// Where one narrow place is far likelier than all others, that one; otherwise their mean.
     fn mean_of_modes(&self, measured: &Measured, modes: &[Mode]) -> Contact {
         let best = modes[0];
         let weight = |m: &Mode| (m.log_evidence - best.log_evidence).exp();
         let total: f64 = modes.iter().map(weight).sum();
         if 1.0 / total >= CLEAR {
-            let region = Region::of_normal(best.covariance, best.plane);
-            return self.contact(
-                measured,
-                best.at,
-                (best.force, best.force_variance),
-                region,
-                best.cost,
-                true,
-            );
+            return self.contact_at(measured, &best, true);
         }
         let mean = |value: &dyn Fn(&Mode) -> f64| {
             modes.iter().map(|m| weight(m) * value(m)).sum::<f64>() / total
@@ -409,15 +405,7 @@ impl Matching {
             squares += weight * (mean * mean + variance);
         }
         if total <= 0.0 {
-            let region = Region::of_normal(best.covariance, best.plane);
-            return self.contact(
-                measured,
-                best.at,
-                (best.force, best.force_variance),
-                region,
-                best.cost,
-                false,
-            );
+            return self.contact_at(measured, best, false);
         }
         let at = map.index.nearest(centre / total).0;
         let force = force / total;

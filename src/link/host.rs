@@ -184,7 +184,9 @@ impl Door for SocketDoor {
     }
 
     fn unplug(&mut self) {
-        (self.client, self.listener) = (None, None);
+        // The listener first: one who comes back at once must not be let in by what is about to go.
+        self.listener = None;
+        self.client = None;
     }
 
     fn plug(&mut self) {

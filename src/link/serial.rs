@@ -93,20 +93,7 @@ pub(super) fn open(path: &str, baud: u32) -> Result<Box<dyn Port>, String> {
 
 impl Port for Serial {
     fn read(&mut self, buffer: &mut [u8]) -> Got {
-        match self.0.read(buffer) {
-            // A hang-up reads as nothing for ever.
-            Ok(0) => Got::Gone,
-            Ok(count) => Got::Bytes(count),
-            Err(e)
-                if matches!(
-                    e.kind(),
-                    ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
-                ) =>
-            {
-                Got::Nothing
-            }
-            Err(_) => Got::Gone,
-        }
+        Got::of(self.0.read(buffer))
     }
 
     fn write(&mut self, bytes: &[u8]) {

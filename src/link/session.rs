@@ -270,6 +270,10 @@ impl Listener {
     /// A recording can be replayed on its own: it begins with the board and its rest.
     fn begin_recording(&mut self) {
         self.pipeline.begin_anew();
+        let taring = self.pipeline.is_taring();
+        if taring {
+            self.pipeline.tare();
+        }
         if let (Some(recorder), Some(hello)) = (&mut self.recorder, &self.hello) {
             recorder.hello(hello);
         }
@@ -278,6 +282,9 @@ impl Listener {
         }
         let dead: Vec<usize> = self.pipeline.dead().collect();
         self.record(|r| {
+            if taring {
+                r.own("tare");
+            }
             for k in dead {
                 r.own(&format!("dead {k}"));
             }
@@ -310,6 +317,16 @@ impl Listener {
         self.pipeline.hello(&hello);
         self.record(|r| r.hello(&hello));
         tell(Heard::Hello(&hello));
+        let channels = self.pipeline.settings.channels.iter().enumerate();
+        if let Some((gauge, channel)) =
+            { channels }.find(|(_, c)| **c >= usize::from(hello.channels))
+        {
+            tell(Heard::Message(&format!(
+                "gauge {} is on channel {channel}, but this board has only {} channels (from 0): nothing can be told of a touch. Correct “Channels of the gauges”, or channels in the project's table [live]",
+                gauge + 1,
+                hello.channels
+            )));
+        }
         if let Some(rate) = self
             .rate
             .filter(|&r| r != hello.rate_hz && self.hello.as_ref() != Some(&hello))
@@ -463,7 +480,6 @@ impl Port for Nowhere {
 pub struct Connection {
     commands: Sender<Command>,
     stop: Arc<AtomicBool>,
-    thread: Option<std::thread::JoinHandle<()>>,
 }
 
 impl Connection {
@@ -479,15 +495,11 @@ impl Connection {
         let (commands, inbox) = channel();
         let stop = Arc::new(AtomicBool::new(false));
         let stopping = Arc::clone(&stop);
-        let thread = std::thread::Builder::new()
+        std::thread::Builder::new()
             .name("board".into())
             .spawn(move || ended(listener.run(&stopping, &inbox, tell)))
             .map_err(|e| format!("the port cannot be listened to ({e})"))?;
-        Ok(Self {
-            commands,
-            stop,
-            thread: Some(thread),
-        })
+        Ok(Self { commands, stop })
     }
 
     pub fn send(&self, command: Command) {
@@ -497,10 +509,8 @@ impl Connection {
 }
 
 impl Drop for Connection {
+    /// Does not wait: a thread that is looking for an unplugged board may take a moment to hear of it.
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
     }
 }

@@ -1,6 +1,6 @@
 //! Boards behind TCP: a network bridge, or a simulated board.
 
-use std::io::{ErrorKind, Read, Write};
+use std::io::{Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
@@ -34,19 +34,7 @@ pub(super) fn open(address: &str) -> Result<Box<dyn Port>, String> {
 
 impl Port for Socket {
     fn read(&mut self, buffer: &mut [u8]) -> Got {
-        match self.0.read(buffer) {
-            Ok(0) => Got::Gone,
-            Ok(count) => Got::Bytes(count),
-            Err(e)
-                if matches!(
-                    e.kind(),
-                    ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
-                ) =>
-            {
-                Got::Nothing
-            }
-            Err(_) => Got::Gone,
-        }
+        Got::of(self.0.read(buffer))
     }
 
     fn write(&mut self, bytes: &[u8]) {

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::health::{Expected, Health, Watcher};
 use super::receiver::Sample;
 use super::tare::{Rest, Taring};
-use crate::inference::{Chain, Contact, Errors, Matching, Region, ResponseMap, Trained};
+use crate::inference::{Chain, Contact, Errors, Matching, ResponseMap, Trained};
 use crate::wire::Hello;
 
 /// Which estimator is shown.
@@ -528,15 +528,6 @@ impl Pipeline {
             // Quantization alone is 0.29 counts.
             *noise = (counts.max(0.3) / per_strain).max(self.settings.least_noise);
         }
-    }
-}
-
-impl Contact {
-    /// Half the longer and half the shorter axis of the 90 % region (mm).
-    #[must_use]
-    pub fn region_mm(&self) -> [f64; 2] {
-        let Region { axes, .. } = self.region;
-        axes.map(|a| a.length() * 1e3)
     }
 }
 

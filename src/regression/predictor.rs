@@ -19,7 +19,6 @@ const LANES: usize = 64;
 pub struct Predictor {
     standardizer: Standardizer,
     gamma: f64,
-    features: usize,
     support_vectors: usize,
     biases: Vec<f64>,
     /// Blocks of [`LANES`] support vectors: feature by feature, then output by output their coefficients.
@@ -54,7 +53,6 @@ impl Predictor {
         Self {
             standardizer,
             gamma,
-            features: x.rows(),
             support_vectors: support.len(),
             biases: fits.iter().map(|f| f.bias).collect(),
             blocks,
@@ -64,11 +62,6 @@ impl Predictor {
     #[must_use]
     pub fn support_vectors(&self) -> usize {
         self.support_vectors
-    }
-
-    #[must_use]
-    pub fn features(&self) -> usize {
-        self.features
     }
 
     /// All outputs for one sample (a value a feature).

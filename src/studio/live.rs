@@ -51,7 +51,8 @@ pub(super) struct Live {
     known: Vec<Known>,
     known_force: f64,
     gathering: known::Gathering,
-    trained: Option<(Vec<bool>, Pair)>,
+    /// For the model of this key and these gauges.
+    trained: Option<(String, Vec<bool>, Pair)>,
     /// For which gauges training was begun.
     training_for: Option<Vec<bool>>,
     forces: [f64; 2],
@@ -256,6 +257,9 @@ impl Studio {
 
     /// What a job of this stage has brought.
     pub(super) fn take_live(&mut self, ctx: &Context, brought: Brought, key: String) {
+        if let Brought::Table(path) = brought {
+            return self.tell(format!("The table is in {}", path.display()));
+        }
         if key != self.sensing_key() {
             self.live.wish = None;
             return self.tell(
@@ -276,11 +280,12 @@ impl Studio {
                 }
             }
             Brought::Trained(used, trained) => {
-                self.live.trained = Some((used.clone(), trained.clone()));
+                self.live.trained = Some((key, used.clone(), trained.clone()));
                 self.live
                     .send(Command::Do(Box::new(move |p| p.set_trained(trained, used))));
             }
-            Brought::Table(path) => self.tell(format!("The table is in {}", path.display())),
+            // Told above: a file that was written is there whatever has changed since.
+            Brought::Table(_) => {}
             Brought::Calibrated(calibration) => self.take_calibration(&calibration),
         }
     }
@@ -306,7 +311,8 @@ impl Studio {
         let live = self.document.state.project.live.clone();
         let mut pipeline =
             Pipeline::new(sensing.map_for(&live), live.settings(sensing.gauges.len()));
-        if let Some((used, trained)) = &self.live.trained {
+        let key = self.sensing_key();
+        if let Some((_, used, trained)) = self.live.trained.as_ref().filter(|t| t.0 == key) {
             pipeline.set_trained(trained.clone(), used.clone());
         }
         let feed = Arc::clone(&self.live.feed);
@@ -350,10 +356,10 @@ impl Studio {
             }
             None => {}
         }
-        self.apply_settings();
-        if self.stage == super::Stage::Live {
-            let _ = self.proposed_touch();
+        if !self.live.is_connected() {
+            return;
         }
+        self.apply_settings();
         self.keep_trained(ctx);
         self.gather_known(ctx);
         if let (Some(_), Some(truth)) = (&self.live.hosted, self.live.look(|f| f.truth))
@@ -383,15 +389,15 @@ impl Studio {
     /// The trained estimators are trained when they are wanted, and again when gauges fail or recover.
     fn keep_trained(&mut self, ctx: &Context) {
         let wanted = self.live.compare || self.live.estimator != Estimator::Matching;
+        if !wanted || !self.live.is_connected() {
+            return;
+        }
         let used = self.live.look(|f| f.used.clone()).unwrap_or_default();
-        let done = self.live.trained.as_ref().is_some_and(|(u, _)| *u == used);
+        let key = self.sensing_key();
+        let trained = self.live.trained.as_ref();
+        let done = trained.is_some_and(|(k, u, _)| *k == key && *u == used);
         let begun = self.live.training_for.as_ref() == Some(&used) && self.jobs.runs(Task::Train);
-        if !wanted
-            || !self.live.is_connected()
-            || used.iter().filter(|u| **u).count() < 3
-            || done
-            || begun
-        {
+        if used.iter().filter(|u| **u).count() < 3 || done || begun {
             return;
         }
         let Some(sensing) = self.sensing().map(Arc::clone) else {

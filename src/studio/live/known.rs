@@ -13,7 +13,7 @@ use crate::design::Sensing;
 use crate::inference::{Calibration, Known, calibrate};
 
 /// How many are proposed, and how many a calibration takes at least.
-pub const WANTED: usize = 12;
+pub const WANTED: usize = crate::design::PROPOSED;
 pub const LEAST: usize = 4;
 /// Pictures that a reading is averaged over.
 const FRAMES: usize = 10;
@@ -30,38 +30,14 @@ pub struct Gathering {
     /// The last touch that was read: each only once.
     read: Option<DVec3>,
     last_us: u64,
-    /// Places that are proposed (m), for the model they were drawn on.
-    proposed: Option<(usize, Vec<DVec3>)>,
-}
-
-impl Gathering {
-    /// Where the next known touch is to be pressed (m), after so many.
-    pub fn next(&self, known: usize) -> Option<DVec3> {
-        let (_, places) = self.proposed.as_ref()?;
-        places.get(known % places.len().max(1)).copied()
-    }
 }
 
 impl Studio {
     /// Where the next known touch is proposed (m).
-    pub(super) fn proposed_touch(&mut self) -> Option<DVec3> {
-        let sensing = Arc::clone(self.sensing()?);
-        let mark = Arc::as_ptr(&sensing) as usize;
-        if self
-            .live
-            .gathering
-            .proposed
-            .as_ref()
-            .is_none_or(|(m, _)| *m != mark)
-        {
-            const SEED: u64 = 0xca11;
-            let touches = sensing
-                .touches(&self.document.inputs(), WANTED, SEED, true)
-                .ok()?;
-            let places = touches.iter().map(|t| t.position).collect();
-            self.live.gathering.proposed = Some((mark, places));
-        }
-        self.live.gathering.next(self.live.known.len())
+    pub(super) fn proposed_touch(&self) -> Option<DVec3> {
+        let places = &self.sensing()?.proposed;
+        let touch = places.get(self.live.known.len() % places.len().max(1))?;
+        Some(touch.position)
     }
 
     /// Reads the press that is on as one at the proposed place.

@@ -165,12 +165,7 @@ impl Studio {
     fn paint_proposed(&self, painter: &Painter, pane: Pane) {
         let shown =
             self.stage == Stage::Live && self.live.is_connected() && self.live.hosted.is_none();
-        let Some(place) = self
-            .live
-            .gathering
-            .next(self.live.known.len())
-            .filter(|_| shown)
-        else {
+        let Some(place) = shown.then(|| self.proposed_touch()).flatten() else {
             return;
         };
         if let Some(at) = self.view.place_in(pane, place) {
