@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::budget::{Cancelled, Watch, Work};
-use crate::elasticity::observe::{Face, Observer, SiteFrame, along};
+use crate::elasticity::observe::{Face, SiteFrame, along};
 use crate::elasticity::respond::{Reading, respond};
-use crate::elasticity::{ShellModel, Touch};
+use crate::elasticity::{Model, Touch};
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 
 /// What a site reports.
@@ -201,14 +201,14 @@ pub fn spread_touches(
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
 pub fn simulate(
-    model: &ShellModel,
+    model: &dyn Model,
     touches: Vec<Touch>,
     points: &[SurfacePoint],
     signal: Signal,
     directions: usize,
     watch: Watch,
 ) -> Result<Dataset, Cancelled> {
-    let observer = Observer::new(model, points, Face::Inside);
+    let observer = model.observer(points, Face::Inside);
     let reading = match signal {
         Signal::Strain => Reading::Strain,
         Signal::Displacement | Signal::NormalDisplacement => Reading::StrainAndDisplacement,
@@ -240,11 +240,11 @@ pub fn simulate(
                     }
                     read_displacement(signal, frame.z_axis, rows, into);
                 }
-                moments.site(model.mesh.point(points[i]), frame, angle, count)
+                moments.site(model.mesh().point(points[i]), frame, angle, count)
             },
         )
         .collect();
-    let mut work = model.work();
+    let mut work = model.system().work();
     work.solves += responses.solves as u64;
     Ok(Dataset {
         signal,
@@ -261,7 +261,7 @@ pub fn simulate(
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
 pub fn measure(
-    model: &ShellModel,
+    model: &dyn Model,
     touches: &[Touch],
     sites: &[Site],
     signal: Signal,
@@ -269,9 +269,9 @@ pub fn measure(
 ) -> Result<(SignalMatrix, usize), Cancelled> {
     let points: Vec<SurfacePoint> = sites
         .iter()
-        .map(|s| model.index.nearest(s.position).0)
+        .map(|s| model.index().nearest(s.position).0)
         .collect();
-    let observer = Observer::new(model, &points, Face::Inside);
+    let observer = model.observer(&points, Face::Inside);
     let angles: Vec<f64> = sites
         .iter()
         .zip(observer.frames())

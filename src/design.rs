@@ -3,6 +3,7 @@
 //! Each stage is a pure function of the ones before it, so that a caller can keep what has not changed.
 
 mod choose;
+mod ground;
 mod judge;
 mod layout;
 mod road;
@@ -18,6 +19,7 @@ use crate::placement::PlacementError;
 use crate::project::{BadValue, Masks, Project};
 
 pub use self::choose::*;
+pub use self::ground::*;
 pub use self::judge::*;
 pub use self::layout::*;
 pub use self::road::*;

@@ -18,11 +18,15 @@ pub mod respond;
 mod rows;
 pub mod scope;
 pub mod sensitivity;
+pub mod shell;
+pub mod solid;
 mod solver;
 pub mod support;
+pub mod system;
 
 pub use load::{NodalForces, Touch};
-pub use model::{ElasticError, ShellModel};
+pub use model::{ElasticError, Model};
+pub use shell::ShellModel;
 pub use support::{Freedoms, Support};
 
 /// An isotropic linear elastic material.
@@ -32,6 +36,30 @@ pub struct Material {
     pub youngs_modulus: f64,
     /// Poisson's ratio, above -1 and below 0.5.
     pub poissons_ratio: f64,
+}
+
+impl Material {
+    /// Lamé's λ and μ (Pa).
+    #[must_use]
+    pub fn lame(&self) -> (f64, f64) {
+        let Self {
+            youngs_modulus: e,
+            poissons_ratio: nu,
+        } = *self;
+        let mu = e / (2.0 * (1.0 + nu));
+        (2.0 * mu * nu / (1.0 - 2.0 * nu), mu)
+    }
+
+    /// Both values within their ranges.
+    ///
+    /// # Errors
+    /// [`ElasticError::Value`] naming the one that is not.
+    pub fn check(&self) -> Result<(), ElasticError> {
+        let (e, nu) = (self.youngs_modulus, self.poissons_ratio);
+        model::range("Young's modulus in Pa", "above zero", e, e > 0.0)?;
+        let rule = "above -1 and below 0.5";
+        model::range("Poisson's ratio", rule, nu, nu > -1.0 && nu < 0.5)
+    }
 }
 
 /// A shell of one thickness whose mid-surface is the mesh.

@@ -5,13 +5,12 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::budget::{Budget, Watch};
-use crate::design::{self, Checks, DesignError, Inputs};
+use crate::design::{self, Built, Checks, DesignError, Inputs};
 use crate::elasticity::estimate::Discretization;
-use crate::elasticity::grade::Graded;
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::observe::{Face, Observer};
 use crate::elasticity::respond::{Reading, Responses, respond};
-use crate::elasticity::{Freedoms, ShellModel, Touch};
+use crate::elasticity::{Model, Touch};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
@@ -26,8 +25,7 @@ pub struct GivenSite {
 
 /// What the model answers.
 pub struct Answer {
-    pub model: ShellModel,
-    pub held: Vec<Freedoms>,
+    pub model: Box<dyn Model>,
     responses: Responses,
     sites: usize,
     touches: usize,
@@ -35,7 +33,8 @@ pub struct Answer {
     pub touch_distances: Vec<f64>,
     pub site_distances: Vec<f64>,
     pub discretization: Discretization,
-    pub linearity: Linearity,
+    /// Of a shell.
+    pub linearity: Option<Linearity>,
     pub checks: Checks,
     /// What a reader must know.
     pub notes: Vec<String>,
@@ -82,30 +81,34 @@ pub fn answer(
 
     let ground = design::ground(&inputs)?;
     let places: Vec<DVec3> = sites.iter().map(|s| s.position).collect();
-    let graded = ground.grade(touches, &places, &budget.elements, watch)?;
-    let checks = Checks::of(&graded);
-    let Graded {
+    ground.check(&inputs.project)?;
+    let built = ground.build(touches, &places, &budget.elements, watch)?;
+    let checks = Checks::of(&built);
+    let Built {
+        laid,
         model,
-        held,
         estimate,
         linearity,
         ..
-    } = graded;
+    } = built;
     notes.extend(checks.distrust());
-    notes.extend(design::cautions(&estimate, &linearity, &budget.elements));
+    notes.extend(design::cautions(
+        &estimate,
+        linearity.as_ref(),
+        &budget.elements,
+    ));
     let smallest = touches
         .iter()
         .map(|t| t.tip_radius)
         .fold(f64::INFINITY, f64::min);
-    notes.extend(ground.cautions(smallest));
-    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
-    let observer = Observer::new(&model, &points, Face::Inside);
+    notes.extend(ground.cautions(&laid, smallest));
+    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index().nearest(p).0).collect();
+    let observer = model.observer(&points, Face::Inside);
     let angles = angles(sites, &observer)?;
     let reading = Reading::GaugeAndDisplacement(&angles);
-    let responses = respond(&model, touches, &observer, reading, watch)?;
+    let responses = respond(&*model, touches, &observer, reading, watch)?;
     Ok(Answer {
         model,
-        held,
         responses,
         sites: sites.len(),
         touches: touches.len(),

@@ -5,13 +5,17 @@
 pub mod cut;
 pub mod flatten;
 pub mod geodesic;
+pub mod inside;
 pub mod locate;
 pub mod remesh;
 pub mod repair;
 pub mod sample;
 pub mod scatter;
 pub mod surface;
+mod thicken;
 pub mod unroll;
+pub mod walls;
+pub mod winding;
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
@@ -248,6 +252,27 @@ impl TriMesh {
         Self::from_checked(self.positions.clone(), turned.collect())
     }
 
+    /// The triangles that are kept, with their vertices' numbers in this mesh; nothing where none is.
+    #[must_use]
+    pub fn part_of(&self, keep: impl Fn(u32) -> bool) -> Option<(Self, Vec<u32>)> {
+        let mut number = vec![u32::MAX; self.positions.len()];
+        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        for (_, tri) in (0u32..).zip(&self.triangles).filter(|(t, _)| keep(*t)) {
+            triangles.push(tri.map(|v| {
+                if number[v as usize] == u32::MAX {
+                    number[v as usize] = vertices.len() as u32;
+                    vertices.push(v);
+                }
+                number[v as usize]
+            }));
+        }
+        let positions = vertices
+            .iter()
+            .map(|&v| self.positions[v as usize])
+            .collect();
+        (!triangles.is_empty()).then(|| (Self::from_checked(positions, triangles), vertices))
+    }
+
     /// The three corners of a triangle (m).
     #[must_use]
     pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
@@ -266,6 +291,28 @@ impl TriMesh {
     pub fn facet_area(&self, triangle: u32) -> f64 {
         let [a, b, c] = self.corners(triangle);
         (b - a).cross(c - a).length() / 2.0
+    }
+
+    /// The longest side of a facet (m).
+    #[must_use]
+    pub fn longest_side(&self, triangle: u32) -> f64 {
+        let p = self.corners(triangle);
+        let side = |i: usize| p[i].distance(p[(i + 1) % 3]);
+        (0..3).map(side).fold(0.0, f64::max)
+    }
+
+    /// A point of the surface at each vertex, in order.
+    #[must_use]
+    pub fn vertex_points(&self) -> Vec<SurfacePoint> {
+        let at = |(v, around): (usize, &Vec<u32>)| {
+            let triangle = around.first().copied().unwrap_or(0);
+            let corners = self.triangles[triangle as usize];
+            SurfacePoint {
+                triangle,
+                barycentric: corners.map(|c| f64::from(u8::from(c as usize == v))),
+            }
+        };
+        self.vertex_triangles.iter().enumerate().map(at).collect()
     }
 
     /// Height of a facet over its longest side.
@@ -319,12 +366,23 @@ impl TriMesh {
         (0..3).map(|i| corners[i] * at.barycentric[i]).sum()
     }
 
-    /// The smoothed unit normal at a point, from the vertex normals.
+    /// The smoothed unit normal at a point, from the vertex normals; at a vertex on a crease the facet's own.
     #[must_use]
     pub fn normal(&self, at: SurfacePoint) -> DVec3 {
+        /// Vertex normals turned further than this from the facet belong to a crease (cos 30°).
+        const CREASE: f64 = 0.866;
         let tri = self.triangles[at.triangle as usize];
+        let own = self.facet_normal(at.triangle);
         let blend: DVec3 = (0..3)
-            .map(|i| self.vertex_normals[tri[i] as usize] * at.barycentric[i])
+            .map(|i| {
+                let smooth = self.vertex_normals[tri[i] as usize];
+                let normal = if smooth.dot(own) < CREASE {
+                    own
+                } else {
+                    smooth
+                };
+                normal * at.barycentric[i]
+            })
             .sum();
         blend
             .try_normalize()

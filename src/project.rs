@@ -131,6 +131,12 @@ pub struct Part {
     pub model: PartModel,
     #[serde(default = "defaults::thickness")]
     pub thickness_mm: f64,
+    /// Of a solid: masks of the part's vertices that say where gauges can go and where touches land, where
+    /// what is found by itself is wrong.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inside: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outside: Option<String>,
     /// The axis the part is unrolled about.
     #[serde(default)]
     pub axis: Axis,
@@ -165,6 +171,8 @@ pub enum PartModel {
     /// The mesh is the mid-surface of a shell.
     #[default]
     Shell,
+    /// The mesh encloses a solid with walls.
+    Solid,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -533,6 +541,8 @@ impl Project {
                 elements: Elements::Graded,
                 model: PartModel::Shell,
                 thickness_mm: defaults::thickness(),
+                inside: None,
+                outside: None,
                 axis: Axis::Z,
             },
             material: MaterialKeys::default(),
@@ -565,6 +575,8 @@ impl Project {
     pub fn mask_names(&mut self) -> impl Iterator<Item = &mut String> {
         let supports = self.supports.iter_mut().filter_map(|s| s.vertices.as_mut());
         supports
+            .chain(self.part.inside.as_mut())
+            .chain(self.part.outside.as_mut())
             .chain(self.touch.region.as_mut())
             .chain(self.feasible.keep_out.as_mut())
     }

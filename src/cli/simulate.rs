@@ -88,11 +88,7 @@ fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()>
         let model = simulated.model()?;
         let touches = &simulated.dataset.touches;
         let first = &touches[..touches.len().min(vtu::TOUCHES)];
-        vtu::write(
-            path,
-            &model.mesh,
-            &vtu::fields(&model, &simulated.held, first),
-        )?;
+        vtu::write(path, model.mesh(), &vtu::fields(&*model, first))?;
     }
     say(&simulated.achieved.notes);
     let dataset = &simulated.dataset;
@@ -138,15 +134,15 @@ fn at_points(
     points::write_answers(&args.out, &answer)?;
     if let Some(path) = &args.vtu {
         let first = &touches[..touches.len().min(vtu::TOUCHES)];
-        let fields = vtu::fields(&answer.model, &answer.held, first);
-        vtu::write(path, &answer.model.mesh, &fields)?;
+        let fields = vtu::fields(&*answer.model, first);
+        vtu::write(path, answer.model.mesh(), &fields)?;
     }
     say(&answer.notes);
     let summary = json!({
         "sites": sites.len(),
         "touches": touches.len(),
-        "vertices": answer.model.mesh.positions().len(),
-        "unknowns": answer.model.unknowns(),
+        "vertices": answer.model.mesh().positions().len(),
+        "unknowns": answer.model.system().dimension(),
         "discretization": answer.discretization,
         "linearity": answer.linearity,
         "checks": answer.checks,

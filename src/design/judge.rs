@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::layout::touches_on;
 use super::{
-    Design, DesignError, Inputs, NOISE_SEED, Reduced, Simulated, TEST_SEED, WORKSHOP_SEED,
+    Design, DesignError, Ground, Inputs, NOISE_SEED, Reduced, Simulated, TEST_SEED, WORKSHOP_SEED,
 };
 use crate::budget::{Budget, Cancelled, Watch, Work};
 use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
@@ -64,10 +64,10 @@ pub fn truth(
     watch: Watch,
 ) -> Result<Truth, DesignError> {
     let project = &inputs.project;
-    let laid = simulated.ground.halved(&simulated.laid);
-    let mesh = &laid.mesh;
+    let laid = simulated.ground.finer(&simulated.laid);
+    let mesh = simulated.ground.touched_surface(&laid);
     let seed = project.budget.seed.wrapping_add(TEST_SEED);
-    let touches = touches_on(mesh, inputs, budget.test_touches, seed, false)?;
+    let touches = touches_on(&mesh, inputs, budget.test_touches, seed, false)?;
     let model = simulated.ground.model(&laid, watch)?;
     let mut rows = sites.to_vec();
     rows.sort_unstable();
@@ -78,17 +78,17 @@ pub fn truth(
         (rows.iter().zip(drawn.clone())).map(|(&s, site)| as_built(&site, project.budget.seed, s));
     let gauges: Vec<Site> = drawn.clone().chain(built).collect();
     let (signals, solves) =
-        dataset::measure(&model, &touches, &gauges, project.gauge.signal, watch)?;
+        dataset::measure(&*model, &touches, &gauges, project.gauge.signal, watch)?;
     let half =
         |k: usize| signals.select_rows(&(k * rows.len()..(k + 1) * rows.len()).collect::<Vec<_>>());
     let (x, workshop) = (half(0), half(1));
     let gains = (rows.iter()).map(|&s| workshop_draw(project.budget.seed, s).gain);
     let workshop = workshop.scaled_rows(gains);
-    let mut work = model.work();
+    let mut work = model.system().work();
     work.solves += solves as u64;
     Ok(Truth {
         regions: regions(project, &touches),
-        element_mm: mesh.mean_edge() * 1000.0,
+        element_mm: Ground::element_mm(&laid),
         touches,
         work,
         sites: rows,

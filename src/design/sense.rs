@@ -8,14 +8,12 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::layout::{lay_out_sites, lay_out_touches, touches_on};
-use super::{DesignError, Inputs, as_built, ground, layout, workshop_draw};
+use super::{DesignError, Ground, Inputs, Laid, as_built, ground, workshop_draw};
 use crate::budget::{Budget, Watch};
 use crate::dataset::{SignalMatrix, Site};
-use crate::elasticity::Touch;
-use crate::elasticity::grade::Ground;
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
+use crate::elasticity::{Model, Touch};
 use crate::inference::{AsDrawn, ResponseMap};
-use crate::mesh::remesh::Remeshed;
 use crate::project::{LiveKeys, Project};
 
 /// A model of the chosen gauges, without the stiffness it came from.
@@ -29,7 +27,7 @@ pub struct Sensing {
     /// Mean edge of the elements (mm).
     pub element_mm: f64,
     ground: Ground,
-    laid: Remeshed,
+    laid: Laid,
 }
 
 /// Known touches that are proposed.
@@ -67,19 +65,18 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
         return Err(DesignError::NoGauges);
     }
     let ground = ground(inputs)?;
-    let even = layout(inputs, &ground);
-    crate::elasticity::model::check_section(&project.section())?;
-    crate::elasticity::model::check_held(&ground.held.mesh, &ground.held.held)?;
-    let touches = lay_out_touches(&even, inputs, budget)?;
+    ground.check(project)?;
+    let even = ground.site_layout(&inputs.part);
+    let touches = lay_out_touches(&ground.touch_layout(&inputs.part), inputs, budget)?;
     let sites = lay_out_sites(&even, project)?;
     let places: Vec<DVec3> = sites.iter().map(|&at| even.point(at)).collect();
-    let graded = ground.grade(&touches, &places, &budget.elements, watch)?;
-    let gauges = chosen_gauges(project, &graded.model);
-    let sensitivity = Sensitivity::new(&graded.model, &gauges, watch)?;
+    let graded = ground.build(&touches, &places, &budget.elements, watch)?;
+    let gauges = chosen_gauges(project, &*graded.model);
+    let sensitivity = Sensitivity::new(&*graded.model, &gauges, watch)?;
     let tip_radius = project.tip().1;
-    let mesh = ground.of_size(map_size(&ground, tip_radius)).mesh;
+    let mesh = ground.of_size(map_size(&ground, tip_radius));
     let moved: Vec<Gauge> = gauges.iter().flat_map(moved).collect();
-    let all = Sensitivity::new(&graded.model, &moved, watch)?;
+    let all = Sensitivity::new(&*graded.model, &moved, watch)?;
     let drawn = as_drawn(
         &ResponseMap::new(&all, mesh, tip_radius, watch)?,
         gauges.len(),
@@ -90,7 +87,7 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
         sensitivity: Arc::new(sensitivity),
         drawn: Arc::new(drawn),
         proposed,
-        element_mm: graded.laid.mesh.mean_edge() * 1e3,
+        element_mm: Ground::element_mm(&graded.laid),
         ground,
         laid: graded.laid,
     })
@@ -153,18 +150,18 @@ fn map_size(ground: &Ground, tip_radius: f64) -> f64 {
 }
 
 /// The chosen gauges on the model's own surface.
-fn chosen_gauges(project: &Project, model: &crate::elasticity::ShellModel) -> Vec<Gauge> {
+fn chosen_gauges(project: &Project, model: &dyn Model) -> Vec<Gauge> {
     let keys = &project.gauge;
     (project.selection.sites.iter())
         .map(|site| {
             let (at, _) = model
-                .index
+                .index()
                 .nearest(DVec3::from_array(site.position_mm) * 1e-3);
-            let normal = model.mesh.normal(at);
+            let normal = model.mesh().normal(at);
             let direction = DVec3::from_array(site.direction);
             let flat = (direction - normal * direction.dot(normal)).try_normalize();
             Gauge {
-                position: model.mesh.point(at),
+                position: model.mesh().point(at),
                 direction: flat.unwrap_or_else(|| normal.any_orthonormal_vector()),
                 normal,
                 length: keys.grid_length_mm * 1e-3,
@@ -186,7 +183,7 @@ impl Sensing {
         seed: u64,
         watch: Watch,
     ) -> Result<(Sensitivity, Vec<f64>), DesignError> {
-        let laid = self.ground.halved(&self.laid);
+        let laid = self.ground.finer(&self.laid);
         let model = self.ground.model(&laid, watch)?;
         let gauges: Vec<Gauge> = (self.gauges.iter().enumerate())
             .map(|(k, gauge)| {
@@ -202,7 +199,7 @@ impl Sensing {
             Workshop::Gains | Workshop::All => workshop_draw(seed, k).gain,
         };
         let gains = (0..gauges.len()).map(gain).collect();
-        Ok((Sensitivity::new(&model, &gauges, watch)?, gains))
+        Ok((Sensitivity::new(&*model, &gauges, watch)?, gains))
     }
 
     /// Evenly spread touches with forces drawn evenly from half a newton to the hardest of the paper's.

@@ -5,25 +5,27 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::layout::{check_memory, lay_out_sites, lay_out_touches, size_mm};
-use super::{DesignError, Inputs, LAYOUT};
+use super::ground::{Built, Ground, Laid, ground};
+use super::layout::{check_memory, lay_out_sites, lay_out_touches};
+use super::{DesignError, Inputs};
 use crate::budget::{Achieved, Budget, Quality, StopReason, Watch};
 use crate::dataset::{self, Dataset};
 use crate::elasticity::estimate::Discretization;
-use crate::elasticity::grade::{Graded, Ground};
 use crate::elasticity::linearity::Linearity;
-use crate::elasticity::model::{check_held, check_section};
-use crate::elasticity::{Freedoms, ShellModel};
-use crate::mesh::remesh::Remeshed;
+use crate::elasticity::{Freedoms, Model};
+use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
-use crate::project::{Elements, Project};
+use crate::project::Project;
 
 /// The elastic stage: the mesh that was computed on, the sites on it and the dataset.
 pub struct Simulated {
+    /// The surface that gauges are glued to: the elements of a shell, the inside of a solid.
     pub mesh: Arc<TriMesh>,
-    /// What it was laid on, and where.
+    /// Size of the elements (mm).
+    pub element_mm: f64,
+    /// What they were laid on, and where.
     pub(super) ground: Ground,
-    pub(super) laid: Remeshed,
+    pub(super) laid: Laid,
     /// What is held at its vertices.
     pub held: Vec<Freedoms>,
     /// Where the vertices of the part that is shown lie on it.
@@ -32,7 +34,8 @@ pub struct Simulated {
     pub points: Vec<SurfacePoint>,
     pub dataset: Dataset,
     pub unknowns: usize,
-    pub linearity: Linearity,
+    /// Of a shell.
+    pub linearity: Option<Linearity>,
     pub checks: Checks,
     pub achieved: Achieved,
 }
@@ -42,8 +45,8 @@ impl Simulated {
     ///
     /// # Errors
     /// [`DesignError`] as when it was built first.
-    pub fn model(&self) -> Result<ShellModel, DesignError> {
-        Ok(self.ground.model(&self.laid, &crate::budget::unwatched)?)
+    pub fn model(&self) -> Result<Box<dyn Model>, DesignError> {
+        self.ground.model(&self.laid, &crate::budget::unwatched)
     }
 }
 
@@ -57,31 +60,28 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     let kept_out = project.feasible.keep_out.as_ref();
     Project::mask("feasible.keep_out", kept_out, &inputs.masks)?;
     let ground = ground(inputs)?;
-    let layout = layout(inputs, &ground);
-    // First what cannot be computed at all: a part that nothing holds is the likeliest mistake.
-    check_section(&project.section())?;
-    check_held(&ground.held.mesh, &ground.held.held)?;
+    ground.check(project)?;
+    let layout = ground.site_layout(&inputs.part);
     let sites = lay_out_sites(&layout, project)?;
     check_memory(sites.len(), project.touch.count.min(budget.touches))?;
-    let touches = lay_out_touches(&layout, inputs, budget)?;
+    let touches = lay_out_touches(&ground.touch_layout(&inputs.part), inputs, budget)?;
     let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
-    let graded = ground.grade(&touches, &places, &budget.elements, watch)?;
-    let checks = Checks::of(&graded);
-    let Graded {
+    let built = ground.build(&touches, &places, &budget.elements, watch)?;
+    let checks = Checks::of(&built);
+    let Built {
         laid,
-        held,
         model,
         estimate,
         linearity,
         models,
         solves,
         ..
-    } = graded;
-    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
-    let unknowns = model.unknowns();
+    } = built;
+    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index().nearest(p).0).collect();
+    let unknowns = model.system().dimension();
     let gauge = &project.gauge;
     let (signal, directions) = (gauge.signal, gauge.directions);
-    let mut dataset = dataset::simulate(&model, touches, &points, signal, directions, watch)?;
+    let mut dataset = dataset::simulate(&*model, touches, &points, signal, directions, watch)?;
     dataset.work.assemblies += models - 1;
     dataset.work.factorizations += models - 1;
     dataset.work.solves += solves;
@@ -95,10 +95,13 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         Vec::new()
     };
     notes.extend(checks.distrust());
-    notes.extend(cautions(&estimate, &linearity, &budget.elements));
-    notes.extend(ground.cautions(project.tip().1));
-    let carried = carry(&model, &inputs.part);
+    notes.extend(cautions(&estimate, linearity.as_ref(), &budget.elements));
+    notes.extend(ground.cautions(&laid, project.tip().1));
     drop(model);
+    let (mesh, held) = ground.gauge_surface(&laid);
+    let index = SurfaceIndex::new(&mesh);
+    let points = places.iter().map(|&p| index.nearest(p).0).collect();
+    let carried = carry(&index, &inputs.part);
     Ok(Simulated {
         achieved: Achieved {
             error_estimate: Some(estimate.strain_percent),
@@ -111,7 +114,8 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
             },
             notes,
         },
-        mesh: Arc::clone(&laid.mesh),
+        element_mm: Ground::element_mm(&laid),
+        mesh,
         ground,
         laid,
         held,
@@ -140,12 +144,12 @@ pub struct Checks {
 
 impl Checks {
     #[must_use]
-    pub fn of(graded: &Graded) -> Self {
+    pub fn of(built: &Built) -> Self {
         Self {
-            reaction_error: graded.balance.reaction_error,
-            energy_error: graded.balance.energy_error,
-            smallest_pivot: graded.model.smallest_pivot(),
-            pieces_held: graded.model.pieces(),
+            reaction_error: built.balance.reaction_error,
+            energy_error: built.balance.energy_error,
+            smallest_pivot: built.model.system().smallest_pivot(),
+            pieces_held: built.model.pieces(),
         }
     }
 
@@ -176,7 +180,7 @@ impl Checks {
 #[must_use]
 pub fn cautions(
     discretization: &Discretization,
-    linearity: &Linearity,
+    linearity: Option<&Linearity>,
     aim: &crate::budget::Elements,
 ) -> Vec<String> {
     /// Beyond this change a linear answer is the wrong kind of answer (%).
@@ -201,6 +205,9 @@ pub fn cautions(
             }
         ));
     }
+    let Some(linearity) = linearity else {
+        return notes;
+    };
     if linearity.beyond > 0 {
         notes.push(format!(
             "At {:.1} N the shell may snap or fold under {} of {} sampled touches: the linear answer says nothing there. Lower the force.",
@@ -218,49 +225,9 @@ pub fn cautions(
     notes
 }
 
-/// The part with its supports, ready to have elements laid on it.
-///
-/// # Errors
-/// [`DesignError`] for supports without a region.
-pub fn ground(inputs: &Inputs) -> Result<Ground, DesignError> {
-    let project = &inputs.project;
-    if project.part.thickness_mm > size_mm(&inputs.part) {
-        return Err(DesignError::ThickerThanWide {
-            size_mm: size_mm(&inputs.part),
-            thickness_mm: project.part.thickness_mm,
-        });
-    }
-    let supports = project.supports(&inputs.masks)?;
-    let as_given = project.part.elements == Elements::AsGiven;
-    Ok(Ground::new(
-        &inputs.part,
-        project.section(),
-        &supports,
-        as_given,
-    ))
-}
-
-/// The mesh that sites and touches are laid out on, the same for every quality: the part, or where its
-/// triangles are too thin to measure distances on, even ones on its surface.
-pub(super) fn layout(inputs: &Inputs, ground: &Ground) -> Arc<TriMesh> {
-    /// Height over length of a triangle, and the share of the area that may be thinner.
-    const THIN: f64 = 0.1;
-    const SHARE: f64 = 0.02;
-    let part = &inputs.part;
-    let thin: f64 = (0..part.triangles().len() as u32)
-        .filter(|&t| part.thinness(t) < THIN)
-        .map(|t| part.facet_area(t))
-        .sum();
-    if thin < SHARE * part.area() {
-        Arc::clone(part)
-    } else {
-        ground.even(LAYOUT).mesh
-    }
-}
-
 /// Where the vertices of the part that is shown lie on the mesh that was computed on.
 #[must_use]
-pub fn carry(model: &ShellModel, part: &TriMesh) -> Vec<SurfacePoint> {
-    let nearest = |&p: &DVec3| model.index.nearest(p).0;
+pub fn carry(index: &SurfaceIndex, part: &TriMesh) -> Vec<SurfacePoint> {
+    let nearest = |&p: &DVec3| index.nearest(p).0;
     part.positions().iter().map(nearest).collect()
 }

@@ -7,9 +7,9 @@
 use glam::DVec3;
 use serde::Serialize;
 
+use super::Model;
 use super::load::Touch;
-use super::observe::{Face, Observer, turn};
-use super::{NodalForces, ShellModel};
+use super::observe::{Face, turn};
 use crate::budget::Elements;
 
 /// Change from 2h to h over the error at h. Displacements and smoothed strains converge with h² where all
@@ -68,19 +68,16 @@ impl Sample {
     /// Reads solved loads at places on the inside (m).
     #[must_use]
     pub fn of(
-        model: &ShellModel,
+        model: &dyn Model,
         touches: &[Touch],
         solutions: &[Vec<f64>],
         places: &[DVec3],
     ) -> Self {
-        let points: Vec<_> = places.iter().map(|&p| model.index.nearest(p).0).collect();
-        let observer = Observer::new(model, &points, Face::Inside);
-        let loads: Vec<NodalForces> = touches.iter().map(|t| model.forces(t)).collect();
+        let points: Vec<_> = places.iter().map(|&p| model.index().nearest(p).0).collect();
+        let observer = model.observer(&points, Face::Inside);
         Self {
-            under: loads
-                .iter()
-                .zip(touches.iter().zip(solutions))
-                .map(|(forces, (touch, u))| under_load(forces, touch, u))
+            under: (touches.iter().zip(solutions))
+                .map(|(touch, u)| under_load(&model.load(touch), touch, u))
                 .collect(),
             strains: observer.strains_of(model, solutions),
             frames: observer.frames().to_vec(),
@@ -90,14 +87,8 @@ impl Sample {
 
 /// Work-conjugate displacement of a touch: the mean under the tip, along the force (m).
 #[must_use]
-pub fn under_load(forces: &NodalForces, touch: &Touch, u: &[f64]) -> f64 {
-    let work: f64 = forces
-        .iter()
-        .map(|&(v, f)| {
-            let at = 6 * v as usize;
-            f.dot(DVec3::new(u[at], u[at + 1], u[at + 2]))
-        })
-        .sum();
+pub fn under_load(load: &[(usize, f64)], touch: &Touch, u: &[f64]) -> f64 {
+    let work: f64 = load.iter().map(|&(freedom, f)| f * u[freedom]).sum();
     work / touch.force
 }
 
@@ -109,9 +100,25 @@ pub fn between(
     touches: &[Touch],
     places: &[DVec3],
 ) -> Discretization {
+    let displacement = left(coarse, fine, touches, places, DISPLACEMENT);
+    Discretization {
+        strain_percent: displacement.strain_percent * DISPLACEMENT / STRAIN,
+        ..displacement
+    }
+}
+
+/// As [`between`] where what changes is `change` times what is left.
+#[must_use]
+pub fn left(
+    coarse: &Sample,
+    fine: &Sample,
+    touches: &[Touch],
+    places: &[DVec3],
+    change: f64,
+) -> Discretization {
     let (mut square, mut relative) = (0.0, 0.0);
     for (c, f) in coarse.under.iter().zip(&fine.under) {
-        let left = (f - c) / DISPLACEMENT;
+        let left = (f - c) / change;
         square += left * left;
         if *f != 0.0 {
             relative += (left / f).powi(2);
@@ -121,7 +128,7 @@ pub fn between(
     Discretization {
         displacement_mm: (square / loads).sqrt() * 1000.0,
         displacement_percent: (relative / loads).sqrt() * 100.0,
-        strain_percent: 100.0 * strain_apart(coarse, fine, touches, places) / STRAIN,
+        strain_percent: 100.0 * strain_apart(coarse, fine, touches, places) / change,
         loads: touches.len(),
         places: places.len(),
     }

@@ -10,7 +10,7 @@ use super::load::Touch;
 use super::model::LoadCheck;
 use super::recover::facet_errors;
 use super::support::{Freedoms, HeldPart, Support};
-use super::{ElasticError, Section, ShellModel, scope};
+use super::{ElasticError, Model as _, Section, ShellModel, scope};
 use crate::budget::{Elements, Watch, report};
 use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
@@ -41,9 +41,9 @@ pub struct Graded {
 
 /// Loads and places that the error is measured with, at most.
 const LOADS: usize = 64;
-const PLACES: usize = 400;
+pub(super) const PLACES: usize = 400;
 /// Loads whose reactions and energy are added up element by element, at most.
-const CHECKED: usize = 16;
+pub(super) const CHECKED: usize = 16;
 /// Facets × loads that the smoothed strain is built for, at most.
 const RECOVERED: usize = 250_000;
 /// A size may change by this factor in one pass.
@@ -103,13 +103,7 @@ impl Ground {
             .boundary_edges()
             .map(|e| self.length(e))
             .sum();
-        // Vertices for edges of length h: 1/h² times what the area takes, 1/h times what the rims take.
-        let (a, b, n) = (
-            AREA * self.held.mesh.area(),
-            RIM * rim,
-            vertices.max(4) as f64,
-        );
-        let size = (b + (b * b + 4.0 * n * a).sqrt()) / (2.0 * n);
+        let size = even_size(self.held.mesh.area(), rim, vertices);
         let size = size.max(LEAST_IN_THICKNESS * self.section.thickness);
         remesh(&self.surface, &|_| size)
     }
@@ -226,6 +220,13 @@ impl Ground {
     }
 }
 
+/// Edge length (m) at which so many vertices lie on an area with free rims of some length.
+pub(super) fn even_size(area: f64, rims: f64, vertices: usize) -> f64 {
+    // Vertices for edges of length h: 1/h² times what the area takes, 1/h times what the rims take.
+    let (a, b, n) = (AREA * area, RIM * rims, vertices.max(4) as f64);
+    (b + (b * b + 4.0 * n * a).sqrt()) / (2.0 * n)
+}
+
 /// A mesh with its model and the sample loads solved on it.
 struct Solved {
     laid: Remeshed,
@@ -273,7 +274,7 @@ impl Solved {
 }
 
 /// Touches that stand for all: evenly through the list, and the strongest.
-fn sample(touches: &[Touch]) -> Vec<Touch> {
+pub(super) fn sample(touches: &[Touch]) -> Vec<Touch> {
     let mut sample: Vec<Touch> = spread(touches, LOADS - 1);
     let strongest = touches.iter().max_by(|a, b| a.force.total_cmp(&b.force));
     if let Some(strongest) = strongest
@@ -285,7 +286,7 @@ fn sample(touches: &[Touch]) -> Vec<Touch> {
 }
 
 /// At most `count` of the items, evenly through the list.
-fn spread<T: Clone>(items: &[T], count: usize) -> Vec<T> {
+pub(super) fn spread<T: Clone>(items: &[T], count: usize) -> Vec<T> {
     let step = items.len().div_ceil(count.max(1)).max(1);
     items.iter().step_by(step).cloned().collect()
 }

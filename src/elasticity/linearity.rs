@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::element::{Facet, Matrix3x18};
 use super::load::Touch;
-use super::{NodalForces, ShellModel, estimate};
+use super::{Model, ShellModel, estimate};
 
 /// What linearity costs at the largest force.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -32,7 +32,9 @@ pub struct Linearity {
 #[must_use]
 pub fn linearity(model: &ShellModel, touches: &[Touch], solutions: &[Vec<f64>]) -> Linearity {
     let second = Second::of_all(model, solutions);
-    let relaxed = model.solve_loads(&second.iter().map(|s| s.force.clone()).collect::<Vec<_>>());
+    let relaxed = model
+        .system()
+        .solve_loads(&second.iter().map(|s| s.force.clone()).collect::<Vec<_>>());
     let mut changes = Vec::new();
     let mut beyond = 0;
     for ((touch, u), (second, u2)) in touches
@@ -40,8 +42,7 @@ pub fn linearity(model: &ShellModel, touches: &[Touch], solutions: &[Vec<f64>]) 
         .zip(solutions)
         .zip(second.iter().zip(&relaxed))
     {
-        let forces: NodalForces = model.forces(touch);
-        let twice_energy = estimate::under_load(&forces, touch, u) * touch.force;
+        let twice_energy = estimate::under_load(&model.load(touch), touch, u) * touch.force;
         if twice_energy <= 0.0 {
             continue; // pressed on the support itself
         }

@@ -29,69 +29,96 @@ const SAME_WALL: f64 = 0.26;
 /// The nodal forces of a touch, by quadrature of the tip's pressure with the linear shape functions.
 #[must_use]
 pub fn nodal_forces(mesh: &TriMesh, index: &SurfaceIndex, touch: &Touch) -> NodalForces {
+    let mut shares: Vec<(u32, f64)> = Vec::new();
+    for (at, share) in pressure(mesh, index, touch) {
+        let corners = mesh.triangles()[at.triangle as usize];
+        let own = |(v, w): (u32, f64)| (w > 0.0).then_some((v, w * share));
+        shares.extend(corners.into_iter().zip(at.barycentric).filter_map(own));
+    }
+    let force = -touch.normal * touch.force;
+    let shares = merge(shares).into_iter();
+    shares.map(|(v, w)| (v, force * w)).collect()
+}
+
+/// Points under the tip with their shares of its force; they sum to one.
+#[must_use]
+pub fn pressure(mesh: &TriMesh, index: &SurfaceIndex, touch: &Touch) -> Vec<(SurfacePoint, f64)> {
     let (at, _) = index.nearest(touch.position);
     let centre = mesh.point(at);
-    let mut weights: Vec<(u32, f64)> = Vec::new();
+    let mut shares: Vec<(SurfacePoint, f64)> = Vec::new();
     for t in index.triangles_near(centre, touch.tip_radius) {
         if mesh.facet_normal(t).dot(touch.normal) > SAME_WALL {
-            integrate(mesh, t, centre, touch, &mut weights);
+            integrate(mesh, t, &WHOLE, centre, touch.tip_radius, &mut shares);
         }
     }
-    let total: f64 = weights.iter().map(|w| w.1).sum();
-    // A tip smaller than the quadrature can see is a point force.
-    let weights = if total > 0.0 {
-        merge(weights, total)
-    } else {
-        concentrated(mesh, at)
-    };
-    let force = -touch.normal * touch.force;
-    weights.into_iter().map(|(v, w)| (v, force * w)).collect()
+    let total: f64 = shares.iter().map(|s| s.1).sum();
+    if total == 0.0 {
+        // A tip smaller than the quadrature can see is a point force.
+        return vec![(at, 1.0)];
+    }
+    for (_, share) in &mut shares {
+        *share /= total;
+    }
+    shares
 }
 
-fn concentrated(mesh: &TriMesh, at: SurfacePoint) -> Vec<(u32, f64)> {
-    mesh.triangles()[at.triangle as usize]
-        .into_iter()
-        .zip(at.barycentric)
-        .collect()
-}
+/// A part of a facet, by the barycentric coordinates of its corners.
+type Piece = [[f64; 3]; 3];
+const WHOLE: Piece = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// A facet is split into this many pieces a side at once; larger ones are quartered first.
+const AT_ONCE: f64 = 64.0;
 
-/// Adds the pressure on one facet, split into equal pieces with the three-point rule on each.
-fn integrate(mesh: &TriMesh, t: u32, centre: DVec3, touch: &Touch, into: &mut Vec<(u32, f64)>) {
+/// Adds the pressure on a piece of a facet, split into equal pieces with the three-point rule on each.
+fn integrate(
+    mesh: &TriMesh,
+    t: u32,
+    piece: &Piece,
+    centre: DVec3,
+    radius: f64,
+    into: &mut Vec<(SurfacePoint, f64)>,
+) {
     let corners = mesh.corners(t);
+    let point = |zeta: &[f64; 3]| -> DVec3 { (0..3).map(|i| corners[i] * zeta[i]).sum() };
+    let ends = piece.each_ref().map(point);
     let longest = (0..3)
-        .map(|i| corners[i].distance(corners[(i + 1) % 3]))
+        .map(|i| ends[i].distance(ends[(i + 1) % 3]))
         .fold(0.0, f64::max);
-    let n = (PIECES_PER_RADIUS * longest / touch.tip_radius)
-        .ceil()
-        .clamp(1.0, 64.0) as usize;
-    let mut sums = [0.0; 3];
-    for piece in pieces(n) {
+    let n = (PIECES_PER_RADIUS * longest / radius).ceil().max(1.0);
+    if n > AT_ONCE {
+        if ends[0].distance(centre) < radius + longest {
+            for quarter in pieces(2) {
+                let quarter = quarter.each_ref().map(|zeta| within(piece, zeta));
+                integrate(mesh, t, &quarter, centre, radius, into);
+            }
+        }
+        return;
+    }
+    let n = n as usize;
+    let area = (ends[1] - ends[0]).cross(ends[2] - ends[0]).length() / 2.0;
+    let share = area / (n * n) as f64 / 3.0;
+    for small in pieces(n) {
         for k in 0..3 {
-            let mut zeta = [0.0; 3];
-            for i in 0..3 {
-                zeta[i] = f64::midpoint(piece[k][i], piece[(k + 1) % 3][i]);
-            }
-            let p: DVec3 = (0..3).map(|i| corners[i] * zeta[i]).sum();
-            let r2 = p.distance_squared(centre) / touch.tip_radius.powi(2);
+            let middle = std::array::from_fn(|i| f64::midpoint(small[k][i], small[(k + 1) % 3][i]));
+            let zeta = within(piece, &middle);
+            let r2 = point(&zeta).distance_squared(centre) / radius.powi(2);
             if r2 < 1.0 {
-                let q = (1.0 - r2).powi(2);
-                for i in 0..3 {
-                    sums[i] += q * zeta[i];
-                }
+                let at = SurfacePoint {
+                    triangle: t,
+                    barycentric: zeta,
+                };
+                into.push((at, (1.0 - r2).powi(2) * share));
             }
         }
     }
-    let piece_area = mesh.facet_area(t) / (n * n) as f64 / 3.0;
-    let tri = mesh.triangles()[t as usize];
-    for i in 0..3 {
-        if sums[i] > 0.0 {
-            into.push((tri[i], sums[i] * piece_area));
-        }
-    }
+}
+
+/// Coordinates in the facet of a point given by those in a piece of it.
+fn within(piece: &Piece, zeta: &[f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| (0..3).map(|k| zeta[k] * piece[k][i]).sum())
 }
 
 /// The n² equal triangles of a split facet, by the barycentric coordinates of their corners.
-fn pieces(n: usize) -> impl Iterator<Item = [[f64; 3]; 3]> {
+pub(super) fn pieces(n: usize) -> impl Iterator<Item = [[f64; 3]; 3]> {
     let at = move |i: usize, j: usize| {
         let (u, v) = (i as f64 / n as f64, j as f64 / n as f64);
         [1.0 - u - v, u, v]
@@ -105,13 +132,13 @@ fn pieces(n: usize) -> impl Iterator<Item = [[f64; 3]; 3]> {
     })
 }
 
-fn merge(mut weights: Vec<(u32, f64)>, total: f64) -> Vec<(u32, f64)> {
-    weights.sort_by_key(|w| w.0);
+fn merge(mut shares: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
+    shares.sort_by_key(|w| w.0);
     let mut merged: Vec<(u32, f64)> = Vec::new();
-    for (v, w) in weights {
+    for (v, w) in shares {
         match merged.last_mut() {
-            Some(last) if last.0 == v => last.1 += w / total,
-            _ => merged.push((v, w / total)),
+            Some(last) if last.0 == v => last.1 += w,
+            _ => merged.push((v, w)),
         }
     }
     merged

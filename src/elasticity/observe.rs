@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::ShellModel;
 use super::element::Facet;
 use super::rows::Rows;
 use super::solver::BLOCK;
+use super::{Model, ShellModel};
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// A facet turned further than this from the mean normal at a corner is across a crease, where strains
@@ -86,6 +86,20 @@ impl Observer {
         }
     }
 
+    /// From strain rows (xx, yy, 2xy a point) and displacement rows (x, y, z) on solved blocks.
+    pub(super) fn direct(strains: Rows, displacements: Rows, frames: Vec<SiteFrame>) -> Self {
+        let mut same = Rows::default();
+        for row in 0..strains.count() as u32 {
+            same.push([(row, 1.0)]);
+        }
+        Self {
+            corners: strains,
+            strains: same,
+            displacements,
+            frames,
+        }
+    }
+
     /// The frames that strains are given in.
     #[must_use]
     pub fn frames(&self) -> &[SiteFrame] {
@@ -148,8 +162,8 @@ impl Observer {
 
     /// Strain tensors (xx, yy, 2xy) at each point for a single solution (6 × vertices freedoms).
     #[must_use]
-    pub fn strain_of(&self, model: &ShellModel, displacement: &[f64]) -> Vec<[f64; 3]> {
-        self.strain(&model.widened(&[displacement]))
+    pub fn strain_of(&self, model: &dyn Model, displacement: &[f64]) -> Vec<[f64; 3]> {
+        self.strain(&model.system().widened(&[displacement]))
             .chunks_exact(3 * BLOCK)
             .map(|s| [s[0], s[BLOCK], s[2 * BLOCK]])
             .collect()
@@ -157,10 +171,10 @@ impl Observer {
 
     /// As [`Self::strain_of`] for several solutions.
     #[must_use]
-    pub fn strains_of(&self, model: &ShellModel, solutions: &[Vec<f64>]) -> Vec<Vec<[f64; 3]>> {
+    pub fn strains_of(&self, model: &dyn Model, solutions: &[Vec<f64>]) -> Vec<Vec<[f64; 3]>> {
         let mut all = Vec::with_capacity(solutions.len());
         for chunk in solutions.chunks(BLOCK) {
-            let strain = self.strain(&model.widened(chunk));
+            let strain = self.strain(&model.system().widened(chunk));
             for k in 0..chunk.len() {
                 let points = strain.chunks_exact(3 * BLOCK);
                 all.push(
@@ -175,8 +189,8 @@ impl Observer {
 
     /// Displacements (m) at each point for a single solution.
     #[must_use]
-    pub fn displacement_of(&self, model: &ShellModel, displacement: &[f64]) -> Vec<DVec3> {
-        self.displacement(&model.widened(&[displacement]))
+    pub fn displacement_of(&self, model: &dyn Model, displacement: &[f64]) -> Vec<DVec3> {
+        self.displacement(&model.system().widened(&[displacement]))
             .chunks_exact(3 * BLOCK)
             .map(|s| DVec3::new(s[0], s[BLOCK], s[2 * BLOCK]))
             .collect()
@@ -348,7 +362,7 @@ fn placed(
     row: impl IntoIterator<Item = (u32, f64)>,
 ) -> impl Iterator<Item = (u32, f64)> {
     row.into_iter().filter_map(|(freedom, weight)| {
-        let (place, scale) = model.place(freedom as usize)?;
+        let (place, scale) = model.system().place(freedom as usize)?;
         Some((place, weight * scale))
     })
 }

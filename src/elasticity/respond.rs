@@ -6,11 +6,10 @@
 use rayon::prelude::*;
 
 use super::load::Touch;
-use super::model::spread;
 use super::observe::Observer;
 use super::rows::Rows;
 use super::solver::BLOCK;
-use super::{ShellModel, observe};
+use super::{Model, observe};
 use crate::budget::{Cancelled, Watch};
 
 /// Which side was solved for.
@@ -104,7 +103,7 @@ fn along_gauges(strain: &[f64], angles: &[f64]) -> Vec<f64> {
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
 pub fn respond(
-    model: &ShellModel,
+    model: &dyn Model,
     touches: &[Touch],
     observer: &Observer,
     reading: Reading,
@@ -124,7 +123,7 @@ pub fn respond(
 /// [`Cancelled`] when the watch asks for it.
 pub fn respond_from(
     side: Side,
-    model: &ShellModel,
+    model: &dyn Model,
     touches: &[Touch],
     observer: &Observer,
     reading: Reading,
@@ -136,7 +135,7 @@ pub fn respond_from(
         let outputs = output_rows(observer, reading);
         return by_outputs(model, &loads, &outputs, watch);
     }
-    let blocks = model.solve_rows(
+    let blocks = model.system().solve_rows(
         &loads,
         "Solving touches",
         watch,
@@ -176,19 +175,22 @@ pub fn respond_from(
 }
 
 fn by_outputs(
-    model: &ShellModel,
+    model: &dyn Model,
     loads: &Rows,
     outputs: &Rows,
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
-    let blocks = model.solve_rows(outputs, "Solving sites", watch, |wide, rows, solved| {
-        wide.resize(loads.count() * BLOCK, 0.0);
-        loads.apply(solved, wide);
-        let values = (0..rows.len())
-            .flat_map(|k| wide.iter().skip(k).step_by(BLOCK).copied())
-            .collect();
-        (rows.to_vec(), values)
-    })?;
+    let blocks =
+        model
+            .system()
+            .solve_rows(outputs, "Solving sites", watch, |wide, rows, solved| {
+                wide.resize(loads.count() * BLOCK, 0.0);
+                loads.apply(solved, wide);
+                let values = (0..rows.len())
+                    .flat_map(|k| wide.iter().skip(k).step_by(BLOCK).copied())
+                    .collect();
+                (rows.to_vec(), values)
+            })?;
     let mut found = vec![(0, 0); outputs.count()];
     for (b, (rows, _)) in blocks.iter().enumerate() {
         for (k, &row) in rows.iter().enumerate() {
@@ -206,14 +208,13 @@ fn by_outputs(
 }
 
 /// The touches' nodal forces as rows over solved blocks.
-fn touch_rows(model: &ShellModel, touches: &[Touch]) -> Rows {
+fn touch_rows(model: &dyn Model, touches: &[Touch]) -> Rows {
     let forces: Vec<Vec<(u32, f64)>> = touches
         .par_iter()
         .map(|touch| {
-            spread(&model.forces(touch))
-                .into_iter()
+            (model.load(touch).into_iter())
                 .filter_map(|(freedom, force)| {
-                    let (place, scale) = model.place(freedom)?;
+                    let (place, scale) = model.system().place(freedom)?;
                     Some((place, force * scale))
                 })
                 .collect()

@@ -8,12 +8,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::ShellModel;
+use super::Model;
 use super::load::{Touch, nodal_forces};
-use super::observe::{Face, Observer};
+use super::observe::Face;
 use super::respond::{Reading, output_rows};
 use super::rows::Rows;
-use super::solver::BLOCK;
 use crate::budget::{Cancelled, Watch};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
@@ -71,14 +70,14 @@ impl Sensitivity {
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
-    pub fn new(model: &ShellModel, gauges: &[Gauge], watch: Watch) -> Result<Self, Cancelled> {
+    pub fn new(model: &dyn Model, gauges: &[Gauge], watch: Watch) -> Result<Self, Cancelled> {
         let rows = mean_rows(model, gauges);
-        let blocks = model.solve_rows(&rows, "Solving gauges", watch, |_, rows, solved| {
-            let fields: Vec<Vec<DVec3>> =
-                (0..rows.len()).map(|k| field(model, solved, k)).collect();
-            (rows.to_vec(), fields)
+        let system = model.system();
+        let blocks = system.solve_rows(&rows, "Solving gauges", watch, |_, rows, solved| {
+            (rows.to_vec(), model.translations(solved, rows.len()))
         })?;
-        let vertices = model.mesh.positions().len();
+        let mesh = model.mesh();
+        let vertices = mesh.positions().len();
         let mut weights = vec![DVec3::ZERO; vertices * gauges.len()];
         for (rows, fields) in blocks {
             for (&gauge, field) in rows.iter().zip(&fields) {
@@ -88,8 +87,8 @@ impl Sensitivity {
             }
         }
         Ok(Self {
-            mesh: Arc::clone(&model.mesh),
-            index: SurfaceIndex::new(&model.mesh),
+            mesh: Arc::clone(mesh),
+            index: SurfaceIndex::new(mesh),
             gauges: gauges.len(),
             weights,
         })
@@ -115,7 +114,7 @@ impl Sensitivity {
 }
 
 /// Mean strain over each gauge's grid, as rows over solved blocks.
-fn mean_rows(model: &ShellModel, gauges: &[Gauge]) -> Rows {
+fn mean_rows(model: &dyn Model, gauges: &[Gauge]) -> Rows {
     let (mut points, mut directions) = (Vec::<SurfacePoint>::new(), Vec::new());
     let mut means = Rows::default();
     for gauge in gauges {
@@ -123,28 +122,15 @@ fn mean_rows(model: &ShellModel, gauges: &[Gauge]) -> Rows {
         let grid: Vec<(DVec3, f64)> = gauge.grid().collect();
         means.push((first..).zip(&grid).map(|(i, (_, weight))| (i, *weight)));
         for (place, _) in grid {
-            points.push(model.index.nearest(place).0);
+            points.push(model.index().nearest(place).0);
             directions.push(gauge.direction);
         }
     }
-    let observer = Observer::new(model, &points, Face::Inside);
+    let observer = model.observer(&points, Face::Inside);
     let angles: Vec<f64> = (directions.iter().zip(observer.frames()))
         .map(|(d, f)| d.dot(f.y_axis).atan2(d.dot(f.x_axis)))
         .collect();
     means.times(&output_rows(&observer, Reading::Gauge(&angles)))
-}
-
-/// Translations at every vertex of one solved column.
-fn field(model: &ShellModel, solved: &[f64], column: usize) -> Vec<DVec3> {
-    let at = |freedom: usize| {
-        let place = model.place(freedom);
-        place.map_or(0.0, |(row, scale)| {
-            solved[row as usize * BLOCK + column] * scale
-        })
-    };
-    (0..model.mesh.positions().len())
-        .map(|v| DVec3::new(at(6 * v), at(6 * v + 1), at(6 * v + 2)))
-        .collect()
 }
 
 #[cfg(test)]
@@ -152,6 +138,8 @@ mod tests {
     use super::*;
     use crate::budget::unwatched;
     use crate::elasticity::Freedoms;
+    use crate::elasticity::ShellModel;
+    use crate::elasticity::observe::Observer;
     use crate::elasticity::respond::respond;
     use crate::limb::LimbSpec;
     use crate::mesh::sample;

@@ -6,6 +6,7 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
+use faer::perm::Perm;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
@@ -27,7 +28,14 @@ pub enum FactorError {
         row: usize,
     },
     OutOfMemory,
+    /// The factor alone would take so many bytes.
+    TooLarge {
+        bytes: f64,
+    },
 }
+
+/// Memory that a factor may take (GB).
+pub const MOST_GB: f64 = 6.0;
 
 /// The lower triangle of a symmetric matrix, by columns.
 pub struct SymmetricMatrix {
@@ -103,7 +111,9 @@ impl Block {
 }
 
 impl Factor {
-    pub fn new(matrix: &SymmetricMatrix) -> Result<Self, FactorError> {
+    /// Factors. `order` names the row that is eliminated first, second …; without one, rows are taken by
+    /// approximate minimum degree.
+    pub fn new(matrix: &SymmetricMatrix, order: Option<Vec<usize>>) -> Result<Self, FactorError> {
         let n = matrix.dimension();
         if let Some(row) =
             (0..n).find(|&c| matrix.diagonal(c) <= 0.0 || !matrix.diagonal(c).is_finite())
@@ -116,13 +126,24 @@ impl Factor {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
-        let symbolic = factorize_symbolic_cholesky(
-            scaled.symbolic(),
-            Side::Lower,
-            SymmetricOrdering::Amd,
-            params,
-        )
-        .map_err(|_| FactorError::OutOfMemory)?;
+        let order = order.map(|forward| {
+            let mut inverse = vec![0; n];
+            for (place, &row) in forward.iter().enumerate() {
+                inverse[row] = place;
+            }
+            Perm::new_checked(forward.into(), inverse.into(), n)
+        });
+        let ordering = match &order {
+            Some(order) => SymmetricOrdering::Custom(order.as_ref()),
+            None => SymmetricOrdering::Amd,
+        };
+        let symbolic =
+            factorize_symbolic_cholesky(scaled.symbolic(), Side::Lower, ordering, params)
+                .map_err(|_| FactorError::OutOfMemory)?;
+        let bytes = symbolic.len_val() as f64 * size_of::<f64>() as f64;
+        if bytes > MOST_GB * 1e9 {
+            return Err(FactorError::TooLarge { bytes });
+        }
         let mut values = Vec::new();
         values
             .try_reserve_exact(symbolic.len_val())

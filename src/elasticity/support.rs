@@ -124,6 +124,14 @@ impl HeldPart {
         together(common, &self.kinds)
     }
 
+    /// Whether a facet of the (cut) part belongs to a support, by its number.
+    #[must_use]
+    pub fn facet_belongs(&self, facet: u32, support: usize) -> bool {
+        let tri = self.mesh.triangles()[facet as usize];
+        tri.iter()
+            .all(|&v| self.members[v as usize] >> support & 1 == 1)
+    }
+
     /// Whether an edge is the border of a support: it belongs to one that a facet beside it does not.
     #[must_use]
     pub fn is_border(&self, edge: &Edge) -> bool {

@@ -492,11 +492,16 @@ fn trust(simulated: &Simulated) -> [(&'static str, String); 3] {
         ),
         (
             "Error of linearity, estimated",
-            format!(
-                "up to {:.1} %, half of the touches below {:.1} %, at {} N",
-                simulated.linearity.largest_percent.abs(),
-                simulated.linearity.median_percent,
-                simulated.linearity.force_n
+            simulated.linearity.as_ref().map_or_else(
+                || "not estimated for solids".into(),
+                |l| {
+                    format!(
+                        "up to {:.1} %, half of the touches below {:.1} %, at {} N",
+                        l.largest_percent.abs(),
+                        l.median_percent,
+                        l.force_n
+                    )
+                },
             ),
         ),
         (

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::{FileError, atomic};
-use crate::elasticity::observe::{Face, Observer};
-use crate::elasticity::{Freedoms, ShellModel, Touch};
-use crate::mesh::{SurfacePoint, TriMesh};
+use crate::elasticity::observe::Face;
+use crate::elasticity::{Model, Touch};
+use crate::mesh::TriMesh;
 
 /// One named field, by rows.
 pub struct Field {
@@ -22,24 +22,28 @@ pub const TOUCHES: usize = 32;
 /// What a model says of touches at its vertices: displacement, and strain on the inside face as the two
 /// principal values.
 #[must_use]
-pub fn fields(model: &ShellModel, held: &[Freedoms], touches: &[Touch]) -> Vec<Field> {
-    let vertices: Vec<SurfacePoint> = corners(&model.mesh);
-    let observer = Observer::new(model, &vertices, Face::Inside);
+pub fn fields(model: &dyn Model, touches: &[Touch]) -> Vec<Field> {
+    let vertices = model.mesh().vertex_points();
+    let observer = model.observer(&vertices, Face::Inside);
     let mut fields = vec![Field {
         name: "held".into(),
         width: 1,
-        values: held.iter().map(|h| f64::from(h.0 != 0)).collect(),
+        values: model
+            .held()
+            .into_iter()
+            .map(|h| f64::from(u8::from(h)))
+            .collect(),
     }];
-    let loads: Vec<_> = touches.iter().map(|t| model.forces(t)).collect();
-    let solutions = model.solve_many(&loads);
+    let loads: Vec<_> = touches.iter().map(|t| model.load(t)).collect();
+    let solutions = model.system().solve_loads(&loads);
+    let middle = model.observer(&vertices, Face::Middle);
     let strains = observer.strains_of(model, &solutions);
     for (k, (u, strain)) in solutions.iter().zip(strains).enumerate() {
         fields.push(Field {
             name: format!("displacement_mm_touch_{k}"),
             width: 3,
-            values: u
-                .chunks_exact(6)
-                .flat_map(|u| [u[0], u[1], u[2]].map(|x| x * 1000.0))
+            values: (middle.displacement_of(model, u).into_iter())
+                .flat_map(|u| (u * 1000.0).to_array())
                 .collect(),
         });
         fields.push(Field {
@@ -55,22 +59,6 @@ pub fn fields(model: &ShellModel, held: &[Freedoms], touches: &[Touch]) -> Vec<F
         });
     }
     fields
-}
-
-/// A surface point at each vertex, in order.
-fn corners(mesh: &TriMesh) -> Vec<SurfacePoint> {
-    mesh.vertex_triangles()
-        .iter()
-        .enumerate()
-        .map(|(v, around)| {
-            let triangle = around.first().copied().unwrap_or(0);
-            let tri = mesh.triangles()[triangle as usize];
-            SurfacePoint {
-                triangle,
-                barycentric: std::array::from_fn(|k| f64::from(u8::from(tri[k] as usize == v))),
-            }
-        })
-        .collect()
 }
 
 /// Writes a mesh (in mm) with fields at its vertices.

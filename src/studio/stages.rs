@@ -446,16 +446,16 @@ fn next_commands(stage: Stage) -> &'static [Command] {
 /// What the elastic model says of its own error.
 fn trust(simulated: &Simulated) -> Vec<String> {
     let d = &simulated.discretization;
-    let l = &simulated.linearity;
-    vec![
-        format!(
-            "mesh: about {:.1} % ({:.3} mm) under a touch, strain {:.1} %",
-            d.displacement_percent, d.displacement_mm, d.strain_percent
-        ),
-        format!(
+    let mut lines = vec![format!(
+        "mesh: about {:.1} % ({:.3} mm) under a touch, strain {:.1} %",
+        d.displacement_percent, d.displacement_mm, d.strain_percent
+    )];
+    if let Some(l) = &simulated.linearity {
+        lines.push(format!(
             "linearity: up to {:.1} % at {:.1} N",
             l.largest_percent.abs(),
             l.force_n
-        ),
-    ]
+        ));
+    }
+    lines
 }

@@ -8,7 +8,7 @@ use crate::budget::unwatched;
 use crate::design::{self, DesignError, Inputs};
 use crate::document::Document;
 use crate::elasticity::observe::{Face, Observer};
-use crate::elasticity::{ShellModel, Touch};
+use crate::elasticity::{Model, Touch};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
@@ -159,8 +159,8 @@ fn serve(
             return inbox.recv().ok();
         }
     };
-    let vertices = design::carry(&model, &first.inputs.part);
-    let observer = Observer::new(&model, &vertices, Face::Inside);
+    let vertices = design::carry(model.index(), &first.inputs.part);
+    let observer = model.observer(&vertices, Face::Inside);
     let key = first.key.clone();
     let mut request = first;
     loop {
@@ -171,20 +171,20 @@ fn serve(
         if request.key != key {
             return Some(request);
         }
-        answer(Ok(solve(&model, &observer, &request)));
+        answer(Ok(solve(&*model, &observer, &request)));
         request = inbox.recv().ok()?;
     }
 }
 
 /// An even mesh, quick to have: the click is answered at once, the simulation brings the graded one.
-fn build(inputs: &Inputs) -> Result<ShellModel, DesignError> {
+fn build(inputs: &Inputs) -> Result<Box<dyn Model>, DesignError> {
     inputs.project.check()?;
     let ground = design::ground(inputs)?;
-    Ok(ground.model(&ground.even(design::LAYOUT), &unwatched)?)
+    ground.quick(&unwatched)
 }
 
-fn solve(model: &ShellModel, observer: &Observer, request: &Request) -> Touched {
-    let u = model.solve(&model.forces(&request.touch));
+fn solve(model: &dyn Model, observer: &Observer, request: &Request) -> Touched {
+    let u = model.press(&request.touch);
     let displacement: Vec<DVec3> = observer.displacement_of(model, &u);
     let strain = observer
         .strain_of(model, &u)

@@ -3,6 +3,7 @@
 
 pub mod round;
 pub mod slotted;
+pub mod solids;
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;

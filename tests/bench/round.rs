@@ -9,7 +9,7 @@ use hapdef::elasticity::estimate::under_load;
 use hapdef::elasticity::grade::{Graded, Ground};
 use hapdef::elasticity::observe::{Face, Observer};
 use hapdef::elasticity::support::Region;
-use hapdef::elasticity::{Freedoms, Section, ShellModel, Support, Touch};
+use hapdef::elasticity::{Freedoms, Model as _, Section, ShellModel, Support, Touch};
 use hapdef::mesh::{SurfacePoint, TriMesh};
 
 use super::section;
@@ -173,7 +173,7 @@ impl Disc {
     /// True errors (%) of the displacement under the tip and of the strains.
     pub fn errors(&self, model: &ShellModel) -> [f64; 2] {
         let u = model.solve(&model.forces(&self.touch));
-        let under = under_load(&model.forces(&self.touch), &self.touch, &u);
+        let under = under_load(&model.load(&self.touch), &self.touch, &u);
         let strain = strain_error(model, &u, &Self::places(), |p| self.strain(p));
         [100.0 * (under / self.under() - 1.0).abs(), 100.0 * strain]
     }

@@ -54,10 +54,27 @@ fn part(t: &mut Text, project: &Project) {
     );
     t.key(
         "model",
-        quoted("shell"),
-        "\"shell\": the mesh is the mid-surface",
+        serialized(&part.model),
+        "\"shell\": the mesh is the mid-surface; \"solid\": it encloses a part with walls",
     );
     t.key("thickness_mm", float(part.thickness_mm), "of the shell");
+    let told = [
+        (
+            "inside",
+            &part.inside,
+            "mask of vertices where gauges can go, in place of what is found by itself (solids)",
+        ),
+        (
+            "outside",
+            &part.outside,
+            "mask of vertices where touches land, likewise",
+        ),
+    ];
+    for (key, name, comment) in told {
+        if let Some(name) = name {
+            t.key(key, quoted(name), comment);
+        }
+    }
     t.key(
         "axis",
         serialized(&part.axis),

@@ -1,0 +1,284 @@
+//! The part ready to be computed, as a shell or as a solid.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::layout::size_mm;
+use super::{DesignError, Inputs, LAYOUT};
+use crate::budget::{Elements, Watch};
+use crate::elasticity::estimate::Discretization;
+use crate::elasticity::grade::{self, Graded};
+use crate::elasticity::linearity::Linearity;
+use crate::elasticity::model::LoadCheck;
+use crate::elasticity::shell::{check_held, check_section};
+use crate::elasticity::solid::ground::SolidGround;
+use crate::elasticity::solid::immersed::Fineness;
+use crate::elasticity::{Freedoms, Model, Touch};
+use crate::mesh::TriMesh;
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::remesh::Remeshed;
+use crate::mesh::walls::Side;
+use crate::project::{Elements as ElementKind, PartModel, Project};
+
+/// A part with its supports, ready to have elements laid on it or cells around it.
+pub enum Ground {
+    Shell(Box<grade::Ground>),
+    Solid(Box<SolidGround>),
+}
+
+/// The elements of a model.
+pub enum Laid {
+    Shell(Remeshed),
+    Solid(Fineness),
+}
+
+/// The elements, with the model built on them.
+pub struct Built {
+    pub laid: Laid,
+    pub model: Box<dyn Model>,
+    pub estimate: Discretization,
+    /// Of a shell; a solid's is not estimated.
+    pub linearity: Option<Linearity>,
+    pub balance: LoadCheck,
+    /// Assemblies and factorizations, and loads solved on the way here.
+    pub models: u64,
+    pub solves: u64,
+}
+
+/// The part with its supports, as its project means it.
+///
+/// # Errors
+/// [`DesignError`] for supports without a region, and for parts that are not what the project says.
+pub fn ground(inputs: &Inputs) -> Result<Ground, DesignError> {
+    let project = &inputs.project;
+    let supports = project.supports(&inputs.masks)?;
+    if project.part.model == PartModel::Solid {
+        let told = told(inputs)?;
+        let material = project.section().material;
+        material.check()?;
+        let solid = SolidGround::new(&inputs.part, material, &supports, &told)?;
+        return Ok(Ground::Solid(Box::new(solid)));
+    }
+    if project.part.thickness_mm > size_mm(&inputs.part) {
+        return Err(DesignError::ThickerThanWide {
+            size_mm: size_mm(&inputs.part),
+            thickness_mm: project.part.thickness_mm,
+        });
+    }
+    let as_given = project.part.elements == ElementKind::AsGiven;
+    let shell = grade::Ground::new(&inputs.part, project.section(), &supports, as_given);
+    Ok(Ground::Shell(Box::new(shell)))
+}
+
+/// What the user has said of the faces of a solid, by place (m).
+fn told(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, DesignError> {
+    let part = Arc::clone(&inputs.part);
+    let keys = &inputs.project.part;
+    let mask = |key: &str, name: Option<&String>| {
+        Project::mask(key, name, &inputs.masks).map(Option::<&Arc<Vec<bool>>>::cloned)
+    };
+    let inside = mask("part.inside", keys.inside.as_ref())?;
+    let outside = mask("part.outside", keys.outside.as_ref())?;
+    let index = (inside.is_some() || outside.is_some()).then(|| SurfaceIndex::new(&part));
+    Ok(move |place: DVec3| {
+        let at = index.as_ref()?.nearest(place).0;
+        let set = |mask: &Option<Arc<Vec<bool>>>| {
+            mask.as_ref().is_some_and(|mask| part.mostly_in(mask, at))
+        };
+        match (set(&inside), set(&outside)) {
+            (true, _) => Some(Side::Inside),
+            (_, true) => Some(Side::Outside),
+            _ => None,
+        }
+    })
+}
+
+impl Ground {
+    /// Refuses at once what cannot be computed at all: a part that nothing holds is the likeliest mistake.
+    ///
+    /// # Errors
+    /// [`DesignError`] saying what is wrong.
+    pub fn check(&self, project: &Project) -> Result<(), DesignError> {
+        check_section(&project.section())?;
+        if let Self::Shell(shell) = self {
+            check_held(&shell.held.mesh, &shell.held.held)?;
+        }
+        Ok(())
+    }
+
+    /// The mesh that sites are laid out on, the same for every quality: the part, or where its triangles are
+    /// too thin to measure distances on, even ones on its surface; of a solid the inside.
+    #[must_use]
+    pub fn site_layout(&self, part: &Arc<TriMesh>) -> Arc<TriMesh> {
+        match self {
+            Self::Shell(shell) => even_enough(part, shell),
+            Self::Solid(solid) => Arc::clone(&solid.inside),
+        }
+    }
+
+    /// As [`Self::site_layout`], for touches.
+    #[must_use]
+    pub fn touch_layout(&self, part: &Arc<TriMesh>) -> Arc<TriMesh> {
+        match self {
+            Self::Shell(shell) => even_enough(part, shell),
+            Self::Solid(solid) => Arc::clone(&solid.outside),
+        }
+    }
+
+    /// The surface that gauges are glued to, on these elements, and what is held at its vertices.
+    #[must_use]
+    pub fn gauge_surface(&self, laid: &Laid) -> (Arc<TriMesh>, Vec<Freedoms>) {
+        match (self, laid) {
+            (Self::Shell(shell), Laid::Shell(laid)) => (Arc::clone(&laid.mesh), shell.held(laid)),
+            (Self::Solid(solid), _) => (Arc::clone(&solid.inside), solid.inside_held.clone()),
+            (Self::Shell(_), Laid::Solid(_)) => unreachable!("cells are of solids"),
+        }
+    }
+
+    /// The surface that touches press on, on these elements.
+    #[must_use]
+    pub fn touched_surface(&self, laid: &Laid) -> Arc<TriMesh> {
+        match (self, laid) {
+            (Self::Solid(solid), _) => Arc::clone(&solid.outside),
+            (Self::Shell(_), Laid::Shell(laid)) => Arc::clone(&laid.mesh),
+            (Self::Shell(_), Laid::Solid(_)) => unreachable!("cells are of solids"),
+        }
+    }
+
+    /// A mesh of about one edge length (m) where touches land.
+    #[must_use]
+    pub fn of_size(&self, size: f64) -> Arc<TriMesh> {
+        match self {
+            Self::Shell(shell) => shell.of_size(size).mesh,
+            Self::Solid(solid) => solid.outside_of_size(size),
+        }
+    }
+
+    /// Area where touches land (m²).
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        match self {
+            Self::Shell(shell) => shell.area(),
+            Self::Solid(solid) => solid.outside.area(),
+        }
+    }
+
+    /// Where the theory is off for this part, these elements and a tip of this radius (m).
+    #[must_use]
+    pub fn cautions(&self, laid: &Laid, tip_radius: f64) -> Vec<String> {
+        match (self, laid) {
+            (Self::Solid(solid), Laid::Solid(fineness)) => solid.cautions(fineness),
+            (Self::Shell(shell), _) => shell.cautions(tip_radius),
+            (Self::Solid(_), Laid::Shell(_)) => unreachable!("triangles are of shells"),
+        }
+    }
+
+    /// Size of the elements (mm): mean edge of triangles, largest side of cells.
+    #[must_use]
+    pub fn element_mm(laid: &Laid) -> f64 {
+        match laid {
+            Laid::Shell(laid) => laid.mesh.mean_edge() * 1e3,
+            Laid::Solid(fineness) => fineness.size * 1e3,
+        }
+    }
+
+    /// Elements for these touches, finer until the error is small enough or the budget spent.
+    ///
+    /// # Errors
+    /// [`DesignError`] for what cannot be computed.
+    pub fn build(
+        &self,
+        touches: &[Touch],
+        places: &[DVec3],
+        aim: &Elements,
+        watch: Watch,
+    ) -> Result<Built, DesignError> {
+        match self {
+            Self::Shell(shell) => {
+                let Graded {
+                    laid,
+                    model,
+                    estimate,
+                    linearity,
+                    balance,
+                    models,
+                    solves,
+                    ..
+                } = shell.grade(touches, places, aim, watch)?;
+                Ok(Built {
+                    laid: Laid::Shell(laid),
+                    model: Box::new(model),
+                    estimate,
+                    linearity: Some(linearity),
+                    balance,
+                    models,
+                    solves,
+                })
+            }
+            Self::Solid(solid) => {
+                let graded = solid.grade(touches, places, aim, watch)?;
+                Ok(Built {
+                    laid: Laid::Solid(graded.fineness),
+                    model: Box::new(graded.model),
+                    estimate: graded.estimate,
+                    linearity: None,
+                    balance: graded.balance,
+                    models: graded.models,
+                    solves: graded.solves,
+                })
+            }
+        }
+    }
+
+    /// Finer elements, for the truth: half as large for a shell, two thirds for a solid.
+    #[must_use]
+    pub fn finer(&self, laid: &Laid) -> Laid {
+        match (self, laid) {
+            (Self::Shell(shell), Laid::Shell(laid)) => Laid::Shell(shell.halved(laid)),
+            (_, Laid::Solid(fineness)) => Laid::Solid(SolidGround::finer(fineness)),
+            (Self::Solid(_), Laid::Shell(_)) => unreachable!("triangles are of shells"),
+        }
+    }
+
+    /// The model on elements.
+    ///
+    /// # Errors
+    /// [`DesignError`] for what cannot be computed.
+    pub fn model(&self, laid: &Laid, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
+        Ok(match (self, laid) {
+            (Self::Shell(shell), Laid::Shell(laid)) => Box::new(shell.model(laid, watch)?),
+            (Self::Solid(solid), Laid::Solid(fineness)) => Box::new(solid.model(fineness, watch)?),
+            _ => unreachable!("cells are of solids, triangles of shells"),
+        })
+    }
+
+    /// A model that is quick to have.
+    ///
+    /// # Errors
+    /// [`DesignError`] for what cannot be computed.
+    pub fn quick(&self, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
+        /// Unknowns of a solid.
+        const UNKNOWNS: f64 = 30_000.0;
+        let laid = match self {
+            Self::Shell(shell) => Laid::Shell(shell.even(LAYOUT)),
+            Self::Solid(solid) => Laid::Solid(solid.fineness(solid.size_for(UNKNOWNS))),
+        };
+        self.model(&laid, watch)
+    }
+}
+
+fn even_enough(part: &Arc<TriMesh>, ground: &grade::Ground) -> Arc<TriMesh> {
+    /// Height over length of a triangle, and the share of the area that may be thinner.
+    const THIN: f64 = 0.1;
+    const SHARE: f64 = 0.02;
+    let thin: f64 = (0..part.triangles().len() as u32)
+        .filter(|&t| part.thinness(t) < THIN)
+        .map(|t| part.facet_area(t))
+        .sum();
+    if thin < SHARE * part.area() {
+        Arc::clone(part)
+    } else {
+        ground.even(LAYOUT).mesh
+    }
+}

@@ -1,0 +1,368 @@
+//! The assembled and factored shell, ready for any number of touches.
+
+use std::sync::Arc;
+
+use super::element::Facet;
+use super::load::{NodalForces, Touch, nodal_forces};
+use super::model::{ElasticError, LoadCheck, Model, range};
+use super::observe::{Face, Observer};
+use super::solver::{BLOCK, FactorError, MOST_GB, SymmetricMatrix};
+use super::system::{HELD, System, number_unknowns};
+use super::{Freedoms, Section};
+use crate::budget::{Watch, report};
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::{SurfacePoint, TriMesh};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// A shell: mesh, section and supports, assembled once and factored once.
+pub struct ShellModel {
+    pub mesh: Arc<TriMesh>,
+    pub section: Section,
+    pub index: SurfaceIndex,
+    system: System,
+}
+
+impl ShellModel {
+    /// Assembles and factors. `held` names the held freedoms of every vertex.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for values outside their range, and for parts that are not held.
+    pub fn new(
+        mesh: &Arc<TriMesh>,
+        section: Section,
+        held: &[Freedoms],
+        watch: Watch,
+    ) -> Result<Self, ElasticError> {
+        check_section(&section)?;
+        check_held(mesh, held)?;
+        check_areas(mesh)?;
+        report(watch, "Assembling", 0, 2)?;
+        let unknowns = number_unknowns(held.iter().flat_map(|h| (0..6).map(|i| h.holds(i))));
+        let mut stiffness = pattern(mesh, &unknowns);
+        assemble(mesh, &section, &unknowns, &mut stiffness);
+        report(watch, "Factoring", 1, 2)?;
+        let factored = System::new(unknowns.clone(), stiffness, None);
+        let system = factored.map_err(|e| explain(mesh, &unknowns, e))?;
+        report(watch, "Factoring", 2, 2)?;
+        Ok(Self {
+            mesh: Arc::clone(mesh),
+            section,
+            index: SurfaceIndex::new(mesh),
+            system,
+        })
+    }
+
+    /// Nodal forces of a touch.
+    #[must_use]
+    pub fn forces(&self, touch: &Touch) -> NodalForces {
+        nodal_forces(&self.mesh, &self.index, touch)
+    }
+
+    /// Displacements and rotations under one load: 6 × vertices, m and rad.
+    #[must_use]
+    pub fn solve(&self, forces: &NodalForces) -> Vec<f64> {
+        self.system.solve_freedoms(&spread(forces))
+    }
+
+    /// As [`Self::solve`] for several loads.
+    #[must_use]
+    pub fn solve_many(&self, loads: &[NodalForces]) -> Vec<Vec<f64>> {
+        self.system
+            .solve_loads(&loads.iter().map(spread).collect::<Vec<_>>())
+    }
+
+    /// Checks a solution against its load: reactions and energy.
+    #[must_use]
+    pub fn check(&self, forces: &NodalForces, displacement: &[f64]) -> LoadCheck {
+        self.check_solved(std::slice::from_ref(forces), &[displacement])
+    }
+
+    /// Element by element, apart from the assembled matrix and its factor.
+    fn check_solved(&self, loads: &[NodalForces], solutions: &[&[f64]]) -> LoadCheck {
+        let freedoms = self.system.freedoms();
+        let mut internal = vec![vec![0.0; freedoms]; solutions.len()];
+        for (t, tri) in self.mesh.triangles().iter().enumerate() {
+            let k = Facet::new(self.mesh.corners(t as u32), &self.section).stiffness(&self.section);
+            let place = element_freedoms(tri);
+            for (internal, displacement) in internal.iter_mut().zip(solutions) {
+                let u = nalgebra::SVector::<f64, 18>::from_fn(|i, _| displacement[place[i]]);
+                let f = k * u;
+                for i in 0..18 {
+                    internal[place[i]] += f[i];
+                }
+            }
+        }
+        let mut worst = LoadCheck {
+            reaction_error: 0.0,
+            energy_error: 0.0,
+        };
+        for ((forces, displacement), internal) in loads.iter().zip(solutions).zip(&internal) {
+            let check = self.balance(forces, displacement, internal);
+            worst.reaction_error = worst.reaction_error.max(check.reaction_error);
+            worst.energy_error = worst.energy_error.max(check.energy_error);
+        }
+        worst
+    }
+
+    fn balance(&self, forces: &NodalForces, displacement: &[f64], internal: &[f64]) -> LoadCheck {
+        // Held freedoms carry the reactions: the internal force less what presses there directly.
+        let mut reaction = DVec3::ZERO;
+        for (freedom, force) in spread(forces) {
+            if self.system.is_held(freedom) {
+                reaction[freedom % 6] -= force;
+            }
+        }
+        for (freedom, force) in internal.iter().enumerate() {
+            if self.system.is_held(freedom) && freedom % 6 < 3 {
+                reaction[freedom % 6] += force;
+            }
+        }
+        let load: DVec3 = forces.iter().map(|f| f.1).sum();
+        let twice_energy: f64 = internal.iter().zip(displacement).map(|(f, u)| f * u).sum();
+        let external: f64 = spread(forces)
+            .iter()
+            .map(|&(d, f)| displacement[d] * f)
+            .sum();
+        let energy_error = if external == 0.0 && twice_energy == 0.0 {
+            0.0 // pressed on the support itself
+        } else {
+            (external - twice_energy).abs() / twice_energy.abs().max(f64::MIN_POSITIVE)
+        };
+        LoadCheck {
+            reaction_error: (reaction + load).length() / load.length().max(f64::MIN_POSITIVE),
+            energy_error,
+        }
+    }
+}
+
+impl Model for ShellModel {
+    fn mesh(&self) -> &Arc<TriMesh> {
+        &self.mesh
+    }
+
+    fn index(&self) -> &SurfaceIndex {
+        &self.index
+    }
+
+    fn system(&self) -> &System {
+        &self.system
+    }
+
+    fn load(&self, touch: &Touch) -> Vec<(usize, f64)> {
+        spread(&self.forces(touch))
+    }
+
+    fn observer(&self, points: &[SurfacePoint], face: Face) -> Observer {
+        Observer::new(self, points, face)
+    }
+
+    fn check_all(&self, touches: &[Touch], solutions: &[Vec<f64>]) -> LoadCheck {
+        let forces: Vec<NodalForces> = touches.iter().map(|t| self.forces(t)).collect();
+        let solutions: Vec<&[f64]> = solutions.iter().map(Vec::as_slice).collect();
+        self.check_solved(&forces, &solutions)
+    }
+
+    fn held(&self) -> Vec<bool> {
+        let any = |v| (0..6).any(|i| self.system.is_held(6 * v + i));
+        (0..self.mesh.positions().len()).map(any).collect()
+    }
+
+    fn pieces(&self) -> usize {
+        let mut labels =
+            crate::mesh::components(self.mesh.positions().len(), self.mesh.triangles());
+        labels.sort_unstable();
+        labels.dedup();
+        labels.len()
+    }
+
+    fn translations(&self, solved: &[f64], columns: usize) -> Vec<Vec<DVec3>> {
+        let at = |freedom: usize, column: usize| {
+            let place = self.system.place(freedom);
+            place.map_or(0.0, |(row, scale)| {
+                solved[row as usize * BLOCK + column] * scale
+            })
+        };
+        let field = |k| {
+            let vertex = |v| DVec3::new(at(6 * v, k), at(6 * v + 1, k), at(6 * v + 2, k));
+            (0..self.mesh.positions().len()).map(vertex).collect()
+        };
+        (0..columns).map(field).collect()
+    }
+}
+
+pub(super) fn spread(forces: &NodalForces) -> Vec<(usize, f64)> {
+    forces
+        .iter()
+        .flat_map(|&(v, f)| (0..3).map(move |c| (6 * v as usize + c, f[c])))
+        .collect()
+}
+
+/// Material and thickness within their ranges.
+///
+/// # Errors
+/// [`ElasticError::Value`] naming the one that is not.
+pub fn check_section(section: &Section) -> Result<(), ElasticError> {
+    section.material.check()?;
+    let thickness = section.thickness;
+    range(
+        "the thickness in m",
+        "above zero",
+        thickness,
+        thickness > 0.0,
+    )
+}
+
+fn check_areas(mesh: &TriMesh) -> Result<(), ElasticError> {
+    /// Height over length below which rounding decides the normal.
+    const FLAT: f64 = 1e-11;
+    let flat = (0..mesh.triangles().len() as u32).find(|&t| {
+        let thinness = mesh.thinness(t);
+        thinness.is_nan() || thinness < FLAT
+    });
+    flat.map_or(Ok(()), |t| {
+        let place = mesh.corners(t)[0] * 1000.0;
+        Err(ElasticError::NoArea { place })
+    })
+}
+
+/// Each connected piece must have its six rigid motions held.
+///
+/// # Errors
+/// [`ElasticError`] saying what is loose.
+pub fn check_held(mesh: &TriMesh, held: &[Freedoms]) -> Result<(), ElasticError> {
+    let (lower, upper) = mesh.bounds();
+    if held.iter().all(|h| h.0 == 0) {
+        return Err(ElasticError::NothingHeld {
+            lower: lower * 1000.0,
+            upper: upper * 1000.0,
+        });
+    }
+    if held.iter().all(|h| *h == Freedoms::ALL) {
+        return Err(ElasticError::AllHeld);
+    }
+    let labels = crate::mesh::components(mesh.positions().len(), mesh.triangles());
+    let mut roots: Vec<u32> = labels.clone();
+    roots.sort_unstable();
+    roots.dedup();
+    let size = (upper - lower).length().max(f64::MIN_POSITIVE);
+    for root in roots {
+        let members = (0..labels.len()).filter(|&v| labels[v] == root);
+        let gram = rigid_gram(mesh, held, members, size);
+        let values = gram.symmetric_eigenvalues();
+        if values.max() == 0.0 {
+            let vertex = root as usize;
+            let place = mesh.positions()[vertex] * 1000.0;
+            return Err(ElasticError::NotHeld { vertex, place });
+        }
+        if values.min() < 1e-10 * values.max() {
+            return Err(ElasticError::Loose);
+        }
+    }
+    Ok(())
+}
+
+/// Σ over held freedoms of the outer product of what the six rigid motions do there.
+fn rigid_gram(
+    mesh: &TriMesh,
+    held: &[Freedoms],
+    members: impl Iterator<Item = usize>,
+    size: f64,
+) -> nalgebra::Matrix6<f64> {
+    let centre = mesh.positions()[0];
+    let mut gram = nalgebra::Matrix6::zeros();
+    for v in members {
+        let r = (mesh.positions()[v] - centre) / size;
+        for i in (0..6).filter(|&i| held[v].holds(i)) {
+            let mut row = nalgebra::Vector6::zeros();
+            if i < 3 {
+                row[i] = 1.0;
+                for axis in 0..3 {
+                    row[3 + axis] = DVec3::AXES[axis].cross(r)[i];
+                }
+            } else {
+                row[i] = 1.0;
+            }
+            gram += row * row.transpose();
+        }
+    }
+    gram
+}
+
+/// The lower triangle's pattern from the mesh's edges: every vertex couples with itself and its
+/// neighbours.
+fn pattern(mesh: &TriMesh, unknowns: &[u32]) -> SymmetricMatrix {
+    let mut coupled: Vec<Vec<u32>> = (0..mesh.positions().len() as u32)
+        .map(|v| vec![v])
+        .collect();
+    for edge in mesh.edges() {
+        coupled[edge.a as usize].push(edge.b);
+        coupled[edge.b as usize].push(edge.a);
+    }
+    let mut columns = vec![0];
+    let mut rows = Vec::new();
+    for (v, list) in coupled.iter_mut().enumerate() {
+        list.sort_unstable();
+        for i in 0..6 {
+            let column = unknowns[6 * v + i];
+            if column == HELD {
+                continue;
+            }
+            let below = list
+                .iter()
+                .flat_map(|&w| (0..6).map(move |k| unknowns[6 * w as usize + k]))
+                .filter(|&row| row != HELD && row >= column);
+            rows.extend(below.map(|row| row as usize));
+            columns.push(rows.len());
+        }
+    }
+    let values = vec![0.0; rows.len()];
+    SymmetricMatrix {
+        columns,
+        rows,
+        values,
+    }
+}
+
+fn element_freedoms(tri: &[u32; 3]) -> [usize; 18] {
+    std::array::from_fn(|i| 6 * tri[i / 6] as usize + i % 6)
+}
+
+/// Element matrices on the rayon pool, added up in the order of the triangles.
+fn assemble(mesh: &TriMesh, section: &Section, unknowns: &[u32], into: &mut SymmetricMatrix) {
+    const CHUNK: usize = 4096;
+    for (c, chunk) in mesh.triangles().chunks(CHUNK).enumerate() {
+        let elements: Vec<_> = (0..chunk.len())
+            .into_par_iter()
+            .map(|k| Facet::new(mesh.corners((c * CHUNK + k) as u32), section).stiffness(section))
+            .collect();
+        for (tri, k) in chunk.iter().zip(&elements) {
+            let place = element_freedoms(tri).map(|d| unknowns[d]);
+            for j in 0..18 {
+                for i in 0..18 {
+                    if place[j] != HELD && place[i] != HELD && place[i] >= place[j] {
+                        into.add(place[i] as usize, place[j] as usize, k[(i, j)]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn explain(mesh: &TriMesh, unknowns: &[u32], error: FactorError) -> ElasticError {
+    match error {
+        FactorError::OutOfMemory => ElasticError::OutOfMemory,
+        FactorError::TooLarge { bytes } => ElasticError::TooLarge {
+            needed_gb: bytes / 1e9,
+            limit_gb: MOST_GB,
+        },
+        FactorError::NotPositive { row } => {
+            let freedom = unknowns.iter().position(|&u| u as usize == row);
+            let vertex = freedom.unwrap_or(0) / 6;
+            ElasticError::NotHeld {
+                vertex,
+                place: mesh.positions()[vertex] * 1000.0,
+            }
+        }
+    }
+}

@@ -1,0 +1,394 @@
+//! Three-dimensional elasticity of a closed part with walls.
+//!
+//! Elements with three displacements a node: cells of a grid that the part is immersed in (`cells`), or the
+//! tetrahedra of a mesh that the user has (`tetrahedra`). Touches press on the true surface and gauges are read
+//! there, wherever it crosses the elements.
+
+pub mod cells;
+pub mod cut;
+pub mod dissect;
+pub mod grid;
+pub mod grip;
+pub mod ground;
+pub mod immersed;
+pub mod lagrange;
+
+use std::sync::Arc;
+
+use faer::Mat;
+use glam::DVec3;
+use rayon::prelude::*;
+
+use self::grip::Grip;
+use super::load::{Touch, pressure};
+use super::model::{ElasticError, LoadCheck, Model};
+use super::observe::{Face, Observer, tangent_frame};
+use super::rows::Rows;
+use super::solver::{BLOCK, FactorError, MOST_GB, SymmetricMatrix};
+use super::system::{HELD, System, number_unknowns};
+use super::{Freedoms, Material};
+use crate::budget::{Watch, report};
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::{SurfacePoint, TriMesh};
+
+/// What a displacement at a point is made of.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    pub element: u32,
+    pub nodes: Vec<u32>,
+    /// Value and gradient (1/m) of each node's shape function.
+    pub values: Vec<(f64, DVec3)>,
+}
+
+/// Elements with three displacements a node.
+pub trait Elements: Send + Sync {
+    /// Where the nodes lie (m).
+    fn nodes(&self) -> &[DVec3];
+
+    /// How many elements there are.
+    fn count(&self) -> usize;
+
+    fn nodes_of(&self, element: usize) -> &[u32];
+
+    /// A point in the middle of an element (m).
+    fn centre(&self, element: usize) -> DVec3;
+
+    /// Stiffness (N/m) over the nodes' displacements: row 3 a + i.
+    fn stiffness(&self, element: usize, material: &Material) -> Mat<f64>;
+
+    /// The shape functions at a point of the surface (m) with this outward normal.
+    fn shape(&self, at: SurfacePoint, point: DVec3, outward: DVec3) -> Shape;
+
+    /// Nodes in a good order of elimination, where there is one.
+    fn elimination(&self) -> Option<Vec<u32>>;
+}
+
+/// A solid: elements, material and supports, assembled once and factored once.
+pub struct SolidModel {
+    mesh: Arc<TriMesh>,
+    index: SurfaceIndex,
+    elements: Box<dyn Elements>,
+    material: Material,
+    grip: Grip,
+    system: System,
+    /// Displacements at the vertices of the surface, as rows over solved blocks.
+    vertices: Rows,
+    pieces: usize,
+}
+
+impl SolidModel {
+    /// Assembles and factors.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for values outside their range, and for parts that are not held.
+    pub fn new(
+        mesh: &Arc<TriMesh>,
+        elements: Box<dyn Elements>,
+        material: Material,
+        grip: Grip,
+        watch: Watch,
+    ) -> Result<Self, ElasticError> {
+        material.check()?;
+        let pieces = grip::check(&*elements, &grip)?;
+        let unknowns = number_unknowns(grip.nodes.iter().flat_map(|h| (0..3).map(|i| h.holds(i))));
+        let mut stiffness = pattern(&*elements, &unknowns);
+        assemble(&*elements, &material, &unknowns, &mut stiffness, watch)?;
+        grip.stiffen(&unknowns, &mut stiffness);
+        report(watch, "Factoring", 0, 1)?;
+        let order = elements
+            .elimination()
+            .map(|nodes| in_unknowns(&nodes, &unknowns));
+        let factored = System::new(unknowns.clone(), stiffness, order);
+        let system = factored.map_err(|e| explain(&*elements, &unknowns, e))?;
+        report(watch, "Factoring", 1, 1)?;
+        let mut model = Self {
+            mesh: Arc::clone(mesh),
+            index: SurfaceIndex::new(mesh),
+            elements,
+            material,
+            grip,
+            system,
+            vertices: Rows::default(),
+            pieces,
+        };
+        model.vertices = model.displacement_rows(&mesh.vertex_points());
+        Ok(model)
+    }
+
+    #[must_use]
+    pub fn elements(&self) -> &dyn Elements {
+        &*self.elements
+    }
+
+    /// Which of a surface's vertices are held.
+    fn shape(&self, at: SurfacePoint) -> Shape {
+        let point = self.mesh.point(at);
+        self.elements
+            .shape(at, point, self.mesh.facet_normal(at.triangle))
+    }
+
+    /// A row over freedoms as one over solved blocks: held freedoms are zero.
+    fn placed(&self, row: impl Iterator<Item = (usize, f64)>) -> impl Iterator<Item = (u32, f64)> {
+        row.filter_map(|(freedom, weight)| {
+            let (place, scale) = self.system.place(freedom)?;
+            Some((place, weight * scale))
+        })
+    }
+
+    /// Rows x, y, z of the displacement at each point.
+    fn displacement_rows(&self, points: &[SurfacePoint]) -> Rows {
+        let shapes: Vec<Shape> = points.par_iter().map(|&at| self.shape(at)).collect();
+        let mut rows = Rows::default();
+        for shape in shapes {
+            for axis in 0..3 {
+                let entries = shape.nodes.iter().zip(&shape.values);
+                rows.push(self.placed(entries.map(|(&n, v)| (3 * n as usize + axis, v.0))));
+            }
+        }
+        rows
+    }
+
+    /// Rows xx, yy, 2xy of the strain at each point in its frame.
+    fn strain_rows(&self, points: &[SurfacePoint], frames: &[glam::DMat3]) -> Rows {
+        let shapes: Vec<Shape> = points.par_iter().map(|&at| self.shape(at)).collect();
+        let mut rows = Rows::default();
+        for (shape, frame) in shapes.iter().zip(frames) {
+            let (t, s) = (frame.x_axis, frame.y_axis);
+            for component in 0..3 {
+                let entries = shape.nodes.iter().zip(&shape.values).flat_map(|(&n, v)| {
+                    let (along, aside) = (v.1.dot(t), v.1.dot(s));
+                    (0..3).map(move |k| {
+                        let weight = match component {
+                            0 => along * t[k],
+                            1 => aside * s[k],
+                            _ => along * s[k] + aside * t[k],
+                        };
+                        (3 * n as usize + k, weight)
+                    })
+                });
+                rows.push(self.placed(entries));
+            }
+        }
+        rows
+    }
+}
+
+impl Model for SolidModel {
+    fn mesh(&self) -> &Arc<TriMesh> {
+        &self.mesh
+    }
+
+    fn index(&self) -> &SurfaceIndex {
+        &self.index
+    }
+
+    fn system(&self) -> &System {
+        &self.system
+    }
+
+    fn load(&self, touch: &Touch) -> Vec<(usize, f64)> {
+        let force = -touch.normal * touch.force;
+        let mut load: std::collections::BTreeMap<usize, f64> = std::collections::BTreeMap::new();
+        for (at, share) in pressure(&self.mesh, &self.index, touch) {
+            let shape = self.shape(at);
+            for (&node, (value, _)) in shape.nodes.iter().zip(&shape.values) {
+                for axis in 0..3 {
+                    *load.entry(3 * node as usize + axis).or_default() +=
+                        value * share * force[axis];
+                }
+            }
+        }
+        load.into_iter().collect()
+    }
+
+    fn observer(&self, points: &[SurfacePoint], _: Face) -> Observer {
+        let frames: Vec<_> = (points.iter())
+            .map(|&at| tangent_frame(self.mesh.normal(at)))
+            .collect();
+        let strains = self.strain_rows(points, &frames);
+        Observer::direct(strains, self.displacement_rows(points), frames)
+    }
+
+    fn check_all(&self, touches: &[Touch], solutions: &[Vec<f64>]) -> LoadCheck {
+        let mut internal = vec![vec![0.0; self.system.freedoms()]; solutions.len()];
+        for element in 0..self.elements.count() {
+            let k = self.elements.stiffness(element, &self.material);
+            let nodes = self.elements.nodes_of(element);
+            let freedoms: Vec<usize> = nodes
+                .iter()
+                .flat_map(|&n| (0..3).map(move |i| 3 * n as usize + i))
+                .collect();
+            for (internal, u) in internal.iter_mut().zip(solutions) {
+                for (j, &from) in freedoms.iter().enumerate() {
+                    for (i, &into) in freedoms.iter().enumerate() {
+                        internal[into] += k[(i, j)] * u[from];
+                    }
+                }
+            }
+        }
+        let mut worst = LoadCheck::default();
+        for ((touch, u), internal) in touches.iter().zip(solutions).zip(&internal) {
+            let check = self.balance(&self.load(touch), u, internal);
+            worst.reaction_error = worst.reaction_error.max(check.reaction_error);
+            worst.energy_error = worst.energy_error.max(check.energy_error);
+        }
+        worst
+    }
+
+    fn held(&self) -> Vec<bool> {
+        // A vertex whose displacement no free node takes part in.
+        let moves = |v: usize| (0..3).any(|i| !self.vertices.row(3 * v + i).is_empty());
+        let by_nodes = (0..self.vertices.count() / 3).map(|v| !moves(v));
+        let near = self.grip.near(&self.mesh, &self.index);
+        by_nodes
+            .zip(near)
+            .map(|(held, spring)| held || spring)
+            .collect()
+    }
+
+    fn pieces(&self) -> usize {
+        self.pieces
+    }
+
+    fn translations(&self, solved: &[f64], columns: usize) -> Vec<Vec<DVec3>> {
+        let mut all = vec![0.0; self.vertices.count() * BLOCK];
+        self.vertices.apply(solved, &mut all);
+        let at = |row: usize, column: usize| all[row * BLOCK + column];
+        let field = |c| {
+            let vertex = |v| DVec3::new(at(3 * v, c), at(3 * v + 1, c), at(3 * v + 2, c));
+            (0..self.vertices.count() / 3).map(vertex).collect()
+        };
+        (0..columns).map(field).collect()
+    }
+}
+
+impl SolidModel {
+    fn balance(&self, load: &[(usize, f64)], u: &[f64], internal: &[f64]) -> LoadCheck {
+        let (mut reaction, mut total) = (DVec3::ZERO, DVec3::ZERO);
+        let mut external = 0.0;
+        for &(freedom, force) in load {
+            total[freedom % 3] += force;
+            external += force * u[freedom];
+            if self.system.is_held(freedom) {
+                reaction[freedom % 3] -= force;
+            }
+        }
+        for (freedom, force) in internal.iter().enumerate() {
+            if self.system.is_held(freedom) {
+                reaction[freedom % 3] += force;
+            }
+        }
+        let (held, stored) = self.grip.reaction(u);
+        let twice_energy = internal.iter().zip(u).map(|(f, u)| f * u).sum::<f64>() + stored;
+        let energy_error = if external == 0.0 && twice_energy == 0.0 {
+            0.0 // pressed on the support itself
+        } else {
+            (external - twice_energy).abs() / twice_energy.abs().max(f64::MIN_POSITIVE)
+        };
+        LoadCheck {
+            reaction_error: (reaction + held + total).length()
+                / total.length().max(f64::MIN_POSITIVE),
+            energy_error,
+        }
+    }
+}
+
+/// The unknowns of nodes, one node after the other.
+fn in_unknowns(nodes: &[u32], unknowns: &[u32]) -> Vec<usize> {
+    let of = |&n: &u32| unknowns[3 * n as usize..][..3].iter();
+    let all = nodes.iter().flat_map(of);
+    all.filter(|&&u| u != HELD).map(|&u| u as usize).collect()
+}
+
+/// The lower triangle's pattern: nodes that share an element are coupled.
+fn pattern(elements: &dyn Elements, unknowns: &[u32]) -> SymmetricMatrix {
+    let mut coupled: Vec<Vec<u32>> = vec![Vec::new(); elements.nodes().len()];
+    for element in 0..elements.count() {
+        let nodes = elements.nodes_of(element);
+        for &node in nodes {
+            coupled[node as usize].extend_from_slice(nodes);
+        }
+    }
+    let mut columns = vec![0];
+    let mut rows = Vec::new();
+    for (node, list) in coupled.iter_mut().enumerate() {
+        list.sort_unstable();
+        list.dedup();
+        for i in 0..3 {
+            let column = unknowns[3 * node + i];
+            if column == HELD {
+                continue;
+            }
+            let below = list
+                .iter()
+                .flat_map(|&n| &unknowns[3 * n as usize..][..3])
+                .filter(|&&row| row != HELD && row >= column);
+            rows.extend(below.map(|&row| row as usize));
+            columns.push(rows.len());
+        }
+        *list = Vec::new();
+    }
+    let values = vec![0.0; rows.len()];
+    SymmetricMatrix {
+        columns,
+        rows,
+        values,
+    }
+}
+
+/// Element matrices on the rayon pool, added up in the order of the elements.
+fn assemble(
+    elements: &dyn Elements,
+    material: &Material,
+    unknowns: &[u32],
+    into: &mut SymmetricMatrix,
+    watch: Watch,
+) -> Result<(), ElasticError> {
+    const CHUNK: usize = 512;
+    for first in (0..elements.count()).step_by(CHUNK) {
+        report(watch, "Assembling", first, elements.count())?;
+        let last = (first + CHUNK).min(elements.count());
+        let matrices: Vec<Mat<f64>> = (first..last)
+            .into_par_iter()
+            .map(|e| elements.stiffness(e, material))
+            .collect();
+        for (element, k) in (first..last).zip(&matrices) {
+            let nodes = elements.nodes_of(element);
+            let places: Vec<u32> = (nodes.iter())
+                .flat_map(|&n| unknowns[3 * n as usize..][..3].iter().copied())
+                .collect();
+            for (j, &column) in places.iter().enumerate().filter(|p| *p.1 != HELD) {
+                for (i, &row) in places.iter().enumerate().filter(|p| *p.1 != HELD) {
+                    if row >= column {
+                        into.add(row as usize, column as usize, k[(i, j)]);
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn explain(elements: &dyn Elements, unknowns: &[u32], error: FactorError) -> ElasticError {
+    match error {
+        FactorError::OutOfMemory => ElasticError::OutOfMemory,
+        FactorError::TooLarge { bytes } => ElasticError::TooLarge {
+            needed_gb: bytes / 1e9,
+            limit_gb: MOST_GB,
+        },
+        FactorError::NotPositive { row } => {
+            let freedom = unknowns.iter().position(|&u| u as usize == row);
+            let vertex = freedom.unwrap_or(0) / 3;
+            ElasticError::NotHeld {
+                vertex,
+                place: elements.nodes()[vertex] * 1000.0,
+            }
+        }
+    }
+}
+
+/// Nothing held.
+#[must_use]
+pub fn free(elements: &dyn Elements) -> Vec<Freedoms> {
+    vec![Freedoms::default(); elements.nodes().len()]
+}

@@ -1,0 +1,220 @@
+//! How a solid is held: nodes that do not move, and facets of the true surface that are kept from moving.
+//!
+//! What a box holds is a volume, and the grid has planes along its sides: nodes of the cells inside are held as
+//! they are. What is painted is a piece of surface somewhere in its cells: stiff springs all over it hold it.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use super::{Elements, Shape};
+use crate::elasticity::model::ElasticError;
+use crate::elasticity::solver::SymmetricMatrix;
+use crate::elasticity::system::HELD;
+use crate::elasticity::{Freedoms, Material};
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::{SurfacePoint, TriMesh};
+
+/// What is held.
+#[derive(Clone, Debug, Default)]
+pub struct Grip {
+    /// Held displacements of every node.
+    pub nodes: Vec<Freedoms>,
+    springs: Vec<Spring>,
+}
+
+/// Springs along the held ones of x, y, z at a point of the surface.
+#[derive(Clone, Debug)]
+struct Spring {
+    point: DVec3,
+    shape: Shape,
+    held: Freedoms,
+    /// N/m.
+    stiffness: f64,
+}
+
+/// Stiffness of the springs, in Young's moduli over the size of an element, a unit of area: 0.01 % softer
+/// than held.
+const STIFF: f64 = 1e4;
+/// A facet is held at the points of this rule on it, split until its pieces are smaller than half an element.
+const RULE: [[f64; 3]; 3] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
+
+impl Grip {
+    #[must_use]
+    pub fn new(elements: &dyn Elements) -> Self {
+        Self {
+            nodes: vec![Freedoms::default(); elements.nodes().len()],
+            springs: Vec::new(),
+        }
+    }
+
+    /// Holds all nodes of the elements whose middle `inside` says is held.
+    pub fn hold_elements(&mut self, elements: &dyn Elements, inside: impl Fn(DVec3) -> Freedoms) {
+        for element in 0..elements.count() {
+            let held = inside(elements.centre(element));
+            if held.0 != 0 {
+                for &node in elements.nodes_of(element) {
+                    self.nodes[node as usize].0 |= held.0;
+                }
+            }
+        }
+    }
+
+    /// Holds a facet of a surface with springs. `size` (m) is that of an element.
+    pub fn hold_facet(
+        &mut self,
+        elements: &dyn Elements,
+        mesh: &TriMesh,
+        facet: u32,
+        held: Freedoms,
+        material: &Material,
+        size: f64,
+    ) {
+        let longest = mesh.longest_side(facet);
+        let splits = (2.0 * longest / size).ceil().clamp(1.0, 64.0) as usize;
+        let pieces = crate::elasticity::load::pieces(splits);
+        let area = mesh.facet_area(facet) / (splits * splits) as f64 / 3.0;
+        let normal = mesh.facet_normal(facet);
+        for piece in pieces {
+            for weights in RULE {
+                let at = SurfacePoint {
+                    triangle: facet,
+                    barycentric: std::array::from_fn(|i| {
+                        (0..3).map(|k| weights[k] * piece[k][i]).sum()
+                    }),
+                };
+                let point = mesh.point(at);
+                self.springs.push(Spring {
+                    point,
+                    shape: elements.shape(at, point, normal),
+                    held,
+                    stiffness: STIFF * material.youngs_modulus / size * area,
+                });
+            }
+        }
+    }
+
+    /// Adds the springs to a stiffness.
+    pub(super) fn stiffen(&self, unknowns: &[u32], into: &mut SymmetricMatrix) {
+        for spring in &self.springs {
+            let shape = &spring.shape;
+            for axis in (0..3).filter(|&i| spring.held.holds(i)) {
+                for (&a, va) in shape.nodes.iter().zip(&shape.values) {
+                    for (&b, vb) in shape.nodes.iter().zip(&shape.values) {
+                        let (row, column) = (
+                            unknowns[3 * a as usize + axis],
+                            unknowns[3 * b as usize + axis],
+                        );
+                        if row != HELD && column != HELD && row >= column {
+                            let k = spring.stiffness * va.0 * vb.0;
+                            into.add(row as usize, column as usize, k);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// What the springs push back with (N), and twice the energy in them (J).
+    pub(super) fn reaction(&self, displacement: &[f64]) -> (DVec3, f64) {
+        let (mut force, mut energy) = (DVec3::ZERO, 0.0);
+        for spring in &self.springs {
+            for axis in (0..3).filter(|&i| spring.held.holds(i)) {
+                let shape = &spring.shape;
+                let u: f64 = (shape.nodes.iter().zip(&shape.values))
+                    .map(|(&n, v)| v.0 * displacement[3 * n as usize + axis])
+                    .sum();
+                force[axis] -= spring.stiffness * u;
+                energy += spring.stiffness * u * u;
+            }
+        }
+        (force, energy)
+    }
+
+    /// The vertices of a surface that have springs on a facet around them.
+    pub(super) fn near(&self, mesh: &TriMesh, index: &SurfaceIndex) -> Vec<bool> {
+        let mut near = vec![false; mesh.positions().len()];
+        for spring in &self.springs {
+            let at = index.nearest(spring.point).0;
+            for v in mesh.triangles()[at.triangle as usize] {
+                near[v as usize] = true;
+            }
+        }
+        near
+    }
+
+    /// Whether a point of the surface hangs on springs or held nodes alone.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.springs.is_empty() && self.nodes.iter().all(|h| h.0 == 0)
+    }
+}
+
+/// Each connected piece must have its six rigid motions held. Says how many pieces there are.
+///
+/// # Errors
+/// [`ElasticError`] saying what is loose.
+pub fn check(elements: &dyn Elements, grip: &Grip) -> Result<usize, ElasticError> {
+    let nodes = elements.nodes();
+    let (lower, upper) = nodes
+        .iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), &p| {
+            (l.min(p), u.max(p))
+        });
+    if grip.is_empty() {
+        return Err(ElasticError::NothingHeld {
+            lower: lower * 1000.0,
+            upper: upper * 1000.0,
+        });
+    }
+    if grip.nodes.iter().all(|h| h.0 & 7 == 7) {
+        return Err(ElasticError::AllHeld);
+    }
+    let labels = labels(elements);
+    let size = (upper - lower).length().max(f64::MIN_POSITIVE);
+    let mut grams: BTreeMap<u32, nalgebra::Matrix6<f64>> = BTreeMap::new();
+    let mut hold = |label: u32, point: DVec3, held: Freedoms| {
+        let gram = grams.entry(label).or_insert_with(nalgebra::Matrix6::zeros);
+        let r = (point - nodes[0]) / size;
+        for i in (0..3).filter(|&i| held.holds(i)) {
+            let mut row = nalgebra::Vector6::zeros();
+            row[i] = 1.0;
+            for axis in 0..3 {
+                row[3 + axis] = DVec3::AXES[axis].cross(r)[i];
+            }
+            *gram += row * row.transpose();
+        }
+    };
+    for (node, &held) in grip.nodes.iter().enumerate() {
+        hold(labels[node], nodes[node], held);
+    }
+    for spring in &grip.springs {
+        hold(
+            labels[spring.shape.nodes[0] as usize],
+            spring.point,
+            spring.held,
+        );
+    }
+    for (&label, gram) in &grams {
+        let values = gram.symmetric_eigenvalues();
+        if values.max() == 0.0 {
+            let (vertex, place) = (label as usize, nodes[label as usize] * 1000.0);
+            return Err(ElasticError::NotHeld { vertex, place });
+        }
+        if values.min() < 1e-10 * values.max() {
+            return Err(ElasticError::Loose);
+        }
+    }
+    Ok(grams.len())
+}
+
+/// For each node the smallest node it is connected to through elements.
+fn labels(elements: &dyn Elements) -> Vec<u32> {
+    let fans: Vec<[u32; 3]> = (0..elements.count())
+        .flat_map(|e| {
+            let nodes = elements.nodes_of(e);
+            (1..nodes.len()).map(|k| [nodes[0], nodes[k], nodes[k]])
+        })
+        .collect();
+    crate::mesh::components(elements.nodes().len(), &fans)
+}

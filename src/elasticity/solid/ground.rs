@@ -1,0 +1,262 @@
+//! A closed part ready to be computed as a solid: its faces told apart, and cells sized for its walls.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::SolidModel;
+use super::immersed::{Fineness, Immersed};
+use crate::budget::{Elements, Watch};
+use crate::elasticity::estimate::{self, Discretization, Sample};
+use crate::elasticity::grade::{CHECKED, PLACES, even_size, sample, spread};
+use crate::elasticity::load::Touch;
+use crate::elasticity::model::{ElasticError, LoadCheck, Model as _};
+use crate::elasticity::{Freedoms, Material, Support};
+use crate::mesh::TriMesh;
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::remesh::remesh;
+use crate::mesh::surface::Surface;
+use crate::mesh::walls::{Side, Walls};
+
+/// A closed part with its faces.
+pub struct SolidGround {
+    immersed: Immersed,
+    surface: Surface,
+    /// Even triangles all over the part: what is pressed on and read.
+    pub whole: Arc<TriMesh>,
+    pub walls: Walls,
+    /// Its faces: where gauges go and where touches land.
+    pub inside: Arc<TriMesh>,
+    pub outside: Arc<TriMesh>,
+    /// What is held at the vertices of the inside.
+    pub inside_held: Vec<Freedoms>,
+}
+
+/// The cells, with the model built on them.
+pub struct SolidGraded {
+    pub fineness: Fineness,
+    pub model: SolidModel,
+    pub estimate: Discretization,
+    /// The worst balance over the sample of the loads.
+    pub balance: LoadCheck,
+    pub models: u64,
+    pub solves: u64,
+}
+
+/// Vertices of the even triangles, about.
+const VERTICES: usize = 9000;
+/// Size of the first cells in thicknesses of the wall, and of each next ones over the last.
+const FIRST: f64 = 2.5;
+const FINER: f64 = 1.0 / 1.5;
+/// What changes from one size to the next over what is left, where errors fall with the square of the size.
+const CHANGE: f64 = 1.0 / (FINER * FINER) - 1.0;
+/// Unknowns of quadratic cells for a surface, times the squared size over its area (measured on tubes and
+/// shins, walls half as thick as the cells).
+const UNKNOWNS: f64 = 45.0;
+/// The error is an estimate: stop at this share of the tolerance.
+const SAFETY: f64 = 0.8;
+
+impl SolidGround {
+    /// Tells the faces of a part apart; `told` says what the user has said of a place.
+    ///
+    /// # Errors
+    /// [`ElasticError::Open`] for a surface that encloses nothing.
+    pub fn new(
+        part: &Arc<TriMesh>,
+        material: Material,
+        supports: &[Support],
+        told: &dyn Fn(DVec3) -> Option<Side>,
+    ) -> Result<Self, ElasticError> {
+        let immersed = Immersed::new(part, material, supports);
+        encloses(part, &immersed)?;
+        let held = &immersed.held;
+        let surface = Surface::new(&held.mesh, |e| held.is_border(e), |v| held.is_spot(v));
+        let size = even_size(held.mesh.area(), 0.0, VERTICES);
+        let laid = remesh(&surface, &|_| size);
+        let whole = laid.mesh;
+        let mut walls = Walls::of(&whole, &SurfaceIndex::new(&whole));
+        for (t, side) in (0u32..).zip(&mut walls.sides) {
+            let middle = whole.corners(t).iter().sum::<DVec3>() / 3.0;
+            *side = told(middle).unwrap_or(*side);
+        }
+        let face = |side: Side| whole.part_of(|t| walls.sides[t as usize] == side);
+        let (inside, vertices) =
+            face(Side::Inside).ok_or(ElasticError::NoFace { face: "inside" })?;
+        let (outside, _) = face(Side::Outside).ok_or(ElasticError::NoFace { face: "outside" })?;
+        let at = |&v: &u32| held.held_at(laid.places[v as usize]);
+        Ok(Self {
+            inside_held: vertices.iter().map(at).collect(),
+            inside: Arc::new(inside),
+            outside: Arc::new(outside),
+            walls,
+            whole,
+            surface,
+            immersed,
+        })
+    }
+
+    /// Thickness that cells are sized by (m): thinner than nine tenths of the walls; of a part without walls
+    /// half its least side.
+    #[must_use]
+    pub fn wall(&self) -> f64 {
+        let thin = self.walls.thinner_than(&self.whole, 0.1);
+        if thin.is_finite() {
+            return thin;
+        }
+        let (lower, upper) = self.whole.bounds();
+        (upper - lower).min_element() / 2.0
+    }
+
+    /// A mesh of about one edge length (m) on the outside.
+    #[must_use]
+    pub fn outside_of_size(&self, size: f64) -> Arc<TriMesh> {
+        let laid = remesh(&self.surface, &|_| size).mesh;
+        let index = SurfaceIndex::new(&self.whole);
+        let outside = laid.part_of(|t| {
+            let middle = laid.corners(t).iter().sum::<DVec3>() / 3.0;
+            self.walls.sides[index.nearest(middle).0.triangle as usize] == Side::Outside
+        });
+        outside.map_or_else(|| Arc::clone(&self.outside), |(mesh, _)| Arc::new(mesh))
+    }
+
+    /// The model on cells of a fineness.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for what cannot be computed.
+    pub fn model(&self, fineness: &Fineness, watch: Watch) -> Result<SolidModel, ElasticError> {
+        self.immersed.model(&self.whole, fineness, watch)
+    }
+
+    /// Finer cells, to judge coarser ones by.
+    #[must_use]
+    pub fn finer(fineness: &Fineness) -> Fineness {
+        Fineness {
+            size: fineness.size * FINER,
+            ..*fineness
+        }
+    }
+
+    /// Quadratic cells of a size (m) for this part's walls.
+    #[must_use]
+    pub fn fineness(&self, size: f64) -> Fineness {
+        Fineness::of(size, self.wall())
+    }
+
+    /// Size of cells (m) for about so many unknowns.
+    #[must_use]
+    pub fn size_for(&self, unknowns: f64) -> f64 {
+        (UNKNOWNS * self.whole.area() / unknowns).sqrt()
+    }
+
+    /// Makes cells smaller until the error under these touches is small enough or the most unknowns are
+    /// spent. `places` (m) are where strains matter.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for what cannot be computed.
+    pub fn grade(
+        &self,
+        touches: &[Touch],
+        places: &[DVec3],
+        aim: &Elements,
+        watch: Watch,
+    ) -> Result<SolidGraded, ElasticError> {
+        // As many unknowns as the shell's six at a vertex.
+        let least_size = self.size_for(6.0 * aim.most_for(touches.len()) as f64);
+        let touches = sample(touches);
+        let places: Vec<DVec3> = spread(places, PLACES);
+        let mut size = (FIRST * self.wall()).max(least_size / FINER);
+        let mut coarse = Solved::new(self, size, &touches, &places, watch)?;
+        let (mut models, mut solves) = (1, touches.len() as u64);
+        loop {
+            size *= FINER;
+            let fine = Solved::new(self, size, &touches, &places, watch)?;
+            models += 1;
+            solves += touches.len() as u64;
+            let (before, after) = (&coarse.sample, &fine.sample);
+            let estimate = estimate::left(before, after, &touches, &places, CHANGE);
+            let excess = (estimate.displacement_percent / aim.displacement_percent)
+                .max(estimate.strain_percent / aim.strain_percent)
+                / SAFETY;
+            if excess <= 1.0 || excess.is_nan() || size * FINER < least_size {
+                return Ok(SolidGraded {
+                    balance: fine.model.check_all(
+                        &spread(&touches, CHECKED),
+                        &spread(&fine.solutions, CHECKED),
+                    ),
+                    fineness: fine.fineness,
+                    model: fine.model,
+                    estimate,
+                    models,
+                    solves,
+                });
+            }
+            coarse = fine;
+        }
+    }
+
+    /// What is worth a word about the cells of a model.
+    #[must_use]
+    pub fn cautions(&self, fineness: &Fineness) -> Vec<String> {
+        /// Cells larger than this many walls do not bend as they should.
+        const LARGE: f64 = 3.0;
+        let ratio = fineness.size / self.wall();
+        let mut notes = Vec::new();
+        if ratio > LARGE {
+            notes.push(format!(
+                "The cells ({:.2} mm) are {ratio:.1} times as large as the thinnest walls ({:.2} mm): choose a higher quality, or fewer touches.",
+                fineness.size * 1e3,
+                self.wall() * 1e3
+            ));
+        }
+        notes
+    }
+}
+
+/// A model with the sample loads solved on it.
+struct Solved {
+    fineness: Fineness,
+    model: SolidModel,
+    solutions: Vec<Vec<f64>>,
+    sample: Sample,
+}
+
+impl Solved {
+    fn new(
+        ground: &SolidGround,
+        size: f64,
+        touches: &[Touch],
+        places: &[DVec3],
+        watch: Watch,
+    ) -> Result<Self, ElasticError> {
+        let fineness = ground.fineness(size);
+        let model = ground.model(&fineness, watch)?;
+        let loads: Vec<_> = touches.iter().map(|t| model.load(t)).collect();
+        let solutions = model.system().solve_loads(&loads);
+        Ok(Self {
+            sample: Sample::of(&model, touches, &solutions, places),
+            fineness,
+            model,
+            solutions,
+        })
+    }
+}
+
+/// Whether a surface encloses anything: just behind most of it there is material.
+fn encloses(part: &TriMesh, immersed: &Immersed) -> Result<(), ElasticError> {
+    /// Share of the area with material behind it.
+    const MOST: f64 = 0.9;
+    let (lower, upper) = part.bounds();
+    let off = 1e-5 * (upper - lower).length();
+    let mut behind = 0.0;
+    for t in 0..part.triangles().len() as u32 {
+        let middle = part.corners(t).iter().sum::<DVec3>() / 3.0;
+        if immersed.is_inside(middle - part.facet_normal(t) * off) {
+            behind += part.facet_area(t);
+        }
+    }
+    if behind < MOST * part.area() {
+        let rims = part.boundary_edges().count();
+        return Err(ElasticError::Open { rims });
+    }
+    Ok(())
+}

@@ -1,0 +1,151 @@
+//! A closed part ready to be immersed in grids of any size.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::Elements as _;
+use super::SolidModel;
+use super::cells::FiniteCells;
+use super::cut::Cutting;
+use super::grid::Grid;
+use super::grip::Grip;
+use crate::budget::Watch;
+use crate::elasticity::model::ElasticError;
+use crate::elasticity::support::{HeldPart, Region};
+use crate::elasticity::{Freedoms, Material, Support};
+use crate::mesh::TriMesh;
+use crate::mesh::inside::SignedDistance;
+
+/// A part, its material and its supports.
+pub struct Immersed {
+    /// The part, cut along its support boxes.
+    pub held: HeldPart,
+    pub material: Material,
+    supports: Vec<Support>,
+    surface: SignedDistance,
+}
+
+/// How fine a grid is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fineness {
+    /// Largest side of a cell (m).
+    pub size: f64,
+    /// Order of the shape functions, 1 to 4.
+    pub order: usize,
+    /// How far the surface may be from where it is taken to be, in cells.
+    pub tolerance: f64,
+    /// The smallest box that a cell is halved into to find it (m).
+    pub least: f64,
+}
+
+impl Fineness {
+    /// Quadratic cells of a size (m) for walls of this thickness (m).
+    #[must_use]
+    pub fn of(size: f64, wall: f64) -> Self {
+        Self {
+            size,
+            order: 2,
+            tolerance: 3e-3,
+            least: wall / 6.0,
+        }
+    }
+
+    fn depth(&self) -> u32 {
+        const MOST: f64 = 10.0;
+        (self.size / self.least).log2().ceil().clamp(1.0, MOST) as u32
+    }
+}
+
+impl Immersed {
+    #[must_use]
+    pub fn new(part: &Arc<TriMesh>, material: Material, supports: &[Support]) -> Self {
+        Self {
+            held: HeldPart::new(part, supports),
+            material,
+            supports: supports.to_vec(),
+            surface: SignedDistance::new(part),
+        }
+    }
+
+    /// Whether a point (m) lies in the material.
+    #[must_use]
+    pub fn is_inside(&self, point: DVec3) -> bool {
+        self.surface.inside(point)
+    }
+
+    /// The cells that the part is in.
+    ///
+    /// # Errors
+    /// [`ElasticError::Cancelled`].
+    pub fn cells(&self, fineness: &Fineness, watch: Watch) -> Result<FiniteCells, ElasticError> {
+        let mut planes: [Vec<f64>; 3] = Default::default();
+        for support in &self.supports {
+            if let Region::Box { lower, upper } = support.region {
+                for axis in 0..3 {
+                    planes[axis].extend([lower[axis], upper[axis]]);
+                }
+            }
+        }
+        let grid = Grid::new(self.held.mesh.bounds(), fineness.size, &planes);
+        let cutting = Cutting {
+            tolerance: fineness.tolerance * fineness.size,
+            depth: fineness.depth(),
+        };
+        let order = fineness.order;
+        Ok(FiniteCells::new(
+            grid,
+            order,
+            &self.surface,
+            cutting,
+            watch,
+        )?)
+    }
+
+    /// The model on cells of a fineness, pressed and read on `surface`.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for what cannot be computed.
+    pub fn model(
+        &self,
+        surface: &Arc<TriMesh>,
+        fineness: &Fineness,
+        watch: Watch,
+    ) -> Result<SolidModel, ElasticError> {
+        let cells = self.cells(fineness, watch)?;
+        let grip = self.grip(&cells, fineness.size);
+        SolidModel::new(surface, Box::new(cells), self.material, grip, watch)
+    }
+
+    fn grip(&self, cells: &FiniteCells, size: f64) -> Grip {
+        let mut grip = Grip::new(cells);
+        let mesh = &self.held.mesh;
+        for (number, support) in self.supports.iter().enumerate() {
+            let held = Freedoms(support.held.0 & Freedoms::DISPLACEMENTS.0);
+            let is_volume = held == Freedoms::DISPLACEMENTS && {
+                let inside = |p: DVec3| match support.region {
+                    Region::Box { lower, upper }
+                        if p.cmpge(lower).all() && p.cmple(upper).all() =>
+                    {
+                        held
+                    }
+                    _ => Freedoms::default(),
+                };
+                let any = (0..cells.count()).any(|c| inside(cells.centre(c)).0 != 0);
+                if any {
+                    grip.hold_elements(cells, inside);
+                }
+                any
+            };
+            if is_volume {
+                continue;
+            }
+            for facet in 0..mesh.triangles().len() as u32 {
+                if self.held.facet_belongs(facet, number) {
+                    grip.hold_facet(cells, mesh, facet, held, &self.material, size);
+                }
+            }
+        }
+        grip
+    }
+}

@@ -1,0 +1,217 @@
+//! A factored stiffness, ready for any number of loads, whatever its elements are.
+
+use rayon::prelude::*;
+
+use super::rows::Rows;
+use super::solver::{BLOCK, Block, Factor, FactorError, SymmetricMatrix};
+use crate::budget::{Cancelled, Watch, Work, report};
+
+/// Assembled once, factored once.
+pub struct System {
+    /// Unknown of each freedom, or `HELD`.
+    unknowns: Vec<u32>,
+    stiffness: SymmetricMatrix,
+    factor: Factor,
+    work: Work,
+}
+
+pub(super) const HELD: u32 = u32::MAX;
+
+/// Numbers the freedoms that are not held.
+pub(super) fn number_unknowns(held: impl Iterator<Item = bool>) -> Vec<u32> {
+    let mut next = 0;
+    held.map(|held| {
+        if held {
+            HELD
+        } else {
+            next += 1;
+            next - 1
+        }
+    })
+    .collect()
+}
+
+impl System {
+    /// Factors a stiffness over the unknowns.
+    pub(super) fn new(
+        unknowns: Vec<u32>,
+        stiffness: SymmetricMatrix,
+        order: Option<Vec<usize>>,
+    ) -> Result<Self, FactorError> {
+        Ok(Self {
+            factor: Factor::new(&stiffness, order)?,
+            unknowns,
+            stiffness,
+            work: Work {
+                assemblies: 1,
+                factorizations: 1,
+                ..Work::default()
+            },
+        })
+    }
+
+    /// What building cost.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Unknown displacements and rotations.
+    #[must_use]
+    pub fn dimension(&self) -> usize {
+        self.factor.dimension()
+    }
+
+    /// Freedoms, held ones too.
+    #[must_use]
+    pub fn freedoms(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    /// Whether a freedom is held.
+    #[must_use]
+    pub fn is_held(&self, freedom: usize) -> bool {
+        self.unknowns[freedom] == HELD
+    }
+
+    /// Smallest pivot of the stiffness scaled to a unit diagonal; its reciprocal bounds the
+    /// conditioning from below.
+    #[must_use]
+    pub fn smallest_pivot(&self) -> f64 {
+        self.factor.smallest_pivot
+    }
+
+    /// The solution, by freedom, for loads by freedom (N, and N·m on rotations).
+    #[must_use]
+    pub fn solve_freedoms(&self, loads: &[(usize, f64)]) -> Vec<f64> {
+        let mut block = self.factor.block();
+        self.load(&mut block, 0, loads);
+        self.factor.solve(&mut block);
+        self.column(&block, 0)
+    }
+
+    /// As [`Self::solve_freedoms`] for several loads, one block at a time.
+    #[must_use]
+    pub fn solve_loads(&self, loads: &[Vec<(usize, f64)>]) -> Vec<Vec<f64>> {
+        let mut solutions = Vec::with_capacity(loads.len());
+        let mut block = self.factor.block();
+        for chunk in loads.chunks(BLOCK) {
+            block.clear();
+            for (column, load) in chunk.iter().enumerate() {
+                self.load(&mut block, column, load);
+            }
+            self.factor.solve(&mut block);
+            solutions.extend((0..chunk.len()).map(|column| self.column(&block, column)));
+        }
+        solutions
+    }
+
+    /// One column of a solved block, by freedom.
+    fn column(&self, block: &Block, column: usize) -> Vec<f64> {
+        self.unknowns
+            .iter()
+            .map(|&u| {
+                if u == HELD {
+                    return 0.0;
+                }
+                let row = self.factor.order[u as usize] as usize;
+                block.rows[row * BLOCK + column] * self.factor.scale[u as usize]
+            })
+            .collect()
+    }
+
+    fn load(&self, block: &mut Block, column: usize, loads: &[(usize, f64)]) {
+        for &(freedom, force) in loads {
+            let unknown = self.unknowns[freedom];
+            if unknown != HELD {
+                self.factor.load(block, unknown as usize, column, force);
+            }
+        }
+    }
+
+    /// Solutions by freedom, at most [`BLOCK`], as the first columns of a solved block.
+    pub fn widened(&self, solutions: &[impl AsRef<[f64]>]) -> Vec<f64> {
+        let mut rows = vec![0.0; self.dimension() * BLOCK];
+        for (column, displacement) in solutions.iter().enumerate() {
+            for (freedom, &u) in displacement.as_ref().iter().enumerate() {
+                if let Some((row, scale)) = self.place(freedom) {
+                    rows[row as usize * BLOCK + column] = u / scale;
+                }
+            }
+        }
+        rows
+    }
+
+    /// Where a freedom stands in a solved block and what its value there is to be multiplied with;
+    /// nothing where it is held.
+    #[must_use]
+    pub fn place(&self, freedom: usize) -> Option<(u32, f64)> {
+        let unknown = self.unknowns[freedom];
+        (unknown != HELD).then(|| {
+            let unknown = unknown as usize;
+            (self.factor.order[unknown], self.factor.scale[unknown])
+        })
+    }
+
+    /// Solves for every row of `loads` (its entries by solver row, as [`Self::place`] gives them) and
+    /// hands each block to `consume`: a buffer of the thread's own, which rows the block holds, column by
+    /// column, and the solved block. The rows are taken in an order in which neighbours share blocks; blocks come back in that order,
+    /// which does not depend on the threads.
+    pub(super) fn solve_rows<T: Send>(
+        &self,
+        loads: &Rows,
+        stage: &'static str,
+        watch: Watch,
+        consume: impl Fn(&mut Vec<f64>, &[u32], &[f64]) -> T + Sync,
+    ) -> Result<Vec<T>, Cancelled> {
+        let first = |row: u32| loads.row(row as usize).iter().map(|e| e.0).min();
+        let mut order: Vec<u32> = (0..loads.count() as u32).collect();
+        order.sort_by_key(|&row| (first(row), row));
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        order
+            .par_chunks(BLOCK)
+            .map_init(
+                || (self.factor.block(), Vec::new()),
+                |(block, buffer), chunk| {
+                    let so_far = done.load(std::sync::atomic::Ordering::Relaxed);
+                    report(watch, stage, so_far, order.len())?;
+                    block.clear();
+                    for (column, &row) in chunk.iter().enumerate() {
+                        for &(place, value) in loads.row(row as usize) {
+                            self.factor.load_place(block, place, column, value);
+                        }
+                    }
+                    self.factor.solve(block);
+                    done.fetch_add(chunk.len(), std::sync::atomic::Ordering::Relaxed);
+                    Ok(consume(buffer, chunk, &block.rows))
+                },
+            )
+            .collect()
+    }
+
+    /// ‖K u - f‖ / ‖f‖ over the unknowns.
+    #[must_use]
+    pub fn residual(&self, loads: &[(usize, f64)], displacement: &[f64]) -> f64 {
+        let mut u = vec![0.0; self.dimension()];
+        for (freedom, &unknown) in self.unknowns.iter().enumerate() {
+            if unknown != HELD {
+                u[unknown as usize] = displacement[freedom];
+            }
+        }
+        let mut f = vec![0.0; self.dimension()];
+        for &(freedom, force) in loads {
+            if self.unknowns[freedom] != HELD {
+                f[self.unknowns[freedom] as usize] += force;
+            }
+        }
+        let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let r: Vec<f64> = self
+            .stiffness
+            .multiply(&u)
+            .iter()
+            .zip(&f)
+            .map(|(a, b)| a - b)
+            .collect();
+        norm(&r) / norm(&f)
+    }
+}

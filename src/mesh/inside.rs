@@ -1,0 +1,217 @@
+//! Inside and outside of a closed surface, and how far it is.
+//!
+//! What is inside is said by the winding number, which gaps, overlaps and touching bodies leave alone. It is
+//! asked once for each small piece of the surface; where that piece parts inside from outside, as it does
+//! nearly everywhere, the side on which a point lies of it is enough (J. A. Bærentzen and H. Aanæs 2005).
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use glam::DVec3;
+
+use super::locate::SurfaceIndex;
+use super::winding::Winding;
+use super::{SurfacePoint, TriMesh};
+
+/// Distance to a surface, negative inside of it.
+pub struct SignedDistance {
+    mesh: Arc<TriMesh>,
+    index: SurfaceIndex,
+    winding: Winding,
+    /// Pieces along each side of a triangle, and the first of them.
+    splits: Vec<(u32, u32)>,
+    /// What is known of each piece: a pure function of the surface, filled as it is asked for.
+    pieces: Vec<AtomicU8>,
+}
+
+/// Pieces are about this share of the whole across.
+const PIECE: f64 = 0.02;
+/// Just outside a piece that parts outside from inside, the surface winds less than this.
+const PARTS: f64 = 0.3;
+/// Seen under a flatter angle than this a point has no clear side.
+const FLAT: f64 = 1e-3;
+/// A coordinate of the nearest point below this puts it on an edge.
+const ON_EDGE: f64 = 1e-9;
+
+const UNKNOWN: u8 = 0;
+const PARTING: u8 = 1;
+const UNCLEAR: u8 = 2;
+
+impl SignedDistance {
+    #[must_use]
+    pub fn new(mesh: &Arc<TriMesh>) -> Self {
+        let (lower, upper) = mesh.bounds();
+        let across = PIECE * (upper - lower).length();
+        let mut first = 0;
+        let splits: Vec<(u32, u32)> = (0..mesh.triangles().len() as u32)
+            .map(|t| {
+                let n = (mesh.longest_side(t) / across).ceil().max(1.0) as u32;
+                first += n * n;
+                (n, first - n * n)
+            })
+            .collect();
+        Self {
+            index: SurfaceIndex::new(mesh),
+            winding: Winding::new(mesh),
+            mesh: Arc::clone(mesh),
+            splits,
+            pieces: (0..first).map(|_| AtomicU8::new(UNKNOWN)).collect(),
+        }
+    }
+
+    /// Whether a point lies inside: more around than not.
+    #[must_use]
+    pub fn inside(&self, point: DVec3) -> bool {
+        self.at(point) < 0.0
+    }
+
+    /// Signed distance (m).
+    #[must_use]
+    pub fn at(&self, point: DVec3) -> f64 {
+        let (at, distance) = self.index.nearest(point);
+        let away = point - self.mesh.point(at);
+        let inside = match self.normal(at) {
+            Some(normal) if normal.dot(away).abs() > FLAT * distance => normal.dot(away) < 0.0,
+            _ => self.winding.at(point) > 0.5,
+        };
+        if inside { -distance } else { distance }
+    }
+
+    /// The direction outward at a point of the surface, where it parts inside from outside: that of the
+    /// facet, or of all the facets at its edge or corner.
+    fn normal(&self, at: SurfacePoint) -> Option<DVec3> {
+        let t = at.triangle;
+        if !self.parts(at) {
+            return None;
+        }
+        let small: Vec<usize> = (0..3).filter(|&i| at.barycentric[i] < ON_EDGE).collect();
+        match small[..] {
+            [] => Some(self.mesh.facet_normal(t)),
+            [corner] => {
+                let edge =
+                    &self.mesh.edges()[self.mesh.triangle_edges()[t as usize][corner] as usize];
+                let [a, b] = edge.triangles[..] else {
+                    return None;
+                };
+                Some(self.mesh.facet_normal(a) + self.mesh.facet_normal(b))
+            }
+            _ => {
+                let corner = (0..3).find(|i| !small.contains(i))?;
+                let vertex = self.mesh.triangles()[t as usize][corner] as usize;
+                let around = &self.mesh.vertex_triangles()[vertex];
+                let edges = around
+                    .iter()
+                    .flat_map(|&t| self.mesh.triangle_edges()[t as usize]);
+                let whole = { edges }.all(|e| self.mesh.edges()[e as usize].triangles.len() == 2);
+                whole.then(|| self.mesh.vertex_normals()[vertex])
+            }
+        }
+    }
+
+    /// Whether the piece around a point parts inside from outside.
+    fn parts(&self, at: SurfacePoint) -> bool {
+        let (n, first) = self.splits[at.triangle as usize];
+        let scaled = at.barycentric.map(|w| w * f64::from(n));
+        let (i, j) = (scaled[1].floor().min(f64::from(n - 1)), scaled[2].floor());
+        let j = j.min(f64::from(n - 1) - i).max(0.0);
+        let down = scaled[1] - i + scaled[2] - j > 1.0 && i + j + 1.0 < f64::from(n);
+        // Rows of a triangle: 2 (n - i) - 1 pieces in row i.
+        let (row, column) = (i as u32, j as u32);
+        let number = first + row * (2 * n - row) + 2 * column + u32::from(down);
+        let known = &self.pieces[number as usize];
+        let state = match known.load(Ordering::Relaxed) {
+            UNKNOWN => {
+                let state = self.look(at.triangle, n, [i, j], down);
+                known.store(state, Ordering::Relaxed);
+                state
+            }
+            state => state,
+        };
+        state == PARTING
+    }
+
+    fn look(&self, t: u32, n: u32, [i, j]: [f64; 2], down: bool) -> u8 {
+        /// Points looked at in a piece: its middle, and near its corners.
+        const LOOKS: [[f64; 3]; 4] = [
+            [0.34, 0.33, 0.33],
+            [0.9, 0.05, 0.05],
+            [0.05, 0.9, 0.05],
+            [0.05, 0.05, 0.9],
+        ];
+        /// How far outside, in sizes of the piece.
+        const OFF: f64 = 1e-4;
+        let normal = self.mesh.facet_normal(t);
+        let off = normal * (OFF * self.mesh.longest_side(t) / f64::from(n));
+        let corners: [[f64; 2]; 3] = if down {
+            [[i + 1.0, j], [i + 1.0, j + 1.0], [i, j + 1.0]]
+        } else {
+            [[i, j], [i + 1.0, j], [i, j + 1.0]]
+        };
+        let [a, b, c] = self.mesh.corners(t);
+        let clear = LOOKS.iter().all(|w| {
+            let sum = |k: usize| (0..3).map(|m| w[m] * corners[m][k]).sum::<f64>() / f64::from(n);
+            let (u, v) = (sum(0), sum(1));
+            let point = a + (b - a) * u + (c - a) * v + off;
+            self.winding.at(point).abs() < PARTS
+        });
+        if clear { PARTING } else { UNCLEAR }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::winding::tests::ball;
+    use super::*;
+
+    /// The sign is that of the winding number everywhere but within rounding of the surface.
+    fn agrees(mesh: &Arc<TriMesh>) -> usize {
+        let distance = SignedDistance::new(mesh);
+        let mut inside = 0;
+        for k in 0..4000 {
+            let k = f64::from(k);
+            let p = DVec3::new(
+                (k * 0.754).fract(),
+                (k * 0.569).fract(),
+                (k * 0.341).fract(),
+            );
+            let p = (p - 0.5) * 3.6;
+            let expected = distance.winding.at(p) > 0.5;
+            let signed = distance.at(p);
+            assert!(
+                signed.abs() < 1e-6 || expected == (signed < 0.0),
+                "{p} {signed}"
+            );
+            inside += usize::from(expected);
+        }
+        inside
+    }
+
+    #[test]
+    fn holes_and_overlaps_do_no_harm() {
+        let mesh = ball(3);
+        // Without a cap the inside is still inside.
+        let open: Vec<[u32; 3]> = (mesh.triangles().iter().enumerate())
+            .filter(|(t, _)| mesh.corners(*t as u32)[0].z < 0.9)
+            .map(|(_, t)| *t)
+            .collect();
+        let (open, report) = TriMesh::new(mesh.positions(), &open, 0).unwrap();
+        assert!(report.boundary_edges > 0);
+        let open = Arc::new(open);
+        agrees(&open);
+        let distance = SignedDistance::new(&open);
+        assert!(distance.inside(DVec3::ZERO) && distance.inside(DVec3::new(0.0, 0.0, 0.7)));
+        assert!(!distance.inside(DVec3::new(0.0, 0.0, 1.3)));
+        assert!((distance.at(DVec3::X * 0.5) + 0.5).abs() < 0.01);
+        // Two balls that overlap are one body, and the walls inside part nothing.
+        let mut positions = mesh.positions().to_vec();
+        positions.extend(mesh.positions().iter().map(|p| *p + DVec3::X * 0.7));
+        let count = mesh.positions().len() as u32;
+        let mut triangles = mesh.triangles().to_vec();
+        triangles.extend(mesh.triangles().iter().map(|t| t.map(|v| v + count)));
+        let both = Arc::new(TriMesh::from_checked(positions, triangles));
+        let inside = agrees(&both);
+        assert!(inside > agrees(&Arc::new(mesh)));
+        let distance = SignedDistance::new(&both);
+        assert!(distance.inside(DVec3::X * 0.29) && distance.inside(DVec3::X * 0.31));
+    }
+}

@@ -1,0 +1,253 @@
+//! Walls of a closed part: how thick they are, and which of their faces is the outside.
+//!
+//! Touches land outside, where a surface sees much of the open; gauges go inside, on the other face of the same
+//! wall. What closes a wall at its end is neither.
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::TriMesh;
+use super::locate::SurfaceIndex;
+
+/// Which side of its wall a facet is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    Outside,
+    Inside,
+    /// The end of a wall.
+    Rim,
+}
+
+/// What is known of a part's walls, one value a facet.
+#[derive(Clone, Debug)]
+pub struct Walls {
+    pub sides: Vec<Side>,
+    /// Through the material to the facing surface (m); NaN where there is none.
+    pub thickness: Vec<f64>,
+}
+
+/// Directions that a facet looks in.
+const LOOKS: usize = 64;
+/// A surface faces another one when their normals are opposite to this (cos 120°).
+const FACING: f64 = -0.5;
+/// Faces of a wall that see this much alike are told apart by where the middle of the part is.
+const ALIKE: f64 = 0.05;
+/// A facet has no wall behind it, but its end, when material reaches farther than this many thicknesses of the
+/// walls while beside the facet it does not reach one.
+const END: f64 = 1.6;
+/// Rounds of asking neighbours.
+const ROUNDS: usize = 3;
+
+impl Walls {
+    /// Looks at every facet of a closed surface.
+    #[must_use]
+    pub fn of(mesh: &TriMesh, index: &SurfaceIndex) -> Self {
+        let looks = looks();
+        let facets: Vec<Facet> = (0..mesh.triangles().len() as u32)
+            .into_par_iter()
+            .map(|t| Facet::of(mesh, index, t, &looks))
+            .collect();
+        let thickness: Vec<f64> = facets.iter().map(|f| f.thickness).collect();
+        let typical = middle(&thickness, mesh);
+        let (lower, upper) = mesh.bounds();
+        let centre = (lower + upper) / 2.0;
+        let sides = (0u32..)
+            .zip(&facets)
+            .map(|(t, facet)| facet.side(mesh, t, typical, centre))
+            .collect();
+        let mut walls = Self { sides, thickness };
+        for _ in 0..ROUNDS {
+            walls.ask_neighbours(mesh);
+        }
+        walls
+    }
+
+    /// The thickness that half of the walls' area is thinner than (m); NaN where there are no walls.
+    #[must_use]
+    pub fn typical(&self, mesh: &TriMesh) -> f64 {
+        middle(&self.thickness, mesh)
+    }
+
+    /// The thickness that this share of the walls' area is thinner than (m).
+    #[must_use]
+    pub fn thinner_than(&self, mesh: &TriMesh, share: f64) -> f64 {
+        share_of(&self.thickness, mesh, share)
+    }
+
+    /// A facet whose neighbours all lie on one other side goes over to them.
+    fn ask_neighbours(&mut self, mesh: &TriMesh) {
+        let old = self.sides.clone();
+        for (t, edges) in mesh.triangle_edges().iter().enumerate() {
+            let beside = |e: u32| {
+                let all = &mesh.edges()[e as usize].triangles;
+                let other = all.iter().find(|&&o| o as usize != t)?;
+                let flat = mesh.facet_normal(*other).dot(mesh.facet_normal(t as u32)) > 0.7;
+                (all.len() == 2 && flat).then(|| old[*other as usize])
+            };
+            let votes: Vec<Side> = edges.iter().filter_map(|&e| beside(e)).collect();
+            let other = votes.iter().find(|&&s| s != old[t]);
+            if let Some(&other) = other
+                && votes.iter().filter(|&&s| s == other).count() >= 2
+            {
+                self.sides[t] = other;
+            }
+        }
+    }
+}
+
+/// What one facet sees.
+struct Facet {
+    /// Share of the open that it sees, and that the facet behind its wall sees.
+    open: f64,
+    open_behind: f64,
+    /// m.
+    thickness: f64,
+    /// How far material reaches under 45° to all sides (m), the least.
+    beside: f64,
+}
+
+impl Facet {
+    fn of(mesh: &TriMesh, index: &SurfaceIndex, t: u32, looks: &[DVec3]) -> Self {
+        let (lower, upper) = mesh.bounds();
+        let off = 1e-6 * (upper - lower).length();
+        let normal = mesh.facet_normal(t);
+        let at = mesh.corners(t).iter().sum::<DVec3>() / 3.0;
+        let behind = index.ray(at - normal * off, -normal);
+        let facing = behind.filter(|(hit, _)| mesh.facet_normal(hit.triangle).dot(normal) < FACING);
+        let frame = frame(normal);
+        let beside = (0..8)
+            .map(|k| {
+                let (sin, cos) = (f64::from(k) * std::f64::consts::FRAC_PI_4).sin_cos();
+                let into = frame * DVec3::new(cos, sin, -1.0).normalize();
+                index
+                    .ray(at - normal * off, into)
+                    .map_or(f64::INFINITY, |h| h.1)
+            })
+            .fold(f64::INFINITY, f64::min);
+        Self {
+            open: openness(index, at + normal * off, &frame, looks),
+            open_behind: facing.map_or(0.0, |(hit, _)| {
+                let away = mesh.facet_normal(hit.triangle);
+                openness(
+                    index,
+                    mesh.point(hit) + away * off,
+                    &self::frame(away),
+                    looks,
+                )
+            }),
+            thickness: facing.map_or(f64::NAN, |(_, distance)| distance + off),
+            beside,
+        }
+    }
+
+    fn side(&self, mesh: &TriMesh, t: u32, typical: f64, centre: DVec3) -> Side {
+        let deep = self.thickness.is_nan() || self.thickness > END * typical;
+        if deep && self.beside < typical {
+            return Side::Rim;
+        }
+        let more = if self.thickness.is_nan() {
+            self.open - 0.5
+        } else {
+            self.open - self.open_behind
+        };
+        if more.abs() > ALIKE {
+            return if more > 0.0 {
+                Side::Outside
+            } else {
+                Side::Inside
+            };
+        }
+        let middle = mesh.corners(t)[0] - centre;
+        if mesh.facet_normal(t).dot(middle) >= 0.0 {
+            Side::Outside
+        } else {
+            Side::Inside
+        }
+    }
+}
+
+/// Axes with the third along a normal.
+fn frame(normal: DVec3) -> DMat3 {
+    let x = normal.any_orthonormal_vector();
+    DMat3::from_cols(x, normal.cross(x), normal)
+}
+
+/// Directions over the half-space of z, as many to a side as a matt surface sees it (a spiral of golden angles).
+fn looks() -> Vec<DVec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    (0..LOOKS)
+        .map(|k| {
+            let radius = ((k as f64 + 0.5) / LOOKS as f64).sqrt();
+            let (sin, cos) = (golden * k as f64).sin_cos();
+            DVec3::new(radius * cos, radius * sin, (1.0 - radius * radius).sqrt())
+        })
+        .collect()
+}
+
+/// Share of what a point sees that is open.
+fn openness(index: &SurfaceIndex, at: DVec3, frame: &DMat3, looks: &[DVec3]) -> f64 {
+    let open = looks
+        .iter()
+        .filter(|&&l| index.ray(at, *frame * l).is_none());
+    open.count() as f64 / looks.len() as f64
+}
+
+/// Of the thicknesses, weighted by area, the middle one.
+fn middle(thickness: &[f64], mesh: &TriMesh) -> f64 {
+    share_of(thickness, mesh, 0.5)
+}
+
+fn share_of(thickness: &[f64], mesh: &TriMesh, share: f64) -> f64 {
+    let mut walls: Vec<(f64, f64)> = (0u32..)
+        .zip(thickness)
+        .filter(|(_, t)| t.is_finite())
+        .map(|(f, &t)| (t, mesh.facet_area(f)))
+        .collect();
+    walls.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = walls.iter().map(|w| w.1).sum();
+    let mut sum = 0.0;
+    for (t, area) in walls {
+        sum += area;
+        if sum >= share * total {
+            return t;
+        }
+    }
+    f64::NAN
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limb::LimbSpec;
+
+    #[test]
+    fn the_faces_of_a_thick_limb_are_told_apart() {
+        let (mesh, _) = LimbSpec::default().build().unwrap();
+        let solid = mesh.thickened(3e-3);
+        let walls = Walls::of(&solid, &SurfaceIndex::new(&solid));
+        assert!((walls.typical(&solid) - 3e-3).abs() < 1e-4);
+        let mut wrong = 0.0;
+        let mut found = [0.0; 3];
+        for (t, side) in (0u32..).zip(&walls.sides) {
+            let middle = solid.corners(t).iter().sum::<DVec3>() / 3.0;
+            let radial = solid.facet_normal(t).dot(middle.with_z(0.0).normalize());
+            let truth = match radial {
+                r if r > 0.9 => Side::Outside,
+                r if r < -0.9 => Side::Inside,
+                _ => Side::Rim,
+            };
+            let area = solid.facet_area(t);
+            found[*side as usize] += area;
+            if *side != truth {
+                wrong += area;
+            }
+        }
+        assert!(
+            wrong < 0.02 * solid.area(),
+            "{wrong} of {}: {found:?}",
+            solid.area()
+        );
+    }
+}
