@@ -2,6 +2,7 @@
 //!
 //! Each stage is a pure function of the ones before it, so that a caller can keep what has not changed.
 
+mod advise;
 mod choose;
 mod ground;
 mod judge;
@@ -18,6 +19,7 @@ use crate::mesh::TriMesh;
 use crate::placement::PlacementError;
 use crate::project::{BadValue, Masks, Project};
 
+pub use self::advise::*;
 pub use self::choose::*;
 pub use self::ground::*;
 pub use self::judge::*;

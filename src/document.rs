@@ -13,7 +13,7 @@ use crate::mesh::geodesic::{March, Scratch};
 use crate::mesh::repair::Repair;
 use crate::mesh::{RepairReport, TriMesh};
 use crate::placement::SelectorKind;
-use crate::project::{ChosenSite, Masks, Project, SelectionKeys, SupportKeys};
+use crate::project::{ChosenSite, Masks, PartModel, Project, SelectionKeys, SupportKeys};
 
 pub use paint::{Brush, Layer};
 
@@ -51,7 +51,7 @@ pub struct Document {
 
 /// What is painted on all layers and what is held: equal when these are.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PaintKey([Option<u64>; 4], Vec<(SupportKeys, Option<u64>)>);
+pub struct PaintKey([Option<u64>; 6], Vec<(SupportKeys, Option<u64>)>);
 
 /// Undo steps kept.
 const DEPTH: usize = 200;
@@ -249,6 +249,28 @@ impl Document {
             self.part_key(),
             p.material,
             self.supports_key()
+        )
+    }
+
+    /// Whether the part is taken as a solid.
+    #[must_use]
+    pub fn is_solid(&self) -> bool {
+        self.state.project.part.model == PartModel::Solid
+    }
+
+    /// What is known of the part's walls depends on.
+    #[must_use]
+    pub fn walls_key(&self) -> String {
+        let p = &self.state.project;
+        let mask = |layer| self.layer(layer).map(|m| self.fingerprints.of(m));
+        format!(
+            "{:p} {} {:?} {} {:?} {:?}",
+            Arc::as_ptr(&self.part),
+            p.part.thickness_mm,
+            p.budget.quality,
+            p.touch.count,
+            mask(Layer::Inside),
+            mask(Layer::Outside)
         )
     }
 

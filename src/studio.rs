@@ -2,6 +2,7 @@
 //!
 //! This layer only shows and asks: what takes long runs in jobs on snapshots of the document.
 
+mod advice;
 mod commands;
 mod dialogs;
 mod drive;
@@ -104,6 +105,8 @@ pub struct Studio {
     /// Names of the kept selections that are shown.
     shown_kept: BTreeSet<String>,
     slow: fields::Slow,
+    /// What was measured of the walls, and what for.
+    advice: Option<(String, std::sync::Arc<crate::design::Advice>)>,
     /// The stage whose settings are shown.
     pub stage: Stage,
     results: results::Tab,
@@ -164,6 +167,7 @@ impl Studio {
             shown_kept: BTreeSet::new(),
             focused: None,
             slow: None,
+            advice: None,
             stage: Stage::default(),
             results: results::Tab::default(),
             save_next: None,

@@ -13,7 +13,7 @@ use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::{Face, Observer};
 use hapdef::elasticity::respond::{Reading, Responses, Side, respond, respond_from};
 use hapdef::elasticity::support::held_freedoms;
-use hapdef::elasticity::{Freedoms, ShellModel, Touch};
+use hapdef::elasticity::{Freedoms, Model as _, ShellModel, Touch};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::locate::SurfaceIndex;
 use hapdef::placement::SelectorKind;

@@ -198,7 +198,9 @@ pub fn cautions(
             aim.displacement_percent,
             discretization.strain_percent,
             aim.strain_percent,
-            if *aim == Quality::Reference.budget().elements {
+            if linearity.is_none() {
+                "choose a higher quality or fewer touches"
+            } else if *aim == Quality::Reference.budget().elements {
                 "more vertices than this quality allows for so many touches would be needed"
             } else {
                 "choose a higher quality, fewer touches, or part.elements = \"graded\""

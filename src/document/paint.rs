@@ -21,10 +21,21 @@ pub enum Layer {
     Support,
     /// Where touches come: everywhere when nothing is painted.
     Touch,
+    /// Of a solid: the face that gauges are glued to, and the one that is touched, where what was found by
+    /// itself is wrong.
+    Inside,
+    Outside,
 }
 
 impl Layer {
-    pub const ALL: [Self; 4] = [Self::Feasible, Self::KeepOut, Self::Support, Self::Touch];
+    pub const ALL: [Self; 6] = [
+        Self::Feasible,
+        Self::KeepOut,
+        Self::Support,
+        Self::Touch,
+        Self::Inside,
+        Self::Outside,
+    ];
 
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -33,6 +44,23 @@ impl Layer {
             Self::KeepOut => "Keep out",
             Self::Support => "Support",
             Self::Touch => "Touch region",
+            Self::Inside => "Inside face",
+            Self::Outside => "Outside face",
+        }
+    }
+
+    /// Whether it says something of a solid only.
+    #[must_use]
+    pub fn is_face(self) -> bool {
+        matches!(self, Self::Inside | Self::Outside)
+    }
+
+    /// The layer that a vertex cannot be on at the same time.
+    fn excluded(self) -> Option<Self> {
+        match self {
+            Self::Inside => Some(Self::Outside),
+            Self::Outside => Some(Self::Inside),
+            _ => None,
         }
     }
 }
@@ -46,6 +74,8 @@ pub enum Brush {
 
 const KEEP_OUT: &str = "keep-out";
 const TOUCH: &str = "touch-region";
+const INSIDE: &str = "inside-face";
+const OUTSIDE: &str = "outside-face";
 
 impl Document {
     /// The vertices of a layer, where any were painted.
@@ -57,6 +87,8 @@ impl Document {
             Layer::KeepOut => state.masks.get(state.project.feasible.keep_out.as_ref()?),
             Layer::Touch => state.masks.get(state.project.touch.region.as_ref()?),
             Layer::Support => state.masks.get(self.painted_support()?),
+            Layer::Inside => state.masks.get(state.project.part.inside.as_ref()?),
+            Layer::Outside => state.masks.get(state.project.part.outside.as_ref()?),
         }
     }
 
@@ -104,6 +136,16 @@ impl Document {
                 self.state.project.touch.region = Some(name.clone());
                 name
             }
+            Layer::Inside => {
+                let name = self.own_name(self.state.project.part.inside.clone(), INSIDE);
+                self.state.project.part.inside = Some(name.clone());
+                name
+            }
+            Layer::Outside => {
+                let name = self.own_name(self.state.project.part.outside.clone(), OUTSIDE);
+                self.state.project.part.outside = Some(name.clone());
+                name
+            }
             Layer::Support => {
                 if self.painted_support().is_none() {
                     self.add_painted_support();
@@ -149,6 +191,16 @@ impl Document {
                     self.forget_mask(&name);
                 }
             }
+            Layer::Inside => {
+                if let Some(name) = self.state.project.part.inside.take() {
+                    self.forget_mask(&name);
+                }
+            }
+            Layer::Outside => {
+                if let Some(name) = self.state.project.part.outside.take() {
+                    self.forget_mask(&name);
+                }
+            }
             Layer::Support => {
                 if let Some(name) = self.painted_support().cloned() {
                     let supports = &mut self.state.project.supports;
@@ -179,6 +231,16 @@ impl Document {
         {
             self.forget_mask(&name);
         }
+        if empty(self, Layer::Inside)
+            && let Some(name) = self.state.project.part.inside.take()
+        {
+            self.forget_mask(&name);
+        }
+        if empty(self, Layer::Outside)
+            && let Some(name) = self.state.project.part.outside.take()
+        {
+            self.forget_mask(&name);
+        }
     }
 
     /// One dab of the brush: every vertex within `radius` (m) over the surface. The first dab of paint on
@@ -199,9 +261,18 @@ impl Document {
         if !paint && layer != Layer::Feasible && self.layer(layer).is_none() {
             return;
         }
+        let vertices: Vec<u32> = vertices.into_iter().collect();
         let mask = self.layer_mut(layer, !paint);
-        for v in vertices {
+        for &v in &vertices {
             mask[v as usize] = paint;
+        }
+        if let Some(other) = layer.excluded().filter(|_| paint)
+            && self.layer(other).is_some()
+        {
+            let mask = self.layer_mut(other, false);
+            for &v in &vertices {
+                mask[v as usize] = false;
+            }
         }
     }
 

@@ -43,6 +43,7 @@ pub enum Command {
     Simulate,
     Select,
     Keep,
+    Advise,
     Cancel,
     Follow,
     SimulatedBoard,
@@ -90,6 +91,7 @@ impl Command {
             Self::Simulate => "Simulate",
             Self::Select => "Select gauges",
             Self::Keep => "Keep this selection",
+            Self::Advise => "Shell or solid?",
             Self::Cancel => "Cancel all jobs",
             Self::SimulatedBoard => "Start a simulated board",
             Self::Tare => "Tare",
@@ -116,6 +118,8 @@ impl Command {
             Self::Paint(Layer::KeepOut) => "Paint where no gauge may go",
             Self::Paint(Layer::Support) => "Paint what is held",
             Self::Paint(Layer::Touch) => "Paint where touches come",
+            Self::Paint(Layer::Inside) => "Paint the inside face",
+            Self::Paint(Layer::Outside) => "Paint the outside face",
             Self::Stage(Stage::Part) => "Go to part",
             Self::Stage(Stage::Supports) => "Go to supports and material",
             Self::Stage(Stage::Simulation) => "Go to simulation",
@@ -169,6 +173,9 @@ impl Command {
             Self::Simulate => "Compute how the limb deforms under all touches",
             Self::Select => "Filter, reduce, choose the gauges and judge them on unseen touches",
             Self::Keep => "Keep the gauges as they are, to compare them with others",
+            Self::Advise => {
+                "Measure the walls, say whether shell or solid fits, and what each would cost"
+            }
             Self::Cancel => "Stop whatever is being computed",
             Self::SimulatedBoard => {
                 "Live touch without hardware: a truth of half the element size, and gauges as a workshop glues them"
@@ -218,6 +225,7 @@ impl Command {
             Self::Quit => ctrl(Key::Q),
             Self::Undo => ctrl(Key::Z),
             Self::Redo => shifted(Key::Z),
+            Self::Advise => plain(Key::F4),
             Self::Simulate => plain(Key::F5),
             Self::Select => plain(Key::F6),
             Self::Keep => ctrl(Key::D),
@@ -290,6 +298,7 @@ impl Command {
             Self::Simulate,
             Self::Select,
             Self::Keep,
+            Self::Advise,
             Self::Cancel,
             Self::Follow,
             Self::SimulatedBoard,
@@ -330,6 +339,7 @@ impl Studio {
             Command::Tare | Command::Record | Command::Disconnect => self.live.is_connected(),
             Command::Export => self.design.is_some(),
             Command::Keep => !self.document.state.project.selection.sites.is_empty(),
+            Command::Paint(layer) if layer.is_face() => self.document.is_solid(),
             Command::Pin | Command::RemoveGauges | Command::FramePicked | Command::Nudge(_) => {
                 !self.picked.is_empty()
             }
@@ -393,6 +403,7 @@ impl Studio {
             Command::Simulate => self.simulate(ctx),
             Command::Select => self.select(ctx),
             Command::Keep => self.keep(),
+            Command::Advise => self.start_advising(ctx),
             Command::Cancel => self.cancel(),
             Command::SimulatedBoard => {
                 self.stage = Stage::Live;

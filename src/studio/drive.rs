@@ -30,6 +30,7 @@ pub(super) enum Finished {
     Exported(PathBuf),
     Estimate(f64),
     Judged(Arc<Evaluation>),
+    Advised(Arc<crate::design::Advice>),
     Field(Vec<f64>),
     /// Metres over the surface.
     Measured(f64),
@@ -360,6 +361,7 @@ impl Studio {
             }
             // Of gauges that have moved on.
             Finished::Estimate(_) | Finished::Judged(..) => {}
+            Finished::Advised(advice) => self.advice = Some((key, advice)),
             Finished::Field(values) => self.slow = Some((key, Arc::new(values))),
             Finished::Measured(over) => self.measured(&key, over),
             Finished::Pictured(path) => self.tell(format!("The picture is in {}", path.display())),

@@ -26,16 +26,20 @@ pub enum Field {
     SignalToNoise,
     Error,
     Uncertainty,
+    Faces,
+    Thickness,
 }
 
 impl Field {
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 8] = [
         Self::Region,
         Self::Strain,
         Self::Displacement,
         Self::SignalToNoise,
         Self::Error,
         Self::Uncertainty,
+        Self::Faces,
+        Self::Thickness,
     ];
 
     #[must_use]
@@ -47,6 +51,8 @@ impl Field {
             Self::SignalToNoise => "Signal to noise",
             Self::Error => "Localization error",
             Self::Uncertainty => "GP variance",
+            Self::Faces => "Faces",
+            Self::Thickness => "Wall thickness",
         }
     }
 }
@@ -154,7 +160,13 @@ impl Studio {
         let field = self.view.field;
         let slow = self.slow.as_ref().map(|(_, values)| Arc::as_ptr(values));
         format!(
-            "{field:?} {:?} {} {:?} {:?} {:?} {:?} {slow:?}",
+            "{field:?} {:?} {:?} {} {:?} {:?} {:?} {:?} {slow:?}",
+            matches!(field, Field::Faces | Field::Thickness).then(|| {
+                (
+                    self.advice.as_ref().map(|(_, a)| Arc::as_ptr(a)),
+                    self.current_advice().is_some(),
+                )
+            }),
             self.view.ranges.of(field),
             self.touching.version,
             self.simulation.as_ref().map(|s| Arc::as_ptr(&s.simulated)),
@@ -238,6 +250,16 @@ impl Studio {
                 let top = robust_top(&ratio);
                 let map = ColorMap::Viridis;
                 Some((ratio, legend("signal to noise (rms)", 0.0, top, map)))
+            }
+            Field::Faces => {
+                let sides = self.wall_values(ctx, true)?;
+                let map = ColorMap::BlueOrange;
+                Some((sides, legend("outside … inside", -1.0, 1.0, map)))
+            }
+            Field::Thickness => {
+                let mm = self.wall_values(ctx, false)?;
+                let top = robust_top(&mm);
+                Some((mm, legend("wall thickness (mm)", 0.0, top, ColorMap::Viridis)))
             }
             Field::Error => {
                 let errors = self.slow_field(ctx, key)?;

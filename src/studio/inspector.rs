@@ -10,7 +10,7 @@ use crate::document::Layer;
 use crate::limb::BoxMm;
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
-use crate::project::{Lattice, Project, RegionKeys, SupportKeys, SupportKind};
+use crate::project::{Lattice, PartModel, Project, RegionKeys, SupportKeys, SupportKind};
 
 impl Studio {
     /// The settings of the stage that is looked at.
@@ -61,7 +61,7 @@ impl Studio {
         ui.weak(if from_file { &file } else { "The bundled limb" });
         let project = &mut self.document.state.project;
         let mut pressed = false;
-        rows(ui, "Shell", |ui| part(ui, project));
+        rows(ui, "Model", |ui| part(ui, project));
         if from_file {
             rows(ui, "Taking the mesh in", |ui| {
                 pressed = taking_in(ui, project, bodies, again);
@@ -71,6 +71,8 @@ impl Studio {
             let ctx = ui.ctx().clone();
             self.take_in_again(&ctx);
         }
+        self.button(ui, super::Command::Advise);
+        self.advice_lines(ui);
     }
 
     fn supports_form(&mut self, ui: &mut Ui) {
@@ -100,9 +102,9 @@ impl Studio {
 /// What a stage is for, in a sentence.
 fn purpose(stage: Stage) -> &'static str {
     match stage {
-        Stage::Part => "The shell that gauges go into",
-        Stage::Supports => "What the shell is made of and where it is held",
-        Stage::Simulation => "How the shell deforms under every touch",
+        Stage::Part => "The part that gauges go into",
+        Stage::Supports => "What the part is made of and where it is held",
+        Stage::Simulation => "How the part deforms under every touch",
         Stage::Feasible => "Where a gauge can physically go",
         Stage::Candidates => "The few places that tell what all others would",
         Stage::Selection => "Which of the candidates get a gauge",
@@ -155,6 +157,13 @@ fn taking_in(ui: &mut Ui, project: &mut Project, bodies: usize, again: bool) -> 
     pressed
 }
 
+fn model_name(model: PartModel) -> &'static str {
+    match model {
+        PartModel::Shell => "Shell",
+        PartModel::Solid => "Solid",
+    }
+}
+
 fn quality(ui: &mut Ui, project: &mut Project) {
     ui.horizontal(|ui| {
         ui.label("Quality");
@@ -178,15 +187,25 @@ fn axis_name(axis: Axis) -> &'static str {
 const AXES: [Axis; 3] = [Axis::X, Axis::Y, Axis::Z];
 
 fn part(ui: &mut Ui, project: &mut Project) {
-    number(
+    choice(
         ui,
-        "Thickness",
-        &mut project.part.thickness_mm,
-        1e-4..=1e4,
-        0.01,
-        " mm",
-        "Of the shell; the mesh is its mid-surface",
+        "Taken as",
+        &mut project.part.model,
+        &[PartModel::Shell, PartModel::Solid],
+        model_name,
+        "Shell: the mesh is the middle of a wall. Solid: the mesh encloses a part with walls",
     );
+    if project.part.model == PartModel::Shell {
+        number(
+            ui,
+            "Thickness",
+            &mut project.part.thickness_mm,
+            1e-4..=1e4,
+            0.01,
+            " mm",
+            "Of the shell; the mesh is its mid-surface",
+        );
+    }
     choice(
         ui,
         "Axis",

@@ -22,6 +22,8 @@ pub enum Task {
     Open,
     /// How gauges put by hand do, quickly and truly.
     Estimate,
+    /// Shell or solid.
+    Advise,
     Judge,
     /// A field that takes a while.
     Field,
@@ -50,6 +52,7 @@ impl Task {
             Self::Open => "Open".into(),
             Self::Estimate => "Estimate the error".into(),
             Self::Judge => "Judge the gauges".into(),
+            Self::Advise => "Measure the walls".into(),
             Self::Field => "Compute the field".into(),
             Self::Measure => "Measure".into(),
             Self::Picture => "Save the picture".into(),
@@ -74,7 +77,13 @@ impl Task {
     fn is_quiet(self) -> bool {
         matches!(
             self,
-            Self::Filter | Self::Open | Self::Estimate | Self::Field | Self::Measure | Self::Save
+            Self::Filter
+                | Self::Open
+                | Self::Estimate
+                | Self::Advise
+                | Self::Field
+                | Self::Measure
+                | Self::Save
         )
     }
 }

@@ -439,6 +439,14 @@ impl Studio {
             Field::Uncertainty if self.design.is_none() => {
                 "Press “Select gauges” to see what the gauges leave uncertain"
             }
+            Field::Faces | Field::Thickness if self.advice.is_some() => {
+                if self.view.built.as_ref().is_some_and(|b| b.legend.is_some()) {
+                    "Blue: touches land   ·   orange: gauges go   ·   paint “Inside face” or “Outside face” where that is wrong"
+                } else {
+                    "The part encloses nothing: it has no inside of its own"
+                }
+            }
+            Field::Faces | Field::Thickness => "Measuring the walls …",
             Field::Error | Field::Uncertainty
                 if self.view.built.as_ref().is_none_or(|b| b.legend.is_none()) =>
             {

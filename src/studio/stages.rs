@@ -253,10 +253,14 @@ impl Studio {
                         1 => "1 support".into(),
                         n => format!("{n} supports"),
                     },
-                    format!(
-                        "{} mm thick, {} GPa",
-                        project.part.thickness_mm, project.material.youngs_modulus_gpa
-                    ),
+                    if self.document.is_solid() {
+                        format!("solid, {} GPa", project.material.youngs_modulus_gpa)
+                    } else {
+                        format!(
+                            "{} mm thick, {} GPa",
+                            project.part.thickness_mm, project.material.youngs_modulus_gpa
+                        )
+                    },
                 ]
             }
             Stage::Simulation => self.simulation_lines(),

@@ -110,7 +110,8 @@ impl Studio {
             .selected_text(self.view.layer.name())
             .width(96.0)
             .show_ui(ui, |ui| {
-                for layer in Layer::ALL {
+                let solid = self.document.is_solid();
+                for layer in Layer::ALL.into_iter().filter(|l| solid || !l.is_face()) {
                     ui.selectable_value(&mut self.view.layer, layer, layer.name());
                 }
             })
@@ -166,6 +167,7 @@ impl Studio {
         egui::ComboBox::new("field", "")
             .selected_text(self.view.field.name())
             .width(128.0)
+            .height(400.0)
             .show_ui(ui, |ui| {
                 for field in Field::ALL {
                     ui.selectable_value(&mut self.view.field, field, field.name());

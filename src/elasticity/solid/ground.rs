@@ -53,6 +53,8 @@ const CHANGE: f64 = 1.0 / (FINER * FINER) - 1.0;
 /// Unknowns of quadratic cells for a surface, times the squared size over its area (measured on tubes and
 /// shins, walls half as thick as the cells).
 const UNKNOWNS: f64 = 45.0;
+/// Unknowns that are allowed for each vertex that a shell may have.
+const UNKNOWNS_A_VERTEX: f64 = 12.0;
 /// The error is an estimate: stop at this share of the tolerance.
 const SAFETY: f64 = 0.8;
 
@@ -95,11 +97,11 @@ impl SolidGround {
         })
     }
 
-    /// Thickness that cells are sized by (m): thinner than nine tenths of the walls; of a part without walls
-    /// half its least side.
+    /// Thickness that cells are sized by (m): thinner than three quarters of the walls; of a part without
+    /// walls half its least side.
     #[must_use]
     pub fn wall(&self) -> f64 {
-        let thin = self.walls.thinner_than(&self.whole, 0.1);
+        let thin = self.walls.thinner_than(&self.whole, 0.25);
         if thin.is_finite() {
             return thin;
         }
@@ -142,6 +144,26 @@ impl SolidGround {
         Fineness::of(size, self.wall())
     }
 
+    /// Size of the smallest cells (m) that a budget allows for so many touches.
+    #[must_use]
+    pub fn size_allowed(&self, aim: &Elements, touches: usize) -> f64 {
+        self.size_for(UNKNOWNS_A_VERTEX * aim.most_for(touches) as f64)
+    }
+
+    /// Unknowns with cells of a size (m), about.
+    #[must_use]
+    pub fn unknowns(&self, size: f64) -> f64 {
+        UNKNOWNS * self.whole.area() / (size * size)
+    }
+
+    /// Error of the displacement under a touch (%) with cells of a size (m): as on the slotted tube, where it
+    /// fell with the square of the size.
+    #[must_use]
+    pub fn error_percent(&self, size: f64) -> f64 {
+        const OF_ONE_WALL: f64 = 0.95;
+        OF_ONE_WALL * (size / self.wall()).powi(2)
+    }
+
     /// Size of cells (m) for about so many unknowns.
     #[must_use]
     pub fn size_for(&self, unknowns: f64) -> f64 {
@@ -160,8 +182,7 @@ impl SolidGround {
         aim: &Elements,
         watch: Watch,
     ) -> Result<SolidGraded, ElasticError> {
-        // As many unknowns as the shell's six at a vertex.
-        let least_size = self.size_for(6.0 * aim.most_for(touches.len()) as f64);
+        let least_size = self.size_allowed(aim, touches.len());
         let touches = sample(touches);
         let places: Vec<DVec3> = spread(places, PLACES);
         let mut size = (FIRST * self.wall()).max(least_size / FINER);
@@ -203,7 +224,7 @@ impl SolidGround {
         let mut notes = Vec::new();
         if ratio > LARGE {
             notes.push(format!(
-                "The cells ({:.2} mm) are {ratio:.1} times as large as the thinnest walls ({:.2} mm): choose a higher quality, or fewer touches.",
+                "The cells ({:.2} mm) are {ratio:.1} times as large as thin walls are thick ({:.2} mm): choose a higher quality, or fewer touches.",
                 fineness.size * 1e3,
                 self.wall() * 1e3
             ));
