@@ -14,15 +14,18 @@ pub mod scatter;
 pub mod surface;
 mod thicken;
 pub mod unroll;
+pub mod volume;
 pub mod walls;
 pub mod winding;
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::sync::Arc;
 
 use glam::DVec3;
 use serde::Serialize;
 
 use repair::Repair;
+use volume::VolumeMesh;
 
 /// Why a mesh was refused, with the place and the remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -130,6 +133,8 @@ pub struct TriMesh {
     bounds: (DVec3, DVec3),
     area: f64,
     mean_edge: f64,
+    /// The tetrahedra that it is the surface of, where it came with them.
+    volume: Option<Arc<VolumeMesh>>,
 }
 
 const MAX_TRIANGLES: usize = 4_000_000;
@@ -216,7 +221,23 @@ impl TriMesh {
             triangle_edges,
             vertex_triangles,
             vertex_normals,
+            volume: None,
         }
+    }
+
+    /// The same surface, known to be that of tetrahedra.
+    #[must_use]
+    pub fn around(self, volume: VolumeMesh) -> Self {
+        Self {
+            volume: Some(Arc::new(volume)),
+            ..self
+        }
+    }
+
+    /// The tetrahedra that it is the surface of, where it came with them.
+    #[must_use]
+    pub fn volume(&self) -> Option<&Arc<VolumeMesh>> {
+        self.volume.as_ref()
     }
 
     #[must_use]

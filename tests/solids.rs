@@ -254,7 +254,12 @@ fn strain_inside_converges() {
             tolerance: 1e-3,
             ..Fineness::of(size, 3e-3)
         };
-        read(&model(&part, material, std::slice::from_ref(&support), &fineness))
+        read(&model(
+            &part,
+            material,
+            std::slice::from_ref(&support),
+            &fineness,
+        ))
     };
     let fine = at(4e-3, 3);
     let scale = fine.iter().flatten().fold(0.0f64, |m, e| m.max(e.abs()));

@@ -236,8 +236,8 @@ impl Ground {
     pub fn finer(&self, laid: &Laid) -> Laid {
         match (self, laid) {
             (Self::Shell(shell), Laid::Shell(laid)) => Laid::Shell(shell.halved(laid)),
-            (_, Laid::Solid(fineness)) => Laid::Solid(SolidGround::finer(fineness)),
-            (Self::Solid(_), Laid::Shell(_)) => unreachable!("triangles are of shells"),
+            (Self::Solid(solid), Laid::Solid(fineness)) => Laid::Solid(solid.finer(fineness)),
+            _ => unreachable!("cells are of solids, triangles of shells"),
         }
     }
 

@@ -191,7 +191,12 @@ pub fn cautions(
             "No gauge lies farther than two tip radii from a touch: the mesh's error in strain could not be judged.".into(),
         );
     }
-    if !discretization.meets(aim) {
+    if discretization.displacement_percent.is_nan() {
+        notes.push(
+            "The error of the mesh could not be judged: its elements, halved, would be too many."
+                .into(),
+        );
+    } else if !discretization.meets(aim) {
         notes.push(format!(
             "The mesh leaves about {:.1} % error in displacement (asked: {:.0} %) and {:.1} % in strain (asked: {:.0} %): {}.",
             discretization.displacement_percent,

@@ -12,6 +12,7 @@ pub mod grip;
 pub mod ground;
 pub mod immersed;
 pub mod lagrange;
+pub mod tetrahedra;
 
 use std::sync::Arc;
 

@@ -1,9 +1,11 @@
-//! Meshes from files: glTF and GLB, OBJ, STL (both kinds), PLY.
+//! Meshes from files: glTF and GLB, OBJ, STL (both kinds), PLY; tetrahedra from Gmsh, Abaqus and `CalculiX`.
 //!
 //! The libraries that parse them may panic on hostile bytes, so they run behind a boundary; what they
 //! return is checked by [`TriMesh::repaired`] like anything from outside.
 
 mod gltf;
+mod inp;
+mod msh;
 mod obj;
 mod ply;
 mod stl;
@@ -17,6 +19,7 @@ use glam::DVec3;
 
 use super::FileError;
 use crate::mesh::repair::Repair;
+use crate::mesh::volume::VolumeMesh;
 use crate::mesh::{MeshError, RepairReport, TriMesh};
 use crate::project::{Masks, Unit};
 
@@ -37,9 +40,32 @@ struct Soup {
     groups: Vec<(String, usize, usize)>,
     /// Nodes walked through.
     visits: usize,
+    /// Tetrahedra on the positions: their surface is the mesh, whatever triangles there are.
+    volume: Option<VolumeMesh>,
+    /// Names and positions.
+    node_sets: Vec<(String, Vec<u32>)>,
+}
+
+/// Tetrahedra as they come out of a file.
+#[derive(Default)]
+struct Tets {
+    linear: Vec<[u32; 4]>,
+    quadratic: Vec<[u32; 10]>,
 }
 
 impl Soup {
+    /// Tetrahedra on the positions read so far.
+    fn take_tets(&mut self, tets: Tets) {
+        if tets.linear.is_empty() && tets.quadratic.is_empty() {
+            return;
+        }
+        let from_linear = !tets.linear.is_empty();
+        let mut volume = VolumeMesh::of_linear(self.positions.clone(), &tets.linear);
+        volume.tetrahedra.extend(tets.quadratic);
+        volume.from_linear = from_linear;
+        self.volume = Some(volume);
+    }
+
     /// Names the triangles from `first` on.
     fn group(&mut self, name: &str, first: usize) {
         if !name.is_empty() && first < self.triangles.len() {
@@ -95,7 +121,7 @@ fn ending(path: &Path) -> String {
 }
 
 /// File endings that can be read.
-pub const ENDINGS: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
+pub const ENDINGS: [&str; 7] = ["glb", "gltf", "inp", "msh", "obj", "ply", "stl"];
 
 /// Reads one body of a mesh file. `unit` is that of the file's numbers; glTF needs none.
 ///
@@ -143,6 +169,8 @@ pub fn parse_mesh(
         "obj" => obj::read(bytes),
         "ply" => ply::read(bytes),
         "stl" => stl::read(bytes),
+        "msh" => msh::read(bytes),
+        "inp" => inp::read(bytes),
         _ => gltf::read(bytes, folder),
     };
     let mut soup = catch_unwind(AssertUnwindSafe(parse))
@@ -151,12 +179,53 @@ pub fn parse_mesh(
     for p in &mut soup.positions {
         *p *= scale;
     }
+    if let Some(volume) = soup.volume.take() {
+        return tetrahedral(&soup, volume, scale, body);
+    }
     let taken_in = TriMesh::repaired(&soup.positions, &soup.triangles, body, repair);
     let (mesh, repairs) = taken_in.map_err(|e: MeshError| e.to_string())?;
     Ok(LoadedMesh {
         groups: soup.masks(&mesh, repair.weld),
         mesh,
         repairs,
+    })
+}
+
+/// A piece of a mesh of tetrahedra, its surface as the mesh.
+fn tetrahedral(
+    soup: &Soup,
+    mut volume: VolumeMesh,
+    scale: f64,
+    body: usize,
+) -> Result<LoadedMesh, String> {
+    for p in &mut volume.nodes {
+        *p *= scale;
+    }
+    let finite = |p: &DVec3| p.is_finite() && p.abs().max_element() < 1e9;
+    if let Some(node) = volume.nodes.iter().position(|p| !finite(p)) {
+        return Err(format!("node {node} is not a finite point"));
+    }
+    let whole = volume.checked().map_err(|e| e.to_string())?;
+    let (piece, mesh, bodies) = whole.body(body).map_err(|e| e.to_string())?;
+    let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
+    let groups = (soup.node_sets.iter())
+        .map(|(name, nodes)| {
+            let members: HashSet<[u64; 3]> = (whole.with_middles(nodes).iter())
+                .map(|&n| key(whole.nodes[n as usize]))
+                .collect();
+            let mask: Vec<bool> = (mesh.positions().iter())
+                .map(|&p| members.contains(&key(p)))
+                .collect();
+            (name.clone(), Arc::new(mask))
+        })
+        .filter(|(_, mask)| mask.iter().any(|&m| m));
+    Ok(LoadedMesh {
+        groups: groups.collect(),
+        repairs: RepairReport {
+            bodies,
+            ..RepairReport::default()
+        },
+        mesh: mesh.around(piece),
     })
 }
 

@@ -32,7 +32,7 @@ pub struct Walls {
 const LOOKS: usize = 64;
 /// A surface faces another one when their normals are opposite to this (cos 120°).
 const FACING: f64 = -0.5;
-/// Faces of a wall that see this much alike are told apart by where the middle of the part is.
+/// Faces of a wall see alike when what they see differs by less than this.
 const ALIKE: f64 = 0.05;
 /// A facet has no wall behind it, but its end, when material reaches farther than this many thicknesses of the
 /// walls while beside the facet it does not reach one.
@@ -51,11 +51,9 @@ impl Walls {
             .collect();
         let thickness: Vec<f64> = facets.iter().map(|f| f.thickness).collect();
         let typical = middle(&thickness, mesh);
-        let (lower, upper) = mesh.bounds();
-        let centre = (lower + upper) / 2.0;
         let sides = (0u32..)
             .zip(&facets)
-            .map(|(t, facet)| facet.side(mesh, t, typical, centre))
+            .map(|(t, facet)| facet.side(mesh, t, typical))
             .collect();
         let mut walls = Self { sides, thickness };
         for _ in 0..ROUNDS {
@@ -142,7 +140,7 @@ impl Facet {
         }
     }
 
-    fn side(&self, mesh: &TriMesh, t: u32, typical: f64, centre: DVec3) -> Side {
+    fn side(&self, mesh: &TriMesh, t: u32, typical: f64) -> Side {
         let deep = self.thickness.is_nan() || self.thickness > END * typical;
         if deep && self.beside < typical {
             return Side::Rim;
@@ -159,8 +157,14 @@ impl Facet {
                 Side::Inside
             };
         }
-        let middle = mesh.corners(t)[0] - centre;
-        if mesh.facet_normal(t).dot(middle) >= 0.0 {
+        // A flat plate looks the same from both sides: what faces up is taken for the outside.
+        let normal = mesh.facet_normal(t);
+        let first = [normal.z, normal.y, normal.x];
+        let up = first
+            .into_iter()
+            .find(|c| c.abs() > 0.5)
+            .unwrap_or(normal.z);
+        if up >= 0.0 {
             Side::Outside
         } else {
             Side::Inside

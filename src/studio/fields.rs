@@ -74,6 +74,9 @@ impl Ranges {
     }
 }
 
+/// Faces are ±1 on colours that reach this far, so that both are bright.
+pub(super) const FACE_RANGE: f64 = 1.7;
+
 /// What the regions were built from: the verdicts by their place in memory, and what is painted.
 type RegionKey = (Option<usize>, PaintKey);
 
@@ -254,12 +257,15 @@ impl Studio {
             Field::Faces => {
                 let sides = self.wall_values(ctx, true)?;
                 let map = ColorMap::BlueOrange;
-                Some((sides, legend("outside … inside", -1.0, 1.0, map)))
+                Some((sides, legend("faces", -FACE_RANGE, FACE_RANGE, map)))
             }
             Field::Thickness => {
                 let mm = self.wall_values(ctx, false)?;
                 let top = robust_top(&mm);
-                Some((mm, legend("wall thickness (mm)", 0.0, top, ColorMap::Viridis)))
+                Some((
+                    mm,
+                    legend("wall thickness (mm)", 0.0, top, ColorMap::Viridis),
+                ))
             }
             Field::Error => {
                 let errors = self.slow_field(ctx, key)?;

@@ -309,6 +309,9 @@ impl Studio {
         let Some(legend) = self.view.built.as_ref().and_then(|b| b.legend.clone()) else {
             return;
         };
+        if self.view.field == Field::Faces {
+            return; // they have a key of their own
+        }
         let bar = Rect::from_min_max(
             pos2(rect.right() - 34.0, bottom - 210.0),
             pos2(rect.right() - 16.0, bottom),
@@ -387,6 +390,9 @@ impl Studio {
 
     /// What the colours of the regions mean, of those that are there.
     pub(super) fn paint_region_key(&self, painter: &Painter, rect: Rect) {
+        if self.view.field == Field::Faces && self.shows_field() {
+            return face_key(painter, rect);
+        }
         if self.view.field != Field::Region {
             return;
         }
@@ -409,19 +415,8 @@ impl Studio {
                 Color32::from_rgb(128, 153, 230),
             ),
         ];
-        let mut at = rect.right_top() + vec2(-16.0, 12.0);
-        for (_, name, colour) in rows.into_iter().filter(|r| r.0) {
-            let font = FontId::proportional(11.5);
-            let galley = painter.layout_no_wrap(name.to_owned(), font, Color32::WHITE);
-            let height = galley.size().y;
-            let board = plate(painter, at, Align2::RIGHT_TOP, galley);
-            let square = Rect::from_center_size(
-                pos2(board.left() - 10.0, board.center().y),
-                vec2(11.0, 11.0),
-            );
-            painter.rect_filled(square, 2.0, colour);
-            at.y += height + 10.0;
-        }
+        let there = rows.into_iter().filter(|r| r.0);
+        colour_key(painter, rect, there.map(|(_, name, colour)| (name, colour)));
     }
 
     /// What is missing before a field can be seen, or how to look around.
@@ -441,7 +436,7 @@ impl Studio {
             }
             Field::Faces | Field::Thickness if self.advice.is_some() => {
                 if self.view.built.as_ref().is_some_and(|b| b.legend.is_some()) {
-                    "Blue: touches land   ·   orange: gauges go   ·   paint “Inside face” or “Outside face” where that is wrong"
+                    "Paint the layer “Inside face” or “Outside face” where this is wrong"
                 } else {
                     "The part encloses nothing: it has no inside of its own"
                 }
@@ -456,6 +451,36 @@ impl Studio {
                 "Click: press the limb   ·   drag: look around   ·   Shift-drag: shift   ·   wheel: zoom"
             }
         }
+    }
+}
+
+/// What the colours of the faces of a solid mean.
+fn face_key(painter: &Painter, rect: Rect) {
+    let colour = |side: f64| {
+        let t = f64::midpoint(side / super::fields::FACE_RANGE, 1.0);
+        let [r, g, b] = ColorMap::BlueOrange.at(t).map(|c| (c * 255.0) as u8);
+        Color32::from_rgb(r, g, b)
+    };
+    let rows = [
+        ("Outside: touches land", colour(-1.0)),
+        ("Inside: gauges go", colour(1.0)),
+        ("Ends of walls", colour(0.0)),
+    ];
+    colour_key(painter, rect, rows.into_iter());
+}
+
+/// Names with squares of their colours, in the upper right corner.
+fn colour_key<'n>(painter: &Painter, rect: Rect, rows: impl Iterator<Item = (&'n str, Color32)>) {
+    let mut at = rect.right_top() + vec2(-16.0, 12.0);
+    for (name, colour) in rows {
+        let font = FontId::proportional(11.5);
+        let galley = painter.layout_no_wrap(name.to_owned(), font, Color32::WHITE);
+        let height = galley.size().y;
+        let board = plate(painter, at, Align2::RIGHT_TOP, galley);
+        let middle = pos2(board.left() - 10.0, board.center().y);
+        let square = Rect::from_center_size(middle, vec2(11.0, 11.0));
+        painter.rect_filled(square, 2.0, colour);
+        at.y += height + 10.0;
     }
 }
 

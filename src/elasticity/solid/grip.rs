@@ -60,6 +60,23 @@ impl Grip {
         }
     }
 
+    /// Holds the nodes that lie inside; whether there are any.
+    pub fn hold_nodes(
+        &mut self,
+        elements: &dyn Elements,
+        held: Freedoms,
+        inside: impl Fn(DVec3) -> bool,
+    ) -> bool {
+        let mut any = false;
+        for (node, &p) in self.nodes.iter_mut().zip(elements.nodes()) {
+            if inside(p) {
+                node.0 |= held.0;
+                any = true;
+            }
+        }
+        any
+    }
+
     /// Holds a facet of a surface with springs. `size` (m) is that of an element.
     pub fn hold_facet(
         &mut self,

@@ -16,6 +16,7 @@ use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::remesh::remesh;
 use crate::mesh::surface::Surface;
+use crate::mesh::volume::VolumeMesh;
 use crate::mesh::walls::{Side, Walls};
 
 /// A closed part with its faces.
@@ -55,6 +56,8 @@ const CHANGE: f64 = 1.0 / (FINER * FINER) - 1.0;
 const UNKNOWNS: f64 = 45.0;
 /// Unknowns that are allowed for each vertex that a shell may have.
 const UNKNOWNS_A_VERTEX: f64 = 12.0;
+/// Own tetrahedra of fewer unknowns are halved to judge them.
+const MOST_TO_HALVE: usize = 60_000;
 /// The error is an estimate: stop at this share of the tolerance.
 const SAFETY: f64 = 0.8;
 
@@ -131,9 +134,11 @@ impl SolidGround {
 
     /// Finer cells, to judge coarser ones by.
     #[must_use]
-    pub fn finer(fineness: &Fineness) -> Fineness {
+    pub fn finer(&self, fineness: &Fineness) -> Fineness {
+        let own = self.immersed.own().is_some();
         Fineness {
-            size: fineness.size * FINER,
+            size: fineness.size * if own { 1.0 } else { FINER },
+            halvings: fineness.halvings + u32::from(own),
             ..*fineness
         }
     }
@@ -182,6 +187,9 @@ impl SolidGround {
         aim: &Elements,
         watch: Watch,
     ) -> Result<SolidGraded, ElasticError> {
+        if let Some(own) = self.immersed.own() {
+            return self.as_given(own, touches, places, watch);
+        }
         let least_size = self.size_allowed(aim, touches.len());
         let touches = sample(touches);
         let places: Vec<DVec3> = spread(places, PLACES);
@@ -215,11 +223,69 @@ impl SolidGround {
         }
     }
 
+    /// The part's own tetrahedra, judged by their halves where those fit into memory.
+    fn as_given(
+        &self,
+        own: &VolumeMesh,
+        touches: &[Touch],
+        places: &[DVec3],
+        watch: Watch,
+    ) -> Result<SolidGraded, ElasticError> {
+        /// Errors of quadratic elements fall with the square of their size and better.
+        const CHANGE: f64 = 3.0;
+        let touches = sample(touches);
+        let places: Vec<DVec3> = spread(places, PLACES);
+        let size = own.mean_edge();
+        let given = Solved::new(self, size, &touches, &places, watch)?;
+        let fine = Fineness {
+            halvings: 1,
+            ..given.fineness
+        };
+        let small = given.model.system().dimension() < MOST_TO_HALVE;
+        let halved = small
+            .then(|| Solved::with(self, fine, &touches, &places, watch))
+            .transpose();
+        let halved = match halved {
+            Err(ElasticError::TooLarge { .. } | ElasticError::OutOfMemory) => None,
+            other => other?,
+        };
+        let unknown = Discretization {
+            displacement_mm: f64::NAN,
+            displacement_percent: f64::NAN,
+            strain_percent: f64::NAN,
+            loads: touches.len(),
+            places: places.len(),
+        };
+        let estimate = halved.as_ref().map_or(unknown, |halved| {
+            let (given, halved) = (&given.sample, &halved.sample);
+            estimate::left(given, halved, &touches, &places, CHANGE / (1.0 + CHANGE))
+        });
+        Ok(SolidGraded {
+            balance: given.model.check_all(
+                &spread(&touches, CHECKED),
+                &spread(&given.solutions, CHECKED),
+            ),
+            fineness: given.fineness,
+            model: given.model,
+            estimate,
+            models: 1 + u64::from(halved.is_some()),
+            solves: touches.len() as u64 * (1 + u64::from(halved.is_some())),
+        })
+    }
+
     /// What is worth a word about the cells of a model.
     #[must_use]
     pub fn cautions(&self, fineness: &Fineness) -> Vec<String> {
         /// Cells larger than this many walls do not bend as they should.
         const LARGE: f64 = 3.0;
+        if let Some(own) = self.immersed.own() {
+            let what = if own.from_linear {
+                "The mesh's linear tetrahedra were given nodes at the middles of their edges: as they are they would be several times too stiff."
+            } else {
+                return Vec::new();
+            };
+            return vec![what.into()];
+        }
         let ratio = fineness.size / self.wall();
         let mut notes = Vec::new();
         if ratio > LARGE {
@@ -249,7 +315,16 @@ impl Solved {
         places: &[DVec3],
         watch: Watch,
     ) -> Result<Self, ElasticError> {
-        let fineness = ground.fineness(size);
+        Self::with(ground, ground.fineness(size), touches, places, watch)
+    }
+
+    fn with(
+        ground: &SolidGround,
+        fineness: Fineness,
+        touches: &[Touch],
+        places: &[DVec3],
+        watch: Watch,
+    ) -> Result<Self, ElasticError> {
         let model = ground.model(&fineness, watch)?;
         let loads: Vec<_> = touches.iter().map(|t| model.load(t)).collect();
         let solutions = model.system().solve_loads(&loads);

@@ -4,24 +4,26 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::Elements as _;
-use super::SolidModel;
 use super::cells::FiniteCells;
 use super::cut::Cutting;
 use super::grid::Grid;
 use super::grip::Grip;
+use super::tetrahedra::Tetrahedra;
+use super::{Elements, SolidModel};
 use crate::budget::Watch;
 use crate::elasticity::model::ElasticError;
 use crate::elasticity::support::{HeldPart, Region};
 use crate::elasticity::{Freedoms, Material, Support};
 use crate::mesh::TriMesh;
 use crate::mesh::inside::SignedDistance;
+use crate::mesh::volume::VolumeMesh;
 
 /// A part, its material and its supports.
 pub struct Immersed {
     /// The part, cut along its support boxes.
     pub held: HeldPart,
     pub material: Material,
+    part: Arc<TriMesh>,
     supports: Vec<Support>,
     surface: SignedDistance,
 }
@@ -37,6 +39,8 @@ pub struct Fineness {
     pub tolerance: f64,
     /// The smallest box that a cell is halved into to find it (m).
     pub least: f64,
+    /// How often the tetrahedra of a part that has them are halved, instead of all that.
+    pub halvings: u32,
 }
 
 impl Fineness {
@@ -48,6 +52,7 @@ impl Fineness {
             order: 2,
             tolerance: 3e-3,
             least: wall / 6.0,
+            halvings: 0,
         }
     }
 
@@ -63,9 +68,16 @@ impl Immersed {
         Self {
             held: HeldPart::new(part, supports),
             material,
+            part: Arc::clone(part),
             supports: supports.to_vec(),
             surface: SignedDistance::new(part),
         }
+    }
+
+    /// The tetrahedra that the part came with.
+    #[must_use]
+    pub fn own(&self) -> Option<&VolumeMesh> {
+        self.part.volume().map(|v| &**v)
     }
 
     /// Whether a point (m) lies in the material.
@@ -112,14 +124,56 @@ impl Immersed {
         fineness: &Fineness,
         watch: Watch,
     ) -> Result<SolidModel, ElasticError> {
+        if let Some(own) = self.part.volume() {
+            return self.on_own(surface, own, fineness, watch);
+        }
         let cells = self.cells(fineness, watch)?;
         let grip = self.grip(&cells, fineness.size);
         SolidModel::new(surface, Box::new(cells), self.material, grip, watch)
     }
 
+    /// The model on the part's own tetrahedra, halved as often as `fineness` says.
+    fn on_own(
+        &self,
+        surface: &Arc<TriMesh>,
+        own: &Arc<VolumeMesh>,
+        fineness: &Fineness,
+        watch: Watch,
+    ) -> Result<SolidModel, ElasticError> {
+        let mut mesh = Arc::clone(own);
+        for _ in 0..fineness.halvings {
+            mesh = Arc::new(mesh.refined());
+        }
+        let elements = Tetrahedra::new(&mesh);
+        let mut grip = Grip::new(&elements);
+        for (number, support) in self.supports.iter().enumerate() {
+            let held = Freedoms(support.held.0 & Freedoms::DISPLACEMENTS.0);
+            let slack = 1e-9 * fineness.size;
+            let any = match support.region {
+                Region::Box { lower, upper } => grip.hold_nodes(&elements, held, |p| {
+                    p.cmpge(lower - slack).all() && p.cmple(upper + slack).all()
+                }),
+                Region::Vertices(_) => false,
+            };
+            if !any {
+                self.spring(&mut grip, &elements, number, held, fineness.size);
+            }
+        }
+        SolidModel::new(surface, Box::new(elements), self.material, grip, watch)
+    }
+
+    /// Holds the facets of a support with springs.
+    fn spring(&self, grip: &mut Grip, on: &dyn Elements, number: usize, held: Freedoms, size: f64) {
+        let mesh = &self.held.mesh;
+        for facet in 0..mesh.triangles().len() as u32 {
+            if self.held.facet_belongs(facet, number) {
+                grip.hold_facet(on, mesh, facet, held, &self.material, size);
+            }
+        }
+    }
+
     fn grip(&self, cells: &FiniteCells, size: f64) -> Grip {
         let mut grip = Grip::new(cells);
-        let mesh = &self.held.mesh;
         for (number, support) in self.supports.iter().enumerate() {
             let held = Freedoms(support.held.0 & Freedoms::DISPLACEMENTS.0);
             let is_volume = held == Freedoms::DISPLACEMENTS && {
@@ -140,11 +194,7 @@ impl Immersed {
             if is_volume {
                 continue;
             }
-            for facet in 0..mesh.triangles().len() as u32 {
-                if self.held.facet_belongs(facet, number) {
-                    grip.hold_facet(cells, mesh, facet, held, &self.material, size);
-                }
-            }
+            self.spring(&mut grip, cells, number, held, size);
         }
         grip
     }

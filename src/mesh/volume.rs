@@ -1,0 +1,386 @@
+//! Tetrahedra that the user has: nodes, quadratic elements, and the surface around them.
+
+use std::collections::{HashMap, HashSet};
+
+use glam::DVec3;
+
+use super::{MeshError, TriMesh};
+
+/// Edges of a tetrahedron that nodes 4 to 9 lie on, as Abaqus counts them.
+pub const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
+/// Faces by their corners, counter-clockwise from outside.
+const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+
+/// Ten-node tetrahedra. Linear ones get nodes at the middles of their edges: on the same elements quadratic
+/// displacements bend where linear ones lock.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VolumeMesh {
+    /// m.
+    pub nodes: Vec<DVec3>,
+    /// Corners, then the nodes on [`EDGES`].
+    pub tetrahedra: Vec<[u32; 10]>,
+    /// Whether the file's were linear.
+    pub from_linear: bool,
+}
+
+/// The tetrahedron behind a triangle of the surface, and where the triangle's corners are in it.
+pub type FacePlace = (u32, [DVec3; 3]);
+
+/// Why tetrahedra were refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum VolumeError {
+    #[error(
+        "tetrahedron {element} has no volume (near {place:.2} mm): repair the mesh in the program that wrote it"
+    )]
+    Flat { element: usize, place: DVec3 },
+    #[error(
+        "tetrahedron {element} is turned inside out at one of its nodes (near {place:.2} mm): straighten its edges in the mesher"
+    )]
+    Folded { element: usize, place: DVec3 },
+    #[error(transparent)]
+    Surface(#[from] MeshError),
+}
+
+impl VolumeMesh {
+    /// Of linear tetrahedra.
+    #[must_use]
+    pub fn of_linear(mut nodes: Vec<DVec3>, corners: &[[u32; 4]]) -> Self {
+        let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
+        let tetrahedra = corners
+            .iter()
+            .map(|tet| {
+                std::array::from_fn(|k| {
+                    if k < 4 {
+                        return tet[k];
+                    }
+                    let [a, b] = EDGES[k - 4].map(|i| tet[i]);
+                    *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                        nodes.push((nodes[a as usize] + nodes[b as usize]) / 2.0);
+                        nodes.len() as u32 - 1
+                    })
+                })
+            })
+            .collect();
+        Self {
+            nodes,
+            tetrahedra,
+            from_linear: true,
+        }
+    }
+
+    /// Turns elements to positive volumes and checks them.
+    ///
+    /// # Errors
+    /// [`VolumeError`] naming the element that is none.
+    pub fn checked(mut self) -> Result<Self, VolumeError> {
+        for (element, tet) in self.tetrahedra.iter_mut().enumerate() {
+            let p = tet.map(|n| self.nodes[n as usize]);
+            let volume = (p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0]);
+            let longest = EDGES
+                .iter()
+                .map(|&[a, b]| p[a].distance(p[b]))
+                .fold(0.0, f64::max);
+            let place = p[0] * 1e3;
+            if volume.is_nan() || volume.abs() <= 1e-9 * longest.powi(3) {
+                return Err(VolumeError::Flat { element, place });
+            }
+            if volume < 0.0 {
+                tet.swap(1, 2);
+                // The nodes on the edges 01 and 02, and on 13 and 23, change places with them.
+                tet.swap(4, 6);
+                tet.swap(8, 9);
+            }
+            let p = tet.map(|n| self.nodes[n as usize]);
+            for corner in 0..10 {
+                let at = node_place(corner);
+                if jacobian(&p, at).determinant() <= 0.0 {
+                    return Err(VolumeError::Folded { element, place });
+                }
+            }
+        }
+        Ok(self)
+    }
+
+    /// Nodes, and where the tetrahedra were linear those on the edges between them.
+    #[must_use]
+    pub fn with_middles(&self, nodes: &[u32]) -> Vec<u32> {
+        let mut set: HashSet<u32> = nodes.iter().copied().collect();
+        if self.from_linear {
+            for tet in &self.tetrahedra {
+                for (k, ends) in EDGES.iter().enumerate() {
+                    if ends.iter().all(|&e| set.contains(&tet[e])) {
+                        set.insert(tet[4 + k]);
+                    }
+                }
+            }
+        }
+        let mut all: Vec<u32> = set.into_iter().collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// Mean distance between corners (m).
+    #[must_use]
+    pub fn mean_edge(&self) -> f64 {
+        let length = |t: &[u32; 10]| -> f64 {
+            let p = t.map(|n| self.nodes[n as usize]);
+            EDGES.iter().map(|&[a, b]| p[a].distance(p[b])).sum()
+        };
+        let total: f64 = self.tetrahedra.iter().map(length).sum();
+        total / (6 * self.tetrahedra.len()) as f64
+    }
+
+    /// The piece of connected tetrahedra with the largest, second … surface, with its surface and how many
+    /// pieces there are. Every face of a tetrahedron is four triangles of the surface.
+    ///
+    /// # Errors
+    /// [`VolumeError`] where there is no such piece.
+    pub fn body(&self, body: usize) -> Result<(Self, TriMesh, usize), VolumeError> {
+        let fans: Vec<[u32; 3]> = (self.tetrahedra.iter())
+            .flat_map(|t| (1..10).map(|k| [t[0], t[k], t[k]]))
+            .collect();
+        let labels = super::components(self.nodes.len(), &fans);
+        let mut areas: HashMap<u32, f64> = HashMap::new();
+        for face in self.boundary() {
+            let [a, b, c] = [face[0], face[1], face[2]].map(|n| self.nodes[n as usize]);
+            *areas.entry(labels[face[0] as usize]).or_default() += (b - a).cross(c - a).length();
+        }
+        let mut by_area: Vec<(u32, f64)> = areas.into_iter().collect();
+        by_area.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let count = by_area.len();
+        let &(label, _) = by_area
+            .get(body)
+            .ok_or(MeshError::NoSuchBody { body, count })?;
+        let mut number = HashMap::new();
+        let mut nodes = Vec::new();
+        let tetrahedra = (self.tetrahedra.iter())
+            .filter(|t| labels[t[0] as usize] == label)
+            .map(|t| {
+                t.map(|n| {
+                    *number.entry(n).or_insert_with(|| {
+                        nodes.push(self.nodes[n as usize]);
+                        nodes.len() as u32 - 1
+                    })
+                })
+            })
+            .collect();
+        let piece = Self {
+            nodes,
+            tetrahedra,
+            from_linear: self.from_linear,
+        };
+        let (surface, _) = TriMesh::new(&piece.nodes, &piece.surface_triangles(), 0)?;
+        Ok((piece, surface, count))
+    }
+
+    /// Faces with one tetrahedron, by their corners and the nodes on the edges between them (01, 12, 20).
+    fn boundary(&self) -> Vec<[u32; 6]> {
+        self.boundary_of()
+            .into_iter()
+            .map(|(_, _, face)| face)
+            .collect()
+    }
+
+    /// As [`Self::boundary`], with the tetrahedron and which of its faces it is.
+    fn boundary_of(&self) -> Vec<(u32, usize, [u32; 6])> {
+        let mut faces: HashMap<[u32; 3], Option<(u32, usize)>> = HashMap::new();
+        for (element, tet) in (0u32..).zip(&self.tetrahedra) {
+            for (side, face) in FACES.iter().enumerate() {
+                let mut key = face.map(|i| tet[i]);
+                key.sort_unstable();
+                faces
+                    .entry(key)
+                    .and_modify(|f| *f = None)
+                    .or_insert(Some((element, side)));
+            }
+        }
+        let mut found: Vec<(u32, usize)> = faces.into_values().flatten().collect();
+        found.sort_unstable();
+        let nodes = |(element, side): (u32, usize)| {
+            let tet = &self.tetrahedra[element as usize];
+            let [a, b, c] = FACES[side];
+            let all = [a, b, c, middle(a, b), middle(b, c), middle(c, a)];
+            (element, side, all.map(|i| tet[i]))
+        };
+        found.into_iter().map(nodes).collect()
+    }
+
+    /// The surface as triangles of nodes, four a face.
+    fn surface_triangles(&self) -> Vec<[u32; 3]> {
+        let split =
+            |[a, b, c, ab, bc, ca]: [u32; 6]| [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+        self.boundary().into_iter().flat_map(split).collect()
+    }
+
+    /// For every triangle of [`Self::surface_triangles`] its tetrahedron and the places of its corners in that.
+    #[must_use]
+    pub fn surface_places(&self) -> (Vec<[u32; 3]>, Vec<FacePlace>) {
+        let mut places = Vec::new();
+        for (element, side, _) in self.boundary_of() {
+            let [a, b, c] = FACES[side].map(node_place);
+            let (ab, bc, ca) = (a.midpoint(b), b.midpoint(c), c.midpoint(a));
+            for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
+                places.push((element, corners));
+            }
+        }
+        (self.surface_triangles(), places)
+    }
+
+    /// Every tetrahedron in eight, new nodes where its shape functions put them.
+    #[must_use]
+    pub fn refined(&self) -> Self {
+        // The old nodes stay; between two of them, the same for all elements that share both, is a new one.
+        let mut nodes = self.nodes.clone();
+        let mut between: HashMap<(u32, u32), u32> = HashMap::new();
+        let mut tetrahedra = Vec::with_capacity(8 * self.tetrahedra.len());
+        for tet in &self.tetrahedra {
+            let p = tet.map(|n| self.nodes[n as usize]);
+            for child in CHILDREN {
+                tetrahedra.push(std::array::from_fn(|k| {
+                    if k < 4 {
+                        return tet[child[k]];
+                    }
+                    let [a, b] = EDGES[k - 4].map(|i| child[i]);
+                    let (m, n) = (tet[a].min(tet[b]), tet[a].max(tet[b]));
+                    *between.entry((m, n)).or_insert_with(|| {
+                        nodes.push(position(&p, node_place(a).midpoint(node_place(b))));
+                        nodes.len() as u32 - 1
+                    })
+                }));
+            }
+        }
+        Self {
+            nodes,
+            tetrahedra,
+            from_linear: self.from_linear,
+        }
+    }
+}
+
+/// The children of a tetrahedron by its nodes: at its corners, and the octahedron between in four.
+const CHILDREN: [[usize; 4]; 8] = [
+    [0, 4, 6, 7],
+    [4, 1, 5, 8],
+    [6, 5, 2, 9],
+    [7, 8, 9, 3],
+    [4, 5, 6, 8],
+    [4, 6, 7, 8],
+    [6, 7, 8, 9],
+    [5, 6, 8, 9],
+];
+
+fn middle(a: usize, b: usize) -> usize {
+    let on = |e: &[usize; 2]| e.contains(&a) && e.contains(&b);
+    4 + EDGES.iter().position(on).unwrap_or(0)
+}
+
+/// Where a node lies in the unit tetrahedron 0, x, y, z.
+#[must_use]
+pub fn node_place(node: usize) -> DVec3 {
+    let corner = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    if node < 4 {
+        corner[node]
+    } else {
+        let [a, b] = EDGES[node - 4];
+        corner[a].midpoint(corner[b])
+    }
+}
+
+/// Values and gradients (in the unit tetrahedron) of the ten shape functions.
+#[must_use]
+pub fn shapes(at: DVec3) -> [(f64, DVec3); 10] {
+    let l = [1.0 - at.x - at.y - at.z, at.x, at.y, at.z];
+    let g = [DVec3::NEG_ONE, DVec3::X, DVec3::Y, DVec3::Z];
+    std::array::from_fn(|k| {
+        if k < 4 {
+            (l[k] * (2.0 * l[k] - 1.0), g[k] * (4.0 * l[k] - 1.0))
+        } else {
+            let [a, b] = EDGES[k - 4];
+            (4.0 * l[a] * l[b], (g[a] * l[b] + g[b] * l[a]) * 4.0)
+        }
+    })
+}
+
+/// Where a place of the unit tetrahedron is (m).
+#[must_use]
+pub fn position(nodes: &[DVec3; 10], at: DVec3) -> DVec3 {
+    shapes(at)
+        .iter()
+        .zip(nodes)
+        .map(|((n, _), p)| *p * *n)
+        .sum()
+}
+
+/// ∂x/∂ξ: columns are the derivatives along the unit tetrahedron's axes.
+#[must_use]
+pub fn jacobian(nodes: &[DVec3; 10], at: DVec3) -> glam::DMat3 {
+    let mut columns = [DVec3::ZERO; 3];
+    for ((_, gradient), p) in shapes(at).iter().zip(nodes) {
+        for (i, column) in columns.iter_mut().enumerate() {
+            *column += *p * gradient[i];
+        }
+    }
+    glam::DMat3::from_cols(columns[0], columns[1], columns[2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cube of six tetrahedra.
+    pub fn cube() -> VolumeMesh {
+        let nodes: Vec<DVec3> = (0..8)
+            .map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)))
+            .collect();
+        let corners = [
+            [0, 1, 3, 7],
+            [0, 5, 1, 7],
+            [0, 3, 2, 7],
+            [0, 2, 6, 7],
+            [0, 4, 5, 7],
+            [0, 6, 4, 7],
+        ];
+        VolumeMesh::of_linear(nodes, &corners).checked().unwrap()
+    }
+
+    fn volume(mesh: &VolumeMesh) -> f64 {
+        let of = |t: &[u32; 10]| {
+            let p = t.map(|n| mesh.nodes[n as usize]);
+            (p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0]) / 6.0
+        };
+        mesh.tetrahedra.iter().map(of).sum()
+    }
+
+    #[test]
+    fn a_cube_keeps_its_volume_and_surface_when_it_is_refined() {
+        let cube = cube();
+        let fine = cube.refined().checked().unwrap();
+        assert_eq!(fine.tetrahedra.len(), 48);
+        // A lattice of five nodes a side.
+        assert_eq!(fine.nodes.len(), 125);
+        for mesh in [&cube, &fine] {
+            assert!((volume(mesh) - 1.0).abs() < 1e-12);
+            let (_, surface, pieces) = mesh.body(0).unwrap();
+            assert_eq!((surface.boundary_edges().count(), pieces), (0, 1));
+            assert!((surface.area() - 6.0).abs() < 1e-12);
+            let outward = (0..surface.triangles().len() as u32).all(|t| {
+                let middle = surface.corners(t).iter().sum::<DVec3>() / 3.0;
+                surface.facet_normal(t).dot(middle - DVec3::splat(0.5)) > 0.0
+            });
+            assert!(outward);
+        }
+    }
+
+    #[test]
+    fn what_is_no_tetrahedron_is_named() {
+        let flat = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::ONE.with_z(0.0)];
+        let mesh = VolumeMesh::of_linear(flat.to_vec(), &[[0, 1, 2, 3]]);
+        assert!(matches!(
+            mesh.checked(),
+            Err(VolumeError::Flat { element: 0, .. })
+        ));
+        let mut folded = cube();
+        folded.nodes[folded.tetrahedra[2][4] as usize] = DVec3::splat(5.0);
+        assert!(matches!(folded.checked(), Err(VolumeError::Folded { .. })));
+    }
+}
