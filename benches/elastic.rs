@@ -125,7 +125,7 @@ fn solid(text: &mut String) {
             text,
             "| {} | {} | {:.2} / {:.2} | {:.2} | {:.2}, {:.2} |",
             quality.name(),
-            a.answer.model.mesh.positions().len(),
+            a.answer.model.mesh().positions().len(),
             a.under_rms,
             a.under_worst,
             a.strain_rms,
@@ -186,8 +186,8 @@ fn dataset_time(text: &mut String, reference: f64) {
             d.displacement_mm,
             d.displacement_percent,
             d.strain_percent,
-            s.linearity.largest_percent,
-            s.linearity.median_percent
+            s.linearity.map_or(f64::NAN, |l| l.largest_percent),
+            s.linearity.map_or(f64::NAN, |l| l.median_percent)
         );
     }
     text.push('\n');
@@ -202,7 +202,9 @@ fn trade(text: &mut String) {
         "## The trade of this stage\n\nBundled limb, 64 unseen touches (seed 99), 300 gauges. Error: rms over all pairs against {TRUTH} vertices with the real tip (5 mm), as a share of the signal's own rms. Time: processor seconds of one core to lay the elements and estimate the error, and then for 1000 touches at 3039 sites. The point force is what a simpler program would use.\n\n| vertices | tip | displacement (%) | normal displacement (%) | strain (%) | seconds to build | seconds a 1000 touches: displacement, strain |\n|---|---|---|---|---|---|---|"
     );
     let inputs = inputs(Signal::Strain);
-    let ground = design::ground(&inputs).expect("the limb is held");
+    let design::Ground::Shell(ground) = design::ground(&inputs).expect("the limb is held") else {
+        unreachable!("the limb is a shell")
+    };
     let (force, tip) = inputs.project.tip();
     let touches = dataset::spread_touches(&inputs.part, 64, 99, 2.4e-3, false, (force, tip), None);
     let many = dataset::spread_touches(&inputs.part, 1000, 98, 2.4e-3, false, (force, tip), None);

@@ -542,6 +542,8 @@ fn keep_body(
     }
     let mut by_area: Vec<(u32, f64)> = areas.into_iter().collect();
     by_area.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
+    let hollows = hollows(positions, triangles, &labels, &by_area);
+    by_area.retain(|(label, _)| !hollows.contains_key(label));
     report.bodies = by_area.len();
     let &(label, _) = by_area.get(body).ok_or(MeshError::NoSuchBody {
         body,
@@ -549,7 +551,8 @@ fn keep_body(
     })?;
     let mut used = vec![false; positions.len()];
     let mut chosen: Vec<[u32; 3]> = Vec::new();
-    for tri in triangles.iter().filter(|t| labels[t[0] as usize] == label) {
+    let belongs = |l: u32| l == label || hollows.get(&l) == Some(&label);
+    for tri in triangles.iter().filter(|t| belongs(labels[t[0] as usize])) {
         for &v in tri {
             used[v as usize] = true;
         }
@@ -566,6 +569,45 @@ fn keep_body(
         *tri = tri.map(|v| renumber[v as usize]);
     }
     Ok((kept, chosen))
+}
+
+/// Surfaces that face inward and lie within another one bound a hollow of it: by their labels, that of the
+/// surface around them.
+fn hollows(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    labels: &[u32],
+    by_area: &[(u32, f64)],
+) -> HashMap<u32, u32> {
+    let mut found = HashMap::new();
+    if by_area.len() < 2 {
+        return found;
+    }
+    let mut volumes: HashMap<u32, f64> = HashMap::new();
+    for tri in triangles {
+        let label = labels[tri[0] as usize];
+        let origin = positions[label as usize];
+        let [a, b, c] = tri.map(|v| positions[v as usize] - origin);
+        *volumes.entry(label).or_default() += a.dot(b.cross(c));
+    }
+    for (k, &(inner, _)) in by_area
+        .iter()
+        .enumerate()
+        .filter(|(_, b)| volumes[&b.0] < 0.0)
+    {
+        let point = positions[inner as usize];
+        let around = by_area[..k].iter().map(|b| b.0).find(|outer| {
+            let own = triangles.iter().filter(|t| labels[t[0] as usize] == *outer);
+            let angle: f64 = own
+                .map(|t| winding::solid_angle(&t.map(|v| positions[v as usize]), point))
+                .sum();
+            volumes[outer] > 0.0 && angle > 2.0 * std::f64::consts::PI
+        });
+        if let Some(outer) = around {
+            found.insert(inner, outer);
+        }
+    }
+    found
 }
 
 fn fill_holes(

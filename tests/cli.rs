@@ -257,7 +257,7 @@ fn bad_meshes_are_refused_by_name() {
     design(
         &file("limb.step", b"ISO-10303-21;"),
         1,
-        &["limb.step", "glb, gltf, obj, ply, stl"],
+        &["limb.step", "glb, gltf, inp, msh, obj, ply, stl"],
     );
     // Held nowhere: the part is fine, the project is not.
     design(

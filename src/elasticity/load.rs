@@ -30,7 +30,7 @@ const SAME_WALL: f64 = 0.26;
 #[must_use]
 pub fn nodal_forces(mesh: &TriMesh, index: &SurfaceIndex, touch: &Touch) -> NodalForces {
     let mut shares: Vec<(u32, f64)> = Vec::new();
-    for (at, share) in pressure(mesh, index, touch) {
+    for (at, share) in pressure(mesh, index, touch, f64::INFINITY) {
         let corners = mesh.triangles()[at.triangle as usize];
         let own = |(v, w): (u32, f64)| (w > 0.0).then_some((v, w * share));
         shares.extend(corners.into_iter().zip(at.barycentric).filter_map(own));
@@ -40,15 +40,28 @@ pub fn nodal_forces(mesh: &TriMesh, index: &SurfaceIndex, touch: &Touch) -> Noda
     shares.map(|(v, w)| (v, force * w)).collect()
 }
 
-/// Points under the tip with their shares of its force; they sum to one.
+/// Points under the tip with their shares of its force; they sum to one. `apart` (m) is how far from each other
+/// they may be for the elements that feel them.
 #[must_use]
-pub fn pressure(mesh: &TriMesh, index: &SurfaceIndex, touch: &Touch) -> Vec<(SurfacePoint, f64)> {
+pub fn pressure(
+    mesh: &TriMesh,
+    index: &SurfaceIndex,
+    touch: &Touch,
+    apart: f64,
+) -> Vec<(SurfacePoint, f64)> {
+    let grain = apart.min(touch.tip_radius / PIECES_PER_RADIUS);
     let (at, _) = index.nearest(touch.position);
     let centre = mesh.point(at);
     let mut shares: Vec<(SurfacePoint, f64)> = Vec::new();
     for t in index.triangles_near(centre, touch.tip_radius) {
         if mesh.facet_normal(t).dot(touch.normal) > SAME_WALL {
-            integrate(mesh, t, &WHOLE, centre, touch.tip_radius, &mut shares);
+            integrate(
+                mesh,
+                t,
+                &WHOLE,
+                (centre, touch.tip_radius, grain),
+                &mut shares,
+            );
         }
     }
     let total: f64 = shares.iter().map(|s| s.1).sum();
@@ -73,8 +86,7 @@ fn integrate(
     mesh: &TriMesh,
     t: u32,
     piece: &Piece,
-    centre: DVec3,
-    radius: f64,
+    (centre, radius, grain): (DVec3, f64, f64),
     into: &mut Vec<(SurfacePoint, f64)>,
 ) {
     let corners = mesh.corners(t);
@@ -83,12 +95,12 @@ fn integrate(
     let longest = (0..3)
         .map(|i| ends[i].distance(ends[(i + 1) % 3]))
         .fold(0.0, f64::max);
-    let n = (PIECES_PER_RADIUS * longest / radius).ceil().max(1.0);
+    let n = (longest / grain).ceil().max(1.0);
     if n > AT_ONCE {
         if ends[0].distance(centre) < radius + longest {
             for quarter in pieces(2) {
                 let quarter = quarter.each_ref().map(|zeta| within(piece, zeta));
-                integrate(mesh, t, &quarter, centre, radius, into);
+                integrate(mesh, t, &quarter, (centre, radius, grain), into);
             }
         }
         return;

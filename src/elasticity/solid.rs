@@ -51,6 +51,9 @@ pub trait Elements: Send + Sync {
 
     fn nodes_of(&self, element: usize) -> &[u32];
 
+    /// How far apart points may be for the smallest elements (m).
+    fn grain(&self) -> f64;
+
     /// A point in the middle of an element (m).
     fn centre(&self, element: usize) -> DVec3;
 
@@ -190,7 +193,7 @@ impl Model for SolidModel {
     fn load(&self, touch: &Touch) -> Vec<(usize, f64)> {
         let force = -touch.normal * touch.force;
         let mut load: std::collections::BTreeMap<usize, f64> = std::collections::BTreeMap::new();
-        for (at, share) in pressure(&self.mesh, &self.index, touch) {
+        for (at, share) in pressure(&self.mesh, &self.index, touch, self.elements.grain()) {
             let shape = self.shape(at);
             for (&node, (value, _)) in shape.nodes.iter().zip(&shape.values) {
                 for axis in 0..3 {

@@ -142,7 +142,7 @@ fn grow(nodes: &mut Vec<Node>, triangles: &mut [[DVec3; 3]], from: usize, to: us
 }
 
 /// Solid angle of a triangle (A. van Oosterom and J. Strackee 1983), positive seen from behind.
-fn solid_angle(corners: &[DVec3; 3], point: DVec3) -> f64 {
+pub(super) fn solid_angle(corners: &[DVec3; 3], point: DVec3) -> f64 {
     let [a, b, c] = corners.map(|p| p - point);
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let volume = a.dot(b.cross(c));

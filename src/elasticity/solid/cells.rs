@@ -161,6 +161,10 @@ impl Elements for FiniteCells {
         &self.nodes[element * each..][..each]
     }
 
+    fn grain(&self) -> f64 {
+        self.grid.largest_side() / 3.0
+    }
+
     fn centre(&self, element: usize) -> DVec3 {
         self.cell(element).centre()
     }

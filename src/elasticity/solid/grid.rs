@@ -48,6 +48,13 @@ impl Grid {
         std::array::from_fn(|axis| self.planes[axis].len() as u32 - 1)
     }
 
+    /// The largest side of a cell (m).
+    #[must_use]
+    pub fn largest_side(&self) -> f64 {
+        let steps = self.planes.iter().flat_map(|p| p.windows(2));
+        steps.map(|p| p[1] - p[0]).fold(0.0, f64::max)
+    }
+
     #[must_use]
     pub fn cell(&self, at: Place) -> Cell {
         self.span(at, at.map(|i| i + 1))

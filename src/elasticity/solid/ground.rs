@@ -1,5 +1,6 @@
 //! A closed part ready to be computed as a solid: its faces told apart, and cells sized for its walls.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -12,12 +13,12 @@ use crate::elasticity::grade::{CHECKED, PLACES, even_size, sample, spread};
 use crate::elasticity::load::Touch;
 use crate::elasticity::model::{ElasticError, LoadCheck, Model as _};
 use crate::elasticity::{Freedoms, Material, Support};
-use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::remesh::remesh;
 use crate::mesh::surface::Surface;
 use crate::mesh::volume::VolumeMesh;
 use crate::mesh::walls::{Side, Walls};
+use crate::mesh::{TriMesh, components};
 
 /// A closed part with its faces.
 pub struct SolidGround {
@@ -337,10 +338,11 @@ impl Solved {
     }
 }
 
-/// Whether a surface encloses anything: just behind most of it there is material.
+/// Whether a surface encloses anything: its holes are small, and just behind most of it there is material.
 fn encloses(part: &TriMesh, immersed: &Immersed) -> Result<(), ElasticError> {
-    /// Share of the area with material behind it.
+    /// Share of the area with material behind it, and of the area that holes may have.
     const MOST: f64 = 0.9;
+    const HOLES: f64 = 0.02;
     let (lower, upper) = part.bounds();
     let off = 1e-5 * (upper - lower).length();
     let mut behind = 0.0;
@@ -350,9 +352,31 @@ fn encloses(part: &TriMesh, immersed: &Immersed) -> Result<(), ElasticError> {
             behind += part.facet_area(t);
         }
     }
-    if behind < MOST * part.area() {
+    if behind < MOST * part.area() || hole_area(part) > HOLES * part.area() {
         let rims = part.boundary_edges().count();
         return Err(ElasticError::Open { rims });
     }
     Ok(())
+}
+
+/// Area of the holes in a surface (m²): that of the flattest film across each of its rims.
+fn hole_area(part: &TriMesh) -> f64 {
+    let p = part.positions();
+    let edges: Vec<[u32; 3]> = part.boundary_edges().map(|e| [e.a, e.b, e.b]).collect();
+    let labels = components(p.len(), &edges);
+    let mut films: BTreeMap<u32, DVec3> = BTreeMap::new();
+    for edge in part.boundary_edges() {
+        let tri = part.triangles()[edge.triangles[0] as usize];
+        let along = (0..3).any(|i| tri[i] == edge.a && tri[(i + 1) % 3] == edge.b);
+        let (a, b) = if along {
+            (edge.a, edge.b)
+        } else {
+            (edge.b, edge.a)
+        };
+        let label = labels[a as usize];
+        let origin = p[label as usize];
+        let film = (p[a as usize] - origin).cross(p[b as usize] - origin) / 2.0;
+        *films.entry(label).or_default() += film;
+    }
+    films.values().map(|film| film.length()).sum()
 }

@@ -79,6 +79,10 @@ impl Elements for Tetrahedra {
         &self.mesh.tetrahedra[element]
     }
 
+    fn grain(&self) -> f64 {
+        self.mesh.mean_edge() / 2.0
+    }
+
     fn centre(&self, element: usize) -> DVec3 {
         self.corners(element)[..4].iter().sum::<DVec3>() / 4.0
     }
