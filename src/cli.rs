@@ -1,5 +1,6 @@
 //! The command line: everything the studio computes, without a display.
 
+pub mod advise;
 pub mod board;
 pub mod data;
 pub mod design;
@@ -24,7 +25,7 @@ use crate::io::mesh_file::read_mesh;
 use crate::io::project_file::{self, LoadedProject};
 use crate::mesh::repair::Repair;
 use crate::placement::SelectorKind;
-use crate::project::{Masks, Project, Unit};
+use crate::project::{Masks, PartModel, Project, Unit};
 
 /// Decides where a handful of strain gauges go inside a flexible robot limb.
 ///
@@ -34,7 +35,7 @@ use crate::project::{Masks, Project, Unit};
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// Project (NAME.hapdef.toml) or mesh (glb, gltf, obj, ply, stl) to open in the studio.
+    /// Project (NAME.hapdef.toml) or mesh (glb, gltf, inp, msh, obj, ply, stl) to open in the studio.
     pub file: Option<PathBuf>,
     /// Unit of a mesh file that does not say its own.
     #[arg(long)]
@@ -47,6 +48,8 @@ pub enum Command {
     Design(design::DesignArgs),
     /// The elastic model only: writes the dataset.
     Simulate(simulate::SimulateArgs),
+    /// Shell or solid: what the walls of a part say, and what each model would cost.
+    Advise(advise::AdviseArgs),
     /// Sites for gauges from a dataset alone.
     Select(select::SelectArgs),
     /// How well given sites find touches, from a dataset alone.
@@ -141,9 +144,13 @@ pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
+    let mut project = Project::around(&file_name, unit);
+    if loaded.mesh.volume().is_some() {
+        project.part.model = PartModel::Solid;
+    }
     Ok(LoadedProject {
         inputs: Inputs {
-            project: Project::around(&file_name, unit),
+            project,
             part: Arc::new(loaded.mesh),
             painted: None,
             masks: loaded.groups,

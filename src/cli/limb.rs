@@ -12,7 +12,7 @@ use crate::io::{atomic, glb, project_file};
 use crate::limb::{LimbSpec, LimbSupport};
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
-use crate::project::{Lattice, Masks, Project, RegionKeys, SupportKeys, SupportKind};
+use crate::project::{Lattice, Masks, PartModel, Project, RegionKeys, SupportKeys, SupportKind};
 
 /// Lengths in millimetres. Without options it writes the bundled limb.
 #[derive(Args, Debug, Clone)]
@@ -52,9 +52,12 @@ pub struct LimbArgs {
     /// Largest side of an element.
     #[arg(long)]
     pub element: Option<f64>,
-    /// Thickness of the shell.
+    /// Thickness of the wall.
     #[arg(long)]
     pub thickness: Option<f64>,
+    /// Write the limb as a closed solid with its wall, not as the middle of it.
+    #[arg(long)]
+    pub solid: bool,
     /// Leave the project without chosen sites (they take a Draft design).
     #[arg(long)]
     pub no_sites: bool,
@@ -105,16 +108,20 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
         "a limb has at least one column and two hoops"
     );
     let spec = args.spec();
-    let (mesh, boxes) = spec.build()?;
+    let (mut mesh, boxes) = spec.build()?;
+    let mut project = project(&spec, &boxes);
+    if let Some(thickness) = args.thickness {
+        project.part.thickness_mm = thickness;
+    }
+    if args.solid {
+        mesh = mesh.thickened(project.part.thickness_mm * 1e-3);
+        thicken(&mut project);
+    }
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{}: the folder cannot be created", args.out.display()))?;
     let mesh_path = args.out.join("limb.glb");
     let bytes = glb::write_glb(&mesh)?;
     atomic::write(&mesh_path, &bytes)?;
-    let mut project = project(&spec, &boxes);
-    if let Some(thickness) = args.thickness {
-        project.part.thickness_mm = thickness;
-    }
     if !args.no_sites {
         // On the mesh as it is in the file (single precision), like anyone who opens it.
         let stored = crate::io::mesh_file::parse_glb(&bytes)
@@ -163,6 +170,26 @@ fn project(spec: &LimbSpec, boxes: &[[[f64; 3]; 2]]) -> Project {
         box_mm: [[-wide, -wide, 12.0], [wide, wide, spec.height - 12.0]],
     }];
     project
+}
+
+/// Supports that hold the wall of a solid where they held its middle: their boxes reach through it, across and not
+/// along it.
+fn thicken(project: &mut Project) {
+    project.part.model = PartModel::Solid;
+    let wall = project.part.thickness_mm;
+    for held in project
+        .supports
+        .iter_mut()
+        .filter_map(|s| s.box_mm.as_mut())
+    {
+        let middle = [0, 1].map(|i| f64::midpoint(held[0][i], held[1][i]));
+        let all_round = middle.iter().all(|m| m.abs() < 1e-6);
+        let across = usize::from(middle[1].abs() > middle[0].abs());
+        for axis in (0..2).filter(|&a| all_round || a == across) {
+            held[0][axis] -= wall;
+            held[1][axis] += wall;
+        }
+    }
 }
 
 /// Ten sites by a Draft design on strain with greedy SVR.

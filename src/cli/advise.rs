@@ -1,0 +1,31 @@
+//! `hapdef advise`: shell or solid, measured on the part.
+
+use clap::Args;
+
+use super::Common;
+use crate::design;
+
+#[derive(Args, Debug, Clone)]
+pub struct AdviseArgs {
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// Measures the walls and says what fits and what it would cost.
+///
+/// # Errors
+/// What the user must change.
+pub fn run(args: &AdviseArgs) -> anyhow::Result<()> {
+    let loaded = args.common.load()?;
+    let advice = args
+        .common
+        .in_pool(|| Ok(design::advise(&loaded.inputs)?))?;
+    if args.common.json {
+        println!("{}", serde_json::to_string(&advice)?);
+        return Ok(());
+    }
+    for line in &advice.words {
+        println!("{line}");
+    }
+    Ok(())
+}
