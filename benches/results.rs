@@ -71,7 +71,11 @@ Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the eleme
 fn assembled() -> String {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let mut text = read(DESIGNS);
-    for path in ["benches/elastic.md", "benches/selection.md"] {
+    for path in [
+        "benches/elastic.md",
+        "benches/solid.md",
+        "benches/selection.md",
+    ] {
         let _ = writeln!(text, "{}", read(path));
     }
     let _ = writeln!(

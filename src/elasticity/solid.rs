@@ -21,13 +21,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use self::grip::Grip;
+use super::Material;
 use super::load::{Touch, pressure};
 use super::model::{ElasticError, LoadCheck, Model};
 use super::observe::{Face, Observer, tangent_frame};
 use super::rows::Rows;
 use super::solver::{BLOCK, FactorError, MOST_GB, SymmetricMatrix};
 use super::system::{HELD, System, number_unknowns};
-use super::{Freedoms, Material};
 use crate::budget::{Watch, report};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
@@ -124,7 +124,7 @@ impl SolidModel {
         &*self.elements
     }
 
-    /// Which of a surface's vertices are held.
+    /// The shape functions at a point of the surface.
     fn shape(&self, at: SurfacePoint) -> Shape {
         let point = self.mesh.point(at);
         self.elements
@@ -389,10 +389,4 @@ fn explain(elements: &dyn Elements, unknowns: &[u32], error: FactorError) -> Ela
             }
         }
     }
-}
-
-/// Nothing held.
-#[must_use]
-pub fn free(elements: &dyn Elements) -> Vec<Freedoms> {
-    vec![Freedoms::default(); elements.nodes().len()]
 }

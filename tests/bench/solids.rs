@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use hapdef::budget::unwatched;
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::solid::SolidModel;
 use hapdef::elasticity::solid::immersed::{Fineness, Immersed};
 use hapdef::elasticity::support::Region;
 use hapdef::elasticity::{Freedoms, Material, Model as _, Support, Touch};
+use hapdef::io::points::{read_sites, read_touches};
 use hapdef::mesh::TriMesh;
 
 /// A surface of quadrangles (each counter-clockwise from outside), cut in two.
@@ -96,4 +97,169 @@ pub fn strain_along(m: &SolidModel, touch: &Touch, place: DVec3, direction: DVec
     let [xx, yy, xy] = observer.strain_of(m, &u)[0];
     let (x, y) = (direction.dot(frame.x_axis), direction.dot(frame.y_axis));
     xx * x * x + yy * y * y + xy * x * y
+}
+
+/// What a case gave: computed over exact, or a departure (%).
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    pub displacement: f64,
+    pub strain: f64,
+    pub unknowns: usize,
+}
+
+/// Without lateral contraction a clamped strip is a beam.
+pub const BEAM: Material = Material {
+    youngs_modulus: 2e9,
+    poissons_ratio: 0.0,
+};
+
+/// A strip 100 × 20 × 2 mm held at one end and pressed at the other, turned out of the grid: displacement under
+/// the load and strain at its root's half, over those of the beam with shear.
+pub fn strip(turn: DQuat, cells: f64, order: usize) -> Found {
+    let (length, width, wall) = (0.11_f64, 0.02_f64, 0.002_f64);
+    let part = block(DVec3::new(length, width, wall), |p| turn * p);
+    // The box is as wide as the part's turned end.
+    let support = clamp(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(0.01, 1.0, 1.0));
+    let fineness = Fineness {
+        order,
+        ..Fineness::of(cells * wall, wall)
+    };
+    let m = model(&part, BEAM, &[support], &fineness);
+    let touch = Touch {
+        position: turn * DVec3::new(length - 0.01, width / 2.0, wall),
+        normal: turn * DVec3::Z,
+        force: 1.0,
+        tip_radius: 0.004,
+    };
+    let arm = length - 0.02;
+    let (e, inertia) = (BEAM.youngs_modulus, width * wall.powi(3) / 12.0);
+    let shear = 1.2 * arm / (e / 2.0 * width * wall);
+    let exact = arm.powi(3) / (3.0 * e * inertia) + shear;
+    let x = 0.05;
+    let place = turn * DVec3::new(x, width / 2.0, 0.0);
+    let strain = strain_along(&m, &touch, place, turn * DVec3::X);
+    let exact_strain = -(length - 0.01 - x) * wall / 2.0 / (e * inertia);
+    Found {
+        displacement: under(&m, &touch) / exact,
+        strain: strain / exact_strain,
+        unknowns: m.system().dimension(),
+    }
+}
+
+/// A tube bent by pulls and pushes on its free end, over the beam: how far the middle of its wall moves, and the
+/// strain inside.
+pub fn bent_tube(cells: f64, order: usize) -> Found {
+    let (inner, outer, length) = (0.0285_f64, 0.0315_f64, 0.12_f64);
+    let sides = 120;
+    let part = tube(inner, outer, length, sides);
+    let support = clamp(DVec3::splat(-1.0), DVec3::new(1.0, 1.0, 0.02));
+    let wall = outer - inner;
+    let fineness = Fineness {
+        order,
+        ..Fineness::of(cells * wall, wall)
+    };
+    let m = model(&part, BEAM, &[support], &fineness);
+    // Pressures on the end that grow with x: a pure couple.
+    let count = 60;
+    let (mut load, mut moment) = (std::collections::BTreeMap::new(), 0.0);
+    for k in 0..count {
+        let angle = std::f64::consts::TAU * (f64::from(k) + 0.5) / f64::from(count);
+        let position =
+            DVec3::new(angle.cos(), angle.sin(), 0.0) * (inner + outer) / 2.0 + DVec3::Z * length;
+        let touch = Touch {
+            position,
+            normal: DVec3::Z,
+            force: angle.cos(),
+            tip_radius: 0.003,
+        };
+        moment += position.x * touch.force;
+        for (freedom, force) in m.load(&touch) {
+            *load.entry(freedom).or_insert(0.0) += force;
+        }
+    }
+    let load: Vec<(usize, f64)> = load.into_iter().collect();
+    let u = m.system().solve_freedoms(&load);
+    // The second moment of the polygon's ring, which is a little less than the circle's.
+    let n = f64::from(sides);
+    let polygon = (std::f64::consts::TAU / n).sin() * n / std::f64::consts::TAU;
+    let spread = (2.0 + (std::f64::consts::TAU / n).cos()) / 3.0;
+    let ring = std::f64::consts::FRAC_PI_4 * (outer.powi(4) - inner.powi(4));
+    let stiffness = BEAM.youngs_modulus * ring * polygon * spread;
+    let at = |p: DVec3| [m.index().nearest(p).0];
+    let height = 0.09;
+    let side = m.observer(&at(DVec3::new(0.0, outer, height)), Face::Outside);
+    let moved = side.displacement_of(&m, &u)[0].x;
+    let exact = moment * (height - 0.02_f64).powi(2) / (2.0 * stiffness);
+    let inside = m.observer(&at(DVec3::new(inner, 0.0, 0.06)), Face::Inside);
+    let frame = inside.frames()[0];
+    let [xx, yy, xy] = inside.strain_of(&m, &u)[0];
+    let (c, s) = (frame.x_axis.z, frame.y_axis.z);
+    let strain = xx * c * c + yy * s * s + xy * c * s;
+    Found {
+        displacement: moved.abs() / exact,
+        strain: strain.abs() * stiffness / (moment * inner),
+        unknowns: m.system().dimension(),
+    }
+}
+
+/// The slotted tube of the shell's test, thick, against a solid model that shares nothing with this one (747 000
+/// freedoms, quadratic wedges): rms over the loads of the displacement under the load (%), and of the strain of
+/// the inside beyond two tip radii over the load's largest there (%).
+pub fn slotted(cells_mm: f64, order: usize) -> Found {
+    let (inputs, reference) = (super::slotted::inputs(), super::slotted::solid());
+    let touches = read_touches(&super::slotted::fixture("touches.csv")).unwrap();
+    let sites = read_sites(&super::slotted::fixture("sites.csv")).unwrap();
+    let wall = 3e-3;
+    let part = Arc::new(inputs.part.thickened(wall));
+    let supports = inputs.project.supports(&inputs.masks).unwrap();
+    let immersed = Immersed::new(&part, inputs.project.section().material, &supports);
+    let fineness = Fineness {
+        order,
+        ..Fineness::of(cells_mm * 1e-3, wall)
+    };
+    let m = immersed.model(&part, &fineness, &unwatched).unwrap();
+    let radial = |p: DVec3| p.with_z(0.0).normalize() * wall / 2.0;
+    let outside = |t: &Touch| Touch {
+        position: t.position + radial(t.position),
+        ..*t
+    };
+    let loads: Vec<_> = touches.iter().map(|t| m.load(&outside(t))).collect();
+    let solved = m.system().solve_loads(&loads);
+    let face = |sign: f64| -> Vec<_> {
+        let on = |p: DVec3| m.index().nearest(p + radial(p) * sign).0;
+        sites.iter().map(|s| on(s.position)).collect()
+    };
+    let inner = m.observer(&face(-1.0), Face::Inside);
+    let outer = m.observer(&face(1.0), Face::Outside);
+    let far = |t: usize, s: usize| {
+        s >= touches.len()
+            && sites[s].position.distance(touches[t].position) > 2.0 * touches[t].tip_radius
+    };
+    let (mut displacement, mut strain) = (Vec::<f64>::new(), Vec::<f64>::new());
+    for (t, u) in solved.iter().enumerate() {
+        let largest = (0..sites.len())
+            .filter(|&s| far(t, s))
+            .map(|s| reference[&(t, s)].1.abs())
+            .fold(0.0, f64::max);
+        let (below, above) = (inner.displacement_of(&m, u), outer.displacement_of(&m, u));
+        let strains = inner.strain_of(&m, u);
+        for s in 0..sites.len() {
+            let (middle, along) = reference[&(t, s)];
+            let (frame, d) = (inner.frames()[s], sites[s].direction);
+            let (x, y) = (d.dot(frame.x_axis), d.dot(frame.y_axis));
+            let found = strains[s][0] * x * x + strains[s][1] * y * y + strains[s][2] * x * y;
+            if s == t {
+                let n = touches[t].normal;
+                displacement.push((below[s] + above[s]).dot(n) * 500.0 / middle.dot(n) - 1.0);
+            } else if far(t, s) {
+                strain.push((found - along) / largest);
+            }
+        }
+    }
+    let rms = |v: &[f64]| 100.0 * (v.iter().map(|x| x * x).sum::<f64>() / v.len() as f64).sqrt();
+    Found {
+        displacement: rms(&displacement),
+        strain: rms(&strain),
+        unknowns: m.system().dimension(),
+    }
 }

@@ -33,10 +33,10 @@ struct Spring {
     stiffness: f64,
 }
 
-/// Stiffness of the springs, in Young's moduli over the size of an element, a unit of area: 0.01 % softer
-/// than held.
+/// Stiffness of the springs, in Young's moduli over the size of an element, a unit of area: they give a ten
+/// thousandth of what the element beside them does.
 const STIFF: f64 = 1e4;
-/// A facet is held at the points of this rule on it, split until its pieces are smaller than half an element.
+/// A facet is held at the points of this rule on each of its pieces, which are smaller than half an element.
 const RULE: [[f64; 3]; 3] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
 
 impl Grip {
@@ -160,7 +160,7 @@ impl Grip {
         near
     }
 
-    /// Whether a point of the surface hangs on springs or held nodes alone.
+    /// Whether nothing is held at all.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.springs.is_empty() && self.nodes.iter().all(|h| h.0 == 0)
