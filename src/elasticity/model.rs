@@ -46,6 +46,10 @@ pub enum ElasticError {
     )]
     Open { rims: usize },
     #[error(
+        "no material was found in cells of {size_mm:.3} mm: the walls are thinner than a thousandth of that. Check the unit of the mesh, or take its middle as a shell (part.model = \"shell\")"
+    )]
+    NoMaterial { size_mm: f64 },
+    #[error(
         "no {face} face was found on the part: paint it, so that it is known where gauges go and where touches land"
     )]
     NoFace { face: &'static str },

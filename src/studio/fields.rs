@@ -168,6 +168,8 @@ impl Studio {
                 (
                     self.advice.as_ref().map(|(_, a)| Arc::as_ptr(a)),
                     self.current_advice().is_some(),
+                    // What is painted is measured when the hand lets go.
+                    self.view.is_stroking(),
                 )
             }),
             self.view.ranges.of(field),

@@ -128,6 +128,11 @@ impl Immersed {
             return self.on_own(surface, own, fineness, watch);
         }
         let cells = self.cells(fineness, watch)?;
+        if cells.count() == 0 {
+            return Err(ElasticError::NoMaterial {
+                size_mm: fineness.size * 1e3,
+            });
+        }
         let grip = self.grip(&cells, fineness.size);
         SolidModel::new(surface, Box::new(cells), self.material, grip, watch)
     }
