@@ -202,7 +202,9 @@ fn trade(text: &mut String) {
         "## The trade of this stage\n\nBundled limb, 64 unseen touches (seed 99), 300 gauges. Error: rms over all pairs against {TRUTH} vertices with the real tip (5 mm), as a share of the signal's own rms. Time: processor seconds of one core to lay the elements and estimate the error, and then for 1000 touches at 3039 sites. The point force is what a simpler program would use.\n\n| vertices | tip | displacement (%) | normal displacement (%) | strain (%) | seconds to build | seconds a 1000 touches: displacement, strain |\n|---|---|---|---|---|---|---|"
     );
     let inputs = inputs(Signal::Strain);
-    let design::Ground::Shell(ground) = design::ground(&inputs).expect("the limb is held") else {
+    let design::Ground::Shell(ground) =
+        design::ground(&inputs, &unwatched).expect("the limb is held")
+    else {
         unreachable!("the limb is a shell")
     };
     let (force, tip) = inputs.project.tip();

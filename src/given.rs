@@ -79,7 +79,7 @@ pub fn answer(
     refuse_far("site", &site_distances, &inputs.part)?;
     askew(touches, &index, &inputs.part, &mut notes);
 
-    let ground = design::ground(&inputs)?;
+    let ground = design::ground(&inputs, watch)?;
     let places: Vec<DVec3> = sites.iter().map(|s| s.position).collect();
     ground.check(&inputs.project)?;
     let built = ground.build(touches, &places, &budget.elements, watch)?;

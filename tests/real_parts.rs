@@ -42,7 +42,7 @@ fn real_limbs_become_datasets() {
             painted: None,
             masks: Masks::new(),
         };
-        let advice = design::advise(&inputs).unwrap();
+        let advice = design::advise(&inputs, &unwatched).unwrap();
         // The makers say 2.8 mm of the first; the others have about that.
         assert!(
             advice.closed && (1.5..4.5).contains(&advice.wall_mm[1]),

@@ -166,12 +166,12 @@ fn an_open_surface_is_no_solid() {
         "{error}"
     );
     // The advice says the same before anything is computed.
-    let advice = design::advise(&inputs).unwrap();
+    let advice = design::advise(&inputs, &unwatched).unwrap();
     assert!(!advice.closed && advice.fits == PartModel::Shell);
     // Thickened, it is one, and its faces are found.
     let mut solid = inputs.clone();
     solid.part = Arc::new(inputs.part.thickened(2e-3));
-    let advice = design::advise(&solid).unwrap();
+    let advice = design::advise(&solid, &unwatched).unwrap();
     assert!(
         advice.closed && (advice.wall_mm[1] - 2.0).abs() < 0.1,
         "{advice:?}"

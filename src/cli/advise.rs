@@ -3,6 +3,7 @@
 use clap::Args;
 
 use super::Common;
+use crate::budget::unwatched;
 use crate::design;
 
 #[derive(Args, Debug, Clone)]
@@ -19,7 +20,7 @@ pub fn run(args: &AdviseArgs) -> anyhow::Result<()> {
     let loaded = args.common.load()?;
     let advice = args
         .common
-        .in_pool(|| Ok(design::advise(&loaded.inputs)?))?;
+        .in_pool(|| Ok(design::advise(&loaded.inputs, &unwatched)?))?;
     if args.common.json {
         println!("{}", serde_json::to_string(&advice)?);
         return Ok(());

@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use super::layout::size_mm;
 use super::{DesignError, Ground, Inputs, ground};
-use crate::elasticity::ElasticError;
+use crate::budget::{Budget, Watch};
 use crate::elasticity::solid::ground::SolidGround;
+use crate::elasticity::{ElasticError, scope};
 use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::walls::Side;
@@ -21,29 +22,57 @@ pub struct Advice {
     /// Thickness (mm) that a tenth, half and nine tenths of the walls are thinner than; of an open part as its
     /// project says.
     pub wall_mm: [f64; 3],
+    /// Radius (mm) that a tenth and half of the walls are bent tighter than; infinite where they are flat.
+    pub radius_mm: [f64; 2],
     pub size_mm: f64,
     /// Share of a closed part's area that is the face of a wall, and not its end or a lump.
     pub walls: f64,
     /// What fits.
     pub fits: PartModel,
-    /// The models that can be computed, with what they would cost.
-    pub costs: Vec<Cost>,
+    /// What the shell and the solid would cost.
+    pub costs: [Cost; 2],
     /// In words.
     pub words: Vec<String>,
     #[serde(skip)]
     pub faces: Option<Faces>,
 }
 
-/// What a model would cost at the project's quality.
-#[derive(Clone, Debug, Serialize)]
+/// What a model would cost at the project's quality, and how far off it would be, as on other parts.
+#[derive(Clone, Copy, Debug, Serialize)]
 pub struct Cost {
     pub model: PartModel,
+    /// Size of its elements (mm).
+    pub element_mm: f64,
     pub unknowns: f64,
-    /// Processor time (s), memory of the factor (GB), and error of the displacement under a touch (%), all as
-    /// they were on other parts.
+    /// Processor time of all its stages (s), and memory of the largest (GB).
     pub seconds: f64,
     pub memory_gb: f64,
+    /// Error of the displacement under a touch (%) that finer elements would take away.
     pub error_percent: f64,
+    /// And what no elements take away (%): what the theory leaves out.
+    pub theory_percent: f64,
+}
+
+impl Cost {
+    fn total(&self) -> f64 {
+        self.error_percent + self.theory_percent
+    }
+
+    fn words(&self) -> String {
+        let theory = if self.theory_percent > 0.0 {
+            format!(" and {:.1} % of theory", self.theory_percent)
+        } else {
+            String::new()
+        };
+        format!(
+            "elements of {:.1} mm, about {:.0} thousand unknowns, {:.0} s of processor time, {:.1} GB, {:.1} % error of elements{theory} under a touch",
+            self.element_mm,
+            self.unknowns / 1e3,
+            self.seconds.max(1.0),
+            self.memory_gb.max(0.1),
+            self.error_percent
+        )
+    }
 }
 
 /// The faces of a closed part, by its vertices.
@@ -57,122 +86,250 @@ pub struct Faces {
 /// Looks at a part, whatever its project takes it for.
 ///
 /// # Errors
-/// [`DesignError`] for values out of range.
-pub fn advise(inputs: &Inputs) -> Result<Advice, DesignError> {
+/// [`DesignError`] for values out of range, and when the watch asks for a stop.
+pub fn advise(inputs: &Inputs, watch: Watch) -> Result<Advice, DesignError> {
     let mut as_solid = inputs.clone();
     as_solid.project.part.model = PartModel::Solid;
-    match ground(&as_solid) {
+    match ground(&as_solid, watch) {
         Ok(Ground::Solid(solid)) => Ok(of_closed(inputs, &solid)),
         Ok(Ground::Shell(_)) => unreachable!("a solid was asked for"),
-        Err(DesignError::Elastic(ElasticError::Open { rims })) => Ok(of_open(inputs, rims)),
+        Err(DesignError::Elastic(ElasticError::Open { rims })) => of_open(inputs, rims, watch),
         Err(error) => Err(error),
     }
 }
 
+/// What the cost of a model hangs on, whichever it is.
+struct Asked {
+    budget: Budget,
+    touches: usize,
+    /// m.
+    tip: f64,
+    /// Of the middles of the walls (m²).
+    area: f64,
+    /// Thickness of the wall and the radius it is bent to (m).
+    wall: f64,
+    radius: f64,
+}
+
+impl Asked {
+    fn new(inputs: &Inputs, area: f64, wall: f64, radius: f64) -> Self {
+        let budget = inputs.project.budget.quality.budget();
+        Self {
+            touches: inputs.project.touch.count.min(budget.touches),
+            tip: inputs.project.tip().1,
+            budget,
+            area,
+            wall,
+            radius,
+        }
+    }
+
+    fn shell(&self) -> Cost {
+        /// Share of the tolerance that elements are graded to.
+        const AIM: f64 = 0.6;
+        let elements = &self.budget.elements;
+        let wanted =
+            self.vertices(self.tip * (AIM * elements.displacement_percent / OF_TIP).sqrt());
+        let most = elements.most_for(self.touches) as f64;
+        let vertices = wanted.clamp(elements.vertices.min(most as usize) as f64, most);
+        let size = (A_VERTEX * self.area / vertices).sqrt();
+        let unknowns = 6.0 * vertices;
+        Cost {
+            model: PartModel::Shell,
+            element_mm: size * 1e3,
+            unknowns,
+            seconds: SHELL.seconds(elements.passes as f64 * unknowns, unknowns, self.touches),
+            memory_gb: SHELL.memory_gb(unknowns),
+            error_percent: OF_TIP * (size / self.tip).powi(2),
+            theory_percent: OF_THEORY * self.wall / self.radius,
+        }
+    }
+
+    /// Vertices of even triangles of a size (m).
+    fn vertices(&self, size: f64) -> f64 {
+        A_VERTEX * self.area / (size * size)
+    }
+
+    fn solid(&self) -> Cost {
+        let sizes = SolidGround::foreseen(
+            self.wall,
+            2.0 * self.area,
+            &self.budget.elements,
+            self.touches,
+        );
+        let unknowns = |size: &f64| SolidGround::unknowns(2.0 * self.area, *size);
+        let size = sizes.last().copied().unwrap_or(self.wall);
+        let last = unknowns(&size);
+        Cost {
+            model: PartModel::Solid,
+            element_mm: size * 1e3,
+            unknowns: last,
+            seconds: SOLID.seconds(sizes.iter().map(unknowns).sum(), last, self.touches),
+            memory_gb: SOLID.memory_gb(last),
+            error_percent: SolidGround::error_percent(size, self.wall),
+            theory_percent: 0.0,
+        }
+    }
+}
+
+/// Error of the displacement under a touch (%) with triangles as large as the tip's radius, which falls with the
+/// square of their size; area of such triangles' vertices over their squared edge. As on the bundled limb.
+const OF_TIP: f64 = 15.0;
+const A_VERTEX: f64 = 1.15;
+/// What a shell leaves out of the displacement under a touch (%), over thickness over radius: as on the slotted
+/// tube.
+const OF_THEORY: f64 = 30.0;
+/// A shell that leaves out more than this (%) is the wrong model.
+const MOST_THEORY: f64 = 5.0;
+/// Cells that are this many times as wrong as a shell do not fit.
+const MUCH: f64 = 3.0;
+
+/// Processor time and memory of a model, as they were on limbs and shins.
+struct Measured {
+    /// Once (s); for each unknown of every factor (s); for each unknown and touch, less its growth (s).
+    once: f64,
+    build: f64,
+    solve: f64,
+    /// Entries of the factor, over the unknowns to the power 4/3.
+    entries: f64,
+}
+
+const SHELL: Measured = Measured {
+    once: 0.2,
+    build: 3e-5,
+    solve: 1.8e-8,
+    entries: 8.0,
+};
+const SOLID: Measured = Measured {
+    once: 3.0,
+    build: 6e-5,
+    solve: 4e-8,
+    entries: 18.0,
+};
+
+impl Measured {
+    fn seconds(&self, built: f64, unknowns: f64, touches: usize) -> f64 {
+        /// Unknowns at which the times were taken: solves grow with the power 4/3.
+        const AT: f64 = 5e4;
+        let growth = (unknowns / AT).cbrt();
+        self.once + self.build * built * growth + self.solve * unknowns * growth * touches as f64
+    }
+
+    fn memory_gb(&self, unknowns: f64) -> f64 {
+        self.entries * unknowns.powf(4.0 / 3.0) * 8.0 / 1e9
+    }
+}
+
 fn of_closed(inputs: &Inputs, solid: &SolidGround) -> Advice {
-    let project = &inputs.project;
     let whole = &solid.whole;
     let wall_mm = [0.1, 0.5, 0.9].map(|s| 1e3 * solid.walls.thinner_than(whole, s));
-    let size_mm = size_mm(&inputs.part);
-    let faces = (0..whole.triangles().len() as u32)
-        .filter(|&t| solid.walls.sides[t as usize] != Side::Rim)
-        .map(|t| whole.facet_area(t))
-        .sum::<f64>();
-    let budget = project.budget.quality.budget();
-    let touches = project.touch.count.min(budget.touches);
-    let size = solid.size_allowed(&budget.elements, touches);
-    let unknowns = solid.unknowns(size);
-    let cost = Cost {
-        model: PartModel::Solid,
-        unknowns,
-        seconds: seconds(unknowns, touches),
-        memory_gb: memory_gb(unknowns),
-        error_percent: solid.error_percent(size),
-    };
-    let mut words = vec![format!(
-        "The mesh is closed, with walls {:.2} mm thick (a tenth thinner than {:.2} mm, a tenth thicker than {:.2} mm) on a part {size_mm:.0} mm across.",
-        wall_mm[1], wall_mm[0], wall_mm[2]
-    )];
-    words.push(format!(
-        "As a solid at {} quality: cells of {:.1} mm, about {:.0} thousand unknowns, {:.0} s of processor time, {:.1} GB, {:.0} % error under a touch.",
-        budget.quality.name(),
-        size * 1e3,
-        unknowns / 1e3,
-        cost.seconds,
-        cost.memory_gb,
-        cost.error_percent
-    ));
-    let thin = wall_mm[1] < size_mm / 50.0 && wall_mm[2] < 1.5 * wall_mm[1];
-    words.push(if thin {
-        "Its walls are thin and even: a mid-surface of it as a shell would be several times faster. As it is, taken as a shell, both faces of each wall would be walls of their own: a solid fits.".into()
+    let is_face = |t: u32| solid.walls.sides[t as usize] != Side::Rim;
+    let faces: Vec<u32> = (0..whole.triangles().len() as u32)
+        .filter(|&t| is_face(t))
+        .collect();
+    let area: f64 = faces.iter().map(|&t| whole.facet_area(t)).sum();
+    let radius = scope::radii(whole, &faces);
+    let asked = Asked::new(inputs, area / 2.0, solid.wall(), radius[0]);
+    let costs = [asked.shell(), asked.solid()];
+    let [shell, cells] = &costs;
+    let fits = if cells.total() > MUCH * shell.total() {
+        PartModel::Shell
     } else {
-        "Taken as a shell, both faces of each wall would be walls of their own: a solid fits.".into()
-    });
+        PartModel::Solid
+    };
+    let words = vec![
+        format!(
+            "The mesh is closed, with walls {:.2} mm thick (a tenth thinner than {:.2} mm, a tenth thicker than {:.2} mm){} on a part {:.0} mm across.",
+            wall_mm[1],
+            wall_mm[0],
+            wall_mm[2],
+            bent(radius),
+            size_mm(&inputs.part)
+        ),
+        format!(
+            "As a solid at {} quality: {}.",
+            asked.budget.quality.name(),
+            cells.words()
+        ),
+        format!("Its middle, as a shell: {}.", shell.words()),
+        if fits == PartModel::Shell {
+            "A shell fits: the walls are too thin for cells. Draw the middle of the walls in the program that wrote the part and open that; as it is, taken as a shell, both faces of each wall would be walls of their own.".into()
+        } else {
+            "As it is a solid fits: taken as a shell, both faces of each wall would be walls of their own.".into()
+        },
+    ];
     Advice {
         closed: true,
         wall_mm,
-        size_mm,
-        walls: faces / whole.area(),
-        fits: PartModel::Solid,
-        costs: vec![cost],
+        radius_mm: radius.map(|r| r * 1e3),
+        size_mm: size_mm(&inputs.part),
+        walls: area / whole.area(),
+        fits,
+        costs,
         words,
         faces: Some(carried(&inputs.part, solid)),
     }
 }
 
-fn of_open(inputs: &Inputs, rims: usize) -> Advice {
+fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Result<Advice, DesignError> {
     let project = &inputs.project;
-    let budget = project.budget.quality.budget();
-    let touches = project.touch.count.min(budget.touches);
-    let unknowns = 6.0 * budget.elements.most_for(touches) as f64;
+    let part = &inputs.part;
+    let facets: Vec<u32> = (0..part.triangles().len() as u32).collect();
     let wall = project.part.thickness_mm;
-    let size_mm = size_mm(&inputs.part);
-    let cost = Cost {
-        model: PartModel::Shell,
-        unknowns,
-        seconds: seconds(unknowns, touches),
-        memory_gb: memory_gb(unknowns),
-        error_percent: budget.elements.displacement_percent,
+    let radius = scope::radii(part, &facets);
+    let asked = Asked::new(inputs, part.area(), wall * 1e-3, radius[0]);
+    let costs = [asked.shell(), asked.solid()];
+    let [shell, cells] = &costs;
+    let fits = if shell.theory_percent > MOST_THEORY && cells.total() < shell.total() {
+        PartModel::Solid
+    } else {
+        PartModel::Shell
     };
     let mut words = vec![
         format!(
-            "The mesh is open ({rims} free edges): it is the middle of a wall, {wall} mm thick on a part {size_mm:.0} mm across. A shell fits."
+            "The mesh is open ({rims} free edges): it is the middle of a wall, {wall} mm thick{}, on a part {:.0} mm across.",
+            bent(radius),
+            size_mm(part)
         ),
         format!(
-            "As a shell at {} quality: at most {:.0} thousand unknowns, {:.0} s of processor time, {:.0} % error under a touch.",
-            budget.quality.name(),
-            unknowns / 1e3,
-            cost.seconds,
-            cost.error_percent
+            "As a shell at {} quality: {}.",
+            asked.budget.quality.name(),
+            shell.words()
         ),
+        format!("Its closed body, as a solid: {}.", cells.words()),
+        if fits == PartModel::Solid {
+            "The wall is thick for what it is bent to: its closed body, taken as a solid, would be nearer to the truth.".into()
+        } else {
+            "A shell fits.".into()
+        },
     ];
-    if let Ok(Ground::Shell(shell)) = ground(inputs) {
+    let mut as_shell = inputs.clone();
+    as_shell.project.part.model = PartModel::Shell;
+    if let Ground::Shell(shell) = ground(&as_shell, watch)? {
         words.extend(shell.cautions(project.tip().1));
     }
-    Advice {
+    Ok(Advice {
         closed: false,
         wall_mm: [wall; 3],
-        size_mm,
+        radius_mm: radius.map(|r| r * 1e3),
+        size_mm: size_mm(part),
         walls: 1.0,
-        fits: PartModel::Shell,
-        costs: vec![cost],
+        fits,
+        costs,
         words,
         faces: None,
+    })
+}
+
+fn bent(radius: [f64; 2]) -> String {
+    if radius[0].is_finite() {
+        format!(
+            ", a tenth of them bent to less than {:.0} mm",
+            radius[0] * 1e3
+        )
+    } else {
+        ", flat".into()
     }
-}
-
-/// Processor time (s) of a factor and its solves, as measured on limbs and shins.
-fn seconds(unknowns: f64, touches: usize) -> f64 {
-    /// Per unknown; and per unknown to the power 4/3 and touch.
-    const BUILD: f64 = 2e-4;
-    const SOLVE: f64 = 1.2e-8;
-    BUILD * unknowns + SOLVE * unknowns.powf(4.0 / 3.0) * touches as f64
-}
-
-/// Memory of a factor (GB), as measured on limbs and shins.
-fn memory_gb(unknowns: f64) -> f64 {
-    const ENTRIES: f64 = 18.0;
-    ENTRIES * unknowns.powf(4.0 / 3.0) * 8.0 / 1e9
 }
 
 /// Faces and thickness at the vertices of the part that is shown.

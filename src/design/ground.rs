@@ -50,14 +50,14 @@ pub struct Built {
 ///
 /// # Errors
 /// [`DesignError`] for supports without a region, and for parts that are not what the project says.
-pub fn ground(inputs: &Inputs) -> Result<Ground, DesignError> {
+pub fn ground(inputs: &Inputs, watch: Watch) -> Result<Ground, DesignError> {
     let project = &inputs.project;
     let supports = project.supports(&inputs.masks)?;
     if project.part.model == PartModel::Solid {
         let told = told(inputs)?;
         let material = project.section().material;
         material.check()?;
-        let solid = SolidGround::new(&inputs.part, material, &supports, &told)?;
+        let solid = SolidGround::new(&inputs.part, material, &supports, &told, watch)?;
         return Ok(Ground::Solid(Box::new(solid)));
     }
     if project.part.thickness_mm > size_mm(&inputs.part) {

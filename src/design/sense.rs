@@ -64,7 +64,7 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
     if project.selection.sites.is_empty() {
         return Err(DesignError::NoGauges);
     }
-    let ground = ground(inputs)?;
+    let ground = ground(inputs, watch)?;
     ground.check(project)?;
     let even = ground.site_layout(&inputs.part);
     let touches = lay_out_touches(&ground.touch_layout(&inputs.part), inputs, budget)?;

@@ -59,7 +59,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     project.check()?;
     let kept_out = project.feasible.keep_out.as_ref();
     Project::mask("feasible.keep_out", kept_out, &inputs.masks)?;
-    let ground = ground(inputs)?;
+    let ground = ground(inputs, watch)?;
     ground.check(project)?;
     let layout = ground.site_layout(&inputs.part);
     let sites = lay_out_sites(&layout, project)?;

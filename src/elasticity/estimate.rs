@@ -17,6 +17,8 @@ use crate::budget::Elements;
 const DISPLACEMENT: f64 = 2.0;
 /// Strains a little slower, near the borders of supports and at slot ends.
 const STRAIN: f64 = 2.0;
+/// A load is judged by what it moves, but by no less than this share of what the middle one moves.
+const LEAST_MOVED: f64 = 0.05;
 /// Strains are judged farther than this from the touch, in tip radii.
 const BEYOND: f64 = 2.0;
 
@@ -25,7 +27,8 @@ const BEYOND: f64 = 2.0;
 pub struct Discretization {
     /// Rms over the loads of the error of the displacement under the load (mm).
     pub displacement_mm: f64,
-    /// The same as a share of each load's displacement (%).
+    /// The same as a share of each load's displacement (%), or of a twentieth of the middle one where a load
+    /// moves less: what presses beside or on a support moves next to nothing, and nobody reads that.
     pub displacement_percent: f64,
     /// Rms over loads and places of the strain's error on the inside, farther than two tip radii from
     /// the touch, as a share of the load's largest strain there (%).
@@ -117,11 +120,13 @@ pub fn left(
     change: f64,
 ) -> Discretization {
     let (mut square, mut relative) = (0.0, 0.0);
+    let least = LEAST_MOVED * median(fine.under.iter().map(|f| f.abs()).collect());
     for (c, f) in coarse.under.iter().zip(&fine.under) {
         let left = (f - c) / change;
         square += left * left;
-        if *f != 0.0 {
-            relative += (left / f).powi(2);
+        let moved = f.abs().max(least);
+        if moved > 0.0 {
+            relative += (left / moved).powi(2);
         }
     }
     let loads = touches.len().max(1) as f64;
@@ -132,6 +137,11 @@ pub fn left(
         loads: touches.len(),
         places: places.len(),
     }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Rms over loads and places beyond the tip (NaN where there is none) of the difference of strains over the load's largest.

@@ -74,29 +74,50 @@ fn is_joint(mesh: &TriMesh, edge: &Edge) -> bool {
 /// Share of the area whose radius of curvature across smooth edges is below `radius` (m).
 fn tightly_curved(surface: &Surface, radius: f64) -> f64 {
     let mesh = &surface.mesh;
-    let mut curved = vec![false; mesh.triangles().len()];
-    for (edge, _) in mesh
-        .edges()
-        .iter()
-        .zip(&surface.features)
-        .filter(|(_, f)| !**f)
-    {
+    let curvatures = curvatures(mesh, |e| surface.features[e]);
+    let tight = |t: &usize| curvatures[*t] * radius > 1.0;
+    let curved = (0..curvatures.len()).filter(tight);
+    curved.map(|t| mesh.facet_area(t as u32)).sum::<f64>() / mesh.area()
+}
+
+/// Largest curvature (1/m) across the edges of each facet but those that are sharp.
+fn curvatures(mesh: &TriMesh, sharp: impl Fn(usize) -> bool) -> Vec<f64> {
+    /// Smaller angles are rounding.
+    const LEAST: f64 = 0.02;
+    let mut curvatures = vec![0.0_f64; mesh.triangles().len()];
+    for (_, edge) in (mesh.edges().iter().enumerate()).filter(|(e, _)| !sharp(*e)) {
         let [s, t] = edge.triangles[..] else { continue };
         // The angle between two facets spreads over half of either's height over the edge.
         let angle = mesh.facet_normal(s).angle_between(mesh.facet_normal(t));
         let across = (mesh.facet_area(s) + mesh.facet_area(t)) / length(mesh, edge);
-        if angle * radius > across && angle > 0.02 {
-            curved[s as usize] = true;
-            curved[t as usize] = true;
+        if angle > LEAST {
+            for facet in [s, t] {
+                let curvature = &mut curvatures[facet as usize];
+                *curvature = curvature.max(angle / across);
+            }
         }
     }
-    let area = |keep: &dyn Fn(usize) -> bool| -> f64 {
-        (0..curved.len())
-            .filter(|&t| keep(t))
-            .map(|t| mesh.facet_area(t as u32))
-            .sum()
-    };
-    area(&|t| curved[t]) / area(&|_| true)
+    curvatures
+}
+
+/// Radius of curvature (m) that a tenth and half of the area of these facets are bent tighter than, across
+/// edges that are no creases; infinite where they are flat.
+#[must_use]
+pub fn radii(mesh: &TriMesh, facets: &[u32]) -> [f64; 2] {
+    let curvatures = curvatures(mesh, |e| is_joint(mesh, &mesh.edges()[e]));
+    let mut bent: Vec<(f64, f64)> = (facets.iter())
+        .map(|&t| (curvatures[t as usize], mesh.facet_area(t)))
+        .collect();
+    bent.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let total: f64 = bent.iter().map(|b| b.1).sum();
+    [0.1, 0.5].map(|share| {
+        let mut sum = 0.0;
+        let tight = bent.iter().find(|b| {
+            sum += b.1;
+            sum >= share * total
+        });
+        tight.map_or(f64::INFINITY, |b| 1.0 / b.0)
+    })
 }
 
 #[cfg(test)]
@@ -105,6 +126,14 @@ mod tests {
 
     use super::*;
     use crate::elasticity::Material;
+
+    #[test]
+    fn the_radius_of_a_limb_is_found() {
+        let (mesh, _) = LimbSpec::default().build().unwrap();
+        let facets: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
+        let [_, half] = radii(&mesh, &facets);
+        assert!((half / 31.831e-3 - 1.0).abs() < 0.25, "{half}");
+    }
     use crate::limb::LimbSpec;
 
     fn notes(thickness: f64, tip: f64) -> Vec<String> {

@@ -9,7 +9,7 @@ use super::observe::{Face, Observer};
 use super::solver::{BLOCK, FactorError, MOST_GB, SymmetricMatrix};
 use super::system::{HELD, System, number_unknowns};
 use super::{Freedoms, Section};
-use crate::budget::{Watch, report};
+use crate::budget::{Cancelled, Watch, report};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 use glam::DVec3;
@@ -37,14 +37,13 @@ impl ShellModel {
         check_section(&section)?;
         check_held(mesh, held)?;
         check_areas(mesh)?;
-        report(watch, "Assembling", 0, 2)?;
+        report(watch, "Assembling", 0, 1)?;
         let unknowns = number_unknowns(held.iter().flat_map(|h| (0..6).map(|i| h.holds(i))));
         let mut stiffness = pattern(mesh, &unknowns);
         assemble(mesh, &section, &unknowns, &mut stiffness);
-        report(watch, "Factoring", 1, 2)?;
-        let factored = System::new(unknowns.clone(), stiffness, None);
+        report(watch, "Factoring", 0, 1)?;
+        let factored = System::new(unknowns.clone(), stiffness, None, watch);
         let system = factored.map_err(|e| explain(mesh, &unknowns, e))?;
-        report(watch, "Factoring", 2, 2)?;
         Ok(Self {
             mesh: Arc::clone(mesh),
             section,
@@ -352,6 +351,7 @@ fn assemble(mesh: &TriMesh, section: &Section, unknowns: &[u32], into: &mut Symm
 fn explain(mesh: &TriMesh, unknowns: &[u32], error: FactorError) -> ElasticError {
     match error {
         FactorError::OutOfMemory => ElasticError::OutOfMemory,
+        FactorError::Cancelled => ElasticError::Cancelled(Cancelled),
         FactorError::TooLarge { bytes } => ElasticError::TooLarge {
             needed_gb: bytes / 1e9,
             limit_gb: MOST_GB,

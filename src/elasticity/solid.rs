@@ -26,9 +26,9 @@ use super::load::{Touch, pressure};
 use super::model::{ElasticError, LoadCheck, Model};
 use super::observe::{Face, Observer, tangent_frame};
 use super::rows::Rows;
-use super::solver::{BLOCK, FactorError, MOST_GB, SymmetricMatrix};
+use super::solver::{BLOCK, FactorError, MOST_GB, SymmetricMatrix, bytes, check_bytes};
 use super::system::{HELD, System, number_unknowns};
-use crate::budget::{Watch, report};
+use crate::budget::{Cancelled, Watch, report};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
@@ -95,16 +95,16 @@ impl SolidModel {
         material.check()?;
         let pieces = grip::check(&*elements, &grip)?;
         let unknowns = number_unknowns(grip.nodes.iter().flat_map(|h| (0..3).map(|i| h.holds(i))));
-        let mut stiffness = pattern(&*elements, &unknowns);
+        let mut stiffness = pattern(&*elements, &unknowns)
+            .map_err(|error| explain(&*elements, &unknowns, error))?;
         assemble(&*elements, &material, &unknowns, &mut stiffness, watch)?;
         grip.stiffen(&unknowns, &mut stiffness);
         report(watch, "Factoring", 0, 1)?;
         let order = elements
             .elimination()
             .map(|nodes| in_unknowns(&nodes, &unknowns));
-        let factored = System::new(unknowns.clone(), stiffness, order);
+        let factored = System::new(unknowns.clone(), stiffness, order, watch);
         let system = factored.map_err(|e| explain(&*elements, &unknowns, e))?;
-        report(watch, "Factoring", 1, 1)?;
         let mut model = Self {
             mesh: Arc::clone(mesh),
             index: SurfaceIndex::new(mesh),
@@ -305,7 +305,7 @@ fn in_unknowns(nodes: &[u32], unknowns: &[u32]) -> Vec<usize> {
 }
 
 /// The lower triangle's pattern: nodes that share an element are coupled.
-fn pattern(elements: &dyn Elements, unknowns: &[u32]) -> SymmetricMatrix {
+fn pattern(elements: &dyn Elements, unknowns: &[u32]) -> Result<SymmetricMatrix, FactorError> {
     let mut coupled: Vec<Vec<u32>> = vec![Vec::new(); elements.nodes().len()];
     for element in 0..elements.count() {
         let nodes = elements.nodes_of(element);
@@ -313,11 +313,16 @@ fn pattern(elements: &dyn Elements, unknowns: &[u32]) -> SymmetricMatrix {
             coupled[node as usize].extend_from_slice(nodes);
         }
     }
+    for list in &mut coupled {
+        list.sort_unstable();
+        list.dedup();
+        list.shrink_to_fit();
+    }
+    let couples: f64 = coupled.iter().map(|list| list.len() as f64).sum();
+    check_bytes(bytes(couples * 9.0 / 2.0))?;
     let mut columns = vec![0];
     let mut rows = Vec::new();
     for (node, list) in coupled.iter_mut().enumerate() {
-        list.sort_unstable();
-        list.dedup();
         for i in 0..3 {
             let column = unknowns[3 * node + i];
             if column == HELD {
@@ -333,11 +338,11 @@ fn pattern(elements: &dyn Elements, unknowns: &[u32]) -> SymmetricMatrix {
         *list = Vec::new();
     }
     let values = vec![0.0; rows.len()];
-    SymmetricMatrix {
+    Ok(SymmetricMatrix {
         columns,
         rows,
         values,
-    }
+    })
 }
 
 /// Element matrices on the rayon pool, added up in the order of the elements.
@@ -376,6 +381,7 @@ fn assemble(
 fn explain(elements: &dyn Elements, unknowns: &[u32], error: FactorError) -> ElasticError {
     match error {
         FactorError::OutOfMemory => ElasticError::OutOfMemory,
+        FactorError::Cancelled => ElasticError::Cancelled(Cancelled),
         FactorError::TooLarge { bytes } => ElasticError::TooLarge {
             needed_gb: bytes / 1e9,
             limit_gb: MOST_GB,

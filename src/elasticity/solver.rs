@@ -1,21 +1,23 @@
 //! The sparse stiffness matrix: its pattern, its scaled factor, and solves in blocks.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
+mod numeric;
+
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
 use faer::perm::Perm;
 use faer::reborrow::{Reborrow, ReborrowMut};
+use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Accum, MatMut, MatRef, Par, Side, Spec};
+use faer::{Accum, MatMut, MatRef, Par, Side};
+
+use crate::budget::Watch;
 
 /// Right-hand sides solved together. Fixed, so that a load gives the same bytes in any company.
 pub const BLOCK: usize = 64;
@@ -28,14 +30,15 @@ pub enum FactorError {
         row: usize,
     },
     OutOfMemory,
-    /// The factor alone would take so many bytes.
+    /// The matrix and its factor would take so many bytes.
     TooLarge {
         bytes: f64,
     },
+    Cancelled,
 }
 
-/// Memory that a factor may take (GB).
-pub const MOST_GB: f64 = 6.0;
+/// Memory that a matrix and its factor may take (GB).
+pub const MOST_GB: f64 = 8.0;
 
 /// The lower triangle of a symmetric matrix, by columns.
 pub struct SymmetricMatrix {
@@ -113,7 +116,11 @@ impl Block {
 impl Factor {
     /// Factors. `order` names the row that is eliminated first, second …; without one, rows are taken by
     /// approximate minimum degree.
-    pub fn new(matrix: &SymmetricMatrix, order: Option<Vec<usize>>) -> Result<Self, FactorError> {
+    pub fn new(
+        matrix: &SymmetricMatrix,
+        order: Option<Vec<usize>>,
+        watch: Watch,
+    ) -> Result<Self, FactorError> {
         let n = matrix.dimension();
         if let Some(row) =
             (0..n).find(|&c| matrix.diagonal(c) <= 0.0 || !matrix.diagonal(c).is_finite())
@@ -121,89 +128,62 @@ impl Factor {
             return Err(FactorError::NotPositive { row });
         }
         let scale: Vec<f64> = (0..n).map(|c| matrix.diagonal(c).sqrt().recip()).collect();
-        let scaled = scaled(matrix, &scale);
-        let params = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        let order = order.map(|forward| {
-            let mut inverse = vec![0; n];
-            for (place, &row) in forward.iter().enumerate() {
-                inverse[row] = place;
-            }
-            Perm::new_checked(forward.into(), inverse.into(), n)
-        });
-        let ordering = match &order {
-            Some(order) => SymmetricOrdering::Custom(order.as_ref()),
-            None => SymmetricOrdering::Amd,
-        };
-        let symbolic =
-            factorize_symbolic_cholesky(scaled.symbolic(), Side::Lower, ordering, params)
-                .map_err(|_| FactorError::OutOfMemory)?;
-        let bytes = symbolic.len_val() as f64 * size_of::<f64>() as f64;
-        if bytes > MOST_GB * 1e9 {
-            return Err(FactorError::TooLarge { bytes });
-        }
+        let symbolic = symbolic(matrix, order)?;
+        let factor_bytes = symbolic.len_val() as f64 * size_of::<f64>() as f64;
+        check_bytes(factor_bytes + bytes(matrix.rows.len() as f64))?;
         let mut values = Vec::new();
         values
             .try_reserve_exact(symbolic.len_val())
             .map_err(|_| FactorError::OutOfMemory)?;
         values.resize(symbolic.len_val(), 0.0);
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default());
-        let mut memory = MemBuffer::try_new(scratch).map_err(|_| FactorError::OutOfMemory)?;
-        let outcome = symbolic
-            .factorize_numeric_llt::<f64>(
-                &mut values,
-                scaled.as_ref(),
-                Side::Lower,
-                LltRegularization::default(),
-                Par::Seq,
-                MemStack::new(&mut memory),
-                Spec::default(),
-            )
-            .map(|_| ());
-        if let Err(LltError::NonPositivePivot { index }) = outcome {
-            return Err(FactorError::NotPositive {
-                row: original_row(&symbolic, index),
-            });
-        }
-        Ok(Self::finished(symbolic, values, scale))
+        let mut factor = Self::empty(symbolic, scale);
+        let nodes = nodes(&factor.symbolic);
+        let order = factor.symbolic.perm();
+        numeric::factorize(
+            nodes,
+            order,
+            matrix,
+            &factor.scale,
+            &factor.supernode,
+            &mut values,
+            watch,
+        )
+        .map_err(|error| match error {
+            FactorError::NotPositive { row } => FactorError::NotPositive {
+                row: order.map_or(row, |p| p.arrays().0[row]),
+            },
+            other => other,
+        })?;
+        factor.smallest_pivot = smallest_pivot(nodes, &values);
+        factor.values = values;
+        Ok(factor)
     }
 
-    fn finished(symbolic: SymbolicCholesky<usize>, values: Vec<f64>, scale: Vec<f64>) -> Self {
+    fn empty(symbolic: SymbolicCholesky<usize>, scale: Vec<f64>) -> Self {
         let n = scale.len();
         let order = symbolic.perm().map_or_else(
             || (0..n as u32).collect(),
             |p| p.arrays().1.iter().map(|&i| i as u32).collect(),
         );
-        let smallest_pivot = smallest_pivot(&symbolic, &values);
-        let mut factor = Self {
+        let (mut supernode, mut tallest) = (vec![0; n], 0);
+        let l = nodes(&symbolic);
+        for s in 0..l.n_supernodes() {
+            supernode[l.supernode_begin()[s]..l.supernode_end()[s]].fill(s as u32);
+            tallest = tallest.max(l.supernode(s).pattern().len());
+        }
+        Self {
             symbolic,
-            values,
+            values: Vec::new(),
             order,
             scale,
-            supernode: vec![0; n],
-            tallest: 0,
-            smallest_pivot,
-        };
-        let (mut supernode, mut tallest) = (vec![0; n], 0);
-        let l = factor.supernodes();
-        for s in 0..l.symbolic().n_supernodes() {
-            let node = l.supernode(s);
-            let columns = node.val().ncols();
-            supernode[node.start()..][..columns].fill(s as u32);
-            tallest = tallest.max(node.pattern().len());
+            supernode,
+            tallest,
+            smallest_pivot: f64::INFINITY,
         }
-        (factor.supernode, factor.tallest) = (supernode, tallest);
-        factor
     }
 
-    /// The library was made to build supernodes.
     fn supernodes(&self) -> SupernodalLltRef<'_, usize, f64> {
-        match self.symbolic.raw() {
-            SymbolicCholeskyRaw::Supernodal(s) => SupernodalLltRef::new(s, &self.values),
-            SymbolicCholeskyRaw::Simplicial(_) => unreachable!("supernodes were asked for"),
-        }
+        SupernodalLltRef::new(nodes(&self.symbolic), &self.values)
     }
 
     pub fn dimension(&self) -> usize {
@@ -295,45 +275,63 @@ fn backward(l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut Block) {
     solve_upper_triangular_in_place(top.transpose(), x, Par::Seq);
 }
 
-fn scaled(matrix: &SymmetricMatrix, scale: &[f64]) -> SparseColMat<usize, f64> {
+/// Memory of a matrix of so many entries while it is factored.
+#[must_use]
+pub fn bytes(entries: f64) -> f64 {
+    let own = size_of::<usize>() + size_of::<f64>();
+    entries * (own + numeric::BYTES_AN_ENTRY) as f64
+}
+
+/// Refuses what takes too much memory, before it is taken.
+///
+/// # Errors
+/// [`FactorError::TooLarge`].
+pub fn check_bytes(bytes: f64) -> Result<(), FactorError> {
+    if bytes > MOST_GB * 1e9 {
+        return Err(FactorError::TooLarge { bytes });
+    }
+    Ok(())
+}
+
+/// The pattern of the factor.
+fn symbolic(
+    matrix: &SymmetricMatrix,
+    order: Option<Vec<usize>>,
+) -> Result<SymbolicCholesky<usize>, FactorError> {
     let n = matrix.dimension();
-    let mut values = matrix.values.clone();
-    for column in 0..n {
-        for k in matrix.columns[column]..matrix.columns[column + 1] {
-            values[k] *= scale[column] * scale[matrix.rows[k]];
-        }
-    }
-    let pattern =
-        SymbolicSparseColMat::new_checked(n, n, matrix.columns.clone(), None, matrix.rows.clone());
-    SparseColMat::new(pattern, values)
-}
-
-fn original_row(symbolic: &SymbolicCholesky<usize>, index: usize) -> usize {
-    // The library counts from zero in one of its two forms and from one in the other.
-    let permuted = match symbolic.raw() {
-        SymbolicCholeskyRaw::Supernodal(_) => index,
-        SymbolicCholeskyRaw::Simplicial(_) => index.saturating_sub(1),
+    let params = CholeskySymbolicParams {
+        supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+        ..Default::default()
     };
-    symbolic.perm().map_or(permuted, |p| p.arrays().0[permuted])
+    let order = order.map(|forward| {
+        let mut inverse = vec![0; n];
+        for (place, &row) in forward.iter().enumerate() {
+            inverse[row] = place;
+        }
+        Perm::new_checked(forward.into(), inverse.into(), n)
+    });
+    let ordering = match &order {
+        Some(order) => SymmetricOrdering::Custom(order.as_ref()),
+        None => SymmetricOrdering::Amd,
+    };
+    let pattern = SymbolicSparseColMatRef::new_checked(n, n, &matrix.columns, None, &matrix.rows);
+    factorize_symbolic_cholesky(pattern, Side::Lower, ordering, params)
+        .map_err(|_| FactorError::OutOfMemory)
 }
 
-fn smallest_pivot(symbolic: &SymbolicCholesky<usize>, values: &[f64]) -> f64 {
-    let mut smallest = f64::INFINITY;
+/// The library was made to build supernodes.
+fn nodes(symbolic: &SymbolicCholesky<usize>) -> &SymbolicSupernodalCholesky<usize> {
     match symbolic.raw() {
-        SymbolicCholeskyRaw::Supernodal(s) => {
-            let l = SupernodalLltRef::<'_, usize, f64>::new(s, values);
-            for k in 0..s.n_supernodes() {
-                let columns = l.supernode(k).val();
-                for j in 0..columns.ncols() {
-                    smallest = smallest.min(columns[(j, j)].powi(2));
-                }
-            }
-        }
-        SymbolicCholeskyRaw::Simplicial(s) => {
-            for &start in &s.col_ptr()[..s.col_ptr().len() - 1] {
-                smallest = smallest.min(values[start].powi(2));
-            }
-        }
+        SymbolicCholeskyRaw::Supernodal(s) => s,
+        SymbolicCholeskyRaw::Simplicial(_) => unreachable!("supernodes were asked for"),
     }
-    smallest
+}
+
+fn smallest_pivot(symbolic: &SymbolicSupernodalCholesky<usize>, values: &[f64]) -> f64 {
+    let l = SupernodalLltRef::<'_, usize, f64>::new(symbolic, values);
+    let pivots = (0..symbolic.n_supernodes()).flat_map(|s| {
+        let columns = l.supernode(s).val();
+        (0..columns.ncols()).map(move |j| columns[(j, j)].powi(2))
+    });
+    pivots.fold(f64::INFINITY, f64::min)
 }

@@ -37,9 +37,10 @@ impl System {
         unknowns: Vec<u32>,
         stiffness: SymmetricMatrix,
         order: Option<Vec<usize>>,
+        watch: Watch,
     ) -> Result<Self, FactorError> {
         Ok(Self {
-            factor: Factor::new(&stiffness, order)?,
+            factor: Factor::new(&stiffness, order, watch)?,
             unknowns,
             stiffness,
             work: Work {

@@ -2,7 +2,8 @@
 //!
 //! What is inside is said by the winding number, which gaps, overlaps and touching bodies leave alone. It is
 //! asked once for each small piece of the surface; where that piece parts inside from outside, as it does
-//! nearly everywhere, the side on which a point lies of it is enough (J. A. Bærentzen and H. Aanæs 2005).
+//! nearly everywhere, the side on which a point lies of it is enough (J. A. Bærentzen and H. Aanæs 2005). Points
+//! nearest to a corner are few, and ask for themselves.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -26,7 +27,8 @@ pub struct SignedDistance {
 
 /// Pieces are about this share of the whole across.
 const PIECE: f64 = 0.02;
-/// Just outside a piece that parts outside from inside, the surface winds less than this.
+/// Just outside a piece that parts outside from inside the surface winds less than this, and just inside as
+/// nearly once.
 const PARTS: f64 = 0.3;
 /// Seen under a flatter angle than this a point has no clear side.
 const FLAT: f64 = 1e-3;
@@ -78,33 +80,39 @@ impl SignedDistance {
     }
 
     /// The direction outward at a point of the surface, where it parts inside from outside: that of the
-    /// facet, or of all the facets at its edge or corner.
+    /// facet, or of both facets at its edge.
     fn normal(&self, at: SurfacePoint) -> Option<DVec3> {
         let t = at.triangle;
         if !self.parts(at) {
             return None;
         }
-        let small: Vec<usize> = (0..3).filter(|&i| at.barycentric[i] < ON_EDGE).collect();
-        match small[..] {
-            [] => Some(self.mesh.facet_normal(t)),
-            [corner] => {
-                let edge =
-                    &self.mesh.edges()[self.mesh.triangle_edges()[t as usize][corner] as usize];
-                let [a, b] = edge.triangles[..] else {
-                    return None;
-                };
-                Some(self.mesh.facet_normal(a) + self.mesh.facet_normal(b))
-            }
-            _ => {
-                let corner = (0..3).find(|i| !small.contains(i))?;
-                let vertex = self.mesh.triangles()[t as usize][corner] as usize;
-                let around = &self.mesh.vertex_triangles()[vertex];
-                let edges = around
-                    .iter()
-                    .flat_map(|&t| self.mesh.triangle_edges()[t as usize]);
-                let whole = { edges }.all(|e| self.mesh.edges()[e as usize].triangles.len() == 2);
-                whole.then(|| self.mesh.vertex_normals()[vertex])
-            }
+        let mut small = (0..3).filter(|&i| at.barycentric[i] < ON_EDGE);
+        let Some(corner) = small.next() else {
+            return Some(self.mesh.facet_normal(t));
+        };
+        if small.next().is_some() {
+            return None;
+        }
+        let edge = &self.mesh.edges()[self.mesh.triangle_edges()[t as usize][corner] as usize];
+        let [a, b] = edge.triangles[..] else {
+            return None;
+        };
+        let other = if a == t { b } else { a };
+        let beyond = self.seen_from(other, at);
+        (self.parts(beyond)).then(|| self.mesh.facet_normal(t) + self.mesh.facet_normal(other))
+    }
+
+    /// A point on an edge of a triangle, as a point of the other triangle at that edge.
+    fn seen_from(&self, other: u32, at: SurfacePoint) -> SurfacePoint {
+        let own = self.mesh.triangles()[at.triangle as usize];
+        let of = |v: u32| {
+            (0..3)
+                .find(|&i| own[i] == v)
+                .map_or(0.0, |i| at.barycentric[i])
+        };
+        SurfacePoint {
+            triangle: other,
+            barycentric: self.mesh.triangles()[other as usize].map(of),
         }
     }
 
@@ -151,8 +159,9 @@ impl SignedDistance {
         let clear = LOOKS.iter().all(|w| {
             let sum = |k: usize| (0..3).map(|m| w[m] * corners[m][k]).sum::<f64>() / f64::from(n);
             let (u, v) = (sum(0), sum(1));
-            let point = a + (b - a) * u + (c - a) * v + off;
-            self.winding.at(point).abs() < PARTS
+            let point = a + (b - a) * u + (c - a) * v;
+            self.winding.at(point + off).abs() < PARTS
+                && (self.winding.at(point - off) - 1.0).abs() < PARTS
         });
         if clear { PARTING } else { UNCLEAR }
     }
@@ -184,6 +193,27 @@ mod tests {
             inside += usize::from(expected);
         }
         inside
+    }
+
+    /// A ball with a fin that has two sides and nothing between them, outside and in its middle.
+    #[test]
+    fn sheets_without_thickness_do_no_harm() {
+        let mesh = ball(3);
+        let mut positions = mesh.positions().to_vec();
+        let mut triangles = mesh.triangles().to_vec();
+        for x in [0.9, -0.3] {
+            let first = positions.len() as u32;
+            positions.extend([
+                DVec3::new(x, -0.3, 0.0),
+                DVec3::new(x + 0.7, -0.3, 0.1),
+                DVec3::new(x, 0.4, 0.0),
+            ]);
+            triangles.push([first, first + 1, first + 2]);
+            triangles.push([first, first + 2, first + 1]);
+        }
+        let fins = Arc::new(TriMesh::from_checked(positions, triangles));
+        let inside = agrees(&fins);
+        assert!(inside.abs_diff(agrees(&Arc::new(mesh))) < 3);
     }
 
     #[test]

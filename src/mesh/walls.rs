@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::TriMesh;
 use super::locate::SurfaceIndex;
+use crate::budget::{Cancelled, Watch, report};
 
 /// Which side of its wall a facet is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -42,13 +43,18 @@ const ROUNDS: usize = 3;
 
 impl Walls {
     /// Looks at every facet of a closed surface.
-    #[must_use]
-    pub fn of(mesh: &TriMesh, index: &SurfaceIndex) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn of(mesh: &TriMesh, index: &SurfaceIndex, watch: Watch) -> Result<Self, Cancelled> {
+        const CHUNK: usize = 512;
         let looks = looks();
-        let facets: Vec<Facet> = (0..mesh.triangles().len() as u32)
-            .into_par_iter()
-            .map(|t| Facet::of(mesh, index, t, &looks))
-            .collect();
+        let all: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
+        let mut facets: Vec<Facet> = Vec::with_capacity(all.len());
+        for chunk in all.chunks(CHUNK) {
+            report(watch, "Measuring walls", facets.len(), all.len())?;
+            facets.par_extend(chunk.par_iter().map(|&t| Facet::of(mesh, index, t, &looks)));
+        }
         let thickness: Vec<f64> = facets.iter().map(|f| f.thickness).collect();
         let typical = middle(&thickness, mesh);
         let sides = (0u32..)
@@ -59,7 +65,7 @@ impl Walls {
         for _ in 0..ROUNDS {
             walls.ask_neighbours(mesh);
         }
-        walls
+        Ok(walls)
     }
 
     /// The thickness that half of the walls' area is thinner than (m); NaN where there are no walls.
@@ -224,13 +230,14 @@ fn share_of(thickness: &[f64], mesh: &TriMesh, share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::unwatched;
     use crate::limb::LimbSpec;
 
     #[test]
     fn the_faces_of_a_thick_limb_are_told_apart() {
         let (mesh, _) = LimbSpec::default().build().unwrap();
         let solid = mesh.thickened(3e-3);
-        let walls = Walls::of(&solid, &SurfaceIndex::new(&solid));
+        let walls = Walls::of(&solid, &SurfaceIndex::new(&solid), &unwatched).unwrap();
         assert!((walls.typical(&solid) - 3e-3).abs() < 1e-4);
         let mut wrong = 0.0;
         let mut found = [0.0; 3];

@@ -26,8 +26,9 @@ impl Studio {
             return;
         }
         let inputs = self.document.inputs();
-        self.jobs.start(ctx, Task::Advise, key, move |_| {
-            let advice = design::advise(&inputs).map_err(|e| super::drive::stop(&e))?;
+        self.jobs.start(ctx, Task::Advise, key, move |reporter| {
+            let watch = |progress| reporter.report(progress);
+            let advice = design::advise(&inputs, &watch).map_err(|e| super::drive::stop(&e))?;
             Ok(Finished::Advised(Arc::new(advice)))
         });
     }

@@ -179,7 +179,7 @@ fn serve(
 /// An even mesh, quick to have: the click is answered at once, the simulation brings the graded one.
 fn build(inputs: &Inputs) -> Result<Box<dyn Model>, DesignError> {
     inputs.project.check()?;
-    let ground = design::ground(inputs)?;
+    let ground = design::ground(inputs, &unwatched)?;
     ground.quick(&unwatched)
 }
 

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::SolidModel;
 use super::immersed::{Fineness, Immersed};
-use crate::budget::{Elements, Watch};
+use crate::budget::{Elements, Watch, report};
 use crate::elasticity::estimate::{self, Discretization, Sample};
 use crate::elasticity::grade::{CHECKED, PLACES, even_size, sample, spread};
 use crate::elasticity::load::Touch;
@@ -50,13 +51,13 @@ const VERTICES: usize = 9000;
 /// Size of the first cells in thicknesses of the wall, and of each next ones over the last.
 const FIRST: f64 = 2.5;
 const FINER: f64 = 1.0 / 1.5;
-/// What changes from one size to the next over what is left, where errors fall with the square of the size.
-const CHANGE: f64 = 1.0 / (FINER * FINER) - 1.0;
+/// Cells that are not at least this much smaller are not worth a model.
+const WORTH: f64 = 0.85;
 /// Unknowns of quadratic cells for a surface, times the squared size over its area (measured on tubes and
 /// shins, walls half as thick as the cells).
 const UNKNOWNS: f64 = 45.0;
 /// Unknowns that are allowed for each vertex that a shell may have.
-const UNKNOWNS_A_VERTEX: f64 = 12.0;
+const UNKNOWNS_A_VERTEX: f64 = 24.0;
 /// Own tetrahedra of fewer unknowns are halved to judge them.
 const MOST_TO_HALVE: usize = 60_000;
 /// The error is an estimate: stop at this share of the tolerance.
@@ -66,13 +67,15 @@ impl SolidGround {
     /// Tells the faces of a part apart; `told` says what the user has said of a place.
     ///
     /// # Errors
-    /// [`ElasticError::Open`] for a surface that encloses nothing.
+    /// [`ElasticError::Open`] for a surface that encloses nothing, [`ElasticError::Cancelled`].
     pub fn new(
         part: &Arc<TriMesh>,
         material: Material,
         supports: &[Support],
         told: &dyn Fn(DVec3) -> Option<Side>,
+        watch: Watch,
     ) -> Result<Self, ElasticError> {
+        report(watch, "Measuring walls", 0, 1)?;
         let immersed = Immersed::new(part, material, supports);
         encloses(part, &immersed)?;
         let held = &immersed.held;
@@ -80,7 +83,7 @@ impl SolidGround {
         let size = even_size(held.mesh.area(), 0.0, VERTICES);
         let laid = remesh(&surface, &|_| size);
         let whole = laid.mesh;
-        let mut walls = Walls::of(&whole, &SurfaceIndex::new(&whole));
+        let mut walls = Walls::of(&whole, &SurfaceIndex::new(&whole), watch)?;
         for (t, side) in (0u32..).zip(&mut walls.sides) {
             let middle = whole.corners(t).iter().sum::<DVec3>() / 3.0;
             *side = told(middle).unwrap_or(*side);
@@ -156,24 +159,40 @@ impl SolidGround {
         self.size_for(UNKNOWNS_A_VERTEX * aim.most_for(touches) as f64)
     }
 
-    /// Unknowns with cells of a size (m), about.
+    /// Unknowns with cells of a size (m) for a surface of an area (m²), about.
     #[must_use]
-    pub fn unknowns(&self, size: f64) -> f64 {
-        UNKNOWNS * self.whole.area() / (size * size)
+    pub fn unknowns(area: f64, size: f64) -> f64 {
+        UNKNOWNS * area / (size * size)
     }
 
-    /// Error of the displacement under a touch (%) with cells of a size (m): as on the slotted tube, where it
-    /// fell with the square of the size.
+    /// Error of the displacement under a touch (%) with cells of a size (m) for a wall (m): between the slotted
+    /// tube (1 % of cells as large as the wall) and printed shins (3 %); it falls with the square of the size.
     #[must_use]
-    pub fn error_percent(&self, size: f64) -> f64 {
-        const OF_ONE_WALL: f64 = 0.95;
-        OF_ONE_WALL * (size / self.wall()).powi(2)
+    pub fn error_percent(size: f64, wall: f64) -> f64 {
+        const OF_ONE_WALL: f64 = 1.75;
+        OF_ONE_WALL * (size / wall).powi(2)
+    }
+
+    /// Sizes of the cells (m), one after the other, that [`Self::grade`] would come to for a wall (m) and a
+    /// surface of an area (m²), were the error as on other parts.
+    #[must_use]
+    pub fn foreseen(wall: f64, area: f64, aim: &Elements, touches: usize) -> Vec<f64> {
+        let least_size = size_for(area, UNKNOWNS_A_VERTEX * aim.most_for(touches) as f64);
+        let first = (FIRST * wall).max(least_size / FINER);
+        let mut sizes = vec![first, first * FINER];
+        while let Some(&size) = sizes.last()
+            && Self::error_percent(size, wall) > SAFETY * aim.displacement_percent
+            && let Some(next) = next_size(size, least_size)
+        {
+            sizes.push(next);
+        }
+        sizes
     }
 
     /// Size of cells (m) for about so many unknowns.
     #[must_use]
     pub fn size_for(&self, unknowns: f64) -> f64 {
-        (UNKNOWNS * self.whole.area() / unknowns).sqrt()
+        size_for(self.whole.area(), unknowns)
     }
 
     /// Makes cells smaller until the error under these touches is small enough or the most unknowns are
@@ -197,17 +216,21 @@ impl SolidGround {
         let mut size = (FIRST * self.wall()).max(least_size / FINER);
         let mut coarse = Solved::new(self, size, &touches, &places, watch)?;
         let (mut models, mut solves) = (1, touches.len() as u64);
+        let mut next = size * FINER;
         loop {
-            size *= FINER;
+            // Errors fall with the square of the size: what changed, over what is left.
+            let change = (size / next).powi(2) - 1.0;
+            size = next;
             let fine = Solved::new(self, size, &touches, &places, watch)?;
             models += 1;
             solves += touches.len() as u64;
             let (before, after) = (&coarse.sample, &fine.sample);
-            let estimate = estimate::left(before, after, &touches, &places, CHANGE);
+            let estimate = estimate::left(before, after, &touches, &places, change);
             let excess = (estimate.displacement_percent / aim.displacement_percent)
                 .max(estimate.strain_percent / aim.strain_percent)
                 / SAFETY;
-            if excess <= 1.0 || excess.is_nan() || size * FINER < least_size {
+            let finer = next_size(size, least_size).filter(|_| excess > 1.0);
+            let Some(finer) = finer else {
                 return Ok(SolidGraded {
                     balance: fine.model.check_all(
                         &spread(&touches, CHECKED),
@@ -219,8 +242,8 @@ impl SolidGround {
                     models,
                     solves,
                 });
-            }
-            coarse = fine;
+            };
+            (coarse, next) = (fine, finer);
         }
     }
 
@@ -338,6 +361,17 @@ impl Solved {
     }
 }
 
+/// The size (m) after one, if there is one to be had.
+fn next_size(size: f64, least: f64) -> Option<f64> {
+    let next = (size * FINER).max(least);
+    (next < WORTH * size).then_some(next)
+}
+
+/// Size of cells (m) of a surface of an area (m²) for about so many unknowns.
+fn size_for(area: f64, unknowns: f64) -> f64 {
+    (UNKNOWNS * area / unknowns).sqrt()
+}
+
 /// Whether a surface encloses anything: its holes are small, and just behind most of it there is material.
 fn encloses(part: &TriMesh, immersed: &Immersed) -> Result<(), ElasticError> {
     /// Share of the area with material behind it, and of the area that holes may have.
@@ -345,13 +379,16 @@ fn encloses(part: &TriMesh, immersed: &Immersed) -> Result<(), ElasticError> {
     const HOLES: f64 = 0.02;
     let (lower, upper) = part.bounds();
     let off = 1e-5 * (upper - lower).length();
-    let mut behind = 0.0;
-    for t in 0..part.triangles().len() as u32 {
+    let count = part.triangles().len() as u32;
+    let has_behind = |t: u32| {
         let middle = part.corners(t).iter().sum::<DVec3>() / 3.0;
-        if immersed.is_inside(middle - part.facet_normal(t) * off) {
-            behind += part.facet_area(t);
-        }
-    }
+        immersed.is_inside(middle - part.facet_normal(t) * off)
+    };
+    let has: Vec<bool> = (0..count).into_par_iter().map(has_behind).collect();
+    let areas = (0..count)
+        .filter(|&t| has[t as usize])
+        .map(|t| part.facet_area(t));
+    let behind: f64 = areas.sum();
     if behind < MOST * part.area() || hole_area(part) > HOLES * part.area() {
         let rims = part.boundary_edges().count();
         return Err(ElasticError::Open { rims });
