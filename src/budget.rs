@@ -223,7 +223,7 @@ impl Elements {
 pub struct Budget {
     pub quality: Quality,
     /// Size of the elastic model. The truth that accuracy is quoted against always has elements of half
-    /// its size.
+    /// their size; of a solid two thirds.
     pub elements: Elements,
     /// Most touches the model is asked for.
     pub touches: usize,

@@ -16,7 +16,7 @@ use crate::placement::Selection;
 use crate::project::Project;
 use crate::regression::folds::evenly;
 
-/// The judge: a model of half the element size, with touches of its own.
+/// The judge: a model of finer elements, with touches of its own.
 #[derive(Clone)]
 pub struct Truth {
     pub touches: Vec<Touch>,

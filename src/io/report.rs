@@ -451,7 +451,7 @@ fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
 fn errors(page: &mut String, design: &Design) {
     let _ = write!(
         page,
-        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, drawn off the nodes of a model of half the element size ({:.2} mm). “As built”: every gauge 1 mm and 3° off and its gain off by 3 %, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
+        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, drawn off the nodes of a finer model ({:.2} mm). “As built”: every gauge 1 mm and 3° off and its gain off by 3 %, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
         design.simulated.dataset.touches.len(),
         design.simulated.mesh.mean_edge() * 1000.0,
         design.truth.touches.len(),

@@ -8,9 +8,16 @@ use super::Studio;
 use super::drive::Finished;
 use super::jobs::Task;
 use crate::design::{self, Advice};
+use crate::document::Layer;
 use crate::mesh::walls::Side;
 
 impl Studio {
+    /// What was measured of the part as it is, if it was.
+    #[must_use]
+    pub fn advice(&self) -> Option<&Advice> {
+        self.current_advice().map(|a| &**a)
+    }
+
     /// What is known of the part as it is.
     pub(super) fn current_advice(&self) -> Option<&Arc<Advice>> {
         let (key, advice) = self.advice.as_ref()?;
@@ -50,7 +57,15 @@ impl Studio {
             Side::Inside => 1.0,
         };
         Some(if sides {
-            faces.sides.iter().map(of_side).collect()
+            let mut values: Vec<f64> = faces.sides.iter().map(of_side).collect();
+            // What the brush says counts at once.
+            for (layer, value) in [(Layer::Inside, 1.0), (Layer::Outside, -1.0)] {
+                let painted = self.document.layer(layer).map_or(&[][..], |m| m);
+                for (shown, _) in values.iter_mut().zip(painted).filter(|(_, p)| **p) {
+                    *shown = value;
+                }
+            }
+            values
         } else {
             faces.thickness.iter().map(|t| t * 1e3).collect()
         })

@@ -178,7 +178,7 @@ impl Command {
             }
             Self::Cancel => "Stop whatever is being computed",
             Self::SimulatedBoard => {
-                "Live touch without hardware: a truth of half the element size, and gauges as a workshop glues them"
+                "Live touch without hardware: a truth with finer elements, and gauges as a workshop glues them"
             }
             Self::Tare => "Take what is read now for rest: nothing may touch the part",
             Self::Record => "Begin to record the raw counts of the board, or end it",
@@ -403,7 +403,10 @@ impl Studio {
             Command::Simulate => self.simulate(ctx),
             Command::Select => self.select(ctx),
             Command::Keep => self.keep(),
-            Command::Advise => self.start_advising(ctx),
+            Command::Advise => {
+                self.stage = Stage::Part;
+                self.start_advising(ctx);
+            }
             Command::Cancel => self.cancel(),
             Command::SimulatedBoard => {
                 self.stage = Stage::Live;

@@ -168,8 +168,9 @@ impl Studio {
                 (
                     self.advice.as_ref().map(|(_, a)| Arc::as_ptr(a)),
                     self.current_advice().is_some(),
-                    // What is painted is measured when the hand lets go.
+                    // What is painted is seen at once, and measured when the hand lets go.
                     self.view.is_stroking(),
+                    self.document.paint_key(),
                 )
             }),
             self.view.ranges.of(field),

@@ -307,7 +307,8 @@ impl Studio {
             let (sites, touches, gigabytes) =
                 crate::design::expected_size(&self.document.inputs(), &budget);
             return vec![format!(
-                "about {sites} sites × {touches} touches, {gigabytes:.2} GB"
+                "about {sites} sites × {touches} touches, {}",
+                memory(gigabytes)
             )];
         };
         let dataset = &s.simulated.dataset;
@@ -462,4 +463,13 @@ fn trust(simulated: &Simulated) -> Vec<String> {
         ));
     }
     lines
+}
+
+/// Memory in the unit that it is read in.
+fn memory(gigabytes: f64) -> String {
+    if gigabytes < 0.1 {
+        format!("{:.0} MB", (gigabytes * 1e3).max(1.0))
+    } else {
+        format!("{gigabytes:.1} GB")
+    }
 }

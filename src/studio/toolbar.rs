@@ -112,7 +112,10 @@ impl Studio {
             .show_ui(ui, |ui| {
                 let solid = self.document.is_solid();
                 for layer in Layer::ALL.into_iter().filter(|l| solid || !l.is_face()) {
-                    ui.selectable_value(&mut self.view.layer, layer, layer.name());
+                    let chosen = &mut self.view.layer;
+                    if ui.selectable_value(chosen, layer, layer.name()).clicked() {
+                        self.view.show_layer();
+                    }
                 }
             })
             .response

@@ -171,8 +171,17 @@ impl Viewport {
         self.tool = tool;
         self.gesture = Gesture::None;
         if tool.paints() {
-            self.field = Field::Region;
+            self.show_layer();
         }
+    }
+
+    /// Shows what the brush changes.
+    pub(super) fn show_layer(&mut self) {
+        self.field = if self.layer.is_face() {
+            Field::Faces
+        } else {
+            Field::Region
+        };
     }
 
     pub(super) fn drop_gesture(&mut self) {

@@ -26,7 +26,11 @@ pub fn to_text(project: &Project) -> String {
 fn part(t: &mut Text, project: &Project) {
     t.table("part");
     let part = &project.part;
-    t.key("mesh", quoted(&part.mesh), "glTF/GLB, OBJ, STL or PLY");
+    t.key(
+        "mesh",
+        quoted(&part.mesh),
+        "glTF/GLB, OBJ, STL, PLY, Gmsh or Abaqus",
+    );
     t.maybe(
         "unit",
         part.unit.map(|u| quoted(u.name())),
