@@ -2,14 +2,16 @@
 
 mod bench;
 
-use std::sync::Arc;
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex};
 
 use bench::solids::{block, clamp, model, under};
 use glam::DVec3;
-use hapdef::budget::{Quality, unwatched};
+use hapdef::budget::{Progress, Quality, Watch, unwatched};
 use hapdef::design::{self, Inputs};
+use hapdef::elasticity::solid::ground::SolidGround;
 use hapdef::elasticity::solid::immersed::{Fineness, Immersed};
-use hapdef::elasticity::{Material, Touch};
+use hapdef::elasticity::{ElasticError, Material, Touch};
 use hapdef::limb::LimbSpec;
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::unroll::Axis;
@@ -188,4 +190,93 @@ fn an_open_surface_is_no_solid() {
     };
     assert!(loose([200.0, 300.0]).contains("support"));
     assert!(loose([-1.0, 300.0]).contains("every point of the part is held"));
+}
+
+/// A fork 20 × 10 × 10 mm whose prongs are a slit of 0.2 mm apart.
+fn fork() -> Arc<TriMesh> {
+    let outline = [
+        [0.0, 0.0],
+        [4.0, 0.0],
+        [20.0, 0.0],
+        [20.0, 4.9],
+        [4.0, 4.9],
+        [4.0, 5.1],
+        [20.0, 5.1],
+        [20.0, 10.0],
+        [4.0, 10.0],
+        [0.0, 10.0],
+    ];
+    let level = |z: f64| outline.map(|[x, y]| DVec3::new(x, y, z) * 1e-3);
+    let positions = [level(0.0), level(10.0)].concat();
+    let caps = [
+        [0, 1, 4],
+        [0, 4, 5],
+        [0, 5, 9],
+        [5, 8, 9],
+        [1, 2, 3],
+        [1, 3, 4],
+        [5, 6, 7],
+        [5, 7, 8],
+    ];
+    let mut triangles: Vec<[u32; 3]> = Vec::new();
+    for [a, b, c] in caps {
+        triangles.push([a, c, b]);
+        triangles.push([a + 10, b + 10, c + 10]);
+    }
+    for i in 0..10 {
+        let j = (i + 1) % 10;
+        triangles.extend([[i, j, j + 10], [i, j + 10, i + 10]]);
+    }
+    Arc::new(TriMesh::new(&positions, &triangles, 0).unwrap().0)
+}
+
+#[test]
+fn a_slit_narrower_than_a_cell_is_named() {
+    let support = clamp(DVec3::splat(-1.0), DVec3::new(2e-3, 1.0, 1.0));
+    let ground = SolidGround::new(&fork(), SOFT, &[support], &|_| None, &unwatched).unwrap();
+    let said = |size: f64| ground.cautions(&ground.fineness(size)).join(" ");
+    assert!(said(2e-3).contains("half a cell"), "{}", said(2e-3));
+    assert!(!said(3e-4).contains("half a cell"), "{}", said(3e-4));
+}
+
+/// Every stage says how far it is, and stops when it is told to.
+#[test]
+fn every_stage_can_be_stopped() {
+    let part = block(DVec3::new(0.04, 0.04, 0.002), |p| p);
+    let support = clamp(DVec3::splat(-1.0), DVec3::new(0.004, 1.0, 1.0));
+    let build = |watch: Watch| {
+        let supports = std::slice::from_ref(&support);
+        let ground = SolidGround::new(&part, SOFT, supports, &|_| None, watch)?;
+        ground.model(&ground.fineness(2e-3), watch).map(|_| ())
+    };
+    let seen = Mutex::new(Vec::new());
+    let all = |p: Progress| {
+        seen.lock().unwrap().push((p.stage, p.done, p.total));
+        ControlFlow::Continue(())
+    };
+    build(&all).unwrap();
+    let seen = seen.into_inner().unwrap();
+    for stage in [
+        "Measuring walls",
+        "Cutting cells",
+        "Assembling",
+        "Factoring",
+    ] {
+        let of: Vec<_> = seen.iter().filter(|s| s.0 == stage).collect();
+        assert!(of.len() > 1, "{stage}: {of:?}");
+        let (_, done, total) = *of[of.len() / 2];
+        assert!(done <= total, "{stage}");
+        let stop = |p: Progress| {
+            if p.stage == stage && p.done >= done {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let error = build(&stop).err();
+        assert!(
+            matches!(error, Some(ElasticError::Cancelled(_))),
+            "{stage}: {error:?}"
+        );
+    }
 }

@@ -7,8 +7,8 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::TriMesh;
 use super::locate::SurfaceIndex;
+use super::{SurfacePoint, TriMesh};
 use crate::budget::{Cancelled, Watch, report};
 
 /// Which side of its wall a facet is on.
@@ -27,6 +27,8 @@ pub struct Walls {
     pub sides: Vec<Side>,
     /// Through the material to the facing surface (m); NaN where there is none.
     pub thickness: Vec<f64>,
+    /// Through the open to a facing surface (m); infinite where there is none.
+    pub gaps: Vec<f64>,
 }
 
 /// Directions that a facet looks in.
@@ -61,7 +63,12 @@ impl Walls {
             .zip(&facets)
             .map(|(t, facet)| facet.side(mesh, t, typical))
             .collect();
-        let mut walls = Self { sides, thickness };
+        let gaps = facets.iter().map(|f| f.gap).collect();
+        let mut walls = Self {
+            sides,
+            thickness,
+            gaps,
+        };
         for _ in 0..ROUNDS {
             walls.ask_neighbours(mesh);
         }
@@ -78,6 +85,13 @@ impl Walls {
     #[must_use]
     pub fn thinner_than(&self, mesh: &TriMesh, share: f64) -> f64 {
         share_of(&self.thickness, mesh, share)
+    }
+
+    /// Share of the surface that faces another across less than this (m).
+    #[must_use]
+    pub fn nearer_than(&self, mesh: &TriMesh, gap: f64) -> f64 {
+        let near = (0u32..).zip(&self.gaps).filter(|(_, g)| **g < gap);
+        near.map(|(t, _)| mesh.facet_area(t)).sum::<f64>() / mesh.area()
     }
 
     /// A facet whose neighbours all lie on one other side goes over to them.
@@ -110,6 +124,8 @@ struct Facet {
     thickness: f64,
     /// How far material reaches under 45° to all sides (m), the least.
     beside: f64,
+    /// m.
+    gap: f64,
 }
 
 impl Facet {
@@ -119,7 +135,10 @@ impl Facet {
         let normal = mesh.facet_normal(t);
         let at = mesh.corners(t).iter().sum::<DVec3>() / 3.0;
         let behind = index.ray(at - normal * off, -normal);
-        let facing = behind.filter(|(hit, _)| mesh.facet_normal(hit.triangle).dot(normal) < FACING);
+        let faces =
+            |(hit, _): &(SurfacePoint, f64)| mesh.facet_normal(hit.triangle).dot(normal) < FACING;
+        let facing = behind.filter(faces);
+        let ahead = index.ray(at + normal * off, normal).filter(faces);
         let frame = frame(normal);
         let beside = (0..8)
             .map(|k| {
@@ -142,6 +161,7 @@ impl Facet {
                 )
             }),
             thickness: facing.map_or(f64::NAN, |(_, distance)| distance + off),
+            gap: ahead.map_or(f64::INFINITY, |(_, distance)| distance + off),
             beside,
         }
     }

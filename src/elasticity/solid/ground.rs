@@ -302,6 +302,10 @@ impl SolidGround {
     pub fn cautions(&self, fineness: &Fineness) -> Vec<String> {
         /// Cells larger than this many walls do not bend as they should.
         const LARGE: f64 = 3.0;
+        /// Gaps narrower than this share of a cell join what they part, and the share of the surface at them
+        /// from which it is worth a word.
+        const NARROW: f64 = 0.5;
+        const WORTH: f64 = 0.01;
         if let Some(own) = self.immersed.own() {
             let what = if own.from_linear {
                 "The mesh's linear tetrahedra were given nodes at the middles of their edges: as they are they would be several times too stiff."
@@ -317,6 +321,15 @@ impl SolidGround {
                 "The cells ({:.2} mm) are {ratio:.1} times as large as thin walls are thick ({:.2} mm): choose a higher quality, or fewer touches.",
                 fineness.size * 1e3,
                 self.wall() * 1e3
+            ));
+        }
+        let narrow = NARROW * fineness.size;
+        let near = self.walls.nearer_than(&self.whole, narrow);
+        if near > WORTH {
+            notes.push(format!(
+                "On {:.0} % of the surface there is less than {:.2} mm to what faces it, half a cell: there, what a gap parts moves nearly as one. Choose a higher quality, or take the body that matters alone (part.body).",
+                100.0 * near,
+                narrow * 1e3
             ));
         }
         notes
