@@ -8,7 +8,6 @@ use std::process::Command;
 
 use egui::{Key, Modifiers};
 use glam::DVec3;
-use hapdef::document::Layer;
 use hapdef::project::PartModel;
 use hapdef::studio::{Field, Studio};
 use window::Window;
