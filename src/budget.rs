@@ -250,3 +250,64 @@ pub struct Budget {
     /// the target.
     pub svr_tolerance_mm: f64,
 }
+/// Limits in place of a quality's own, each where it is given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Limits {
+    /// Estimated error of the displacement (%) at which no elements are added; that of strains follows it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub elements_percent: Option<f64>,
+    /// Most vertices of the elastic model, whatever the number of touches; cells of a solid in proportion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vertices: Option<usize>,
+    /// Most touches and candidates that greedy SVR scores.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub selection_touches: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub selection_candidates: Option<usize>,
+    /// Folds of every cross-validation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub folds: Option<usize>,
+    /// Most touches that hyper-parameters are searched on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tuning_touches: Option<usize>,
+    /// Tolerance of regressions (mm).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub svr_tolerance_mm: Option<f64>,
+}
+
+impl Limits {
+    /// Whether none is given.
+    #[must_use]
+    pub fn are_none(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl Budget {
+    /// The same with limits in place of some of its own.
+    #[must_use]
+    pub fn within(mut self, limits: &Limits) -> Self {
+        if let Some(percent) = limits.elements_percent {
+            let elements = &mut self.elements;
+            elements.strain_percent *= percent / elements.displacement_percent;
+            elements.displacement_percent = percent;
+        }
+        if let Some(vertices) = limits.vertices {
+            self.elements.vertices = self.elements.vertices.min(vertices);
+            self.elements.most_vertices = vertices;
+            self.elements.effort = usize::MAX;
+        }
+        let counts = [
+            (&mut self.selection_touches, limits.selection_touches),
+            (&mut self.selection_candidates, limits.selection_candidates),
+            (&mut self.folds, limits.folds),
+            (&mut self.tuning_touches, limits.tuning_touches),
+        ];
+        for (own, limit) in counts {
+            *own = limit.unwrap_or(*own);
+        }
+        self.svr_tolerance_mm = limits.svr_tolerance_mm.unwrap_or(self.svr_tolerance_mm);
+        self
+    }
+}

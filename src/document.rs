@@ -223,7 +223,7 @@ impl Document {
             p.touch.region.as_ref().map(|name| self.mask_key(name)),
             p.sites,
             (p.gauge.signal, p.gauge.directions),
-            (quality, p.budget.seed),
+            (quality, p.budget.seed, p.budget.limits_at(quality)),
             // A region that is not there cannot be computed with.
             p.feasible
                 .keep_out
@@ -268,7 +268,7 @@ impl Document {
             Arc::as_ptr(&self.part),
             p.part.thickness_mm,
             p.touch.tip_radius_mm,
-            p.budget.quality,
+            (p.budget.quality, p.budget.limits),
             p.touch.count,
             mask(Layer::Inside),
             mask(Layer::Outside)

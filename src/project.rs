@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::budget::Quality;
+use crate::budget::{Budget, Limits, Quality};
 use crate::dataset::Signal;
 use crate::elasticity::support::{MOST, Region};
 use crate::elasticity::{Freedoms, Material, Section, Support};
@@ -423,11 +423,38 @@ impl CostKeys {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BudgetKeys {
     pub quality: Quality,
     pub seed: u64,
+    /// In place of some of the quality's own.
+    #[serde(skip_serializing_if = "Limits::are_none")]
+    pub limits: Limits,
+}
+
+impl BudgetKeys {
+    /// What may be spent.
+    #[must_use]
+    pub fn budget(&self) -> Budget {
+        self.budget_at(self.quality)
+    }
+
+    /// As [`Self::budget`] at a quality that need not be the project's: its limits are those of its own.
+    #[must_use]
+    pub fn budget_at(&self, quality: Quality) -> Budget {
+        quality.budget().within(&self.limits_at(quality))
+    }
+
+    /// The limits that hold at a quality.
+    #[must_use]
+    pub fn limits_at(&self, quality: Quality) -> Limits {
+        if quality == self.quality {
+            self.limits
+        } else {
+            Limits::default()
+        }
+    }
 }
 
 mod defaults {
@@ -517,15 +544,6 @@ impl Default for SelectionKeys {
         }
     }
 }
-impl Default for BudgetKeys {
-    fn default() -> Self {
-        Self {
-            quality: Quality::Standard,
-            seed: 0,
-        }
-    }
-}
-
 impl Project {
     /// A project around a mesh, everything else by default and nothing held yet.
     #[must_use]
@@ -754,6 +772,50 @@ impl Project {
         Ok(())
     }
 
+    fn check_limits(&self) -> Result<(), BadValue> {
+        let limits = &self.budget.limits;
+        let counts = [
+            (
+                "vertices",
+                limits.vertices,
+                "between 100 and 1000000",
+                100..=1_000_000,
+            ),
+            (
+                "selection_touches",
+                limits.selection_touches,
+                "between 10 and 1000000",
+                10..=1_000_000,
+            ),
+            (
+                "selection_candidates",
+                limits.selection_candidates,
+                "between 2 and 100000",
+                2..=100_000,
+            ),
+            ("folds", limits.folds, "between 2 and 20", 2..=20),
+            (
+                "tuning_touches",
+                limits.tuning_touches,
+                "between 10 and 1000000",
+                10..=1_000_000,
+            ),
+        ];
+        for (key, count, rule, range) in counts {
+            let count = count.unwrap_or(*range.start());
+            let key = format!("budget.limits.{key}");
+            check(&key, rule, count as f64, range.contains(&count))?;
+        }
+        for (key, value) in [
+            ("budget.limits.elements_percent", limits.elements_percent),
+            ("budget.limits.svr_tolerance_mm", limits.svr_tolerance_mm),
+        ] {
+            let value = value.unwrap_or(1.0);
+            check(key, "above 0", value, value > 0.0)?;
+        }
+        Ok(())
+    }
+
     /// Checks every number against its range.
     ///
     /// # Errors
@@ -762,6 +824,7 @@ impl Project {
         self.check_signs()?;
         self.check_selection()?;
         self.check_live()?;
+        self.check_limits()?;
         let nu = self.material.poissons_ratio;
         check(
             "material.poissons_ratio",

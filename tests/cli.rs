@@ -342,6 +342,36 @@ fn bad_projects_are_refused_with_the_remedy() {
         &|t| t.replace("count = 4000", "count = 1"),
         &["touch.count"],
     );
+    design(
+        &|t| t + "\n[budget.limits]\nfolds = 1\n",
+        &["budget.limits.folds", "between 2 and 20"],
+    );
+}
+
+/// What a project limits is spent no further, and only that.
+#[test]
+fn limits_of_a_project_hold() {
+    let vertices = |limits: &str| {
+        let (folder, path) = project(|t| t.replace("count = 4000", "count = 60") + limits);
+        let out = folder.path().join("x.npz");
+        let run = hapdef(&[
+            "simulate",
+            text(&path),
+            "--quality",
+            "draft",
+            "--json",
+            "--out",
+            text(&out),
+        ]);
+        assert!(run.status.success(), "{run:?}");
+        let said: Value = serde_json::from_slice(&run.stdout).unwrap();
+        said["vertices"].as_u64().unwrap()
+    };
+    let free = vertices("\n");
+    let few = vertices("\n[budget.limits]\nvertices = 900\n");
+    let fine = vertices("\n[budget.limits]\nelements_percent = 1.0\n");
+    assert!(few <= 1000, "{few}");
+    assert!(few < free && free < fine, "{few} {free} {fine}");
 }
 
 #[test]

@@ -177,7 +177,7 @@ fn record(w: &mut Window, path: &Path) -> BTreeMap<u64, Update> {
 /// The recording says the very same, in the window's own thread and in another.
 fn replay(w: &mut Window, path: &Path, seen: &BTreeMap<u64, Update>) {
     let inputs = w.harness.state().document.inputs();
-    let budget = inputs.project.budget.quality.budget();
+    let budget = inputs.project.budget.budget();
     let sensing = design::sense(&inputs, &budget, &unwatched).unwrap();
     let live = &inputs.project.live;
     let pipeline = Pipeline::new(sensing.map_for(live), live.settings(sensing.gauges.len()));

@@ -180,7 +180,7 @@ fn build(args: &BoardArgs, inputs: &Inputs, watch: Watch) -> anyhow::Result<Simu
         faults.add(text.parse::<Fault>().map_err(anyhow::Error::msg)?);
     }
     let seed = inputs.project.budget.seed;
-    let sensing = design::sense(inputs, &inputs.project.budget.quality.budget(), watch)?;
+    let sensing = design::sense(inputs, &inputs.project.budget.budget(), watch)?;
     let script = match &args.script {
         Some(path) => given(path, inputs, &sensing)?,
         None => Script::random(

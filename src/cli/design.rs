@@ -52,7 +52,7 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
     let kinds: Vec<SelectorKind> = std::iter::once(first)
         .chain(SelectorKind::ALL.into_iter().filter(|&k| k != first))
         .collect();
-    let budget = project.budget.quality.budget();
+    let budget = project.budget.budget();
     let bar = Bar::default();
     let start = Instant::now();
     let inputs = loaded.inputs.clone();

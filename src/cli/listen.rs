@@ -97,7 +97,7 @@ fn pipeline(args: &ListenArgs) -> anyhow::Result<Pipeline> {
         let watch = |p| bar.show(p);
         Ok(design::sense(
             &loaded.inputs,
-            &project.budget.quality.budget(),
+            &project.budget.budget(),
             &watch,
         )?)
     });

@@ -74,7 +74,7 @@ fn check_output(path: &Path, endings: &[&str]) -> anyhow::Result<()> {
 }
 
 fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()> {
-    let budget = loaded.inputs.project.budget.quality.budget();
+    let budget = loaded.inputs.project.budget.budget();
     let (sites, touches, gigabytes) = design::expected_size(&loaded.inputs, &budget);
     eprintln!("about {sites} sites × {touches} touches: {gigabytes:.2} GB while they are computed");
     let bar = Bar::default();
@@ -117,7 +117,7 @@ fn at_points(
 ) -> anyhow::Result<()> {
     let touches = points::read_touches(touches)?;
     let sites = points::read_sites(sites)?;
-    let budget = loaded.inputs.project.budget.quality.budget();
+    let budget = loaded.inputs.project.budget.budget();
     let bar = Bar::default();
     let result = args.common.in_pool(|| {
         let watch = |p| bar.show(p);

@@ -93,7 +93,7 @@ pub fn advise(inputs: &Inputs, watch: Watch) -> Result<Advice, DesignError> {
     match ground(&as_solid, watch) {
         Ok(Ground::Solid(solid)) => Ok(of_closed(inputs, &solid)),
         Ok(Ground::Shell(_)) => unreachable!("a solid was asked for"),
-        Err(DesignError::Elastic(ElasticError::Open { rims })) => of_open(inputs, rims, watch),
+        Err(DesignError::Elastic(ElasticError::Open { rims })) => Ok(of_open(inputs, rims, watch)),
         Err(error) => Err(error),
     }
 }
@@ -113,7 +113,7 @@ struct Asked {
 
 impl Asked {
     fn new(inputs: &Inputs, area: f64, wall: f64, radius: f64) -> Self {
-        let budget = inputs.project.budget.quality.budget();
+        let budget = inputs.project.budget.budget();
         Self {
             touches: inputs.project.touch.count.min(budget.touches),
             tip: inputs.project.tip().1,
@@ -201,10 +201,10 @@ const SHELL: Measured = Measured {
     entries: 8.0,
 };
 const SOLID: Measured = Measured {
-    once: 3.0,
-    build: 6e-5,
+    once: 5.0,
+    build: 1e-4,
     solve: 4e-8,
-    entries: 18.0,
+    entries: 9.0,
 };
 
 impl Measured {
@@ -271,7 +271,7 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround) -> Advice {
     }
 }
 
-fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Result<Advice, DesignError> {
+fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
     let project = &inputs.project;
     let part = &inputs.part;
     let facets: Vec<u32> = (0..part.triangles().len() as u32).collect();
@@ -305,10 +305,10 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Result<Advice, DesignE
     ];
     let mut as_shell = inputs.clone();
     as_shell.project.part.model = PartModel::Shell;
-    if let Ground::Shell(shell) = ground(&as_shell, watch)? {
+    if let Ok(Ground::Shell(shell)) = ground(&as_shell, watch) {
         words.extend(shell.cautions(project.tip().1));
     }
-    Ok(Advice {
+    Advice {
         closed: false,
         wall_mm: [wall; 3],
         radius_mm: radius.map(|r| r * 1e3),
@@ -318,7 +318,7 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Result<Advice, DesignE
         costs,
         words,
         faces: None,
-    })
+    }
 }
 
 fn bent(radius: [f64; 2]) -> String {

@@ -28,6 +28,7 @@ pub enum Ground {
 }
 
 /// The elements of a model.
+#[derive(Clone)]
 pub enum Laid {
     Shell(Remeshed),
     Solid(Fineness),
@@ -179,7 +180,7 @@ impl Ground {
     pub fn element_mm(laid: &Laid) -> f64 {
         match laid {
             Laid::Shell(laid) => laid.mesh.mean_edge() * 1e3,
-            Laid::Solid(fineness) => fineness.size * 1e3,
+            Laid::Solid(fineness) => fineness.size * 1e3 / f64::from(1 << fineness.halvings),
         }
     }
 
@@ -232,8 +233,7 @@ impl Ground {
     }
 
     /// Finer elements, for the truth: half as large for a shell, two thirds for a solid.
-    #[must_use]
-    pub fn finer(&self, laid: &Laid) -> Laid {
+    fn finer(&self, laid: &Laid) -> Laid {
         match (self, laid) {
             (Self::Shell(shell), Laid::Shell(laid)) => Laid::Shell(shell.halved(laid)),
             (Self::Solid(solid), Laid::Solid(fineness)) => Laid::Solid(solid.finer(fineness)),
@@ -253,13 +253,29 @@ impl Ground {
         })
     }
 
+    /// The model that others are judged by, with its elements: finer ones, or where those do not fit into memory
+    /// the same.
+    ///
+    /// # Errors
+    /// [`DesignError`] for what cannot be computed.
+    pub fn truth(&self, laid: &Laid, watch: Watch) -> Result<(Laid, Box<dyn Model>), DesignError> {
+        let finer = self.finer(laid);
+        match self.model(&finer, watch) {
+            Ok(model) => Ok((finer, model)),
+            Err(DesignError::Elastic(error)) if error.is_memory() => {
+                Ok((laid.clone(), self.model(laid, watch)?))
+            }
+            Err(error) => Err(error),
+        }
+    }
+
     /// A model that is quick to have.
     ///
     /// # Errors
     /// [`DesignError`] for what cannot be computed.
     pub fn quick(&self, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
         /// Unknowns of a solid.
-        const UNKNOWNS: f64 = 30_000.0;
+        const UNKNOWNS: f64 = 18_000.0;
         let laid = match self {
             Self::Shell(shell) => Laid::Shell(shell.even(LAYOUT)),
             Self::Solid(solid) => Laid::Solid(solid.fineness(solid.size_for(UNKNOWNS))),

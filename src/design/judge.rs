@@ -64,11 +64,10 @@ pub fn truth(
     watch: Watch,
 ) -> Result<Truth, DesignError> {
     let project = &inputs.project;
-    let laid = simulated.ground.finer(&simulated.laid);
+    let (laid, model) = simulated.ground.truth(&simulated.laid, watch)?;
     let mesh = simulated.ground.touched_surface(&laid);
     let seed = project.budget.seed.wrapping_add(TEST_SEED);
     let touches = touches_on(&mesh, inputs, budget.test_touches, seed, false)?;
-    let model = simulated.ground.model(&laid, watch)?;
     let mut rows = sites.to_vec();
     rows.sort_unstable();
     rows.dedup();

@@ -194,6 +194,11 @@ impl Design {
                     .map(|n| format!("{title}: {n}")),
             );
         }
+        if self.truth.element_mm >= self.simulated.element_mm {
+            notes.push(
+                "Judged on elements as large as the model's own: finer ones would not have fitted into memory, so the errors leave out what elements of this size cost.".into(),
+            );
+        }
         if self.evaluation.rows.iter().any(|r| !r.converged) {
             notes.push(
                 "Some regressions stopped at the effort allowed before they met their tolerance."

@@ -172,7 +172,7 @@ fn chosen_gauges(project: &Project, model: &dyn Model) -> Vec<Gauge> {
 }
 
 impl Sensing {
-    /// The truth of a simulated board: elements of half the size, and gauges as a workshop glues them, with
+    /// The truth of a simulated board: finer elements, and gauges as a workshop glues them, with
     /// the gains they ended up with.
     ///
     /// # Errors
@@ -183,8 +183,7 @@ impl Sensing {
         seed: u64,
         watch: Watch,
     ) -> Result<(Sensitivity, Vec<f64>), DesignError> {
-        let laid = self.ground.finer(&self.laid);
-        let model = self.ground.model(&laid, watch)?;
+        let (_, model) = self.ground.truth(&self.laid, watch)?;
         let gauges: Vec<Gauge> = (self.gauges.iter().enumerate())
             .map(|(k, gauge)| {
                 if workshop == Workshop::All {

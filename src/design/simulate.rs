@@ -203,12 +203,13 @@ pub fn cautions(
             aim.displacement_percent,
             discretization.strain_percent,
             aim.strain_percent,
-            if linearity.is_none() {
-                "choose a higher quality or fewer touches"
-            } else if *aim == Quality::Reference.budget().elements {
-                "more vertices than this quality allows for so many touches would be needed"
-            } else {
-                "choose a higher quality, fewer touches, or part.elements = \"graded\""
+            match (linearity, *aim == Quality::Reference.budget().elements) {
+                (None, true) => "more cells than are allowed for so many touches would be needed",
+                (None, false) => "choose a higher quality or fewer touches",
+                (Some(_), true) =>
+                    "more vertices than this quality allows for so many touches would be needed",
+                (Some(_), false) =>
+                    "choose a higher quality, fewer touches, or part.elements = \"graded\"",
             }
         ));
     }

@@ -63,6 +63,14 @@ pub enum ElasticError {
     Cancelled(#[from] Cancelled),
 }
 
+impl ElasticError {
+    /// Whether it is memory that was wanting.
+    #[must_use]
+    pub fn is_memory(&self) -> bool {
+        matches!(self, Self::TooLarge { .. } | Self::OutOfMemory)
+    }
+}
+
 /// Results of the checks that a solved load is put through.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct LoadCheck {

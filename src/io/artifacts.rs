@@ -58,6 +58,7 @@ pub fn write_all(
 pub fn with_result(project: &Project, design: &Design, at: &Path, mesh: &Path) -> Project {
     let mut project = project.clone();
     project.part.mesh = project_file::relative_to(at, mesh);
+    project.budget.limits = project.budget.limits_at(design.budget.quality);
     project.budget.quality = design.budget.quality;
     project.selection.sites = as_chosen(&design.simulated.dataset.sites, design.chosen());
     project

@@ -306,6 +306,15 @@ mod tests {
             normal: Axis::Z,
         });
         p.candidates.count = Some(407);
+        p.budget.limits = crate::budget::Limits {
+            elements_percent: Some(2.5),
+            vertices: Some(1500),
+            selection_touches: Some(300),
+            selection_candidates: Some(50),
+            folds: Some(4),
+            tuning_touches: Some(200),
+            svr_tolerance_mm: Some(0.05),
+        };
         p.feasible.painted = Some("painted".into());
         p.feasible.keep_out = Some("connector".into());
         p.touch.region = Some("grip".into());

@@ -9,7 +9,7 @@ use egui::Context;
 
 use super::jobs::{Shared, Task};
 use super::{DesignResult, SimulationResult, Studio, opening, saving};
-use crate::budget::{Progress, Quality};
+use crate::budget::{Budget, Progress, Quality};
 use crate::dataset::Site;
 use crate::design::{self, Design, DesignError, Hooks, Inputs, Known, Simulated, StageTime, Step};
 use crate::evaluation::Evaluation;
@@ -140,6 +140,11 @@ impl Studio {
         self.document.state.project.budget.quality
     }
 
+    /// What may be spent.
+    pub(super) fn budget(&self) -> Budget {
+        self.document.state.project.budget.budget()
+    }
+
     /// The simulation of a quality, where it holds for the project as it is.
     fn simulation_at(&self, quality: Quality) -> Option<Arc<Simulated>> {
         let last = self.last.get(&quality)?.simulation.as_ref()?;
@@ -247,7 +252,7 @@ impl Studio {
         self.jobs
             .start(ctx, Task::Simulate(quality), key, move |r| {
                 let start = Instant::now();
-                let budget = quality.budget();
+                let budget = inputs.project.budget.budget_at(quality);
                 let simulated =
                     design::simulate(&inputs, &budget, &|p| r.report(p)).map_err(|e| stop(&e))?;
                 let seconds = start.elapsed().as_secs_f64();
@@ -628,7 +633,7 @@ fn make(
             }
         },
     };
-    let budget = quality.budget();
+    let budget = inputs.project.budget.budget_at(quality);
     design::run_step_by_step(inputs, simulated, &kinds, &budget, known, &hooks)
         .map_err(|e| stop(&e))
 }

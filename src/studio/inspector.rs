@@ -4,7 +4,7 @@ use egui::{DragValue, Ui};
 
 use super::form::{choice, count, number, percentage, rows};
 use super::{Stage, Studio, quality_name};
-use crate::budget::Quality;
+use crate::budget::{Limits, Quality};
 use crate::dataset::Signal;
 use crate::document::Layer;
 use crate::limb::BoxMm;
@@ -173,6 +173,15 @@ fn quality(ui: &mut Ui, project: &mut Project) {
     })
     .response
     .on_hover_text("How much time may be spent for accuracy");
+    if !project.budget.limits.are_none() {
+        ui.horizontal(|ui| {
+            ui.label("Limits of its own hold")
+                .on_hover_text("budget.limits in the project's file");
+            if ui.button("Lift limits").clicked() {
+                project.budget.limits = Limits::default();
+            }
+        });
+    }
     ui.add_space(4.0);
 }
 

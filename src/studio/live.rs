@@ -211,7 +211,7 @@ impl Studio {
     }
 
     fn make_sensing(&mut self, ctx: &Context) {
-        let (inputs, budget) = (self.document.inputs(), self.quality().budget());
+        let (inputs, budget) = (self.document.inputs(), self.budget());
         self.jobs
             .start(ctx, Task::Sense, self.sensing_key(), move |r| {
                 let watch = |p| r.report(p);
@@ -224,7 +224,7 @@ impl Studio {
     }
 
     fn make_board(&mut self, ctx: &Context, known: Option<Arc<Sensing>>) {
-        let (inputs, budget) = (self.document.inputs(), self.quality().budget());
+        let (inputs, budget) = (self.document.inputs(), self.budget());
         let forces = self.live.forces;
         self.jobs
             .start(ctx, Task::Board, self.sensing_key(), move |r| {

@@ -303,7 +303,7 @@ impl Studio {
 
     fn simulation_lines(&self) -> Vec<String> {
         let Some(s) = &self.simulation else {
-            let budget = self.quality().budget();
+            let budget = self.budget();
             let (sites, touches, gigabytes) =
                 crate::design::expected_size(&self.document.inputs(), &budget);
             return vec![format!(

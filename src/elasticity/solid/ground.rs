@@ -55,9 +55,12 @@ const FINER: f64 = 1.0 / 1.5;
 const WORTH: f64 = 0.85;
 /// Unknowns of quadratic cells for a surface, times the squared size over its area (measured on tubes and
 /// shins, walls half as thick as the cells).
-const UNKNOWNS: f64 = 45.0;
+const UNKNOWNS: f64 = 24.0;
 /// Unknowns that are allowed for each vertex that a shell may have.
-const UNKNOWNS_A_VERTEX: f64 = 24.0;
+const UNKNOWNS_A_VERTEX: f64 = 16.0;
+/// Unknowns that are never asked for, whatever the quality: those of the truth, which are more than twice as many,
+/// still fit into memory.
+const MOST_UNKNOWNS: f64 = 300_000.0;
 /// Own tetrahedra of fewer unknowns are halved to judge them.
 const MOST_TO_HALVE: usize = 60_000;
 /// The error is an estimate: stop at this share of the tolerance.
@@ -156,7 +159,7 @@ impl SolidGround {
     /// Size of the smallest cells (m) that a budget allows for so many touches.
     #[must_use]
     pub fn size_allowed(&self, aim: &Elements, touches: usize) -> f64 {
-        self.size_for(UNKNOWNS_A_VERTEX * aim.most_for(touches) as f64)
+        self.size_for(unknowns_allowed(aim, touches))
     }
 
     /// Unknowns with cells of a size (m) for a surface of an area (m²), about.
@@ -177,7 +180,7 @@ impl SolidGround {
     /// surface of an area (m²), were the error as on other parts.
     #[must_use]
     pub fn foreseen(wall: f64, area: f64, aim: &Elements, touches: usize) -> Vec<f64> {
-        let least_size = size_for(area, UNKNOWNS_A_VERTEX * aim.most_for(touches) as f64);
+        let least_size = size_for(area, unknowns_allowed(aim, touches));
         let first = (FIRST * wall).max(least_size / FINER);
         let mut sizes = vec![first, first * FINER];
         while let Some(&size) = sizes.last()
@@ -217,6 +220,7 @@ impl SolidGround {
         let mut coarse = Solved::new(self, size, &touches, &places, watch)?;
         let (mut models, mut solves) = (1, touches.len() as u64);
         let mut next = size * FINER;
+        let mut estimate;
         loop {
             // Errors fall with the square of the size: what changed, over what is left.
             let change = (size / next).powi(2) - 1.0;
@@ -225,26 +229,25 @@ impl SolidGround {
             models += 1;
             solves += touches.len() as u64;
             let (before, after) = (&coarse.sample, &fine.sample);
-            let estimate = estimate::left(before, after, &touches, &places, change);
+            estimate = estimate::left(before, after, &touches, &places, change);
             let excess = (estimate.displacement_percent / aim.displacement_percent)
                 .max(estimate.strain_percent / aim.strain_percent)
                 / SAFETY;
-            let finer = next_size(size, least_size).filter(|_| excess > 1.0);
-            let Some(finer) = finer else {
-                return Ok(SolidGraded {
-                    balance: fine.model.check_all(
-                        &spread(&touches, CHECKED),
-                        &spread(&fine.solutions, CHECKED),
-                    ),
-                    fineness: fine.fineness,
-                    model: fine.model,
-                    estimate,
-                    models,
-                    solves,
-                });
-            };
-            (coarse, next) = (fine, finer);
+            coarse = fine;
+            match next_size(size, least_size) {
+                Some(finer) if excess > 1.0 => next = finer,
+                _ => break,
+            }
         }
+        let checked = spread(&coarse.solutions, CHECKED);
+        Ok(SolidGraded {
+            balance: coarse.model.check_all(&spread(&touches, CHECKED), &checked),
+            fineness: coarse.fineness,
+            model: coarse.model,
+            estimate,
+            models,
+            solves,
+        })
     }
 
     /// The part's own tetrahedra, judged by their halves where those fit into memory.
@@ -270,7 +273,7 @@ impl SolidGround {
             .then(|| Solved::with(self, fine, &touches, &places, watch))
             .transpose();
         let halved = match halved {
-            Err(ElasticError::TooLarge { .. } | ElasticError::OutOfMemory) => None,
+            Err(error) if error.is_memory() => None,
             other => other?,
         };
         let unknown = Discretization {
@@ -372,6 +375,10 @@ impl Solved {
             solutions,
         })
     }
+}
+
+fn unknowns_allowed(aim: &Elements, touches: usize) -> f64 {
+    (UNKNOWNS_A_VERTEX * aim.most_for(touches) as f64).min(MOST_UNKNOWNS)
 }
 
 /// The size (m) after one, if there is one to be had.

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use crate::budget::Limits;
 use crate::project::{Kept, Project};
 
 /// The commented text of a project.
@@ -214,6 +215,46 @@ fn evaluation(t: &mut Text, project: &Project) {
         "\"draft\", \"standard\" or \"reference\"",
     );
     t.key("seed", project.budget.seed, "of every random draw");
+    limits(t, &project.budget.limits);
+}
+
+/// Written where one is given: they are for those who measured what they buy.
+fn limits(t: &mut Text, limits: &Limits) {
+    if limits.are_none() {
+        return;
+    }
+    t.table("budget.limits");
+    t.maybe(
+        "elements_percent",
+        limits.elements_percent.map(float),
+        "estimated error of displacements at which no elements are added",
+    );
+    t.maybe(
+        "vertices",
+        limits.vertices,
+        "most vertices of the elastic model",
+    );
+    t.maybe(
+        "selection_touches",
+        limits.selection_touches,
+        "most touches that greedy SVR scores on",
+    );
+    t.maybe(
+        "selection_candidates",
+        limits.selection_candidates,
+        "most candidates that it scores",
+    );
+    t.maybe("folds", limits.folds, "of every cross-validation");
+    t.maybe(
+        "tuning_touches",
+        limits.tuning_touches,
+        "most touches that hyper-parameters are searched on",
+    );
+    t.maybe(
+        "svr_tolerance_mm",
+        limits.svr_tolerance_mm.map(float),
+        "tolerance of regressions",
+    );
 }
 
 fn gauge(t: &mut Text, project: &Project) {
