@@ -226,3 +226,27 @@ fn gauges_put_by_hand_are_what_the_report_shows() {
         assert!(report.contains("moved by hand"));
     }
 }
+
+/// Touches on a support tell nobody anything, and that is said.
+#[test]
+fn touches_on_a_wide_support_are_named() {
+    let mut inputs = limb();
+    let budget = Quality::Draft.budget();
+    let says = |inputs: &Inputs| {
+        let simulated = design::simulate(inputs, &budget, &unwatched).unwrap();
+        let notes = simulated.achieved.notes.join(" ");
+        notes.contains("press on what a support holds")
+    };
+    assert!(!says(&inputs), "its bosses are small");
+    let lower_third = mask(&inputs, |p| p.z < 0.04);
+    inputs.masks.insert("flange".into(), lower_third);
+    inputs.project.supports.truncate(1);
+    inputs.project.supports[0].box_mm = None;
+    inputs.project.supports[0].vertices = Some("flange".into());
+    assert!(says(&inputs));
+    // Pressed elsewhere only, there is nothing to say.
+    let upper = mask(&inputs, |p| p.z > 0.06);
+    inputs.masks.insert("grip".into(), upper);
+    inputs.project.touch.region = Some("grip".into());
+    assert!(!says(&inputs));
+}

@@ -12,7 +12,8 @@ use crate::budget::{Achieved, Budget, Quality, StopReason, Watch};
 use crate::dataset::{self, Dataset};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
-use crate::elasticity::{Freedoms, Model};
+use crate::elasticity::support::Region;
+use crate::elasticity::{Freedoms, Model, Support, Touch};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::Project;
@@ -94,6 +95,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     } else {
         Vec::new()
     };
+    notes.extend(on_supports(inputs, &dataset.touches)?);
     notes.extend(checks.distrust());
     notes.extend(cautions(&estimate, linearity.as_ref(), &budget.elements));
     notes.extend(ground.cautions(&laid, project.tip().1));
@@ -127,6 +129,35 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         linearity,
         checks,
     })
+}
+
+/// A word where many touches press on what is held: they move next to nothing, so that no gauge can tell them
+/// apart, and rule every mean.
+fn on_supports(inputs: &Inputs, touches: &[Touch]) -> Result<Option<String>, DesignError> {
+    /// Share of the touches from which it is worth a word.
+    const WORTH: f64 = 0.05;
+    let supports = inputs.project.supports(&inputs.masks)?;
+    let holds = |s: &&Support| (0..3).all(|i| s.held.holds(i));
+    let held: Vec<&Support> = supports.iter().filter(holds).collect();
+    let index = SurfaceIndex::new(&inputs.part);
+    let is_held = |touch: &&Touch| {
+        held.iter().any(|support| match &support.region {
+            Region::Box { lower, upper } => {
+                touch.position.cmpge(*lower).all() && touch.position.cmple(*upper).all()
+            }
+            Region::Vertices(mask) => {
+                let at = index.nearest(touch.position).0;
+                inputs.part.mostly_in(mask, at)
+            }
+        })
+    };
+    let count = touches.iter().filter(is_held).count();
+    Ok((count as f64 > WORTH * touches.len() as f64).then(|| {
+        format!(
+            "{count} of {} touches press on what a support holds: next to nothing moves there, and no gauge can tell where they are. Paint where touches come (touch.region), or go by the errors of a region ([[evaluation.region]]).",
+            touches.len()
+        )
+    }))
 }
 
 /// What the solution was checked for.
