@@ -231,7 +231,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         "model": {
             "vertices": design.simulated.mesh.positions().len(),
             "unknowns": design.simulated.unknowns,
-            "element_mm": design.simulated.mesh.mean_edge() * 1000.0,
+            "element_mm": design.simulated.element_mm,
             "truth_element_mm": design.truth.element_mm,
             "checks": design.simulated.checks,
             "discretization": design.simulated.discretization,

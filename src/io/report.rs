@@ -15,7 +15,7 @@ const STYLE: &str = "
 :root{color-scheme:light}body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1080px;margin:32px auto;padding:0 20px}
 h1{font-size:26px;margin:0 0 4px}h2{font-size:19px;margin:36px 0 10px;border-bottom:1px solid #d8dce3;padding-bottom:4px}
 p.lead{color:#4a5568;margin-top:0}table{border-collapse:collapse;font-variant-numeric:tabular-nums;width:100%}
-th,td{padding:5px 10px;text-align:right;white-space:nowrap;border-bottom:1px solid #e7eaef}th{font-weight:600;color:#4a5568}th:first-child,td:first-child{text-align:left}
+th,td{padding:5px 10px;text-align:right;white-space:nowrap;border-bottom:1px solid #e7eaef}th{font-weight:600;color:#4a5568;white-space:normal;vertical-align:bottom}th:first-child,td:first-child{text-align:left}
 .views{display:grid;grid-template-columns:repeat(auto-fit,minmax(220px,1fr));gap:14px}figure{margin:0}figcaption{text-align:center;color:#4a5568;font-size:13px}
 svg{width:100%;height:auto;display:block}svg text{font:12px system-ui,sans-serif;fill:#1d2430}svg text.n{font:bold 10px system-ui,sans-serif}svg text.t{font-weight:600}svg .grid{stroke:#e1e5ea;fill:none}
 svg.limb path{stroke-width:.4}.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:18px}
@@ -453,7 +453,7 @@ fn errors(page: &mut String, design: &Design) {
         page,
         "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, drawn off the nodes of a finer model ({:.2} mm). “As built”: every gauge 1 mm and 3° off and its gain off by 3 %, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
         design.simulated.dataset.touches.len(),
-        design.simulated.mesh.mean_edge() * 1000.0,
+        design.simulated.element_mm,
         design.truth.touches.len(),
         design.truth.element_mm
     );
