@@ -230,7 +230,7 @@ fn touches_are_found_where_they_are() {
 
 #[test]
 fn an_unplugged_board_is_found_again() {
-    let (_board, port) = board(&["--fault", "unplug@4+1", "--flip", "1e-4", "--drop", "1e-4"]);
+    let (_board, port) = board(&["--fault", "unplug@10+1", "--flip", "1e-4", "--drop", "1e-4"]);
     let listening = listen(&port, &["--every", "100"]);
     listening.says("live");
     listening.says("unplugged");
@@ -255,8 +255,9 @@ fn a_recording_survives_a_kill() {
         &port,
         &["--every", "50", "--record", file.to_str().unwrap()],
     );
-    let end = Instant::now() + Duration::from_secs(6);
+    // A busy machine takes its time to be live; counted is what comes after.
     listening.says("live");
+    let end = Instant::now() + Duration::from_secs(5);
     while Instant::now() < end {
         listening.line();
     }
