@@ -132,6 +132,7 @@ impl Quality {
                     passes: 1,
                 },
                 touches: 800,
+                point_tip: false,
                 test_touches: 300,
                 candidates: 60,
                 locations: 600,
@@ -155,6 +156,7 @@ impl Quality {
                     passes: 2,
                 },
                 touches: usize::MAX,
+                point_tip: false,
                 test_touches: 800,
                 candidates: usize::MAX,
                 locations: 4000,
@@ -178,6 +180,7 @@ impl Quality {
                     passes: 3,
                 },
                 touches: usize::MAX,
+                point_tip: false,
                 test_touches: 2000,
                 candidates: usize::MAX,
                 locations: 6000,
@@ -227,6 +230,8 @@ pub struct Budget {
     pub elements: Elements,
     /// Most touches the model is asked for.
     pub touches: usize,
+    /// Whether the tip is taken as a point where the model learns; what judges it has the tip as it is.
+    pub point_tip: bool,
     /// Unseen touches that evaluation uses.
     pub test_touches: usize,
     /// Most candidates kept by the reduction.
@@ -250,7 +255,8 @@ pub struct Budget {
     /// the target.
     pub svr_tolerance_mm: f64,
 }
-/// Limits in place of a quality's own, each where it is given.
+/// Limits in place of a quality's own, each where it is given: the knobs of speed against accuracy that were
+/// measured to buy something (`hapdef trade`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
@@ -260,20 +266,19 @@ pub struct Limits {
     /// Most vertices of the elastic model, whatever the number of touches; cells of a solid in proportion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vertices: Option<usize>,
+    /// Most touches the model is asked for, and most candidates that the reduction keeps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub touches: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub candidates: Option<usize>,
     /// Most touches and candidates that greedy SVR scores.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub selection_touches: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub selection_candidates: Option<usize>,
-    /// Folds of every cross-validation.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub folds: Option<usize>,
     /// Most touches that hyper-parameters are searched on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tuning_touches: Option<usize>,
-    /// Tolerance of regressions (mm).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub svr_tolerance_mm: Option<f64>,
 }
 
 impl Limits {
@@ -299,15 +304,15 @@ impl Budget {
             self.elements.effort = usize::MAX;
         }
         let counts = [
+            (&mut self.touches, limits.touches),
+            (&mut self.candidates, limits.candidates),
             (&mut self.selection_touches, limits.selection_touches),
             (&mut self.selection_candidates, limits.selection_candidates),
-            (&mut self.folds, limits.folds),
             (&mut self.tuning_touches, limits.tuning_touches),
         ];
         for (own, limit) in counts {
             *own = limit.unwrap_or(*own);
         }
-        self.svr_tolerance_mm = limits.svr_tolerance_mm.unwrap_or(self.svr_tolerance_mm);
         self
     }
 }

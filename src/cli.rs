@@ -11,6 +11,7 @@ pub mod progress;
 pub mod render;
 pub mod select;
 pub mod simulate;
+pub mod trade;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -50,6 +51,8 @@ pub enum Command {
     Simulate(simulate::SimulateArgs),
     /// Shell or solid: what the walls of a part say, and what each model would cost.
     Advise(advise::AdviseArgs),
+    /// Speed against accuracy, measured on the part: what each setting costs and how well it does.
+    Trade(trade::TradeArgs),
     /// Sites for gauges from a dataset alone.
     Select(select::SelectArgs),
     /// How well given sites find touches, from a dataset alone.

@@ -4,12 +4,14 @@
 
 mod advise;
 mod choose;
+mod finest;
 mod ground;
 mod judge;
 mod layout;
 mod road;
 mod sense;
 mod simulate;
+mod walled;
 
 use std::sync::Arc;
 
@@ -21,12 +23,14 @@ use crate::project::{BadValue, Masks, Project};
 
 pub use self::advise::*;
 pub use self::choose::*;
+pub use self::finest::*;
 pub use self::ground::*;
 pub use self::judge::*;
 pub use self::layout::*;
 pub use self::road::*;
 pub use self::sense::*;
 pub use self::simulate::*;
+pub use self::walled::*;
 
 /// Why a stage ended without a result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

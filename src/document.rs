@@ -215,14 +215,21 @@ impl Document {
     /// As [`Self::simulation_key`], of a quality that need not be the project's.
     #[must_use]
     pub fn simulation_key_at(&self, quality: Quality) -> String {
+        let gauge = &self.state.project.gauge;
+        let report = (gauge.signal, gauge.directions);
+        format!("{} {report:?}", self.elements_key_at(quality))
+    }
+
+    /// What the simulation depends on beside what gauges report: its elements, sites and touches.
+    #[must_use]
+    pub fn elements_key_at(&self, quality: Quality) -> String {
         let p = &self.state.project;
         format!(
-            "{} {:?} {:?} {:?} {:?} {:?} {:?}",
+            "{} {:?} {:?} {:?} {:?} {:?}",
             self.model_key(),
             p.touch,
             p.touch.region.as_ref().map(|name| self.mask_key(name)),
             p.sites,
-            (p.gauge.signal, p.gauge.directions),
             (quality, p.budget.seed, p.budget.limits_at(quality)),
             // A region that is not there cannot be computed with.
             p.feasible
@@ -230,6 +237,14 @@ impl Document {
                 .as_ref()
                 .is_some_and(|name| !self.state.masks.contains_key(name))
         )
+    }
+
+    /// What a measured trade of speed against accuracy holds for: everything but its knobs.
+    #[must_use]
+    pub fn trade_key(&self) -> String {
+        let project = crate::io::trade_file::without_knobs(&self.state.project);
+        let (part, paint) = (Arc::as_ptr(&self.part), self.paint_key());
+        format!("{part:p} {project:?} {paint:?}")
     }
 
     /// What is painted on all layers, and what is held.
@@ -316,10 +331,16 @@ impl Document {
     /// selector's answer is shown.
     #[must_use]
     pub fn selection_key_at(&self, quality: Quality) -> String {
+        let keys = &self.state.project.selection;
         let asked = SelectionKeys {
             sites: Vec::new(),
-            selector: SelectorKind::default(),
-            ..self.state.project.selection.clone()
+            // Where all of them choose, another in the lead changes nothing.
+            selector: if keys.compare {
+                SelectorKind::default()
+            } else {
+                keys.selector
+            },
+            ..keys.clone()
         };
         format!("{} {asked:?}", self.candidates_key_at(quality))
     }

@@ -150,6 +150,9 @@ fn fail(
     watch: Watch,
 ) -> Result<Vec<Failures>, Cancelled> {
     const MOST_FAILED: usize = 5;
+    if budget.failure_subsets == 0 {
+        return Ok(Vec::new());
+    }
     let touches = evenly(trial.train_targets.len(), budget.failure_touches);
     let targets: Vec<[f64; 3]> = touches.iter().map(|&t| trial.train_targets[t]).collect();
     let train = noisy.train.select_columns(&touches);
@@ -217,7 +220,8 @@ pub fn add_noise(x: &SignalMatrix, deviation: f64, seed: u64) -> Cow<'_, SignalM
     add_noise_by(x, deviation, seed, &|row| row as u64)
 }
 
-fn add_noise_by<'a>(
+/// As [`add_noise`], with the number of each row's stream.
+pub(crate) fn add_noise_by<'a>(
     x: &'a SignalMatrix,
     deviation: f64,
     seed: u64,

@@ -32,4 +32,6 @@ pub mod render;
 #[cfg(feature = "studio")]
 pub mod studio;
 pub mod study;
+pub mod tally;
+pub mod trade;
 pub mod wire;

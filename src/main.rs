@@ -11,6 +11,7 @@ fn main() -> ExitCode {
         Some(Command::Design(args)) => cli::design::run(args),
         Some(Command::Simulate(args)) => cli::simulate::run(args),
         Some(Command::Advise(args)) => cli::advise::run(args),
+        Some(Command::Trade(args)) => cli::trade::run(args),
         Some(Command::Select(args)) => cli::select::run(args),
         Some(Command::Evaluate(args)) => cli::evaluate::run(args),
         Some(Command::Render(args)) => render(args),

@@ -120,7 +120,7 @@ impl Pca {
     pub fn pivots(&self, count: usize) -> Vec<usize> {
         let mut pivoting = self.pivoting(count);
         let mut chosen = Vec::new();
-        while let Some(best) = pivoting.largest(0..self.sites, |_, norm| norm) {
+        while let Some((best, _)) = pivoting.largest(0..self.sites, |_, norm| norm) {
             pivoting.take(best);
             chosen.push(best);
             if chosen.len() == count {
@@ -172,14 +172,14 @@ impl Pivoting {
     const FELL: f64 = 1e-3;
 
     /// Of some sites the one with the largest worth of its squared norm, if any is left that is not
-    /// rounding; of those equal to rounding the first.
+    /// rounding; of those equal to rounding the first. With how far it is ahead of the next, as a share.
     pub fn largest(
         &mut self,
         sites: impl IntoIterator<Item = usize> + Clone,
         worth: impl Fn(usize, f64) -> f64,
-    ) -> Option<usize> {
+    ) -> Option<(usize, f64)> {
         let best = self.best(sites.clone(), &worth);
-        let fell = |site: usize| self.norms[site] < Self::FELL * self.began[site];
+        let fell = |(site, _): (usize, f64)| self.norms[site] < Self::FELL * self.began[site];
         if self.panel.is_empty() || !best.is_none_or(fell) {
             return best;
         }
@@ -191,21 +191,28 @@ impl Pivoting {
         &self,
         sites: impl IntoIterator<Item = usize>,
         worth: impl Fn(usize, f64) -> f64,
-    ) -> Option<usize> {
+    ) -> Option<(usize, f64)> {
         /// Squared norms start at most at one.
         const ROUNDING: f64 = 1e-24;
         const TIE: f64 = 1e-10;
         if self.taken == self.components {
             return None;
         }
-        let mut best: Option<(usize, f64)> = None;
+        let (mut best, mut second): (Option<(usize, f64)>, f64) = (None, 0.0);
         for site in sites {
+            if self.norms[site] <= ROUNDING {
+                continue;
+            }
             let value = worth(site, self.norms[site]);
-            if self.norms[site] > ROUNDING && best.is_none_or(|(_, b)| value > b * (1.0 + TIE)) {
-                best = Some((site, value));
+            match best {
+                Some((_, b)) if value <= b * (1.0 + TIE) => second = second.max(value),
+                _ => {
+                    second = best.map_or(second, |(_, b)| second.max(b));
+                    best = Some((site, value));
+                }
             }
         }
-        best.map(|b| b.0)
+        best.map(|(site, value)| (site, (1.0 - second / value).max(0.0)))
     }
 
     /// Projects a site's column out of all others.

@@ -4,6 +4,7 @@ pub mod candidates;
 pub mod entropy;
 pub mod greedy_svr;
 pub mod information;
+pub mod lead;
 pub mod mutual_information;
 pub mod pca_qr;
 pub mod wishes;
@@ -94,6 +95,11 @@ pub struct SensorSet {
     /// choice is exact by its nature.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<f64>,
+    /// How far the last pick was ahead of the next best site, as a share of the criterion (greedy SVR) or of what
+    /// the pick adds to it; where each set is chosen for itself, of the least certain of its picks. Absent where
+    /// there was no choice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lead: Option<f64>,
 }
 
 /// What a selector chose: one set for each number of gauges from one up.

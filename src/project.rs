@@ -301,6 +301,8 @@ pub struct SelectionKeys {
     pub with_noise: bool,
     /// Probability that one gauge has failed.
     pub failure: f64,
+    /// Whether the other selectors choose too, to be compared.
+    pub compare: bool,
     pub gaussian_process: GaussianProcessKeys,
     /// What a gauge costs inside a box, the last box counting; 1 elsewhere.
     #[serde(rename = "cost", skip_serializing_if = "Vec::is_empty")]
@@ -538,6 +540,7 @@ impl Default for SelectionKeys {
             cost_budget: None,
             with_noise: false,
             failure: 0.0,
+            compare: true,
             gaussian_process: GaussianProcessKeys::default(),
             costs: Vec::new(),
             sites: Vec::new(),
@@ -665,6 +668,16 @@ impl Project {
         )
     }
 
+    /// The selectors that choose, the one whose sites are shown first.
+    #[must_use]
+    pub fn selectors(&self) -> Vec<SelectorKind> {
+        let first = self.selection.selector;
+        let others = SelectorKind::ALL
+            .into_iter()
+            .filter(|&k| self.selection.compare && k != first);
+        std::iter::once(first).chain(others).collect()
+    }
+
     #[must_use]
     pub fn hyper(&self) -> Hyper {
         Hyper {
@@ -782,6 +795,18 @@ impl Project {
                 100..=1_000_000,
             ),
             (
+                "touches",
+                limits.touches,
+                "between 3 and 1000000",
+                3..=1_000_000,
+            ),
+            (
+                "candidates",
+                limits.candidates,
+                "between 2 and 100000",
+                2..=100_000,
+            ),
+            (
                 "selection_touches",
                 limits.selection_touches,
                 "between 10 and 1000000",
@@ -793,7 +818,6 @@ impl Project {
                 "between 2 and 100000",
                 2..=100_000,
             ),
-            ("folds", limits.folds, "between 2 and 20", 2..=20),
             (
                 "tuning_touches",
                 limits.tuning_touches,
@@ -806,13 +830,13 @@ impl Project {
             let key = format!("budget.limits.{key}");
             check(&key, rule, count as f64, range.contains(&count))?;
         }
-        for (key, value) in [
-            ("budget.limits.elements_percent", limits.elements_percent),
-            ("budget.limits.svr_tolerance_mm", limits.svr_tolerance_mm),
-        ] {
-            let value = value.unwrap_or(1.0);
-            check(key, "above 0", value, value > 0.0)?;
-        }
+        let percent = limits.elements_percent.unwrap_or(1.0);
+        check(
+            "budget.limits.elements_percent",
+            "above 0",
+            percent,
+            percent > 0.0,
+        )?;
         Ok(())
     }
 

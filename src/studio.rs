@@ -28,6 +28,7 @@ mod theme;
 mod toolbar;
 mod tools;
 mod touching;
+mod trade;
 mod viewport;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -49,6 +50,7 @@ pub use fields::Field;
 pub use gauges::Way;
 pub use stages::{Stage, Standing};
 pub use tools::Tool;
+pub use trade::Promise;
 pub use viewport::{Pane, Section};
 
 /// Something to tell the user that stays until it is read.
@@ -63,6 +65,8 @@ pub struct Message {
 pub struct SimulationResult {
     pub simulated: Arc<Simulated>,
     pub key: String,
+    /// What its elements, sites and touches hold for.
+    elements: String,
     pub quality: Quality,
     pub seconds: f64,
 }
@@ -107,6 +111,8 @@ pub struct Studio {
     slow: fields::Slow,
     /// What was measured of the walls, and what for.
     advice: Option<(String, std::sync::Arc<crate::design::Advice>)>,
+    /// Speed against accuracy, as measured.
+    trade: trade::Trade,
     /// The stage whose settings are shown.
     pub stage: Stage,
     results: results::Tab,
@@ -168,6 +174,7 @@ impl Studio {
             focused: None,
             slow: None,
             advice: None,
+            trade: trade::Trade::default(),
             stage: Stage::default(),
             results: results::Tab::default(),
             save_next: None,
@@ -213,6 +220,7 @@ impl Studio {
         self.refresh_feasibility(ctx);
         self.refresh_by_hand(ctx);
         self.refresh_live(ctx);
+        self.refresh_trade(ctx);
     }
 
     fn update_title(&mut self, ctx: &egui::Context) {
@@ -324,6 +332,7 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
         if let Some(home) = eframe::storage_dir("hapdef-studio") {
             studio.keep_unsaved_in(&home.join("unsaved"));
             studio.keep_recent_in(&home);
+            studio.keep_trades_in(&home.join("trades"));
             if let Some(path) = file {
                 studio.recent.push(path);
             }

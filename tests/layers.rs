@@ -4,7 +4,7 @@ use std::path::Path;
 
 /// From the bottom up; a module may use those above it in this list, itself included.
 const ORDER: [&[&str]; 14] = [
-    &["budget", "colormap", "eigen", "lanes", "wire"],
+    &["budget", "colormap", "eigen", "lanes", "tally", "wire"],
     &["mesh"],
     &["limb", "elasticity"],
     &["dataset"],
@@ -16,7 +16,7 @@ const ORDER: [&[&str]; 14] = [
     &["live", "board"],
     &["project"],
     &["design", "study"],
-    &["given"],
+    &["given", "trade"],
     &["io", "job", "link", "document", "render", "cli", "studio"],
 ];
 

@@ -8,7 +8,6 @@ use clap::Args;
 use super::{Common, SelectorArg, prepare_folder, progress::Bar};
 use crate::design;
 use crate::io::artifacts::{self, Provenance};
-use crate::placement::SelectorKind;
 
 #[derive(Args, Debug, Clone)]
 pub struct DesignArgs {
@@ -48,10 +47,7 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
     let existed = args.out.exists();
     prepare_folder(&mut loaded, &args.out)?;
     let project = &loaded.inputs.project;
-    let first = project.selection.selector;
-    let kinds: Vec<SelectorKind> = std::iter::once(first)
-        .chain(SelectorKind::ALL.into_iter().filter(|&k| k != first))
-        .collect();
+    let kinds = project.selectors();
     let budget = project.budget.budget();
     let bar = Bar::default();
     let start = Instant::now();

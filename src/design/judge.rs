@@ -10,6 +10,7 @@ use super::{
 };
 use crate::budget::{Budget, Cancelled, Watch, Work};
 use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
+use crate::elasticity::Model;
 use crate::elasticity::load::Touch;
 use crate::evaluation::{self, Candidate, Evaluation, Region, Trial};
 use crate::placement::Selection;
@@ -63,11 +64,27 @@ pub fn truth(
     budget: &Budget,
     watch: Watch,
 ) -> Result<Truth, DesignError> {
-    let project = &inputs.project;
     let (laid, model) = simulated.ground.truth(&simulated.laid, watch)?;
     let mesh = simulated.ground.touched_surface(&laid);
-    let seed = project.budget.seed.wrapping_add(TEST_SEED);
+    let seed = inputs.project.budget.seed.wrapping_add(TEST_SEED);
     let touches = touches_on(&mesh, inputs, budget.test_touches, seed, false)?;
+    let mut truth = measured_by(&*model, inputs, simulated, sites, touches, watch)?;
+    let work = model.system().work();
+    truth.work += work;
+    truth.element_mm = Ground::element_mm(&laid);
+    Ok(truth)
+}
+
+/// Sites as a model reads them under touches. The size of its elements is for the caller to say.
+pub(super) fn measured_by(
+    model: &dyn Model,
+    inputs: &Inputs,
+    simulated: &Simulated,
+    sites: &[usize],
+    touches: Vec<Touch>,
+    watch: Watch,
+) -> Result<Truth, DesignError> {
+    let project = &inputs.project;
     let mut rows = sites.to_vec();
     rows.sort_unstable();
     rows.dedup();
@@ -77,19 +94,20 @@ pub fn truth(
         (rows.iter().zip(drawn.clone())).map(|(&s, site)| as_built(&site, project.budget.seed, s));
     let gauges: Vec<Site> = drawn.clone().chain(built).collect();
     let (signals, solves) =
-        dataset::measure(&*model, &touches, &gauges, project.gauge.signal, watch)?;
+        dataset::measure(model, &touches, &gauges, project.gauge.signal, watch)?;
     let half =
         |k: usize| signals.select_rows(&(k * rows.len()..(k + 1) * rows.len()).collect::<Vec<_>>());
     let (x, workshop) = (half(0), half(1));
     let gains = (rows.iter()).map(|&s| workshop_draw(project.budget.seed, s).gain);
     let workshop = workshop.scaled_rows(gains);
-    let mut work = model.system().work();
-    work.solves += solves as u64;
     Ok(Truth {
         regions: regions(project, &touches),
-        element_mm: Ground::element_mm(&laid),
+        element_mm: f64::NAN,
         touches,
-        work,
+        work: Work {
+            solves: solves as u64,
+            ..Work::default()
+        },
         sites: rows,
         x,
         workshop,
@@ -228,7 +246,7 @@ pub fn judge_set(
     )?)
 }
 
-fn judge(
+pub(super) fn judge(
     inputs: &Inputs,
     simulated: &Simulated,
     truth: &Truth,
@@ -260,6 +278,18 @@ fn judge(
         budget,
         watch,
     )
+}
+
+/// Signals with the noise that the evaluation draws: `draw` tells training (1), test (2) and workshop (3) apart.
+pub(super) fn noisy<'a>(
+    inputs: &Inputs,
+    x: &'a SignalMatrix,
+    draw: u64,
+    streams: &[u64],
+) -> std::borrow::Cow<'a, SignalMatrix> {
+    let noise = inputs.project.gauge.noise_microstrain * 1e-6;
+    let seed = inputs.project.budget.seed.wrapping_add(NOISE_SEED);
+    evaluation::add_noise_by(x, noise, seed.wrapping_add(draw), &|row| streams[row])
 }
 
 /// An estimate of the mean error (mm) of a set of sites, from the training touches alone: quick, and good

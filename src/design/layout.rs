@@ -57,8 +57,16 @@ pub(super) fn lay_out_touches(
     inputs: &Inputs,
     budget: &Budget,
 ) -> Result<Vec<Touch>, DesignError> {
+    /// Radius (m) of a tip that is a point: no element is as small.
+    const POINT: f64 = 1e-6;
     let count = inputs.project.touch.count.min(budget.touches);
-    touches_on(mesh, inputs, count, inputs.project.budget.seed, true)
+    let mut touches = touches_on(mesh, inputs, count, inputs.project.budget.seed, true)?;
+    if budget.point_tip {
+        for touch in &mut touches {
+            touch.tip_radius = touch.tip_radius.min(POINT);
+        }
+    }
+    Ok(touches)
 }
 
 pub(super) fn touches_on(

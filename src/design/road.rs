@@ -10,7 +10,7 @@ use super::{
     select_step_by_step, simulate, sites_to_judge, truth,
 };
 use crate::budget::{Budget, Watch, Work};
-use crate::evaluation::Evaluation;
+use crate::evaluation::{Evaluation, EvaluationRow};
 use crate::feasible::Feasibility;
 use crate::mesh::{TriMesh, scatter};
 use crate::placement::{Selection, SelectorKind};
@@ -94,14 +94,11 @@ impl Design {
         evaluation
             .rows
             .retain(|r| !(r.selector == name && r.sensors == old));
-        let rows = judged
-            .rows
-            .iter()
-            .map(|r| crate::evaluation::EvaluationRow {
-                selector: name.to_owned(),
-                sensors: count,
-                ..r.clone()
-            });
+        let rows = judged.rows.iter().map(|r| EvaluationRow {
+            selector: name.to_owned(),
+            sensors: count,
+            ..r.clone()
+        });
         evaluation.rows.splice(at..at, rows);
         if let (Some(k), Some(errors), Some(built)) =
             (set, judged.errors.first(), judged.built.first())
@@ -134,6 +131,14 @@ impl Design {
         self.led()
             .and_then(|s| s.sets.last())
             .map_or(&[], |set| &set.sites)
+    }
+
+    /// What the chosen set was found to do, over all touches.
+    #[must_use]
+    pub fn chosen_row(&self) -> Option<&EvaluationRow> {
+        let (name, count) = (self.lead.name(), self.chosen().len());
+        let mut rows = self.evaluation.rows.iter();
+        rows.find(|r| r.selector == name && r.sensors == count)
     }
 
     /// Errors touch by touch (mm) of a selector's set of so many gauges, beside the truth's touches.

@@ -142,7 +142,7 @@ fn as_drawn(all: &ResponseMap, gauges: usize) -> AsDrawn {
 
 /// Edge length (m) of the mesh that readings are known on: fine enough for the tip, which smooths them, and
 /// no more than so many triangles.
-fn map_size(ground: &Ground, tip_radius: f64) -> f64 {
+pub(super) fn map_size(ground: &Ground, tip_radius: f64) -> f64 {
     const OF_THE_TIP: f64 = 0.32;
     const TRIANGLES: f64 = 30_000.0;
     let coarsest = (ground.area() / TRIANGLES / 0.433).sqrt();

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::ground::{Built, Ground, Laid, ground};
 use super::layout::{check_memory, lay_out_sites, lay_out_touches};
 use super::{DesignError, Inputs};
-use crate::budget::{Achieved, Budget, Quality, StopReason, Watch};
+use crate::budget::{Achieved, Budget, Quality, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
@@ -25,7 +25,7 @@ pub struct Simulated {
     /// Size of the elements (mm).
     pub element_mm: f64,
     /// What they were laid on, and where.
-    pub(super) ground: Ground,
+    pub(super) ground: Arc<Ground>,
     pub(super) laid: Laid,
     /// What is held at its vertices.
     pub held: Vec<Freedoms>,
@@ -78,14 +78,95 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         solves,
         ..
     } = built;
+    let known = Elements {
+        ground: Arc::new(ground),
+        laid,
+        estimate,
+        linearity,
+        checks,
+    };
+    // The last model is counted with the dataset.
+    let before = Work {
+        assemblies: models - 1,
+        factorizations: models - 1,
+        solves,
+        ..Work::default()
+    };
+    read(
+        inputs, budget, known, &*model, touches, &places, before, watch,
+    )
+}
+
+/// As [`simulate`] where only what gauges report has changed (`gauge.signal`, `gauge.directions`) since `last`: on
+/// its elements, which need not be laid and judged again. Gives the same bytes as from the beginning.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_again(
+    inputs: &Inputs,
+    budget: &Budget,
+    last: &Simulated,
+    watch: Watch,
+) -> Result<Simulated, DesignError> {
+    let project = &inputs.project;
+    project.check()?;
+    let layout = last.ground.site_layout(&inputs.part);
+    let sites = lay_out_sites(&layout, project)?;
+    check_memory(sites.len(), last.dataset.touches.len())?;
+    let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
+    let known = Elements {
+        ground: Arc::clone(&last.ground),
+        laid: last.laid.clone(),
+        estimate: last.discretization,
+        linearity: last.linearity,
+        checks: last.checks,
+    };
+    let model = last.ground.model(&last.laid, watch)?;
+    let touches = last.dataset.touches.clone();
+    let before = Work::default();
+    read(
+        inputs, budget, known, &*model, touches, &places, before, watch,
+    )
+}
+
+/// Elements with what is known of them.
+struct Elements {
+    ground: Arc<Ground>,
+    laid: Laid,
+    estimate: Discretization,
+    linearity: Option<Linearity>,
+    checks: Checks,
+}
+
+/// What sites at some places (m) report of touches on a model, with everything that its reader must know.
+#[allow(
+    clippy::too_many_arguments,
+    reason = "the two ways here have all of it in hand"
+)]
+fn read(
+    inputs: &Inputs,
+    budget: &Budget,
+    known: Elements,
+    model: &dyn Model,
+    touches: Vec<Touch>,
+    places: &[DVec3],
+    before: Work,
+    watch: Watch,
+) -> Result<Simulated, DesignError> {
+    let Elements {
+        ground,
+        laid,
+        estimate,
+        linearity,
+        checks,
+    } = known;
+    let project = &inputs.project;
     let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index().nearest(p).0).collect();
     let unknowns = model.system().dimension();
     let gauge = &project.gauge;
     let (signal, directions) = (gauge.signal, gauge.directions);
-    let mut dataset = dataset::simulate(&*model, touches, &points, signal, directions, watch)?;
-    dataset.work.assemblies += models - 1;
-    dataset.work.factorizations += models - 1;
-    dataset.work.solves += solves;
+    let mut dataset = dataset::simulate(model, touches, &points, signal, directions, watch)?;
+    dataset.work += before;
     let mut notes = if dataset.touches.len() < project.touch.count {
         vec![format!(
             "{} touches instead of the project's {}: the budget of this quality.",
@@ -99,7 +180,6 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     notes.extend(checks.distrust());
     notes.extend(cautions(&estimate, linearity.as_ref(), &budget.elements));
     notes.extend(ground.cautions(&laid, project.tip().1));
-    drop(model);
     let (mesh, held) = ground.gauge_surface(&laid);
     let index = SurfaceIndex::new(&mesh);
     let points = places.iter().map(|&p| index.nearest(p).0).collect();

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::rows::Rows;
 use super::solver::{BLOCK, Block, Factor, FactorError, SymmetricMatrix};
 use crate::budget::{Cancelled, Watch, Work, report};
+use crate::tally::{self, Done};
 
 /// Assembled once, factored once.
 pub struct System {
@@ -39,6 +40,7 @@ impl System {
         order: Option<Vec<usize>>,
         watch: Watch,
     ) -> Result<Self, FactorError> {
+        tally::count(Done::Factorization, 1);
         Ok(Self {
             factor: Factor::new(&stiffness, order, watch)?,
             unknowns,
@@ -87,6 +89,7 @@ impl System {
     pub fn solve_freedoms(&self, loads: &[(usize, f64)]) -> Vec<f64> {
         let mut block = self.factor.block();
         self.load(&mut block, 0, loads);
+        tally::count(Done::Solve, 1);
         self.factor.solve(&mut block);
         self.column(&block, 0)
     }
@@ -101,6 +104,7 @@ impl System {
             for (column, load) in chunk.iter().enumerate() {
                 self.load(&mut block, column, load);
             }
+            tally::count(Done::Solve, chunk.len());
             self.factor.solve(&mut block);
             solutions.extend((0..chunk.len()).map(|column| self.column(&block, column)));
         }
@@ -182,6 +186,7 @@ impl System {
                             self.factor.load_place(block, place, column, value);
                         }
                     }
+                    tally::count(Done::Solve, chunk.len());
                     self.factor.solve(block);
                     done.fetch_add(chunk.len(), std::sync::atomic::Ordering::Relaxed);
                     Ok(consume(buffer, chunk, &block.rows))

@@ -78,6 +78,7 @@ impl Errors {
 }
 
 /// The estimator, with its own working memory.
+#[derive(Clone)]
 pub struct Matching {
     pub map: Arc<ResponseMap>,
     pub errors: Errors,

@@ -309,11 +309,11 @@ mod tests {
         p.budget.limits = crate::budget::Limits {
             elements_percent: Some(2.5),
             vertices: Some(1500),
+            touches: Some(700),
+            candidates: Some(90),
             selection_touches: Some(300),
             selection_candidates: Some(50),
-            folds: Some(4),
             tuning_touches: Some(200),
-            svr_tolerance_mm: Some(0.05),
         };
         p.feasible.painted = Some("painted".into());
         p.feasible.keep_out = Some("connector".into());
@@ -323,6 +323,7 @@ mod tests {
             direction: [0.0, 0.0, 1.0],
         });
         p.selection.with_noise = true;
+        p.selection.compare = false;
         p.selection.cost_budget = Some(12.5);
         p.selection.costs.push(CostKeys {
             box_mm: [[0.0; 3], [1.0; 3]],

@@ -2,6 +2,7 @@
 //! 3): a partial Cholesky factor of the covariance, pivoted by what is still uncertain.
 
 use super::information::{Conditional, Geometry, finish};
+use super::lead::Best;
 use super::wishes::Field;
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::report;
@@ -35,7 +36,8 @@ impl Selector for Entropy<'_> {
             )?;
             // The gain of a measurement over its own noise, ½ ln(1 + σ²/β⁻¹), never negative.
             let gain = |place: usize| (1.0 + given.variance(place) / noise.max(1e-12)).ln() / 2.0;
-            let Some(place) = best(&field, &given, gain) else {
+            let best = best(&field, &given, gain);
+            let Some(place) = best.place() else {
                 break;
             };
             // H = ½ ln(2πe σ²), in nats.
@@ -48,6 +50,7 @@ impl Selector for Entropy<'_> {
                 criterion: entropy,
                 criterion_mm: None,
                 gap: None,
+                lead: best.lead(),
             };
             (request.found)(&set);
             sets.push(set);
@@ -64,20 +67,14 @@ impl Selector for Entropy<'_> {
 }
 
 /// The open place that is worth the most, the first of equal ones; none where nothing uncertain is left.
-fn best(field: &Field, given: &Conditional, gain: impl Fn(usize) -> f64) -> Option<usize> {
-    const TIE: f64 = 1e-10;
+fn best(field: &Field, given: &Conditional, gain: impl Fn(usize) -> f64) -> Best {
     let open = field.open();
-    if let [only] = open[..]
-        && field.is_required(only)
-    {
-        return Some(only);
-    }
-    let mut best: Option<(usize, f64)> = None;
+    let only = matches!(open[..], [only] if field.is_required(only));
+    let mut best = Best::default();
     for place in open {
-        let value = field.worth(place, gain(place));
-        if given.uncertain(place) && best.is_none_or(|(_, b)| value > b + TIE * b.abs()) {
-            best = Some((place, value));
+        if only || given.uncertain(place) {
+            best.offer(place, field.worth(place, gain(place)));
         }
     }
-    best.map(|b| b.0)
+    best
 }

@@ -18,6 +18,7 @@ pub use self::audit::{Audit, Comparison};
 use self::exact::{Judge, Judged};
 use self::race::{Raced, Relation, Rules, Scored, race};
 use self::screen::{Base, LEVELS, Sieve, Stop};
+use super::lead;
 use super::wishes::{Field, Wishes};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Achieved, Cancelled, Progress, StopReason, Watch, Work, report};
@@ -84,6 +85,7 @@ impl Selector for GreedySvr {
                 criterion: step.error,
                 criterion_mm: Some(step.error),
                 gap: Some(step.gap),
+                lead: step.lead,
             });
             (request.found)(&sets[sets.len() - 1]);
             if request.wishes.target_mm.is_some_and(|t| step.error <= t) {
@@ -162,6 +164,8 @@ struct Step {
     error: f64,
     /// Share by which a better choice may still exist.
     gap: f64,
+    /// How far the next best is behind, as a share of the criterion.
+    lead: Option<f64>,
 }
 
 struct Search<'a> {
@@ -183,6 +187,16 @@ struct Search<'a> {
     exactly: usize,
     converged: bool,
     work: Work,
+}
+
+/// What a step knows of the candidates that it has not taken.
+struct Seen {
+    /// Left behind, by the level of their score.
+    waiting: Vec<(usize, Scored)>,
+    /// Fitted exactly.
+    compared: Vec<Scored>,
+    /// How each score relates to the next.
+    relations: Vec<Relation>,
 }
 
 /// A candidate fitted exactly, with the kernel it was fitted on.
@@ -258,12 +272,22 @@ impl<'a> Search<'a> {
         let (winner, raced) = self.final_race(&scored, &worth, field.chosen.len())?;
         relations.push(raced.relation);
         left.push((last, raced.rest));
-        let mut waiting: Vec<(usize, Scored)> = left
+        let waiting = left
             .into_iter()
-            .flat_map(|(level, rest)| rest.into_iter().map(move |s| (level, s)))
-            .collect();
+            .flat_map(|(level, rest)| rest.into_iter().map(move |s| (level, s)));
+        self.exactly += raced.scored.len();
+        let mut seen = Seen {
+            waiting: waiting.collect(),
+            compared: raced.scored,
+            relations,
+        };
         let step = field.chosen.len();
-        let winner = self.second_look(winner, &mut waiting, &mut relations, &worth, step)?;
+        let winner = self.second_look(winner, &mut seen, &worth, step)?;
+        let Seen {
+            waiting,
+            compared,
+            relations,
+        } = seen;
         let stop = || self.stopped(field.chosen.len());
         let own = self.expected(last, winner.place, winner.judged.error, &stop);
         let gap = waiting
@@ -271,15 +295,24 @@ impl<'a> Search<'a> {
             .map(|(level, s)| 1.0 - least_of(&relations[*level..], s.error) / own)
             .fold(0.0, f64::max);
         self.widest = self.widest.max(relations[last].deviation);
-        self.exactly += raced.scored.len();
-        self.relations = relations;
         let place = winner.place;
+        let estimated = |(level, s): &(usize, Scored)| Scored {
+            error: s.error * relations[*level..].iter().map(|r| r.ratio).product::<f64>(),
+            ..*s
+        };
+        let rivals = compared.into_iter().filter(|s| s.place != place);
+        let own_worth = worth(Scored { place, error: own });
+        let lead = (rivals.chain(waiting.iter().map(estimated)))
+            .map(|s| ((own_worth - worth(s)) / own).max(0.0))
+            .min_by(f64::total_cmp);
+        self.relations = relations;
         self.take(winner);
         self.refine(&[&field.chosen[..], &[place]].concat());
         Ok(Some(Step {
             place,
             error: own,
             gap,
+            lead,
         }))
     }
 
@@ -376,14 +409,18 @@ impl<'a> Search<'a> {
     fn second_look(
         &mut self,
         mut winner: Finalist,
-        waiting: &mut Vec<(usize, Scored)>,
-        relations: &mut [Relation],
+        seen: &mut Seen,
         worth: &dyn Fn(Scored) -> f64,
         step: usize,
     ) -> Result<Finalist, PlacementError> {
         /// Looks, and places scored at once.
         const MOST: usize = 32;
         const BATCH: usize = 8;
+        let Seen {
+            waiting,
+            compared,
+            relations,
+        } = seen;
         let last = LEVELS.len() - 1;
         let mut extended = vec![0.0; self.kernel.len()];
         for _ in 0..MOST {
@@ -426,6 +463,10 @@ impl<'a> Search<'a> {
             let departed = (error / (scored.error * relation.ratio) - 1.0).abs();
             relation.deviation = relation.deviation.max(departed);
             self.exactly += 1;
+            compared.push(Scored {
+                place: scored.place,
+                error,
+            });
             self.work += self.fitted(1);
             let value = |place, error| worth(Scored { place, error });
             if value(scored.place, error) > value(winner.place, own) {
@@ -534,6 +575,7 @@ impl<'a> Search<'a> {
             ));
         }
         notes.extend(self.degenerate());
+        notes.extend(lead::ties(sets, self.settings.tolerance));
         if !self.converged {
             notes.push(
                 "Some fits stopped at the effort allowed before they met their tolerance: the criterion is not exact. Allow more steps, or lower C.".into(),

@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::wishes::Field;
-use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet};
+use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet, lead};
 use crate::budget::{Achieved, StopReason, Work};
 use crate::gaussian_process::{Covariance, GpKernel, GpTrial};
 
@@ -147,6 +147,7 @@ pub(super) fn finish(
             geometry.coinciding
         ));
     }
+    notes.extend(lead::ties(&sets, lead::TOLERANCE));
     if short {
         notes.push(format!(
             "Only {} of {wanted} gauges: beyond them nothing uncertain is left that wishes allow.",

@@ -9,6 +9,7 @@ use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::{Mat, Par, Side};
 
 use super::information::{Conditional, Geometry, finish};
+use super::lead::Best;
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Watch, report};
 
@@ -29,7 +30,6 @@ impl Selector for MutualInformation<'_> {
     }
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
-        const TIE: f64 = 1e-10;
         let mut field = self.geometry.field(pool, request, "Mutual information")?;
         let covariance = &self.geometry.covariance;
         let noise = covariance.noise;
@@ -47,15 +47,15 @@ impl Selector for MutualInformation<'_> {
             let gain =
                 |place: usize| 0.5 * ((given.variance(place) + noise) * rest.diagonal[place]).ln();
             let open = field.open();
-            let mut best: Option<(usize, f64)> = None;
+            let mut best = Best::default();
             for &place in &open {
                 let value = field.worth(place, gain(place));
                 let possible = given.uncertain(place) || field.is_required(place);
-                if possible && best.is_none_or(|(_, b)| value > b + TIE * b.abs()) {
-                    best = Some((place, value));
+                if possible {
+                    best.offer(place, value);
                 }
             }
-            let Some((place, _)) = best else {
+            let Some(place) = best.place() else {
                 break;
             };
             information += gain(place);
@@ -67,6 +67,7 @@ impl Selector for MutualInformation<'_> {
                 criterion: information,
                 criterion_mm: None,
                 gap: None,
+                lead: best.lead(),
             };
             (request.found)(&set);
             sets.push(set);

@@ -1,7 +1,7 @@
 //! PCA with pivoted QR as a selector: exact, deterministic, without a seed.
 
 use super::wishes::Field;
-use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
+use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, lead};
 use crate::budget::{Achieved, StopReason, Work, report};
 use crate::pca::Pca;
 
@@ -44,13 +44,15 @@ pub fn from_components(
     let mut sets: Vec<SensorSet> = Vec::new();
     for k in counts(wishes.sensors, wishes.target_mm.is_some()) {
         report(request.watch, "Selecting by PCA-QR", k - 1, wishes.sensors)?;
-        let mut chosen = choose(pca, &whole, k).sites();
+        let (mut field, mut lead) = choose(pca, &whole, k);
+        let mut chosen = field.sites();
         let all = chosen.len() == k;
         // Where so many cannot be had, as many as can.
         let mut wanted = k;
         while chosen.len() < wanted {
             wanted = chosen.len();
-            chosen = choose(pca, &whole, wanted).sites();
+            (field, lead) = choose(pca, &whole, wanted);
+            chosen = field.sites();
         }
         if sets.last().is_none_or(|s| s.sites.len() < chosen.len()) && !chosen.is_empty() {
             let reach = chosen.len().min(pca.reach());
@@ -60,6 +62,7 @@ pub fn from_components(
                 criterion: (1.0 - kept / pca.total).max(0.0),
                 criterion_mm: None,
                 gap: None,
+                lead,
             };
             (request.found)(&set);
             sets.push(set);
@@ -89,6 +92,7 @@ pub fn from_components(
             notes: short
                 .then(|| shortage(pca, reached, wishes.sensors))
                 .into_iter()
+                .chain(lead::ties(&sets, lead::TOLERANCE))
                 .collect(),
         },
         sets,
@@ -108,23 +112,28 @@ fn counts(most: usize, on_the_way: bool) -> Vec<usize> {
 }
 
 /// `count` sites by pivoting in as many components; fewer where not so many can be had.
-fn choose<'a>(pca: &Pca, whole: &Field<'a>, count: usize) -> Field<'a> {
+/// With how far the least certain pick was ahead of the next.
+fn choose<'a>(pca: &Pca, whole: &Field<'a>, count: usize) -> (Field<'a>, Option<f64>) {
     let mut field = whole.clone();
     let mut pivoting = pca.pivoting(count);
+    let mut least: Option<f64> = None;
     while field.chosen.len() < count {
         let open = field.open();
         let next = match open[..] {
             // What must be there is taken whatever it adds.
-            [only] if field.is_required(only) => Some(only),
+            [only] if field.is_required(only) => Some((only, f64::INFINITY)),
             _ => pivoting.largest(open, |place, norm| field.worth(place, norm)),
         };
-        let Some(place) = next else {
+        let Some((place, lead)) = next else {
             break;
         };
+        if lead.is_finite() {
+            least = Some(least.map_or(lead, |l| l.min(lead)));
+        }
         pivoting.take(place);
         field.add(place);
     }
-    field
+    (field, least)
 }
 
 fn shortage(pca: &Pca, reached: usize, wanted: usize) -> String {

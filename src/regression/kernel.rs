@@ -2,6 +2,7 @@
 
 use crate::dataset::SignalMatrix;
 use crate::lanes::wide;
+use crate::tally::{self, Done};
 
 /// exp(x) for x ≤ 0 to a few units in the last place; zero below about -708. Written without branches so
 /// that it is computed in lanes, and so that it gives the same bytes on every machine.
@@ -82,6 +83,7 @@ wide! {
 /// exp(-γ d²), entry by entry.
 #[must_use]
 pub fn gaussian(squared: &[f64], gamma: f64) -> Vec<f64> {
+    tally::count(Done::KernelEvaluation, squared.len());
     let mut values = squared.to_vec();
     exponentials(&mut values, gamma);
     values
@@ -108,10 +110,15 @@ pub fn squared_distances(a: &SignalMatrix, b: &SignalMatrix) -> Vec<f64> {
     d
 }
 
+/// The kernel with one more signal, into `out`: a Gaussian kernel over a union is the product of the
+/// kernels. `kernel` and `out` are `rows` × `columns`, by rows.
+pub fn extend(kernel: &[f64], rows: &[f64], columns: &[f64], gamma: f64, out: &mut [f64]) {
+    tally::count(Done::KernelEvaluation, out.len());
+    multiply(kernel, rows, columns, gamma, out);
+}
+
 wide! {
-    /// The kernel with one more signal, into `out`: a Gaussian kernel over a union is the product of the
-    /// kernels. `kernel` and `out` are `rows` × `columns`, by rows.
-    pub fn extend<'a>(
+    fn multiply<'a>(
         kernel: &'a [f64],
         rows: &'a [f64],
         columns: &'a [f64],

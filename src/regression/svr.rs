@@ -16,6 +16,7 @@ mod smo;
 
 use std::ops::Range;
 
+use crate::tally::{self, Done};
 use smo::Block;
 
 /// Settings of one fit. `c` bounds the coefficients, `epsilon` and `tolerance` are in the target's unit.
@@ -81,6 +82,7 @@ pub fn solve(
     start: Option<Start>,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Fit {
+    tally::count(Done::Fit, 1);
     let mut block = Block::new(problem, params);
     if let Some(start) = start.filter(|s| s.beta.len() == problem.y.len()) {
         block.start(problem.y, start);

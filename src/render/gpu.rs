@@ -8,6 +8,7 @@ use eframe::wgpu::{self, util::DeviceExt};
 
 use crate::colormap::{ColorMap, TABLE};
 use crate::mesh::TriMesh;
+use crate::tally::{self, Done};
 
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -91,13 +92,6 @@ pub struct Frame3d {
     pub size: [u32; 2],
 }
 
-/// Counts of what was done, for tests: an unchanged scene costs nothing.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct GpuWork {
-    pub uploads: u64,
-    pub redraws: u64,
-}
-
 /// Everything on the graphics adapter.
 pub struct SceneGpu {
     pipelines: Pipelines,
@@ -105,7 +99,6 @@ pub struct SceneGpu {
     blit_layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
     slots: [SlotGpu; 2],
-    pub work: GpuWork,
 }
 
 struct Pipelines {
@@ -168,7 +161,6 @@ impl SceneGpu {
             blit_layout,
             sampler,
             slots: [SlotGpu::new(device), SlotGpu::new(device)],
-            work: GpuWork::default(),
         }
     }
 
@@ -182,7 +174,7 @@ impl SceneGpu {
     ) {
         let slot = &mut self.slots[frame.slot as usize];
         let uploaded = slot.upload(device, queue, frame);
-        self.work.uploads += u64::from(uploaded);
+        tally::count(Done::Upload, usize::from(uploaded));
         let signature = (frame.uniforms, frame.map, frame.size, frame.background);
         if !uploaded && slot.drawn == Some(signature) {
             return;
@@ -210,7 +202,7 @@ impl SceneGpu {
         let through = frame.uniforms.look[0] < 1.0;
         slot.pass(encoder, &self.pipelines, frame.background, through);
         slot.drawn = Some(signature);
-        self.work.redraws += 1;
+        tally::count(Done::Redraw, 1);
     }
 }
 

@@ -44,6 +44,7 @@ pub enum Command {
     Select,
     Keep,
     Advise,
+    MeasureTrade,
     Cancel,
     Follow,
     SimulatedBoard,
@@ -92,6 +93,7 @@ impl Command {
             Self::Select => "Select gauges",
             Self::Keep => "Keep this selection",
             Self::Advise => "Shell or solid?",
+            Self::MeasureTrade => "Measure the trade",
             Self::Cancel => "Cancel all jobs",
             Self::SimulatedBoard => "Start a simulated board",
             Self::Tare => "Tare",
@@ -173,6 +175,9 @@ impl Command {
             Self::Simulate => "Compute how the limb deforms under all touches",
             Self::Select => "Filter, reduce, choose the gauges and judge them on unseen touches",
             Self::Keep => "Keep the gauges as they are, to compare them with others",
+            Self::MeasureTrade => {
+                "Run this project at many settings and measure what each costs and achieves"
+            }
             Self::Advise => {
                 "Measure the walls, say whether shell or solid fits, and what each would cost"
             }
@@ -226,6 +231,7 @@ impl Command {
             Self::Undo => ctrl(Key::Z),
             Self::Redo => shifted(Key::Z),
             Self::Advise => plain(Key::F4),
+            Self::MeasureTrade => plain(Key::F10),
             Self::Simulate => plain(Key::F5),
             Self::Select => plain(Key::F6),
             Self::Keep => ctrl(Key::D),
@@ -299,6 +305,7 @@ impl Command {
             Self::Select,
             Self::Keep,
             Self::Advise,
+            Self::MeasureTrade,
             Self::Cancel,
             Self::Follow,
             Self::SimulatedBoard,
@@ -407,6 +414,7 @@ impl Studio {
                 self.stage = Stage::Part;
                 self.start_advising(ctx);
             }
+            Command::MeasureTrade => self.measure_trade(ctx),
             Command::Cancel => self.cancel(),
             Command::SimulatedBoard => {
                 self.stage = Stage::Live;

@@ -31,6 +31,7 @@ pub(super) enum Finished {
     Estimate(f64),
     Judged(Arc<Evaluation>),
     Advised(Arc<crate::design::Advice>),
+    Traded(Box<crate::io::trade_file::Record>),
     Field(Vec<f64>),
     /// Metres over the surface.
     Measured(f64),
@@ -249,12 +250,24 @@ impl Studio {
     fn start_simulation(&mut self, ctx: &Context, quality: Quality) {
         let inputs = self.document.inputs();
         let key = self.document.simulation_key_at(quality);
+        let elements = self.document.elements_key_at(quality);
+        let last = self
+            .last
+            .get(&quality)
+            .and_then(|last| last.simulation.as_ref());
+        let last = last.filter(|s| s.elements == elements);
+        let last = last.map(|s| Arc::clone(&s.simulated));
         self.jobs
             .start(ctx, Task::Simulate(quality), key, move |r| {
                 let start = Instant::now();
                 let budget = inputs.project.budget.budget_at(quality);
-                let simulated =
-                    design::simulate(&inputs, &budget, &|p| r.report(p)).map_err(|e| stop(&e))?;
+                let watch = |p| r.report(p);
+                let simulated = match last {
+                    // Only what gauges report has changed.
+                    Some(last) => design::simulate_again(&inputs, &budget, &last, &watch),
+                    None => design::simulate(&inputs, &budget, &watch),
+                };
+                let simulated = simulated.map_err(|e| stop(&e))?;
                 let seconds = start.elapsed().as_secs_f64();
                 Ok(Finished::Simulation(Arc::new(simulated), quality, seconds))
             });
@@ -366,6 +379,7 @@ impl Studio {
             }
             // Of gauges that have moved on.
             Finished::Estimate(_) | Finished::Judged(..) => {}
+            Finished::Traded(record) => self.take_trade(*record, &key),
             Finished::Advised(advice) => self.advice = Some((key, advice)),
             Finished::Field(values) => self.slow = Some((key, Arc::new(values))),
             Finished::Measured(over) => self.measured(&key, over),
@@ -389,6 +403,7 @@ impl Studio {
         let result = SimulationResult {
             simulated,
             key,
+            elements: self.document.elements_key_at(quality),
             quality,
             seconds,
         };
@@ -407,6 +422,7 @@ impl Studio {
             self.document.candidates_key_at(quality),
             self.document.selection_key_at(quality),
         ];
+        self.hold_to_promise(&design, quality);
         let feasibility = Arc::clone(&design.feasibility);
         let first = self.design.is_none();
         let result = DesignResult {
@@ -614,9 +630,7 @@ fn make(
 ) -> Result<Design, Stop> {
     let start = Instant::now();
     let first = inputs.project.selection.selector;
-    let kinds: Vec<SelectorKind> = std::iter::once(first)
-        .chain(SelectorKind::ALL.into_iter().filter(|&k| k != first))
-        .collect();
+    let kinds = inputs.project.selectors();
     let hooks = Hooks {
         clock: &|| start.elapsed().as_secs_f64(),
         watch: &|p: Progress| r.report(p),

@@ -1,6 +1,6 @@
 //! The right side: the settings of a stage, in the units of the project's file.
 
-use egui::{DragValue, Ui};
+use egui::{DragValue, RichText, Ui};
 
 use super::form::{choice, count, number, percentage, rows};
 use super::{Stage, Studio, quality_name};
@@ -28,6 +28,8 @@ impl Studio {
                     Stage::Simulation => {
                         let project = &mut self.document.state.project;
                         quality(ui, project);
+                        self.quality_promises(ui);
+                        let project = &mut self.document.state.project;
                         rows(ui, "Touch", |ui| touch(ui, project));
                         rows(ui, "Signal and sites", |ui| sites(ui, project));
                     }
@@ -51,6 +53,18 @@ impl Studio {
                     Stage::Live => self.live_form(ui),
                 }
             });
+    }
+
+    /// What each quality was measured to cost and achieve.
+    fn quality_promises(&mut self, ui: &mut Ui) {
+        for quality in Quality::ALL {
+            let chosen = quality == self.quality();
+            let text = RichText::new(self.prediction_in_words(quality)).size(11.5);
+            ui.add(egui::Label::new(if chosen { text } else { text.weak() }).wrap());
+        }
+        if ui.button("Speed against accuracy…").clicked() {
+            self.results = super::results::Tab::Trade;
+        }
     }
 
     fn part_form(&mut self, ui: &mut Ui) {
@@ -598,7 +612,7 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         &mut project.selection.selector,
         &SelectorKind::ALL,
         SelectorKind::title,
-        "Whose sites are shown and reported; all are evaluated",
+        "Whose sites are shown and reported",
     );
     count(
         ui,
@@ -623,6 +637,12 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         0.0..=100.0,
         "That one gauge has failed when it is needed: greedy SVR then chooses sites that can do without each other",
     );
+    let name = ui.label("Compare selectors");
+    ui.checkbox(&mut project.selection.compare, "")
+        .on_hover_text("Let the other selectors choose too: four curves of errors instead of one, for the time that they take")
+        .labelled_by(name.id)
+        .accessible_name("Compare selectors");
+    ui.end_row();
     let name = ui.label("With noise");
     ui.checkbox(&mut project.selection.with_noise, "")
         .on_hover_text("Choose from signals with the gauge's noise added")

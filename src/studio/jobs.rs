@@ -24,6 +24,8 @@ pub enum Task {
     Estimate,
     /// Shell or solid.
     Advise,
+    /// Speed against accuracy.
+    Trade,
     Judge,
     /// A field that takes a while.
     Field,
@@ -53,6 +55,7 @@ impl Task {
             Self::Estimate => "Estimate the error".into(),
             Self::Judge => "Judge the gauges".into(),
             Self::Advise => "Measure the walls".into(),
+            Self::Trade => "Measure the trade".into(),
             Self::Field => "Compute the field".into(),
             Self::Measure => "Measure".into(),
             Self::Picture => "Save the picture".into(),

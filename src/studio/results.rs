@@ -17,17 +17,19 @@ pub(super) enum Tab {
     Compare,
     Gauges,
     Reduction,
+    Trade,
     Live,
     Jobs,
 }
 
 impl Tab {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Error,
         Self::Failures,
         Self::Compare,
         Self::Gauges,
         Self::Reduction,
+        Self::Trade,
         Self::Live,
         Self::Jobs,
     ];
@@ -39,6 +41,7 @@ impl Tab {
             Self::Compare => "Compare",
             Self::Gauges => "Gauge table",
             Self::Reduction => "Reduction",
+            Self::Trade => "Trade",
             Self::Live => "Strains",
             Self::Jobs => "Jobs",
         }
@@ -123,6 +126,7 @@ impl Studio {
             Tab::Gauges => self.gauge_table(ui),
             Tab::Compare => self.compare_tab(ui),
             Tab::Reduction => self.reduction_plot(ui),
+            Tab::Trade => self.trade_tab(ui),
             Tab::Live => self.live_tab(ui),
             Tab::Jobs => self.jobs_tab(ui),
         }

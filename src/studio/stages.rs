@@ -363,6 +363,7 @@ impl Studio {
             d.design.truth.touches.len(),
             self.took("evaluate")
         ));
+        lines.extend(self.promise_line());
         lines
     }
 

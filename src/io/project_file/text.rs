@@ -235,6 +235,16 @@ fn limits(t: &mut Text, limits: &Limits) {
         "most vertices of the elastic model",
     );
     t.maybe(
+        "touches",
+        limits.touches,
+        "most touches that the model is asked for",
+    );
+    t.maybe(
+        "candidates",
+        limits.candidates,
+        "most candidates that the reduction keeps",
+    );
+    t.maybe(
         "selection_touches",
         limits.selection_touches,
         "most touches that greedy SVR scores on",
@@ -244,16 +254,10 @@ fn limits(t: &mut Text, limits: &Limits) {
         limits.selection_candidates,
         "most candidates that it scores",
     );
-    t.maybe("folds", limits.folds, "of every cross-validation");
     t.maybe(
         "tuning_touches",
         limits.tuning_touches,
         "most touches that hyper-parameters are searched on",
-    );
-    t.maybe(
-        "svr_tolerance_mm",
-        limits.svr_tolerance_mm.map(float),
-        "tolerance of regressions",
     );
 }
 
@@ -334,6 +338,11 @@ fn selection(t: &mut Text, project: &Project) {
         "cost_budget",
         selection.cost_budget.map(float),
         "what all gauges together may cost: 1 each, or as in [[selection.cost]]",
+    );
+    t.key(
+        "compare",
+        selection.compare,
+        "whether the other selectors choose too",
     );
     t.key(
         "with_noise",

@@ -1,0 +1,450 @@
+//! A measured trade as files: JSON to go on from, a table, and a plot.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::svg::escape;
+use super::{FileError, atomic};
+use crate::dataset::Signal;
+use crate::design::Inputs;
+use crate::placement::SelectorKind;
+use crate::project::{BudgetKeys, LiveKeys, Project};
+use crate::trade::{Bought, KnobReport, Measured, Point, front, knobs};
+
+/// Everything that was measured of one project on one machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    pub format: u32,
+    /// Of the program: its figures are not those of another.
+    pub version: String,
+    /// What the points hold for ([`inputs_key`]).
+    pub inputs: String,
+    pub threads: usize,
+    pub judge: Judge,
+    pub points: Vec<Point>,
+}
+
+/// The model that all points were judged by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Judge {
+    pub element_mm: f64,
+    pub unknowns: usize,
+    pub touches: usize,
+}
+
+const FORMAT: u32 = 1;
+
+impl Record {
+    /// Nothing measured yet.
+    #[must_use]
+    pub fn new(inputs: &Inputs, threads: usize) -> Self {
+        Self {
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION").into(),
+            inputs: inputs_key(inputs),
+            threads,
+            judge: Judge::default(),
+            points: Vec::new(),
+        }
+    }
+
+    /// Whether its points hold for a project as it is.
+    #[must_use]
+    pub fn is_of(&self, inputs: &Inputs) -> bool {
+        self.version == env!("CARGO_PKG_VERSION") && self.inputs == inputs_key(inputs)
+    }
+
+    /// From what [`to_json`] wrote.
+    ///
+    /// # Errors
+    /// What is wrong with the text.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let record: Self = serde_json::from_str(text).map_err(|e| e.to_string())?;
+        if record.format == FORMAT {
+            Ok(record)
+        } else {
+            Err(format!(
+                "it is of format {}, this version reads {FORMAT}",
+                record.format
+            ))
+        }
+    }
+
+    /// What goes into `trade.json`.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+}
+
+/// A project with its knobs at one place and without what no figure depends on.
+#[must_use]
+pub fn without_knobs(project: &Project) -> Project {
+    let live = &project.live;
+    let mut project = Project {
+        budget: BudgetKeys {
+            seed: project.budget.seed,
+            ..BudgetKeys::default()
+        },
+        live: LiveKeys {
+            model_error: live.model_error,
+            largest_force_n: live.largest_force_n,
+            ..LiveKeys::default()
+        },
+        kept: Vec::new(),
+        ..project.clone()
+    };
+    project.part.mesh.clear();
+    project.selection.sites.clear();
+    project.selection.selector = SelectorKind::default();
+    project.selection.compare = true;
+    project.gauge.signal = Signal::default();
+    project.candidates.unexplained = 0.5;
+    project
+}
+
+/// What a point's figures depend on beside its setting, as a key: the part to the last bit, and every key of the
+/// project that is no knob.
+#[must_use]
+pub fn inputs_key(inputs: &Inputs) -> String {
+    let project = without_knobs(&inputs.project);
+    let mut hash = Hash::default();
+    hash.add(serde_json::to_string(&project).unwrap_or_default().bytes());
+    for p in inputs.part.positions() {
+        hash.add(p.to_array().into_iter().flat_map(f64::to_le_bytes));
+    }
+    for triangle in inputs.part.triangles() {
+        hash.add(triangle.iter().flat_map(|v| v.to_le_bytes()));
+    }
+    let masks = inputs
+        .masks
+        .iter()
+        .map(|(name, mask)| (name.as_str(), mask));
+    let painted = inputs.painted.iter().map(|mask| ("painted", mask));
+    for (name, mask) in masks.chain(painted) {
+        hash.add(name.bytes().chain(mask.iter().map(|&m| u8::from(m))));
+    }
+    format!("{:016x}", hash.0)
+}
+
+/// Fowler, Noll and Vo's hash (FNV-1a): the same on every machine and in every version.
+struct Hash(u64);
+
+impl Default for Hash {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl Hash {
+    fn add(&mut self, bytes: impl Iterator<Item = u8>) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+}
+
+/// Reads what [`write`] left in a folder; nothing where there is nothing.
+///
+/// # Errors
+/// [`FileError`] for a file that is there and is no trade.
+pub fn read(folder: &Path) -> Result<Option<Record>, FileError> {
+    let path = folder.join("trade.json");
+    let text = match std::fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(FileError::of(&path, &e)),
+    };
+    let broken = |m| {
+        FileError::broken(
+            &path,
+            format!("this is no measured trade ({m}). Choose another folder"),
+        )
+    };
+    Record::parse(&text).map(Some).map_err(broken)
+}
+
+/// Writes `trade.json`, `trade.csv`, `trade.md` and `trade.svg`, each atomically.
+///
+/// # Errors
+/// [`FileError`] naming what could not be written.
+pub fn write(folder: &Path, project: &Project, record: &Record) -> Result<(), FileError> {
+    let files = [
+        ("trade.json", record.to_json()),
+        ("trade.csv", csv(project, record)),
+        ("trade.md", markdown(project, record)),
+        ("trade.svg", plot(project, record)),
+    ];
+    for (name, text) in files {
+        atomic::write(&folder.join(name), text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// A row a point; `limits` is what goes into the project's `[budget.limits]`.
+#[must_use]
+pub fn csv(project: &Project, record: &Record) -> String {
+    let best = front(project, &record.points);
+    let mut text = String::from(
+        "on_front,cpu_seconds,seconds,memory_mb,error_mm,median_mm,p95_mm,workshop_mm,own_error_mm,model_percent,candidates,judge_cpu_seconds,quality,repeat,selector,signal,unexplained,estimator,vertices,touches,point_tip,as_solid,selection_touches,selection_candidates,svr_tolerance_mm,folds,tuning_touches,failed\n",
+    );
+    for point in &record.points {
+        let on_front = best.iter().any(|p| std::ptr::eq(*p, point));
+        let s = &point.setting;
+        match &point.outcome {
+            Ok(m) => {
+                let memory = m.memory_mb.map(|mb| format!("{mb:.0}")).unwrap_or_default();
+                let _ = write!(
+                    text,
+                    "{on_front},{:.2},{:.2},{memory},{:.4},{:.4},{:.4},{:.4},{:.4},{:.3},{},{:.2}",
+                    m.cpu_seconds,
+                    m.seconds,
+                    m.error_mm,
+                    m.median_mm,
+                    m.p95_mm,
+                    m.workshop_mm,
+                    m.own_error_mm,
+                    m.model_percent,
+                    m.candidates,
+                    m.judge_cpu_seconds
+                );
+            }
+            Err(_) => text.push_str("false,,,,,,,,,,,"),
+        }
+        let estimator = match s.estimator {
+            crate::trade::Estimator::Regression => "regression",
+            crate::trade::Estimator::Matching => "matching",
+        };
+        let _ = write!(
+            text,
+            ",{},{},{},{},{},{estimator}",
+            s.quality.name(),
+            s.repeat,
+            s.selector.name(),
+            s.signal.name(),
+            s.unexplained
+        );
+        match &s.limits {
+            Some(l) => {
+                let _ = write!(
+                    text,
+                    ",{},{},{},{},{},{},{},{},{}",
+                    l.vertices,
+                    l.touches,
+                    l.point_tip,
+                    l.as_solid,
+                    l.selection_touches,
+                    l.selection_candidates,
+                    l.svr_tolerance_mm,
+                    l.folds,
+                    l.tuning_touches
+                );
+            }
+            None => text.push_str(",,,,,,,,,"),
+        }
+        let failed = point.outcome.as_ref().err().map_or("", String::as_str);
+        let _ = writeln!(text, ",\"{}\"", failed.replace('"', "'"));
+    }
+    text
+}
+
+/// The front and the knobs as tables to read.
+#[must_use]
+pub fn markdown(project: &Project, record: &Record) -> String {
+    let count = record
+        .points
+        .iter()
+        .filter(|p| p.measured().is_some())
+        .count();
+    let judge = &record.judge;
+    let mut text = format!(
+        "{count} settings of {} gauges on {}, judged on {} touches that none has seen, by elements of {:.2} mm ({} unknowns). Processor seconds are of the whole road with the chosen selector alone, up to the judged answer.\n\n| processor s | by the clock | memory | mean error | median | settings |\n|---|---|---|---|---|---|\n",
+        project.selection.sensors,
+        project.gauge.signal.name(),
+        judge.touches,
+        judge.element_mm,
+        judge.unknowns,
+    );
+    let best = front(project, &record.points);
+    let named = (record.points.iter())
+        .filter(|p| p.setting.limits.is_none() && !best.iter().any(|b| std::ptr::eq(*b, *p)));
+    for point in best.iter().copied().chain(named) {
+        let Some(m) = point.measured() else { continue };
+        let memory = m
+            .memory_mb
+            .map_or_else(|| "–".into(), |mb| format!("{mb:.0} MB"));
+        let _ = writeln!(
+            text,
+            "| {:.1} | {:.1} s | {memory} | {:.2} mm | {:.2} mm | {} |",
+            m.cpu_seconds,
+            m.seconds,
+            m.error_mm,
+            m.median_mm,
+            point.setting.in_words()
+        );
+    }
+    let (reports, spread) = knobs(&record.points);
+    let _ = writeln!(
+        text,
+        "\nWhat one step of each knob brings, from the cheaper to the dearer (medians over pairs of settings that differ in it alone). With another seed and nothing else the mean error moves by {spread:.0} %.\n\n| knob | pairs | processor time | mean error | median error | buys |\n|---|---|---|---|---|---|"
+    );
+    for r in &reports {
+        let _ = writeln!(
+            text,
+            "| {} | {} | {:+.0} % | {:+.0} % | {:+.0} % | {} |",
+            r.knob.name(),
+            r.pairs,
+            r.cpu_percent,
+            r.error_percent,
+            r.median_percent,
+            bought(r)
+        );
+    }
+    text
+}
+
+fn bought(report: &KnobReport) -> &'static str {
+    match report.bought {
+        Bought::Accuracy => "accuracy",
+        Bought::Nothing => "nothing",
+        Bought::Idle => "nothing, and is free",
+    }
+}
+
+/// Error over processor time, both by their logarithms: all points, and the front as a line of steps.
+#[must_use]
+pub fn plot(project: &Project, record: &Record) -> String {
+    const WIDTH: f64 = 760.0;
+    const HEIGHT: f64 = 430.0;
+    let own = |p: &&Point| p.setting.answers(project);
+    let measured: Vec<(&Point, &Measured)> = (record.points.iter())
+        .filter(own)
+        .filter_map(|p| Some((p, p.measured()?)))
+        .collect();
+    let best: Vec<&Measured> = front(project, &record.points)
+        .into_iter()
+        .filter_map(Point::measured)
+        .collect();
+    let [x, y] = [
+        Axis::of(
+            measured.iter().map(|(_, m)| m.cpu_seconds),
+            62.0,
+            WIDTH - 18.0,
+        ),
+        Axis::of(
+            measured.iter().map(|(_, m)| m.error_mm),
+            HEIGHT - 46.0,
+            34.0,
+        ),
+    ];
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" font-family=\"sans-serif\" font-size=\"12\"><title>Localization error against processor time</title><rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"#fff\"/><text x=\"62\" y=\"20\" font-weight=\"bold\">Localization error against processor time</text>"
+    );
+    for value in x.ticks() {
+        let at = x.at(value);
+        let _ = write!(
+            svg,
+            "<path d=\"M{at:.1} 34V{}\" stroke=\"#ddd\"/><text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{value}</text>",
+            HEIGHT - 46.0,
+            HEIGHT - 30.0
+        );
+    }
+    for value in y.ticks() {
+        let at = y.at(value);
+        let _ = write!(
+            svg,
+            "<path d=\"M62 {at:.1}H{}\" stroke=\"#ddd\"/><text x=\"56\" y=\"{:.1}\" text-anchor=\"end\">{value}</text>",
+            WIDTH - 18.0,
+            at + 4.0
+        );
+    }
+    let _ = write!(
+        svg,
+        "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">processor seconds up to the judged answer</text><text transform=\"translate(16 {}) rotate(-90)\" text-anchor=\"middle\">mean error (mm)</text>",
+        WIDTH / 2.0,
+        HEIGHT - 8.0,
+        HEIGHT / 2.0
+    );
+    for (point, m) in &measured {
+        let (cx, cy) = (x.at(m.cpu_seconds), y.at(m.error_mm));
+        let label = escape(&format!(
+            "{:.1} s, {:.2} mm: {}",
+            m.cpu_seconds,
+            m.error_mm,
+            point.setting.in_words()
+        ));
+        let _ = write!(
+            svg,
+            "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"3.5\" fill=\"#9aa5b1\"><title>{label}</title></circle>"
+        );
+        if point.setting.limits.is_none() {
+            let _ = write!(
+                svg,
+                "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"6\" fill=\"none\" stroke=\"#d55e00\" stroke-width=\"2\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"#a34700\">{}</text>",
+                cx - 10.0,
+                cy + 4.0,
+                point.setting.quality.name()
+            );
+        }
+    }
+    let mut line = String::new();
+    for (k, m) in best.iter().enumerate() {
+        let (cx, cy) = (x.at(m.cpu_seconds), y.at(m.error_mm));
+        let _ = if k == 0 {
+            write!(line, "M{cx:.1} {cy:.1}")
+        } else {
+            write!(line, "H{cx:.1}V{cy:.1}")
+        };
+        let _ = write!(
+            svg,
+            "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"4.5\" fill=\"#0072b2\"/>"
+        );
+    }
+    let _ = write!(
+        svg,
+        "<path d=\"{line}\" fill=\"none\" stroke=\"#0072b2\" stroke-width=\"2\"/></svg>"
+    );
+    svg
+}
+
+/// A logarithmic axis.
+struct Axis {
+    low: f64,
+    high: f64,
+    from: f64,
+    to: f64,
+}
+
+impl Axis {
+    fn of(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+        let (low, high) = values
+            .filter(|v| v.is_finite() && *v > 0.0)
+            .fold((f64::INFINITY, 0.0), |(l, h): (f64, f64), v| {
+                (l.min(v), h.max(v))
+            });
+        let (low, high) = if high > 0.0 { (low, high) } else { (1.0, 10.0) };
+        Self {
+            low: low / 1.15,
+            high: high * 1.15,
+            from,
+            to,
+        }
+    }
+
+    fn at(&self, value: f64) -> f64 {
+        let share = (value / self.low).ln() / (self.high / self.low).ln();
+        self.from + share * (self.to - self.from)
+    }
+
+    /// Round values on it.
+    fn ticks(&self) -> Vec<f64> {
+        let round = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0];
+        (-3..7)
+            .flat_map(|decade| round.map(|r| r * 10f64.powi(decade)))
+            .filter(|v| (self.low..=self.high).contains(v))
+            .map(|v| (v * 1e4).round() / 1e4)
+            .collect()
+    }
+}

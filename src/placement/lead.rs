@@ -1,0 +1,84 @@
+//! How clearly a pick was the best. Symmetric parts have real ties, and what is nearly one may fall either way when
+//! the input changes by next to nothing.
+
+use super::SensorSet;
+
+/// Relative tolerance of picks by criteria without an effort of their own: a lead of less than twice this is a tie.
+/// It is what a relative change of 1e-6 in the input may grow to on its way through a model.
+pub const TOLERANCE: f64 = 1e-4;
+
+/// The best of some places, the first of equal ones, and the next best.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Best {
+    best: Option<(usize, f64)>,
+    second: Option<f64>,
+}
+
+impl Best {
+    /// Values this near to each other, as a share, are equal: rounding.
+    const EQUAL: f64 = 1e-10;
+
+    /// Looks at a place with its worth; more is better, and the earlier of equal ones.
+    pub fn offer(&mut self, place: usize, worth: f64) {
+        let next = match self.best {
+            Some((_, best)) if worth > best + Self::EQUAL * best.abs() => {
+                self.best = Some((place, worth));
+                Some(best)
+            }
+            Some(_) => Some(worth),
+            None => {
+                self.best = Some((place, worth));
+                None
+            }
+        };
+        if let Some(next) = next {
+            self.second = Some(self.second.map_or(next, |second| second.max(next)));
+        }
+    }
+
+    #[must_use]
+    pub fn place(&self) -> Option<usize> {
+        self.best.map(|b| b.0)
+    }
+
+    /// How far the best is ahead of the next, over its own worth; nothing where there was no choice.
+    #[must_use]
+    pub fn lead(&self) -> Option<f64> {
+        let ((_, best), second) = (self.best?, self.second?);
+        Some(((best - second) / best.abs().max(f64::MIN_POSITIVE)).max(0.0))
+    }
+}
+
+/// A word on the picks whose lead is less than twice the tolerance, where there are any.
+#[must_use]
+pub fn ties(sets: &[SensorSet], tolerance: f64) -> Option<String> {
+    let tied: Vec<String> = sets
+        .iter()
+        .filter(|s| s.lead.is_some_and(|lead| lead <= 2.0 * tolerance))
+        .map(|s| s.sites.len().to_string())
+        .collect();
+    (!tied.is_empty()).then(|| {
+        format!(
+            "Ties with {} gauges: another site is as good to within {:.2} % of the criterion, as mirrored ones are on a symmetric part. The first was taken; a change of next to nothing may take the other.",
+            tied.join(", "),
+            200.0 * tolerance
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_of_equal_ones_is_best_and_has_no_lead() {
+        let mut best = Best::default();
+        assert_eq!(best.lead(), None);
+        for (place, worth) in [(3, 1.0), (5, 2.0), (7, 2.0), (9, 1.5)] {
+            best.offer(place, worth);
+        }
+        assert_eq!((best.place(), best.lead()), (Some(5), Some(0.0)));
+        best.offer(11, 4.0);
+        assert_eq!((best.place(), best.lead()), (Some(11), Some(0.5)));
+    }
+}

@@ -1,0 +1,168 @@
+//! Speed against accuracy, measured: the whole road at many settings, all judged by one model that is finer
+//! than any of theirs, and what each setting's knobs buy.
+//!
+//! A [`Setting`] says how much is spent at every stage. [`measure`] runs it and asks the judge; [`Sweep`] says
+//! which setting is worth measuring next; [`front`] keeps those that no other beats; [`knobs`] says what a step
+//! of each knob costs and buys.
+
+mod front;
+mod knobs;
+mod setting;
+mod sweep;
+
+use serde::{Deserialize, Serialize};
+
+use crate::budget::Watch;
+use crate::design::{self, DesignError, Finest, Inputs, StageTime};
+
+pub use self::front::{Asked, answer, front};
+pub use self::knobs::{Bought, KnobReport, knobs};
+pub use self::setting::{Estimator, Knob, Setting};
+pub use self::sweep::{Sweep, standards};
+
+/// What a setting costs and achieves.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// Processor seconds from the project to the judged answer, and the same by the clock.
+    pub cpu_seconds: f64,
+    pub seconds: f64,
+    /// By the clock, stage by stage.
+    pub stages: Vec<StageSeconds>,
+    /// Processor seconds that the judge took beside it.
+    pub judge_cpu_seconds: f64,
+    /// Most memory that it took (MB), where the system says so; what an allocator kept from runs before is in it.
+    pub memory_mb: Option<f64>,
+    /// Errors on the judge's touches: mean, median, 95th percentile, and the mean as a workshop would build it.
+    #[serde(deserialize_with = "number")]
+    pub error_mm: f64,
+    #[serde(deserialize_with = "number")]
+    pub median_mm: f64,
+    #[serde(deserialize_with = "number")]
+    pub p95_mm: f64,
+    #[serde(deserialize_with = "number")]
+    pub workshop_mm: f64,
+    /// Mean error that the design itself states, on touches of its own and elements finer than its own.
+    #[serde(deserialize_with = "number")]
+    pub own_error_mm: f64,
+    /// Estimated error of the model's displacements (%).
+    #[serde(deserialize_with = "number")]
+    pub model_percent: f64,
+    pub candidates: usize,
+    /// The chosen gauges (mm), in the order of their choice.
+    pub sites_mm: Vec<[f64; 3]>,
+}
+
+/// What is no number is written as null.
+fn number<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+/// Seconds by the clock of one stage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StageSeconds {
+    pub stage: String,
+    pub seconds: f64,
+}
+
+impl From<&StageTime> for StageSeconds {
+    fn from(time: &StageTime) -> Self {
+        Self {
+            stage: time.stage.to_owned(),
+            seconds: time.seconds,
+        }
+    }
+}
+
+/// A setting and what came of it; a message where it cannot be computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    pub setting: Setting,
+    pub outcome: Result<Measured, String>,
+}
+
+impl Point {
+    #[must_use]
+    pub fn measured(&self) -> Option<&Measured> {
+        self.outcome.as_ref().ok()
+    }
+}
+
+/// Clock and memory, which the core does not have of its own.
+pub trait Meter: Sync {
+    /// Processor seconds of this process so far.
+    fn cpu_seconds(&self) -> f64;
+    /// Seconds by the clock since any fixed moment.
+    fn seconds(&self) -> f64;
+    /// Begins to look for the most memory anew.
+    fn forget_memory(&self);
+    /// The most that was held since, beyond what was held when it was first forgotten (MB).
+    fn most_memory_mb(&self) -> Option<f64>;
+}
+
+/// Runs the road at a setting and judges what it chose.
+///
+/// # Errors
+/// [`DesignError`] only for a stop; what cannot be computed at this setting is its outcome.
+pub fn measure(
+    inputs: &Inputs,
+    setting: &Setting,
+    judge: &Finest,
+    meter: &dyn Meter,
+    watch: Watch,
+) -> Result<Point, DesignError> {
+    let outcome = match attempt(inputs, setting, judge, meter, watch) {
+        Ok(measured) => Ok(measured),
+        Err(error) if error.is_cancelled() => return Err(error),
+        Err(error) => Err(error.to_string()),
+    };
+    Ok(Point {
+        setting: *setting,
+        outcome,
+    })
+}
+
+fn attempt(
+    inputs: &Inputs,
+    setting: &Setting,
+    judge: &Finest,
+    meter: &dyn Meter,
+    watch: Watch,
+) -> Result<Measured, DesignError> {
+    let mut inputs = setting.part(inputs)?;
+    setting.apply(&mut inputs.project);
+    let project = &inputs.project;
+    let budget = setting.budget(project);
+    meter.forget_memory();
+    let (cpu, clock) = (meter.cpu_seconds(), meter.seconds());
+    let now = || meter.seconds();
+    let design = design::run(&inputs, &project.selectors(), &budget, &now, watch)?;
+    let cpu_seconds = meter.cpu_seconds() - cpu;
+    let seconds = meter.seconds() - clock;
+    let memory_mb = meter.most_memory_mb();
+    let before = meter.cpu_seconds();
+    let judged = match setting.estimator {
+        Estimator::Regression => {
+            judge.judge(&inputs, &design, setting.raised(&inputs.project), watch)?
+        }
+        Estimator::Matching => judge.judge_matching(&inputs, &design, watch)?,
+    };
+    let own = design.chosen_row().map_or(f64::NAN, |r| r.error_mm);
+    let sites = &design.simulated.dataset.sites;
+    Ok(Measured {
+        cpu_seconds,
+        seconds,
+        stages: design.seconds.iter().map(Into::into).collect(),
+        judge_cpu_seconds: meter.cpu_seconds() - before,
+        memory_mb,
+        error_mm: judged.mean_mm,
+        median_mm: judged.median_mm,
+        p95_mm: judged.p95_mm,
+        workshop_mm: judged.workshop_mm,
+        own_error_mm: own,
+        model_percent: design.simulated.discretization.displacement_percent,
+        candidates: design.reduced.sites.len(),
+        sites_mm: (design.chosen().iter())
+            .map(|&s| (sites[s].position * 1e3).to_array())
+            .collect(),
+    })
+}

@@ -1,0 +1,428 @@
+//! How much is spent at every stage: one value a knob.
+
+use serde::{Deserialize, Serialize};
+
+use crate::budget::{Budget, Limits, Quality};
+use crate::dataset::Signal;
+use crate::design::{Inputs, walled};
+use crate::placement::SelectorKind;
+use crate::project::{BadValue, Project};
+
+/// What turns readings into a place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    /// Support vector regression, as a design trains it.
+    #[default]
+    Regression,
+    /// The elastic model matched to the reading, as live touch does.
+    Matching,
+}
+
+/// A point of the trade: everything that says how much is spent.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// The quality that what is no knob comes from. A setting without limits is that quality itself.
+    pub quality: Quality,
+    /// Added to the project's seed: how much an error moves when nothing else does.
+    pub repeat: u64,
+    pub selector: SelectorKind,
+    pub signal: Signal,
+    /// Share of the variance that candidates may leave unexplained.
+    pub unexplained: f64,
+    pub estimator: Estimator,
+    pub limits: Option<Spent>,
+}
+
+/// The knobs with values of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spent {
+    /// Most vertices of the elastic model.
+    pub vertices: usize,
+    pub touches: usize,
+    pub point_tip: bool,
+    /// The wall of a shell as the solid that it is.
+    pub as_solid: bool,
+    pub selection_touches: usize,
+    pub selection_candidates: usize,
+    pub svr_tolerance_mm: f64,
+    pub folds: usize,
+    pub tuning_touches: usize,
+}
+
+/// Of what is offered to nobody: as at Draft, where every limit begins.
+const FIXED_FOLDS: usize = 3;
+const FIXED_TOLERANCE_MM: f64 = 0.1;
+
+impl Spent {
+    /// Whether a project can ask for it.
+    fn is_offered(&self) -> bool {
+        !self.as_solid
+            && !self.point_tip
+            && self.folds == FIXED_FOLDS
+            && self.svr_tolerance_mm == FIXED_TOLERANCE_MM
+    }
+}
+
+/// What can be turned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Knob {
+    Vertices,
+    Touches,
+    PointTip,
+    AsSolid,
+    Unexplained,
+    Selector,
+    SelectionTouches,
+    SelectionCandidates,
+    SvrTolerance,
+    Folds,
+    TuningTouches,
+    Signal,
+    Estimator,
+}
+
+const VERTICES: [usize; 7] = [300, 600, 1200, 2400, 4800, 9600, 19_200];
+const TOUCHES: [usize; 6] = [100, 200, 400, 800, 1600, 3200];
+const UNEXPLAINED: [f64; 5] = [0.2, 0.1, 0.05, 0.02, 0.01];
+const SELECTION_TOUCHES: [usize; 5] = [50, 100, 200, 400, 800];
+const SELECTION_CANDIDATES: [usize; 5] = [20, 40, 80, 160, 320];
+const SVR_TOLERANCE_MM: [f64; 4] = [1.0, 0.3, 0.1, 0.02];
+const FOLDS: [usize; 3] = [2, 3, 5];
+const TUNING_TOUCHES: [usize; 4] = [50, 100, 300, 1000];
+const SIGNALS: [Signal; 3] = [
+    Signal::Strain,
+    Signal::NormalDisplacement,
+    Signal::Displacement,
+];
+const ESTIMATORS: [Estimator; 2] = [Estimator::Regression, Estimator::Matching];
+/// Estimated error of displacements (%) below which no vertices are added, however many are allowed.
+const ELEMENTS_PERCENT: f64 = 0.5;
+
+impl Knob {
+    pub const ALL: [Self; 13] = [
+        Self::Vertices,
+        Self::Touches,
+        Self::PointTip,
+        Self::AsSolid,
+        Self::Unexplained,
+        Self::Selector,
+        Self::SelectionTouches,
+        Self::SelectionCandidates,
+        Self::SvrTolerance,
+        Self::Folds,
+        Self::TuningTouches,
+        Self::Signal,
+        Self::Estimator,
+    ];
+
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Vertices => "vertices of the model",
+            Self::Touches => "touches learned from",
+            Self::PointTip => "tip model",
+            Self::AsSolid => "shell or solid",
+            Self::Unexplained => "variance left unexplained",
+            Self::Selector => "selector",
+            Self::SelectionTouches => "touches that greedy SVR scores on",
+            Self::SelectionCandidates => "candidates that greedy SVR scores",
+            Self::SvrTolerance => "tolerance of regressions",
+            Self::Folds => "folds",
+            Self::TuningTouches => "touches that settings are searched on",
+            Self::Signal => "signal",
+            Self::Estimator => "estimator",
+        }
+    }
+}
+
+impl Setting {
+    /// A quality by its name, with the project's own selector, signal and variance.
+    #[must_use]
+    pub fn named(project: &Project, quality: Quality) -> Self {
+        Self {
+            quality,
+            repeat: 0,
+            selector: project.selection.selector,
+            signal: project.gauge.signal,
+            unexplained: project.candidates.unexplained,
+            estimator: Estimator::Regression,
+            limits: None,
+        }
+    }
+
+    /// Where a sweep begins: cheap, and in the middle of every ladder.
+    #[must_use]
+    pub fn centre(project: &Project) -> Self {
+        Self {
+            unexplained: 0.05,
+            limits: Some(Spent {
+                vertices: 2400,
+                touches: 400,
+                point_tip: false,
+                as_solid: false,
+                selection_touches: 200,
+                selection_candidates: 40,
+                svr_tolerance_mm: FIXED_TOLERANCE_MM,
+                folds: FIXED_FOLDS,
+                tuning_touches: 100,
+            }),
+            ..Self::named(project, Quality::Draft)
+        }
+        .canonical()
+    }
+
+    /// Makes a project compute at this setting: what it costs and achieves is then that of the point.
+    pub fn apply(&self, project: &mut Project) {
+        project.budget.quality = self.quality;
+        project.budget.seed = project.budget.seed.wrapping_add(self.repeat);
+        project.selection.selector = self.selector;
+        project.selection.compare = false;
+        project.gauge.signal = self.signal;
+        if self.signal != Signal::Strain {
+            project.gauge.directions = 1;
+        }
+        project.candidates.unexplained = self.unexplained;
+        project.budget.limits = self.budget_limits();
+    }
+
+    /// What a project that this was applied to may spend here: also what is measured but offered to nobody, because
+    /// it was found to buy nothing.
+    #[must_use]
+    pub fn budget(&self, project: &Project) -> Budget {
+        let mut budget = project.budget.budget();
+        if let Some(spent) = self.limits {
+            budget.point_tip = spent.point_tip;
+            budget.folds = spent.folds;
+            budget.svr_tolerance_mm = spent.svr_tolerance_mm;
+        }
+        budget
+    }
+
+    fn budget_limits(&self) -> Limits {
+        self.limits.map_or_else(Limits::default, |spent| Limits {
+            elements_percent: Some(ELEMENTS_PERCENT),
+            vertices: Some(spent.vertices),
+            touches: Some(spent.touches),
+            candidates: Some(100_000),
+            selection_touches: Some(spent.selection_touches),
+            selection_candidates: Some(spent.selection_candidates),
+            tuning_touches: Some(spent.tuning_touches),
+        })
+    }
+
+    /// The part as this setting takes it.
+    ///
+    /// # Errors
+    /// [`BadValue`] where a solid is to be taken as one.
+    pub fn part(&self, inputs: &Inputs) -> Result<Inputs, BadValue> {
+        if !self.is_as_solid() {
+            return Ok(inputs.clone());
+        }
+        walled(inputs).ok_or_else(|| BadValue {
+            key: "part.model".into(),
+            rule: "\"shell\" for its wall to be taken as a solid",
+            value: "\"solid\"".into(),
+        })
+    }
+
+    /// Whether a shell's wall is taken as a solid.
+    #[must_use]
+    pub fn is_as_solid(&self) -> bool {
+        self.limits.is_some_and(|spent| spent.as_solid)
+    }
+
+    /// How far (m) the face that touches press on lies above the project's own.
+    #[must_use]
+    pub fn raised(&self, project: &Project) -> f64 {
+        if self.is_as_solid() {
+            project.part.thickness_mm * 1e-3 / 2.0
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether a project computes at this setting already, but for selectors that are compared.
+    #[must_use]
+    pub fn is_of(&self, project: &Project) -> bool {
+        self.is_at(project, project.budget.quality, &project.budget.limits)
+    }
+
+    /// As [`Self::is_of`], at a quality and limits that need not be the project's.
+    #[must_use]
+    pub fn is_at(&self, project: &Project, quality: Quality, limits: &Limits) -> bool {
+        self.answers(project)
+            && (quality, *limits) == (self.quality, self.budget_limits())
+            && self.selector == project.selection.selector
+            && self.unexplained == project.candidates.unexplained
+    }
+
+    /// Whether a project can be computed so, and it answers the project's own question: with its signal and the
+    /// regression that designs state their errors by.
+    #[must_use]
+    pub fn answers(&self, project: &Project) -> bool {
+        self.signal == project.gauge.signal
+            && self.estimator == Estimator::Regression
+            && self.repeat == 0
+            && self.limits.is_none_or(|spent| spent.is_offered())
+    }
+
+    /// The same with knobs that nothing hears at their usual places, so that equal work is one setting.
+    #[must_use]
+    pub fn canonical(mut self) -> Self {
+        if self.signal != Signal::Strain {
+            self.estimator = Estimator::Regression;
+        }
+        if let Some(spent) = &mut self.limits {
+            if self.selector != SelectorKind::GreedySvr {
+                spent.selection_touches = 200;
+                spent.selection_candidates = 40;
+            }
+            spent.selection_touches = spent.selection_touches.min(spent.touches);
+            spent.tuning_touches = spent.tuning_touches.min(spent.touches);
+        }
+        self
+    }
+
+    /// The settings one step away along a knob.
+    #[must_use]
+    pub fn neighbours(&self, knob: Knob) -> Vec<Self> {
+        let mut found: Vec<Self> = match self.limits {
+            Some(spent) => self.turned(knob, spent),
+            None => Vec::new(),
+        };
+        found.iter_mut().for_each(|s| *s = s.canonical());
+        found.retain(|s| s != self);
+        found
+    }
+
+    fn turned(&self, knob: Knob, spent: Spent) -> Vec<Self> {
+        let with = |spent: Spent| Self {
+            limits: Some(spent),
+            ..*self
+        };
+        match knob {
+            Knob::Vertices => beside(&VERTICES, spent.vertices, |vertices| {
+                with(Spent { vertices, ..spent })
+            }),
+            Knob::Touches => beside(&TOUCHES, spent.touches, |touches| {
+                with(Spent { touches, ..spent })
+            }),
+            Knob::PointTip => vec![with(Spent {
+                point_tip: !spent.point_tip,
+                ..spent
+            })],
+            Knob::AsSolid => vec![with(Spent {
+                as_solid: !spent.as_solid,
+                ..spent
+            })],
+            Knob::Unexplained => beside(&UNEXPLAINED, self.unexplained, |unexplained| Self {
+                unexplained,
+                ..*self
+            }),
+            Knob::Selector => others(&SelectorKind::ALL, self.selector, |selector| Self {
+                selector,
+                ..*self
+            }),
+            Knob::SelectionTouches => {
+                beside(&SELECTION_TOUCHES, spent.selection_touches, |touches| {
+                    with(Spent {
+                        selection_touches: touches,
+                        ..spent
+                    })
+                })
+            }
+            Knob::SelectionCandidates => {
+                let now = spent.selection_candidates;
+                beside(&SELECTION_CANDIDATES, now, |candidates| {
+                    with(Spent {
+                        selection_candidates: candidates,
+                        ..spent
+                    })
+                })
+            }
+            Knob::SvrTolerance => beside(&SVR_TOLERANCE_MM, spent.svr_tolerance_mm, |mm| {
+                with(Spent {
+                    svr_tolerance_mm: mm,
+                    ..spent
+                })
+            }),
+            Knob::Folds => beside(&FOLDS, spent.folds, |folds| with(Spent { folds, ..spent })),
+            Knob::TuningTouches => beside(&TUNING_TOUCHES, spent.tuning_touches, |touches| {
+                with(Spent {
+                    tuning_touches: touches,
+                    ..spent
+                })
+            }),
+            Knob::Signal => others(&SIGNALS, self.signal, |signal| Self { signal, ..*self }),
+            Knob::Estimator => others(&ESTIMATORS, self.estimator, |estimator| Self {
+                estimator,
+                ..*self
+            }),
+        }
+    }
+
+    /// The one knob that two settings differ in.
+    #[must_use]
+    pub fn differs_in(&self, other: &Self) -> Option<Knob> {
+        let mut one = Knob::ALL
+            .into_iter()
+            .filter(|&knob| self.neighbours(knob).contains(other));
+        let knob = one.next()?;
+        one.next().is_none().then_some(knob)
+    }
+
+    /// In words, for tables and tooltips.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let Some(spent) = &self.limits else {
+            return format!("the quality “{}”", self.quality.name());
+        };
+        let mut words = format!(
+            "{} vertices, {} touches, {} % unexplained, {}",
+            spent.vertices,
+            spent.touches,
+            (self.unexplained * 1000.0).round() / 10.0,
+            self.selector.title(),
+        );
+        if self.selector == SelectorKind::GreedySvr {
+            words += &format!(
+                " on {} touches × {} candidates",
+                spent.selection_touches, spent.selection_candidates
+            );
+        }
+        words += &format!(
+            ", {} folds, tuned on {}, to {} mm",
+            spent.folds, spent.tuning_touches, spent.svr_tolerance_mm
+        );
+        if spent.as_solid {
+            words += ", as a solid";
+        }
+        if spent.point_tip {
+            words += ", point tip";
+        }
+        if self.estimator == Estimator::Matching {
+            words += ", matching";
+        }
+        format!("{words}, {}", self.signal.name())
+    }
+}
+
+/// The steps of a ladder below and above a value; the ends of the ladder have one.
+fn beside<T: Copy + PartialOrd>(ladder: &[T], now: T, with: impl Fn(T) -> Setting) -> Vec<Setting> {
+    // Ladders fall where less is dearer.
+    let falls = ladder.first() > ladder.last();
+    let before = |&&step: &&T| if falls { step > now } else { step < now };
+    let after = |&&step: &&T| if falls { step < now } else { step > now };
+    let below = ladder.iter().rfind(before);
+    let above = ladder.iter().find(after);
+    below.into_iter().chain(above).map(|&s| with(s)).collect()
+}
+
+fn others<T: Copy + PartialEq>(all: &[T], now: T, with: impl Fn(T) -> Setting) -> Vec<Setting> {
+    all.iter()
+        .filter(|&&x| x != now)
+        .map(|&x| with(x))
+        .collect()
+}

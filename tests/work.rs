@@ -1,0 +1,149 @@
+//! Only what is asked: what each kind of change computes, sends and draws, counted.
+//!
+//! The tally is of the whole process, so this is one test in a program of its own.
+#![cfg(feature = "studio")]
+
+mod window;
+
+use std::time::{Duration, Instant};
+
+use egui_kittest::kittest::Queryable as _;
+use hapdef::dataset::Signal;
+use hapdef::document::Layer;
+use hapdef::placement::SelectorKind;
+use hapdef::project::Project;
+use hapdef::studio::{Stage, Standing};
+use hapdef::tally::{self, Tally};
+use window::Window;
+
+/// Changes the project as a control would.
+fn change(w: &mut Window, how: impl FnOnce(&mut Project)) {
+    let document = &mut w.harness.state_mut().document;
+    how(&mut document.state.project);
+    document.settle();
+}
+
+/// What is done until the design stands again.
+fn until_it_stands(w: &mut Window) -> Tally {
+    let before = tally::now();
+    let start = Instant::now();
+    let stands = |w: &Window| {
+        let s = w.harness.state();
+        !s.busy() && s.standing(Stage::Evaluation) == Standing::Current
+    };
+    // What settles by itself begins after a moment of rest.
+    let mut quiet = 0;
+    while quiet < 120 {
+        assert!(
+            start.elapsed().as_secs() < 300,
+            "timed out: {:?}",
+            w.harness.state().messages
+        );
+        w.harness.step();
+        std::thread::sleep(Duration::from_millis(5));
+        quiet = if stands(w) { quiet + 1 } else { 0 };
+    }
+    tally::now().since(before)
+}
+
+fn none_computed(t: Tally) -> bool {
+    t.factorizations + t.solves + t.kernel_evaluations + t.fits == 0
+}
+
+#[test]
+fn a_change_costs_only_what_depends_on_it() {
+    let Some(mut w) = Window::open() else { return };
+    change(&mut w, |p| {
+        p.touch.count = 200;
+        p.selection.sensors = 4;
+        p.selection.compare = false;
+    });
+    // Nothing is computed before anybody asks.
+    let before = tally::now();
+    w.harness.run_ok();
+    assert!(none_computed(tally::now().since(before)));
+    w.press("Select gauges");
+    let whole = until_it_stands(&mut w);
+    // Elements laid, laid anew and halved; twice, for few touches allow finer ones; then the truth.
+    assert_eq!(whole.factorizations, 6, "{whole:?}");
+    assert!(whole.solves > 200 && whole.fits > 100, "{whole:?}");
+
+    // At rest nothing is drawn, and nothing is sent.
+    w.harness.render().unwrap();
+    let before = tally::now();
+    for _ in 0..10 {
+        w.harness.step();
+        w.harness.render().unwrap();
+    }
+    let rest = tally::now().since(before);
+    assert_eq!(rest, Tally::default(), "at rest");
+
+    // The view: drawn, from what is on the adapter.
+    let before = tally::now();
+    for view in ["Front", "Right"] {
+        w.press(view);
+        w.harness.render().unwrap();
+    }
+    let view = tally::now().since(before);
+    assert!(none_computed(view), "the view: {view:?}");
+    assert_eq!(view.uploads, 0, "the view: {view:?}");
+    assert!((1..=60).contains(&view.redraws), "the view: {view:?}");
+
+    // The painted region: what it leaves is chosen from and judged anew; the model is not.
+    w.harness.state_mut().document.fill(Layer::Feasible);
+    change(&mut w, |p| p.feasible.support_clearance_mm += 1.0);
+    let painted = until_it_stands(&mut w);
+    assert_eq!(painted.factorizations, 1, "the region: {painted:?}");
+    // The truth's gauges are solved for: at most two for each that is judged.
+    assert!(painted.solves < 200, "the region: {painted:?}");
+    assert!(painted.fits > 0);
+
+    // The number of gauges: the same.
+    change(&mut w, |p| p.selection.sensors = 3);
+    let number = until_it_stands(&mut w);
+    assert!(number.factorizations <= 1, "the number: {number:?}");
+    assert!(number.solves < 200, "the number: {number:?}");
+    assert!(number.fits < painted.fits, "the number: {number:?}");
+
+    // What gauges report: read from the elements that are there.
+    change(&mut w, |p| p.gauge.signal = Signal::Displacement);
+    let signal = until_it_stands(&mut w);
+    assert_eq!(signal.factorizations, 2, "the signal: {signal:?}");
+    assert!(signal.solves < whole.solves, "the signal: {signal:?}");
+
+    // Back: it is all there.
+    change(&mut w, |p| p.gauge.signal = Signal::Strain);
+    let back = until_it_stands(&mut w);
+    assert!(back.factorizations <= 2, "back: {back:?}");
+
+    // The thickness: everything, once.
+    change(&mut w, |p| p.part.thickness_mm *= 1.1);
+    let thickness = until_it_stands(&mut w);
+    assert_eq!(thickness.factorizations, 6, "the thickness: {thickness:?}");
+
+    // A region that errors are quoted for: nothing but sums.
+    change(&mut w, |p| {
+        let half = hapdef::project::RegionKeys {
+            name: "upper half".into(),
+            box_mm: [[-100.0, -100.0, 60.0], [100.0, 100.0, 200.0]],
+        };
+        p.evaluation.regions.push(half);
+    });
+    let region = until_it_stands(&mut w);
+    assert!(none_computed(region), "a region: {region:?}");
+
+    // Another selector alone: neither model nor truth of what is known.
+    change(&mut w, |p| p.selection.selector = SelectorKind::PcaQr);
+    let other = until_it_stands(&mut w);
+    assert!(other.factorizations <= 1, "the selector: {other:?}");
+    assert!(other.kernel_evaluations < number.kernel_evaluations);
+
+    // Looking at what is there computes nothing.
+    let before = tally::now();
+    for tab in ["Failures", "Gauge table", "Reduction", "Error"] {
+        w.click_label(tab);
+    }
+    let tabs = tally::now().since(before);
+    assert!(none_computed(tabs), "tabs: {tabs:?}");
+    assert!(w.harness.query_by_label("Trade").is_some());
+}
