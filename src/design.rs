@@ -4,6 +4,7 @@
 
 mod advise;
 mod choose;
+mod doubt;
 mod finest;
 mod ground;
 mod judge;
@@ -23,6 +24,7 @@ use crate::project::{BadValue, Masks, Project};
 
 pub use self::advise::*;
 pub use self::choose::*;
+pub use self::doubt::*;
 pub use self::finest::*;
 pub use self::ground::*;
 pub use self::judge::*;

@@ -1,6 +1,6 @@
 //! What this process has done since it began, whoever asked for it.
 //!
-//! Results state the [`Work`](crate::budget::Work) that they cost; the tally also sees work whose result nobody
+//! Results state the `Work` (`budget.rs`) that they cost; the tally also sees work whose result nobody
 //! kept. Tests hold with it that a change computes and draws only what depends on it. It is written only, never
 //! read by what it counts, so that nothing computed depends on it.
 

@@ -136,15 +136,17 @@ fn attempt(
     let (cpu, clock) = (meter.cpu_seconds(), meter.seconds());
     let now = || meter.seconds();
     let design = design::run(&inputs, &project.selectors(), &budget, &now, watch)?;
+    let matching = match setting.estimator {
+        Estimator::Regression => None,
+        Estimator::Matching => Some(design::matching(&inputs, &design, watch)?),
+    };
     let cpu_seconds = meter.cpu_seconds() - cpu;
     let seconds = meter.seconds() - clock;
     let memory_mb = meter.most_memory_mb();
     let before = meter.cpu_seconds();
-    let judged = match setting.estimator {
-        Estimator::Regression => {
-            judge.judge(&inputs, &design, setting.raised(&inputs.project), watch)?
-        }
-        Estimator::Matching => judge.judge_matching(&inputs, &design, watch)?,
+    let judged = match &matching {
+        None => judge.judge(&inputs, &design, setting.raised(&inputs.project), watch)?,
+        Some(matching) => judge.judge_matching(&inputs, &design, matching, watch)?,
     };
     let own = design.chosen_row().map_or(f64::NAN, |r| r.error_mm);
     let sites = &design.simulated.dataset.sites;

@@ -152,6 +152,38 @@ fn noise_above_every_signal_leaves_no_site() {
 }
 
 #[test]
+fn one_feasible_site_is_taken_and_a_second_is_refused() {
+    let open = sound("all sites", &limb());
+    let part = limb().part;
+    let index = hapdef::mesh::locate::SurfaceIndex::new(&part);
+    let one = open.reduced.feasible.iter().find_map(|&s| {
+        let at = index.nearest(open.simulated.dataset.sites[s].position).0;
+        let mut mask = vec![false; part.positions().len()];
+        for &v in &part.triangles()[at.triangle as usize] {
+            mask[v as usize] = true;
+        }
+        let mut inputs = limb();
+        inputs.painted = Some(Arc::new(mask));
+        inputs.project.selection.sensors = 1;
+        let left = design::filter(&inputs, &open.simulated).sites().len();
+        (left == 1).then_some(inputs)
+    });
+    let mut inputs = one.expect("a triangle with one site");
+    let design = sound("one site", &inputs);
+    assert_eq!(design.chosen().len(), 1);
+    assert_eq!(design.reduced.sites, design.chosen());
+    inputs.project.selection.sensors = 2;
+    let refused = run(&inputs).err();
+    assert_eq!(
+        refused,
+        Some(DesignError::Placement(PlacementError::TooFewSites {
+            wanted: 2,
+            available: 1
+        }))
+    );
+}
+
+#[test]
 fn the_same_limb_at_a_micrometre_and_at_a_metre() {
     // Geometric similarity: lengths and tip times k, force times k²: strains stay. On the part's own
     // triangles, for remeshing takes other turns where two choices are equal.

@@ -117,6 +117,9 @@ fn print_summary(design: &design::Design) {
             row.selector, row.sensors, row.region, row.error_mm, row.median_mm
         );
     }
+    for doubt in design.doubts() {
+        println!("NOT TO BE TRUSTED: {}", doubt.words);
+    }
     for note in design.notes() {
         println!("note: {note}");
     }

@@ -21,9 +21,10 @@ use crate::placement::greedy_svr::{self, GreedySvr};
 use crate::placement::information::Geometry;
 use crate::placement::mutual_information::MutualInformation;
 use crate::placement::{
-    PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes, pca_qr,
+    PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes, lead,
+    pca_qr,
 };
-use crate::project::CostKeys;
+use crate::project::{CostKeys, Elements};
 use crate::regression::folds::evenly;
 use crate::regression::tune::Effort;
 
@@ -283,6 +284,40 @@ pub fn select(
 /// # Errors
 /// As [`select`].
 pub fn select_step_by_step(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    kind: SelectorKind,
+    budget: &Budget,
+    watch: Watch,
+    found: Found,
+) -> Result<Selection, DesignError> {
+    let mut selection = choose(inputs, simulated, reduced, kind, budget, watch, found)?;
+    let tolerance = model_tolerance(inputs, simulated);
+    selection
+        .achieved
+        .notes
+        .extend(lead::within_model(&selection.sets, tolerance));
+    Ok(selection)
+}
+
+/// What elements leave open of any criterion, as a share: a pick that leads by less than twice this may be another
+/// on other elements, and elements that are laid anew for a part may differ wherever the part differs at all. Zero
+/// for the part's own triangles, which stay as they are.
+#[must_use]
+pub fn model_tolerance(inputs: &Inputs, simulated: &Simulated) -> f64 {
+    if inputs.project.part.elements == Elements::AsGiven {
+        return 0.0;
+    }
+    let percent = simulated.discretization.strain_percent;
+    if percent.is_nan() {
+        simulated.discretization.displacement_percent / 100.0
+    } else {
+        percent / 100.0
+    }
+}
+
+fn choose(
     inputs: &Inputs,
     simulated: &Simulated,
     reduced: &Reduced,

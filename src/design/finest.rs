@@ -131,8 +131,8 @@ impl Finest {
         })
     }
 
-    /// As [`Self::judge`], with the design's elastic model matched to each reading instead of a regression.
-    /// Gauges here read at a point, as those of a design do.
+    /// As [`Self::judge`], with the design's elastic model matched to each reading ([`matching`]) instead of a
+    /// regression.
     ///
     /// # Errors
     /// [`DesignError`] as for the design's simulation.
@@ -140,15 +140,15 @@ impl Finest {
         &self,
         inputs: &Inputs,
         design: &Design,
+        matching: &Matching,
         watch: Watch,
     ) -> Result<Judged, DesignError> {
         let truth = self.truth(inputs, &design.simulated, design.chosen(), watch)?;
-        let matching = matching(inputs, &design.simulated, &truth.sites, watch)?;
         let streams: Vec<u64> = truth.sites.iter().map(|&s| s as u64).collect();
         let [x, workshop] =
             [(&truth.x, 2), (&truth.workshop, 3)].map(|(x, draw)| noisy(inputs, x, draw, &streams));
-        let mut errors = self.found_by(&matching, &x);
-        let built = self.found_by(&matching, &workshop);
+        let mut errors = self.found_by(matching, &x);
+        let built = self.found_by(matching, &workshop);
         let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
         let (mean_mm, workshop_mm) = (mean(&errors), mean(&built));
         errors.sort_by(f64::total_cmp);
@@ -193,18 +193,20 @@ fn rows_of(truth: &Truth, sites: &[usize]) -> Vec<usize> {
     sites.iter().filter_map(row).collect()
 }
 
-/// A design's elastic model, ready to be matched to what gauges at some of its sites read.
-fn matching(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    sites: &[usize],
-    watch: Watch,
-) -> Result<Matching, DesignError> {
+/// A design's elastic model, ready to be matched to what its chosen gauges read, in the order of their numbers in
+/// the dataset. Gauges here read at a point, as those of a design do.
+///
+/// # Errors
+/// [`DesignError`] as for the design's simulation.
+pub fn matching(inputs: &Inputs, design: &Design, watch: Watch) -> Result<Matching, DesignError> {
     /// Side of a grid (m) that reads at a point.
     const POINT: f64 = 1e-9;
     let project = &inputs.project;
     debug_assert_eq!(project.gauge.signal, Signal::Strain);
+    let simulated = &design.simulated;
     let model = simulated.model()?;
+    let mut sites = design.chosen().to_vec();
+    sites.sort_unstable();
     let gauge = |&s: &usize| {
         let site = &simulated.dataset.sites[s];
         Gauge {

@@ -267,23 +267,7 @@ impl Checks {
     /// What makes the solution untrustworthy, in plain words.
     #[must_use]
     pub fn distrust(&self) -> Vec<String> {
-        /// Beyond these, fewer than about five digits of a displacement can be right.
-        const BALANCE: f64 = 1e-5;
-        const PIVOT: f64 = 1e-11;
-        let mut notes = Vec::new();
-        let worst = self.reaction_error.max(self.energy_error);
-        if worst.is_nan() || worst > BALANCE {
-            notes.push(format!(
-                "The solution is out of balance by {worst:.0e} of the load: do not trust it. Check thickness, unit and supports."
-            ));
-        }
-        if self.smallest_pivot < PIVOT {
-            notes.push(format!(
-                "The model is nearly singular (smallest scaled pivot {:.0e}): the shell is very thin for its elements or barely held.",
-                self.smallest_pivot
-            ));
-        }
-        notes
+        self.doubts().into_iter().map(|d| d.words).collect()
     }
 }
 

@@ -228,6 +228,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         "evaluation": design.evaluation.rows,
         "failures": design.evaluation.failures,
         "gaussian_process": design.reduced.geometry().map(Geometry::summary),
+        "doubts": design.doubts(),
         "model": {
             "vertices": design.simulated.mesh.positions().len(),
             "unknowns": design.simulated.unknowns,

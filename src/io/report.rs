@@ -19,6 +19,7 @@ th,td{padding:5px 10px;text-align:right;white-space:nowrap;border-bottom:1px sol
 .views{display:grid;grid-template-columns:repeat(auto-fit,minmax(220px,1fr));gap:14px}figure{margin:0}figcaption{text-align:center;color:#4a5568;font-size:13px}
 svg{width:100%;height:auto;display:block}svg text{font:12px system-ui,sans-serif;fill:#1d2430}svg text.n{font:bold 10px system-ui,sans-serif}svg text.t{font-weight:600}svg .grid{stroke:#e1e5ea;fill:none}
 svg.limb path{stroke-width:.4}.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:18px}
+div.doubts{background:#fdecea;border-left:4px solid #b3261e;padding:10px 18px;margin:12px 0}div.doubts ul{margin:6px 0}
 ul.notes{background:#fff7e6;border-left:4px solid #d9a441;padding:10px 28px;margin:12px 0}
 .numbers{display:flex;flex-wrap:wrap;gap:10px 34px;margin:14px 0}.numbers b{display:block;font-size:21px}.numbers span{color:#4a5568;font-size:13px}
 details{overflow-x:auto;margin:10px 0}summary{cursor:pointer;color:#0072b2}table.map td{text-align:center}
@@ -82,6 +83,14 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
     number(page, &design.reduced.feasible.len().to_string(), "feasible");
     number(page, &design.reduced.sites.len().to_string(), "candidates");
     page.push_str("</div>");
+    let doubts = design.doubts();
+    if !doubts.is_empty() {
+        page.push_str("<div class=\"doubts\"><b>Numbers here that cannot be trusted</b><ul>");
+        for doubt in &doubts {
+            let _ = write!(page, "<li>{}</li>", escape(&doubt.words));
+        }
+        page.push_str("</ul></div>");
+    }
     let notes = design.notes();
     if !notes.is_empty() {
         page.push_str("<ul class=\"notes\">");

@@ -270,7 +270,7 @@ pub fn markdown(project: &Project, record: &Record) -> String {
     let best = front(project, &record.points);
     let named = (record.points.iter())
         .filter(|p| p.setting.limits.is_none() && !best.iter().any(|b| std::ptr::eq(*b, *p)));
-    for point in best.iter().copied().chain(named) {
+    for point in thinned(&best).into_iter().chain(named) {
         let Some(m) = point.measured() else { continue };
         let memory = m
             .memory_mb
@@ -288,16 +288,17 @@ pub fn markdown(project: &Project, record: &Record) -> String {
     let (reports, spread) = knobs(&record.points);
     let _ = writeln!(
         text,
-        "\nWhat one step of each knob brings, from the cheaper to the dearer (medians over pairs of settings that differ in it alone). With another seed and nothing else the mean error moves by {spread:.0} %.\n\n| knob | pairs | processor time | mean error | median error | buys |\n|---|---|---|---|---|---|"
+        "\nWhat one step of each knob brings (medians over pairs of settings that differ in it alone; the mean error with its standard error). With another seed and nothing else the mean error moves by {spread:.0} %.\n\n| knob | pairs | processor time | mean error | median error | buys |\n|---|---|---|---|---|---|"
     );
     for r in &reports {
         let _ = writeln!(
             text,
-            "| {} | {} | {:+.0} % | {:+.0} % | {:+.0} % | {} |",
+            "| {} | {} | {:+.0} % | {:+.0} ± {:.0} % | {:+.0} % | {} |",
             r.knob.name(),
             r.pairs,
             r.cpu_percent,
             r.error_percent,
+            r.scatter_percent,
             r.median_percent,
             bought(r)
         );
@@ -305,11 +306,27 @@ pub fn markdown(project: &Project, record: &Record) -> String {
     text
 }
 
+/// Those points of a front that are better than the last one kept by a figure that is worth a row.
+fn thinned<'a>(front: &[&'a Point]) -> Vec<&'a Point> {
+    const WORTH: f64 = 0.05;
+    let mut kept: Vec<&Point> = Vec::new();
+    let mut last = f64::INFINITY;
+    for (k, point) in front.iter().enumerate() {
+        let error = point.measured().map_or(f64::INFINITY, |m| m.error_mm);
+        if error < (1.0 - WORTH) * last || k + 1 == front.len() {
+            kept.push(point);
+            last = error;
+        }
+    }
+    kept
+}
+
 fn bought(report: &KnobReport) -> &'static str {
     match report.bought {
         Bought::Accuracy => "accuracy",
+        Bought::Unclear => "too little to tell",
         Bought::Nothing => "nothing",
-        Bought::Idle => "nothing, and is free",
+        Bought::Idle => "nothing, and costs nothing",
     }
 }
 

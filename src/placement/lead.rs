@@ -66,6 +66,28 @@ pub fn ties(sets: &[SensorSet], tolerance: f64) -> Option<String> {
     })
 }
 
+/// As [`ties`], for what elements leave open of the criterion: which picks are firm on any others as good.
+#[must_use]
+pub fn within_model(sets: &[SensorSet], tolerance: f64) -> Option<String> {
+    let firm = |s: &&SensorSet| s.lead.is_none_or(|lead| lead > 2.0 * tolerance);
+    let number = |s: &SensorSet| s.sites.len().to_string();
+    let open = sets.len() - sets.iter().filter(firm).count();
+    if open == 0 {
+        return None;
+    }
+    let firm: Vec<String> = sets.iter().filter(firm).map(number).collect();
+    let clear = if firm.is_empty() {
+        "none of them leads by more".to_owned()
+    } else {
+        format!("those with {} gauges lead by more", firm.join(", "))
+    };
+    Some(format!(
+        "The elements leave {:.1} % open: of {} choices {open} lead the next best by less than twice that and may be others, as good, on other elements; {clear}.",
+        100.0 * tolerance,
+        sets.len()
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -110,6 +110,7 @@ impl Studio {
                 ui.colored_label(super::theme::STALE, "of settings that have changed since");
             }
             self.by_hand_label(ui);
+            self.doubt_label(ui);
         });
         ui.separator();
         let nothing = self.design.is_none() && self.compared().next().is_none();
@@ -130,6 +131,22 @@ impl Studio {
             Tab::Live => self.live_tab(ui),
             Tab::Jobs => self.jobs_tab(ui),
         }
+    }
+
+    /// Beside every figure of a design that cannot be trusted: that it cannot, and why.
+    fn doubt_label(&self, ui: &mut Ui) {
+        let doubts = self
+            .design
+            .as_ref()
+            .map_or_else(Vec::new, |d| d.design.doubts());
+        if doubts.is_empty() || !self.results.is_of_design() {
+            return;
+        }
+        let numbers: Vec<&str> = doubts.iter().map(|d| d.number).collect();
+        let words: Vec<&str> = doubts.iter().map(|d| d.words.as_str()).collect();
+        let text = format!("not to be trusted: {}", numbers.join(", "));
+        ui.colored_label(super::theme::ERROR, text)
+            .on_hover_text(words.join("\n"));
     }
 
     /// What gauges that were moved by hand do to the error.

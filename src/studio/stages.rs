@@ -138,6 +138,7 @@ impl Studio {
             for line in lines {
                 ui.add(egui::Label::new(RichText::new(line).size(11.5).weak()).wrap());
             }
+            self.doubts_of(ui, stage);
             self.notes_of(ui, stage);
             for &command in next {
                 self.button(ui, command);
@@ -372,6 +373,23 @@ impl Studio {
         let stages = self.design.iter().flat_map(|d| &d.design.seconds);
         let found = { stages }.find(|s| s.stage == stage);
         found.map_or_else(String::new, |s| format!(", {:.1} s", s.seconds))
+    }
+
+    /// What cannot be trusted, in the open.
+    fn doubts_of(&self, ui: &mut Ui, stage: Stage) {
+        let doubts = match (stage, &self.simulation, &self.design) {
+            (Stage::Simulation, Some(s), _) => s.simulated.doubts(),
+            (Stage::Evaluation, _, Some(d)) => {
+                let of_model = d.design.simulated.doubts();
+                let doubts = d.design.doubts().into_iter();
+                doubts.filter(|d| !of_model.contains(d)).collect()
+            }
+            _ => return,
+        };
+        for doubt in doubts {
+            let text = RichText::new(format!("Not to be trusted: {}", doubt.words));
+            ui.add(egui::Label::new(text.size(11.5).color(theme::ERROR)).wrap());
+        }
     }
 
     /// What a reader must know before a result is believed, folded up.

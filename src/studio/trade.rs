@@ -219,13 +219,14 @@ impl Studio {
             predicted_mm: m.own_error_mm,
             achieved_mm: design.chosen_row().map_or(f64::NAN, |r| r.error_mm),
         };
-        if promise.is_broken() {
+        let elsewhere = matches!(self.trade.record, Some((_, Place::Elsewhere)));
+        // Of another machine's times nothing was promised here before the first run.
+        if promise.is_broken() && !(elsewhere && self.trade.pace == 1.0) {
             self.tell(format!(
                 "The prediction was off by more than a factor of two: {}. Other work may run on this machine; “Measure the trade” measures it anew",
                 promise.in_words()
             ));
         }
-        let elsewhere = matches!(self.trade.record, Some((_, Place::Elsewhere)));
         if elsewhere && predicted_s > 0.0 {
             self.trade.pace = achieved_s / predicted_s;
         }

@@ -4,28 +4,33 @@ use serde::{Deserialize, Serialize};
 
 use super::{Knob, Measured, Point};
 
-/// What paying more at a knob brought.
+/// What turning a knob up brought.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Bought {
-    /// The error falls by more than it moves by itself.
+    /// The error falls, and by more than its own scatter over the pairs.
     Accuracy,
-    /// It does not, though the knob costs time.
+    /// It falls, but no more than it scatters.
+    Unclear,
+    /// It does not fall, though time goes up.
     Nothing,
-    /// Neither time nor error moves by more than they do by themselves.
+    /// Neither moves.
     Idle,
 }
 
-/// One knob over all pairs of measured settings that differ by one step of it, each from the cheaper to the
-/// dearer.
+/// One knob over all pairs of measured settings that differ by one step of it alone, each turned the way that is
+/// thought to help: more of everything, from the project's usual signal, estimator and model to another, from
+/// another selector to greedy SVR.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KnobReport {
     pub knob: Knob,
     pub pairs: usize,
-    /// Medians of the change from the cheaper to the dearer (%): processor time, mean and median error.
+    /// Medians of the change (%): processor time, mean and median error.
     pub cpu_percent: f64,
     pub error_percent: f64,
     pub median_percent: f64,
+    /// Standard error of the change of the mean error (%).
+    pub scatter_percent: f64,
     pub bought: Bought,
 }
 
@@ -43,29 +48,28 @@ pub fn knobs(points: &[Point]) -> (Vec<KnobReport>, f64) {
 }
 
 fn report(knob: Knob, points: &[Point], spread: f64) -> Option<KnobReport> {
-    /// A step that moves the time by less is free (%).
+    /// A step that moves the time by less is free, and one that moves the error by less does not (%).
     const FREE: f64 = 5.0;
+    const STILL: f64 = 3.0;
     let pairs = pairs(knob, points);
     if pairs.is_empty() {
         return None;
     }
-    let change = |figure: fn(&Measured) -> f64| {
-        median(
-            pairs
-                .iter()
-                .map(|(a, b)| 100.0 * (figure(b) / figure(a)).ln())
-                .collect(),
-        )
+    let changes = |figure: fn(&Measured) -> f64| -> Vec<f64> {
+        let change = |(a, b): &(&Measured, &Measured)| 100.0 * (figure(b) / figure(a)).ln();
+        pairs.iter().map(change).collect()
     };
+    let errors = changes(|m| m.error_mm);
+    let scatter = scatter(&errors, spread);
     let [cpu, error, middle] = [
-        change(|m| m.cpu_seconds),
-        change(|m| m.error_mm),
-        change(|m| m.median_mm),
+        median(changes(|m| m.cpu_seconds)),
+        median(errors),
+        median(changes(|m| m.median_mm)),
     ];
-    // The median of n pairs moves by less than one of them does.
-    let noise = spread * std::f64::consts::SQRT_2 / (pairs.len() as f64).sqrt();
-    let bought = if error < -noise {
+    let bought = if error < -2.0 * scatter {
         Bought::Accuracy
+    } else if error < -STILL {
+        Bought::Unclear
     } else if cpu > FREE {
         Bought::Nothing
     } else {
@@ -78,23 +82,39 @@ fn report(knob: Knob, points: &[Point], spread: f64) -> Option<KnobReport> {
         cpu_percent: percent(cpu),
         error_percent: percent(error),
         median_percent: percent(middle),
+        scatter_percent: scatter,
         bought,
     })
 }
 
-/// Settings one step of a knob apart, the cheaper first.
+/// Standard error of the median of some changes (%): from their own scatter, and where they are too few to have
+/// one from that of repeats.
+fn scatter(changes: &[f64], spread: f64) -> f64 {
+    /// Of a median over that of a mean, for normal values.
+    const MEDIAN: f64 = 1.253;
+    const FEW: usize = 3;
+    let n = changes.len() as f64;
+    let one = if changes.len() < FEW {
+        spread * std::f64::consts::SQRT_2
+    } else {
+        let mean = changes.iter().sum::<f64>() / n;
+        let squares: f64 = changes.iter().map(|c| (c - mean).powi(2)).sum();
+        (squares / (n - 1.0)).sqrt()
+    };
+    MEDIAN * one / n.sqrt()
+}
+
+/// Settings one step of a knob apart, the lower first.
 fn pairs(knob: Knob, points: &[Point]) -> Vec<(&Measured, &Measured)> {
     let mut found = Vec::new();
-    for (k, a) in points.iter().enumerate() {
-        for b in &points[k + 1..] {
-            if a.setting.repeat + b.setting.repeat > 0
-                || a.setting.differs_in(&b.setting) != Some(knob)
+    let single: Vec<&Point> = points.iter().filter(|p| p.setting.repeat == 0).collect();
+    for a in &single {
+        for b in &single {
+            if a.setting.rank(knob) < b.setting.rank(knob)
+                && a.setting.differs_in(&b.setting) == Some(knob)
+                && let (Some(x), Some(y)) = (a.measured(), b.measured())
             {
-                continue;
-            }
-            if let (Some(x), Some(y)) = (a.measured(), b.measured()) {
-                let rises = x.cpu_seconds <= y.cpu_seconds;
-                found.push(if rises { (x, y) } else { (y, x) });
+                found.push((x, y));
             }
         }
     }
@@ -180,5 +200,6 @@ mod tests {
         assert!((of(Knob::Vertices).error_percent + 29.3).abs() < 0.1);
         assert_eq!(of(Knob::Folds).bought, Bought::Nothing);
         assert_eq!(of(Knob::PointTip).bought, Bought::Idle);
+        assert!(of(Knob::Folds).cpu_percent > 10.0);
     }
 }

@@ -50,9 +50,10 @@ pub struct Spent {
     pub tuning_touches: usize,
 }
 
-/// Of what is offered to nobody: as at Draft, where every limit begins.
+/// Of what was found to buy nothing beyond and is offered to nobody.
 const FIXED_FOLDS: usize = 3;
 const FIXED_TOLERANCE_MM: f64 = 0.1;
+const FIXED_TUNING: usize = 100;
 
 impl Spent {
     /// Whether a project can ask for it.
@@ -60,6 +61,7 @@ impl Spent {
         !self.as_solid
             && !self.point_tip
             && self.folds == FIXED_FOLDS
+            && self.tuning_touches == FIXED_TUNING.min(self.touches)
             && self.svr_tolerance_mm == FIXED_TOLERANCE_MM
     }
 }
@@ -122,17 +124,17 @@ impl Knob {
         match self {
             Self::Vertices => "vertices of the model",
             Self::Touches => "touches learned from",
-            Self::PointTip => "tip model",
-            Self::AsSolid => "shell or solid",
+            Self::PointTip => "tip model: a point",
+            Self::AsSolid => "shell taken as a solid",
             Self::Unexplained => "variance left unexplained",
-            Self::Selector => "selector",
+            Self::Selector => "selector: greedy SVR",
             Self::SelectionTouches => "touches that greedy SVR scores on",
             Self::SelectionCandidates => "candidates that greedy SVR scores",
             Self::SvrTolerance => "tolerance of regressions",
             Self::Folds => "folds",
             Self::TuningTouches => "touches that settings are searched on",
-            Self::Signal => "signal",
-            Self::Estimator => "estimator",
+            Self::Signal => "signal: displacements",
+            Self::Estimator => "estimator: matching",
         }
     }
 }
@@ -166,11 +168,25 @@ impl Setting {
                 selection_candidates: 40,
                 svr_tolerance_mm: FIXED_TOLERANCE_MM,
                 folds: FIXED_FOLDS,
-                tuning_touches: 100,
+                tuning_touches: FIXED_TUNING,
             }),
             ..Self::named(project, Quality::Draft)
         }
         .canonical()
+    }
+
+    /// Where a sweep looks for accuracy: every ladder further up.
+    #[must_use]
+    pub fn fine(project: &Project) -> Self {
+        let centre = Self::centre(project);
+        let limits = centre.limits.map(|spent| Spent {
+            vertices: 4800,
+            touches: 1600,
+            selection_touches: 400,
+            selection_candidates: 80,
+            ..spent
+        });
+        Self { limits, ..centre }.canonical()
     }
 
     /// Makes a project compute at this setting: what it costs and achieves is then that of the point.
@@ -195,6 +211,7 @@ impl Setting {
         if let Some(spent) = self.limits {
             budget.point_tip = spent.point_tip;
             budget.folds = spent.folds;
+            budget.tuning_touches = spent.tuning_touches;
             budget.svr_tolerance_mm = spent.svr_tolerance_mm;
         }
         budget
@@ -208,7 +225,6 @@ impl Setting {
             candidates: Some(100_000),
             selection_touches: Some(spent.selection_touches),
             selection_candidates: Some(spent.selection_candidates),
-            tuning_touches: Some(spent.tuning_touches),
         })
     }
 
@@ -360,6 +376,27 @@ impl Setting {
                 estimator,
                 ..*self
             }),
+        }
+    }
+
+    /// How far a knob is turned up; settings of one rank are not compared.
+    #[must_use]
+    pub fn rank(&self, knob: Knob) -> f64 {
+        let of = |value: fn(&Spent) -> f64| self.limits.as_ref().map_or(f64::NAN, value);
+        match knob {
+            Knob::Vertices => of(|s| s.vertices as f64),
+            Knob::Touches => of(|s| s.touches as f64),
+            Knob::PointTip => of(|s| f64::from(u8::from(s.point_tip))),
+            Knob::AsSolid => of(|s| f64::from(u8::from(s.as_solid))),
+            Knob::Unexplained => -self.unexplained,
+            Knob::Selector => f64::from(u8::from(self.selector == SelectorKind::GreedySvr)),
+            Knob::SelectionTouches => of(|s| s.selection_touches as f64),
+            Knob::SelectionCandidates => of(|s| s.selection_candidates as f64),
+            Knob::SvrTolerance => of(|s| -s.svr_tolerance_mm),
+            Knob::Folds => of(|s| s.folds as f64),
+            Knob::TuningTouches => of(|s| s.tuning_touches as f64),
+            Knob::Signal => f64::from(u8::from(self.signal != Signal::Strain)),
+            Knob::Estimator => f64::from(u8::from(self.estimator == Estimator::Matching)),
         }
     }
 

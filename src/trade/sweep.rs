@@ -58,7 +58,8 @@ impl<'a> Sweep<'a> {
             .into_iter()
             .flat_map(|knob| centre.neighbours(knob))
             .filter(|s| self.is_possible(s));
-        repeats.chain(turned).collect()
+        let fine = Setting::fine(self.project);
+        repeats.chain(turned).chain([fine]).collect()
     }
 
     /// What lies one step from the front: from its two ends inward, and at each of its points the knobs first that

@@ -266,7 +266,7 @@ impl Studio {
         egui::CollapsingHeader::new("What each knob buys").show(ui, |ui| {
             let (reports, spread) = knobs(&self.points());
             ui.weak(format!(
-                "One step dearer; with another seed alone the error moves by {spread:.0} %"
+                "One step each; with another seed alone the error moves by {spread:.0} %"
             ));
             egui::Grid::new("knobs")
                 .num_columns(3)

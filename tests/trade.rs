@@ -1,0 +1,325 @@
+//! Speed against accuracy: measured, stopped and gone on from, reproduced, and turned as a dial in the window.
+#![cfg(feature = "studio")]
+
+mod window;
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use egui_kittest::kittest::Queryable as _;
+use hapdef::budget::{Quality, unwatched};
+use hapdef::cli;
+use hapdef::design::{self, Finest, Inputs};
+use hapdef::io::ProcessMeter;
+use hapdef::io::trade_file::{self, Record};
+use hapdef::studio::{Stage, Standing};
+use hapdef::trade::{Asked, Estimator, Knob, Setting, measure};
+use window::Window;
+
+fn hapdef(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hapdef"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+/// A coarse limb with few gauges and touches, in a folder.
+fn small(folder: &Path) -> String {
+    let made = hapdef(&[
+        "limb",
+        "--out",
+        folder.to_str().unwrap(),
+        "--element",
+        "6",
+        "--no-sites",
+    ]);
+    assert!(made.status.success(), "{made:?}");
+    let path = folder.join("limb.hapdef.toml");
+    let mut text = std::fs::read_to_string(&path).unwrap();
+    for (from, to) in [
+        ("count = 4000", "count = 120"),
+        ("spacing_mm = 2.1", "spacing_mm = 4.1"),
+        ("edge_radius_mm = 2.1", "edge_radius_mm = 4.0"),
+        ("sensors = 10", "sensors = 3"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        text = text.replacen(from, to, 1);
+    }
+    std::fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+fn inputs(project: &str) -> Inputs {
+    cli::open(Path::new(project), None).unwrap().inputs
+}
+
+#[test]
+fn a_sweep_goes_on_from_what_is_there_and_its_points_can_be_had_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = small(folder.path());
+    let out = folder.path().join("trade");
+    let out = out.to_str().unwrap();
+    let sweep = |points: &str, more: &[&str]| {
+        let all = [
+            &[
+                "trade",
+                &project,
+                "--out",
+                out,
+                "--points",
+                points,
+                "--qualities",
+            ][..],
+            more,
+        ]
+        .concat();
+        let done = hapdef(&all);
+        assert!(done.status.success(), "{done:?}");
+        String::from_utf8_lossy(&done.stderr)
+            .lines()
+            .filter(|l| l.contains(" vertices, "))
+            .count()
+    };
+    assert_eq!(sweep("5", &[]), 5);
+    let first = trade_file::read(Path::new(out)).unwrap().unwrap();
+    // Nothing is measured twice, and what is there stays to the byte.
+    assert_eq!(sweep("7", &[]), 2);
+    let record = trade_file::read(Path::new(out)).unwrap().unwrap();
+    assert_eq!(record.points[..5], first.points[..]);
+    assert_eq!(sweep("7", &[]), 0);
+    for name in ["trade.csv", "trade.md", "trade.svg"] {
+        assert!(Path::new(out).join(name).exists(), "{name}");
+    }
+    let csv = std::fs::read_to_string(Path::new(out).join("trade.csv")).unwrap();
+    let columns: Vec<usize> = csv.lines().map(|l| l.split(',').count()).collect();
+    assert!(
+        columns.len() == 8 && columns.iter().all(|c| *c == columns[0]),
+        "{csv}"
+    );
+    // The judge is finer than any of them.
+    let point = record.points[0].measured().unwrap();
+    let mut again = inputs(&project);
+    record.points[0].setting.apply(&mut again.project);
+    let budget = record.points[0].setting.budget(&again.project);
+    let kinds = again.project.selectors();
+    let design = design::run(&again, &kinds, &budget, &|| 0.0, &unwatched).unwrap();
+    assert!(record.judge.element_mm < 0.7 * design.simulated.element_mm);
+    assert!(record.judge.element_mm < design.truth.element_mm);
+    // The setting reproduces the point.
+    let sites = &design.simulated.dataset.sites;
+    let places: Vec<[f64; 3]> = (design.chosen().iter())
+        .map(|&s| (sites[s].position * 1e3).to_array())
+        .collect();
+    assert_eq!(places, point.sites_mm);
+    assert_eq!(design.chosen_row().unwrap().error_mm, point.own_error_mm);
+    // Another part's trade is left alone.
+    let text = std::fs::read_to_string(&project).unwrap();
+    std::fs::write(&project, text.replace("sensors = 3", "sensors = 4")).unwrap();
+    let other = hapdef(&["trade", &project, "--out", out]);
+    let said = String::from_utf8_lossy(&other.stderr).into_owned();
+    assert!(
+        !other.status.success() && said.contains("Choose another folder"),
+        "{said}"
+    );
+}
+
+#[test]
+fn the_dial_writes_a_project_that_keeps_its_word() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = small(folder.path());
+    let out = folder.path().join("trade");
+    let name = out.to_str().unwrap();
+    let done = hapdef(&[
+        "trade",
+        &project,
+        "--out",
+        name,
+        "--points",
+        "6",
+        "--qualities",
+    ]);
+    assert!(done.status.success(), "{done:?}");
+    let asked = hapdef(&[
+        "trade",
+        &project,
+        "--out",
+        name,
+        "--of-the-best-mm",
+        "0",
+        "--json",
+    ]);
+    assert!(asked.status.success(), "{asked:?}");
+    let said: serde_json::Value = serde_json::from_slice(&asked.stdout).unwrap();
+    let promised = said["outcome"]["Ok"]["own_error_mm"].as_f64().unwrap();
+    let answer = out.join("answer.hapdef.toml");
+    let report = folder.path().join("report");
+    let done = hapdef(&[
+        "design",
+        answer.to_str().unwrap(),
+        "--out",
+        report.to_str().unwrap(),
+        "--json",
+    ]);
+    assert!(done.status.success(), "{done:?}");
+    let summary: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    let rows = summary["evaluation"].as_array().unwrap();
+    let chosen = rows
+        .iter()
+        .find(|r| r["sensors"] == 3 && r["region"] == "all touches")
+        .unwrap();
+    assert_eq!(chosen["error_mm"].as_f64().unwrap(), promised);
+    // Only what was asked for was computed.
+    assert_eq!(summary["selections"].as_array().unwrap().len(), 1);
+    let never = hapdef(&["trade", &project, "--out", name, "--within-s", "0"]);
+    let said = String::from_utf8_lossy(&never.stderr).into_owned();
+    assert!(
+        !never.status.success() && said.contains("the quickest took"),
+        "{said}"
+    );
+}
+
+#[test]
+fn knobs_do_what_they_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let inputs = inputs(&small(folder.path()));
+    let centre = Setting::centre(&inputs.project);
+    let judge = Finest::new(&inputs, &unwatched).unwrap();
+    let meter = ProcessMeter::default();
+    let run = |setting: &Setting| {
+        let point = measure(&inputs, setting, &judge, &meter, &unwatched).unwrap();
+        point.outcome.unwrap()
+    };
+    let base = run(&centre);
+    assert!(base.error_mm.is_finite() && base.error_mm < 60.0);
+    // The same setting gives the same answer.
+    assert_eq!(run(&centre).error_mm, base.error_mm);
+    for knob in [Knob::PointTip, Knob::AsSolid, Knob::Estimator, Knob::Signal] {
+        let turned = centre.neighbours(knob)[0];
+        assert_eq!(centre.differs_in(&turned), Some(knob));
+        assert!(!turned.answers(&inputs.project));
+        let found = run(&turned);
+        assert!(
+            found.error_mm.is_finite() && found.error_mm < 60.0,
+            "{knob:?}"
+        );
+        assert_ne!(found.error_mm, base.error_mm, "{knob:?}");
+        if turned.estimator == Estimator::Matching {
+            assert_eq!(found.sites_mm, base.sites_mm);
+        }
+    }
+}
+
+/// The bundled record is of the bundled limb, and what the README shows is what it says.
+#[test]
+fn the_bundled_trade_is_of_the_bundled_limb() {
+    let text = include_str!("../assets/trade/trade.json");
+    let record = Record::parse(text).unwrap();
+    let inputs = cli::bundled().unwrap().inputs;
+    assert!(
+        record.is_of(&inputs),
+        "remake it: cargo bench --bench trade"
+    );
+    let tables = trade_file::markdown(&inputs.project, &record);
+    assert_eq!(tables, include_str!("../assets/trade/trade.md"));
+    assert!(include_str!("../README.md").contains(tables.trim_end()));
+    for quality in [Quality::Draft, Quality::Standard] {
+        let named = Setting::named(&inputs.project, quality);
+        assert!(
+            record
+                .points
+                .iter()
+                .any(|p| p.setting == named && p.outcome.is_ok())
+        );
+    }
+}
+
+#[test]
+fn the_dial_turns_in_the_window() {
+    let Some(mut w) = Window::open() else { return };
+    w.click_label("Trade");
+    w.show("trade-bundled");
+    assert!(
+        w.harness
+            .query_by_label("Error against time of all measured settings")
+            .is_some()
+    );
+    assert!(w.harness.state().predicted(Quality::Draft).is_some());
+    w.assert_named("the tab Trade");
+    // A setting of the front, from the table.
+    let before = w.harness.state().document.state.project.clone();
+    w.harness
+        .get_all_by_label_contains("Use ")
+        .next()
+        .unwrap()
+        .click();
+    w.harness.run_ok();
+    let applied = w.harness.state().document.state.project.clone();
+    assert!(!applied.budget.limits.are_none() && !applied.selection.compare);
+    w.press("Undo");
+    assert_eq!(w.harness.state().document.state.project, before);
+    // The dial: the quickest there is, at once.
+    let ctx = w.harness.ctx.clone();
+    w.harness.state_mut().ask_for(&ctx, Asked::OfTheBest(1e3));
+    w.wait("the answer", 120, |s| {
+        !s.busy() && s.standing(Stage::Evaluation) == Standing::Current
+    });
+    let promise = w.harness.state().promise().unwrap().clone();
+    assert!(promise.achieved_s > 0.0 && promise.predicted_s > 0.0);
+    // The same setting, on the same elements: the same error.
+    assert!(
+        (promise.achieved_mm / promise.predicted_mm - 1.0).abs() < 0.02,
+        "{promise:?}"
+    );
+    w.show("trade-answered");
+    let said = w
+        .harness
+        .state()
+        .messages
+        .iter()
+        .any(|m| m.text.starts_with("Set to "));
+    assert!(said);
+    // No time at all.
+    w.harness.state_mut().ask_for(&ctx, Asked::Within(0.0));
+    w.harness.run_ok();
+    let refused = w
+        .harness
+        .state()
+        .messages
+        .iter()
+        .any(|m| m.text.contains("answers as quickly"));
+    assert!(refused);
+}
+
+#[test]
+fn a_trade_is_measured_in_the_window_and_kept() {
+    let Some(mut w) = Window::open() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let project = small(folder.path());
+    w.open_file(Path::new(&project), None);
+    let home = folder.path().join("trades");
+    w.harness.state_mut().keep_trades_in(&home);
+    w.harness.run_ok();
+    w.click_label("Trade");
+    assert!(w.harness.state().predicted(Quality::Draft).is_none());
+    w.press("Measure the trade");
+    let files = || std::fs::read_dir(&home).map_or(0, Iterator::count);
+    w.wait("the first point", 240, |_| files() == 1);
+    w.show("trade-measuring");
+    // Ended on the way, it keeps what it has.
+    w.press("Cancel: Measure the trade");
+    w.harness.run_ok();
+    let path = std::fs::read_dir(&home)
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
+    let record = Record::parse(&std::fs::read_to_string(path).unwrap()).unwrap();
+    assert!(!record.points.is_empty());
+    assert!(record.is_of(&inputs(&project)));
+    assert!(
+        w.harness
+            .query_by_label_contains("measured on this machine")
+            .is_some()
+    );
+}
