@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::budget::Watch;
 use crate::design::{self, DesignError, Finest, Inputs, StageTime};
 
-pub use self::front::{Asked, answer, front};
+pub use self::front::{Asked, answer, clock, front};
 pub use self::knobs::{Bought, KnobReport, knobs};
 pub use self::setting::{Estimator, Knob, Setting};
 pub use self::sweep::{Sweep, standards};

@@ -251,12 +251,28 @@ fn the_dial_turns_in_the_window() {
         .get_all_by_label_contains("Use ")
         .next()
         .unwrap()
-        .click();
+        .click_accesskit();
     w.harness.run_ok();
     let applied = w.harness.state().document.state.project.clone();
     assert!(!applied.budget.limits.are_none() && !applied.selection.compare);
-    w.press("Undo");
+    w.key(egui::Modifiers::COMMAND, egui::Key::Z);
     assert_eq!(w.harness.state().document.state.project, before);
+    // A click on a point of the plot, wherever one is first met.
+    let figure = w
+        .harness
+        .get_by_label("Error against time of all measured settings")
+        .rect();
+    let across = (0..40).map(|k| k as f32 / 39.0);
+    let places = across.flat_map(|x| (0..24).map(move |y| egui::vec2(x, y as f32 / 23.0)));
+    for place in places {
+        w.click(figure.min + figure.size() * place);
+        if w.harness.state().document.state.project != before {
+            break;
+        }
+    }
+    let clicked = w.harness.state().document.state.project.clone();
+    assert!(clicked != before && clicked.budget != before.budget);
+    w.key(egui::Modifiers::COMMAND, egui::Key::Z);
     // The dial: the quickest there is, at once.
     let ctx = w.harness.ctx.clone();
     w.harness.state_mut().ask_for(&ctx, Asked::OfTheBest(1e3));
@@ -270,6 +286,7 @@ fn the_dial_turns_in_the_window() {
         (promise.achieved_mm / promise.predicted_mm - 1.0).abs() < 0.02,
         "{promise:?}"
     );
+    w.click_label("Trade");
     w.show("trade-answered");
     let said = w
         .harness

@@ -14,7 +14,7 @@ use crate::design::Finest;
 use crate::io::project_file::LoadedProject;
 use crate::io::trade_file::{self, Judge, Record};
 use crate::io::{ProcessMeter, project_file};
-use crate::trade::{Asked, Point, Sweep, answer, front, measure};
+use crate::trade::{Asked, Point, Sweep, answer, clock, front, measure};
 
 #[derive(Args, Debug, Clone)]
 pub struct TradeArgs {
@@ -164,8 +164,9 @@ fn reply(
         args.out.display()
     );
     let quickest = best.first().and_then(|p| p.measured());
-    let Some((point, m)) = answer(&best, asked).and_then(|p| Some((p, p.measured()?))) else {
-        let least = quickest.map_or(f64::NAN, |m| m.seconds);
+    let pace = clock(&record.points);
+    let Some((point, m)) = answer(&best, asked, pace).and_then(|p| Some((p, p.measured()?))) else {
+        let least = quickest.map_or(f64::NAN, |m| m.cpu_seconds * pace);
         anyhow::bail!(
             "no measured setting answers as quickly: the quickest took {least:.1} s. Ask for more time, or measure more points"
         );
@@ -183,7 +184,7 @@ fn reply(
             "{:.2} mm mean, {:.2} mm median, in {:.1} s ({:.1} s of processors): {}",
             m.error_mm,
             m.median_mm,
-            m.seconds,
+            m.cpu_seconds * pace,
             m.cpu_seconds,
             point.setting.in_words()
         );

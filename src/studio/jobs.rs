@@ -123,7 +123,7 @@ impl Running {
 }
 
 /// Seconds as people say them.
-fn duration(seconds: f32) -> String {
+pub(super) fn duration(seconds: f32) -> String {
     if seconds < 90.0 {
         format!("{:.0} s", seconds.max(1.0))
     } else {

@@ -338,10 +338,15 @@ impl Studio {
             .map(|s| s.seconds)
             .sum();
         let mut lines = vec![format!(
-            "{}: {} gauges by {}, {seconds:.1} s for all four",
+            "{}: {} gauges by {}, {seconds:.1} s{}",
             quality_name(d.quality),
             d.design.chosen().len(),
             d.design.lead.title(),
+            if d.design.selections.len() > 1 {
+                " for all four"
+            } else {
+                ""
+            }
         )];
         if !self.drive.take && self.design_holds() == Some(true) {
             lines.push("Gauges were moved by hand".into());

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use egui::Context;
 
 use super::drive::{Finished, stop};
-use super::jobs::{Shared, Task};
+use super::jobs::{Shared, Task, duration};
 use super::{Studio, quality_name};
 use crate::budget::{Progress, Quality};
 use crate::design::{Design, Finest, Inputs};
@@ -16,7 +16,7 @@ use crate::io::ProcessMeter;
 use crate::io::atomic;
 use crate::io::trade_file::{Judge, Record};
 use crate::job::{Reporter, Stop};
-use crate::trade::{Asked, Measured, Point, Setting, Sweep, answer, front, measure};
+use crate::trade::{Asked, Measured, Point, Setting, Sweep, answer, clock, front, measure};
 
 /// The trade of the bundled limb, measured where this program was made.
 const BUNDLED: &str = include_str!("../../assets/trade/trade.json");
@@ -157,7 +157,13 @@ impl Studio {
     #[must_use]
     pub fn predicted(&self, quality: Quality) -> Option<(f64, f64)> {
         let m = self.measured_at(quality)?;
-        Some((m.seconds * self.trade.pace, m.error_mm))
+        Some((m.cpu_seconds * self.clock(), m.error_mm))
+    }
+
+    /// Seconds by the clock here a processor second where it was measured.
+    fn clock(&self) -> f64 {
+        let record = self.trade.record.as_ref();
+        record.map_or(1.0, |(r, _)| clock(&r.points)) * self.trade.pace
     }
 
     /// How the last prediction came out.
@@ -168,23 +174,22 @@ impl Studio {
 
     /// What the quality control says of a quality.
     pub(super) fn prediction_in_words(&self, quality: Quality) -> String {
-        let others = if self.document.state.project.selection.compare {
-            ", and as long as the other selectors take"
+        let one = if self.document.state.project.selection.compare {
+            " for one selector"
         } else {
             ""
         };
         match self.predicted(quality) {
             Some((seconds, mm)) => {
-                let place = match self.trade.record {
-                    Some((_, Place::Elsewhere)) if self.trade.pace == 1.0 => {
-                        " (measured on another machine)"
-                    }
-                    _ => "",
+                let elsewhere = matches!(self.trade.record, Some((_, Place::Elsewhere)));
+                let place = if elsewhere && self.trade.pace == 1.0 {
+                    " (measured elsewhere)"
+                } else {
+                    ""
                 };
-                format!(
-                    "{}: {mm:.2} mm in about {seconds:.0} s{others}{place}",
-                    quality_name(quality)
-                )
+                let name = quality_name(quality);
+                let time = duration(seconds as f32);
+                format!("{name}: {mm:.2} mm in about {time}{one}{place}")
             }
             None => format!("{}: not measured yet", quality_name(quality)),
         }
@@ -212,9 +217,12 @@ impl Studio {
             // What was there already took no time.
             return;
         }
+        // As much of the whole as these stages took when it was measured.
+        let share = predicted_s / m.seconds;
+        let predicted_s = share * m.cpu_seconds * self.clock();
         let promise = Promise {
             quality,
-            predicted_s: predicted_s * self.trade.pace,
+            predicted_s,
             achieved_s,
             predicted_mm: m.own_error_mm,
             achieved_mm: design.chosen_row().map_or(f64::NAN, |r| r.error_mm),
@@ -228,7 +236,7 @@ impl Studio {
             ));
         }
         if elsewhere && predicted_s > 0.0 {
-            self.trade.pace = achieved_s / predicted_s;
+            self.trade.pace *= achieved_s / predicted_s;
         }
         self.trade.promise = Some(promise);
     }
@@ -279,18 +287,16 @@ impl Studio {
             );
         };
         let best = front(&self.document.state.project, &record.points);
-        let scaled = match asked {
-            Asked::Within(seconds) => Asked::Within(seconds / self.trade.pace),
-            asked @ Asked::OfTheBest(_) => asked,
-        };
-        let Some((point, m)) = answer(&best, scaled).and_then(|p| Some((p, p.measured()?))) else {
+        let clock = self.clock();
+        let Some((point, m)) = answer(&best, asked, clock).and_then(|p| Some((p, p.measured()?)))
+        else {
             let quickest = best.first().and_then(|p| p.measured());
             return self.complain(quickest.map_or_else(
                 || "No setting was measured that answers".to_owned(),
                 |m| {
                     format!(
                         "No measured setting answers as quickly: the quickest took {:.1} s",
-                        m.seconds * self.trade.pace
+                        m.cpu_seconds * clock
                     )
                 },
             ));
@@ -298,7 +304,7 @@ impl Studio {
         self.tell(format!(
             "Set to {:.2} mm in about {:.1} s: {}",
             m.error_mm,
-            m.seconds * self.trade.pace,
+            m.cpu_seconds * clock,
             point.setting.in_words()
         ));
         self.apply_setting(&point.setting);

@@ -1,5 +1,7 @@
 //! How much is spent at every stage: one value a knob.
 
+use std::fmt::Write as _;
+
 use serde::{Deserialize, Serialize};
 
 use crate::budget::{Budget, Limits, Quality};
@@ -308,7 +310,9 @@ impl Setting {
             Some(spent) => self.turned(knob, spent),
             None => Vec::new(),
         };
-        found.iter_mut().for_each(|s| *s = s.canonical());
+        for setting in &mut found {
+            *setting = setting.canonical();
+        }
         found.retain(|s| s != self);
         found
     }
@@ -424,12 +428,14 @@ impl Setting {
             self.selector.title(),
         );
         if self.selector == SelectorKind::GreedySvr {
-            words += &format!(
+            let _ = write!(
+                words,
                 " on {} touches × {} candidates",
                 spent.selection_touches, spent.selection_candidates
             );
         }
-        words += &format!(
+        let _ = write!(
+            words,
             ", {} folds, tuned on {}, to {} mm",
             spent.folds, spent.tuning_touches, spent.svr_tolerance_mm
         );

@@ -41,7 +41,7 @@ impl Studio {
             egui::ScrollArea::vertical()
                 .id_salt("trade")
                 .auto_shrink(false)
-                .show(ui, |ui| self.trade_side(ui, &drawn));
+                .show(ui, |ui| ui.vertical(|ui| self.trade_side(ui, &drawn)));
         });
     }
 
@@ -61,11 +61,12 @@ impl Studio {
         let project = &self.document.state.project;
         let points = self.points();
         let best = crate::trade::front(project, &points);
+        let clock = crate::trade::clock(&points) * self.trade.pace;
         let drawn = points.iter().filter(|p| p.setting.answers(project));
         drawn
             .filter_map(|p| {
                 let m = p.measured()?;
-                let seconds = m.seconds * self.trade.pace;
+                let seconds = m.cpu_seconds * clock;
                 (seconds > 0.0 && m.error_mm > 0.0).then(|| Drawn {
                     at: [seconds, m.error_mm],
                     setting: p.setting,
@@ -92,9 +93,6 @@ impl Studio {
             .map(|d| d.at.map(f64::log10))
             .collect();
         front.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let corner = |w: &[[f64; 2]]| [[w[0][0], w[0][1]], [w[1][0], w[0][1]]];
-        let last = front.last().copied();
-        let steps: Vec<[f64; 2]> = front.windows(2).flat_map(corner).chain(last).collect();
         let now = drawn.iter().find(|d| d.setting.is_of(project));
         let shown = Plot::new("trade")
             .height(ui.available_height() - 4.0)
@@ -118,7 +116,11 @@ impl Studio {
                         .color(OTHER)
                         .radius(3.5),
                 );
-                plot.line(Line::new("front", steps).color(FRONT).width(2.0));
+                plot.line(
+                    Line::new("front line", PlotPoints::from(front))
+                        .color(FRONT)
+                        .width(2.0),
+                );
                 plot.points(Points::new("front", marks(true)).color(FRONT).radius(5.0));
                 if let Some(now) = now {
                     let here: PlotPoints = vec![now.at.map(f64::log10)].into();
@@ -318,7 +320,8 @@ fn decades((low, high): (f64, f64)) -> Vec<GridMark> {
         .filter(|v| (low..=high).contains(v))
         .map(|value| GridMark {
             value,
-            step_size: 0.3,
+            // Every one of them has room for its label.
+            step_size: 10.0,
         })
         .collect()
 }
