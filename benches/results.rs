@@ -83,6 +83,11 @@ fn assembled() -> String {
         "### The criterion by scikit-learn\n\n60 sites × 800 touches of the bundled limb on strain, every step and every other site, by `benches/sklearn_criterion.py` (its commands are in the file); fits to a tolerance of 0.001 mm.\n\n```\n{}```\n",
         read("benches/sklearn.txt")
     );
+    let _ = writeln!(
+        text,
+        "## Speed against accuracy\n\n`cargo bench --bench trade`; every point with its settings is in `assets/trade/trade.csv`.\n\n{}",
+        read("assets/trade/trade.md")
+    );
     let _ = writeln!(text, "{}", read("benches/studio.md"));
     let _ = writeln!(text, "{}", read("benches/live.md"));
     let _ = writeln!(

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::budget::Watch;
 use crate::design::{self, DesignError, Finest, Inputs, StageTime};
+use crate::project::BadValue;
 
 pub use self::front::{Asked, answer, clock, front};
 pub use self::knobs::{Bought, KnobReport, knobs};
@@ -136,6 +137,15 @@ fn attempt(
     let (cpu, clock) = (meter.cpu_seconds(), meter.seconds());
     let now = || meter.seconds();
     let design = design::run(&inputs, &project.selectors(), &budget, &now, watch)?;
+    let own_mm = design.simulated.element_mm;
+    if own_mm <= judge.element_mm() {
+        return Err(BadValue {
+            key: "the elements of this setting".into(),
+            rule: "larger than those of the model that judges it, which memory does not let be finer",
+            value: format!("{own_mm:.2} mm"),
+        }
+        .into());
+    }
     let matching = match setting.estimator {
         Estimator::Regression => None,
         Estimator::Matching => Some(design::matching(&inputs, &design, watch)?),

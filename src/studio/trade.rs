@@ -375,3 +375,37 @@ fn sweep(
     }
     Ok(record)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_prediction_off_by_more_than_two_is_broken() {
+        let kept = Promise {
+            quality: Quality::Draft,
+            predicted_s: 10.0,
+            achieved_s: 19.0,
+            predicted_mm: 4.0,
+            achieved_mm: 2.1,
+        };
+        assert!(!kept.is_broken());
+        let slow = Promise {
+            achieved_s: 21.0,
+            ..kept.clone()
+        };
+        let quick = Promise {
+            achieved_s: 4.9,
+            ..kept.clone()
+        };
+        let wrong = Promise {
+            achieved_mm: 8.1,
+            ..kept.clone()
+        };
+        assert!(slow.is_broken() && quick.is_broken() && wrong.is_broken());
+        assert_eq!(
+            slow.in_words(),
+            "predicted 4.00 mm in 10.0 s, achieved 2.10 mm in 21.0 s"
+        );
+    }
+}

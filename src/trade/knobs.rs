@@ -87,12 +87,12 @@ fn report(knob: Knob, points: &[Point], spread: f64) -> Option<KnobReport> {
     })
 }
 
-/// Standard error of the median of some changes (%): from their own scatter, and where they are too few to have
-/// one from that of repeats.
+/// Standard error of the median of some changes (%): from their own scatter, for most of what moves an error moves
+/// both of a pair; of a single pair from that of repeats.
 fn scatter(changes: &[f64], spread: f64) -> f64 {
     /// Of a median over that of a mean, for normal values.
     const MEDIAN: f64 = 1.253;
-    const FEW: usize = 3;
+    const FEW: usize = 2;
     let n = changes.len() as f64;
     let one = if changes.len() < FEW {
         spread * std::f64::consts::SQRT_2

@@ -7,6 +7,9 @@ use crate::project::{PartModel, Project};
 /// Repeats of the centre with other seeds: what an error moves by when nothing is turned.
 const REPEATS: u64 = 3;
 
+/// Pairs from which a knob is known.
+const ENOUGH: usize = 8;
+
 /// A walk over settings.
 pub struct Sweep<'a> {
     project: &'a Project,
@@ -63,7 +66,8 @@ impl<'a> Sweep<'a> {
     }
 
     /// What lies one step from the front: from its two ends inward, and at each of its points the knobs first that
-    /// moved the error most. Around the most accurate point all knobs are turned, those too that nobody is offered.
+    /// moved the error most. Knobs that nobody is offered are turned around the most accurate point, and elsewhere
+    /// until it is known what they do.
     fn beside_the_front(&self, known: &[Point]) -> Vec<Setting> {
         let mut front = front(self.project, known);
         let best = front.iter().rfind(|p| p.setting.limits.is_some());
@@ -76,12 +80,17 @@ impl<'a> Sweep<'a> {
         };
         order.sort_by(|a, b| moved(a).total_cmp(&moved(b)));
         let turned = |s: &Setting| -> Vec<Setting> {
-            let around = order.iter().flat_map(|&knob| s.neighbours(knob));
-            let all = Some(*s) == best;
-            around
-                .filter(|n| all || n.answers(self.project))
-                .filter(|n| self.is_possible(n))
-                .collect()
+            let known = |knob: Knob| {
+                let report = reports.iter().find(|r| r.knob == knob);
+                report.is_some_and(|r| r.pairs >= ENOUGH)
+            };
+            let turned = |knob: Knob| {
+                let all = Some(*s) == best || !known(knob);
+                let around = s.neighbours(knob).into_iter();
+                around.filter(move |n| all || n.answers(self.project))
+            };
+            let around = order.iter().flat_map(|&knob| turned(knob));
+            around.filter(|n| self.is_possible(n)).collect()
         };
         // One of each in turn: the accurate end, the quick end, and so on to the middle.
         let mut ends = Vec::new();
