@@ -288,6 +288,7 @@ fn summary(
                 "criterion": set.criterion,
                 "criterion_mm": set.criterion_mm,
                 "gap": set.gap,
+                "lead": set.lead,
             })
         })
         .collect();

@@ -128,7 +128,7 @@ mod tests {
                 (s.vertices * s.touches) as f64 / 1e5 + s.folds as f64,
                 1.0 + 2000.0 / s.vertices as f64 + 500.0 / s.touches as f64,
             ),
-            None => (100.0, 1.1),
+            None => (1e6, 5.0),
         };
         Point {
             setting: *setting,
@@ -155,7 +155,7 @@ mod tests {
         let project = Project::around("a.stl", None);
         let sweep = Sweep::new(&project, standards());
         let mut known: Vec<Point> = Vec::new();
-        for left in (0..150).rev() {
+        for left in (0..250).rev() {
             let Some(next) = sweep.next(&known, left) else {
                 break;
             };
