@@ -276,6 +276,9 @@ pub struct Limits {
     pub selection_touches: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub selection_candidates: Option<usize>,
+    /// Most touches that hyper-parameters are searched on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tuning_touches: Option<usize>,
 }
 
 impl Limits {
@@ -305,6 +308,7 @@ impl Budget {
             (&mut self.candidates, limits.candidates),
             (&mut self.selection_touches, limits.selection_touches),
             (&mut self.selection_candidates, limits.selection_candidates),
+            (&mut self.tuning_touches, limits.tuning_touches),
         ];
         for (own, limit) in counts {
             *own = limit.unwrap_or(*own);

@@ -88,7 +88,7 @@ impl crate::trade::Meter for ProcessMeter {
 
     fn most_memory_mb(&self) -> Option<f64> {
         let held = self.held.load(std::sync::atomic::Ordering::Relaxed) as f64 / 1024.0;
-        memory_mb("VmHWM").map(|most| most - held)
+        memory_mb("VmHWM").map(|most| (most - held).max(0.0))
     }
 }
 

@@ -198,21 +198,24 @@ impl Pivoting {
         if self.taken == self.components {
             return None;
         }
-        let (mut best, mut second): (Option<(usize, f64)>, f64) = (None, 0.0);
+        let (mut best, mut second): (Option<(usize, f64)>, Option<f64>) = (None, None);
         for site in sites {
-            if self.norms[site] <= ROUNDING {
+            let value = worth(site, self.norms[site]);
+            // What is no number is nothing either.
+            let possible = self.norms[site] > ROUNDING && !value.is_nan();
+            if !possible {
                 continue;
             }
-            let value = worth(site, self.norms[site]);
-            match best {
-                Some((_, b)) if value <= b * (1.0 + TIE) => second = second.max(value),
-                _ => {
-                    second = best.map_or(second, |(_, b)| second.max(b));
-                    best = Some((site, value));
-                }
+            let behind = match best {
+                Some((_, b)) if value <= b * (1.0 + TIE) => Some(value),
+                _ => best.replace((site, value)).map(|(_, b)| b),
+            };
+            if let Some(behind) = behind {
+                second = Some(second.map_or(behind, |s| s.max(behind)));
             }
         }
-        best.map(|(site, value)| (site, (1.0 - second / value).max(0.0)))
+        let lead = |value: f64| second.map_or(f64::INFINITY, |s| (1.0 - s / value).max(0.0));
+        best.map(|(site, value)| (site, lead(value)))
     }
 
     /// Projects a site's column out of all others.

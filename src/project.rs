@@ -818,6 +818,12 @@ impl Project {
                 "between 2 and 100000",
                 2..=100_000,
             ),
+            (
+                "tuning_touches",
+                limits.tuning_touches,
+                "between 10 and 1000000",
+                10..=1_000_000,
+            ),
         ];
         for (key, count, rule, range) in counts {
             let count = count.unwrap_or(*range.start());

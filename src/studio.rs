@@ -67,6 +67,8 @@ pub struct SimulationResult {
     pub key: String,
     /// What its elements, sites and touches hold for.
     elements: String,
+    /// Read again from elements that were there.
+    again: bool,
     pub quality: Quality,
     pub seconds: f64,
 }

@@ -343,8 +343,8 @@ fn bad_projects_are_refused_with_the_remedy() {
         &["touch.count"],
     );
     design(
-        &|t| t + "\n[budget.limits]\nfolds = 1\n",
-        &["budget.limits.folds", "between 2 and 20"],
+        &|t| t + "\n[budget.limits]\ntouches = 1\n",
+        &["budget.limits.touches", "between 3 and 1000000"],
     );
 }
 

@@ -156,6 +156,11 @@ fn reply(
     record: &Record,
     asked: Asked,
 ) -> anyhow::Result<()> {
+    let (Asked::Within(wish) | Asked::OfTheBest(wish)) = asked;
+    anyhow::ensure!(
+        wish >= 0.0,
+        "--within-s and --of-the-best-mm take zero or more, not {wish}"
+    );
     let inputs = &loaded.inputs;
     let best = front(&inputs.project, &record.points);
     anyhow::ensure!(

@@ -313,6 +313,7 @@ mod tests {
             candidates: Some(90),
             selection_touches: Some(300),
             selection_candidates: Some(50),
+            tuning_touches: Some(200),
         };
         p.feasible.painted = Some("painted".into());
         p.feasible.keep_out = Some("connector".into());

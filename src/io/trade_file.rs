@@ -339,6 +339,7 @@ pub fn plot(project: &Project, record: &Record) -> String {
     let measured: Vec<(&Point, &Measured)> = (record.points.iter())
         .filter(own)
         .filter_map(|p| Some((p, p.measured()?)))
+        .filter(|(_, m)| m.error_mm > 0.0 && m.cpu_seconds > 0.0)
         .collect();
     let best: Vec<&Measured> = front(project, &record.points)
         .into_iter()

@@ -69,6 +69,10 @@ pub fn ties(sets: &[SensorSet], tolerance: f64) -> Option<String> {
 /// As [`ties`], for what elements leave open of the criterion: which picks are firm on any others as good.
 #[must_use]
 pub fn within_model(sets: &[SensorSet], tolerance: f64) -> Option<String> {
+    // Where the mesh could not be judged that is said already.
+    if tolerance.is_nan() || tolerance <= 0.0 {
+        return None;
+    }
     let firm = |s: &&SensorSet| s.lead.is_none_or(|lead| lead > 2.0 * tolerance);
     let number = |s: &SensorSet| s.sites.len().to_string();
     let open = sets.len() - sets.iter().filter(firm).count();

@@ -345,6 +345,7 @@ impl Studio {
             Command::Cancel => self.busy(),
             Command::Tare | Command::Record | Command::Disconnect => self.live.is_connected(),
             Command::Export => self.design.is_some(),
+            Command::MeasureTrade => !self.jobs.runs(super::jobs::Task::Trade),
             Command::Keep => !self.document.state.project.selection.sites.is_empty(),
             Command::Paint(layer) if layer.is_face() => self.document.is_solid(),
             Command::Pin | Command::RemoveGauges | Command::FramePicked | Command::Nudge(_) => {

@@ -24,7 +24,7 @@ const STILL: Duration = Duration::from_millis(400);
 
 /// What a job brings back.
 pub(super) enum Finished {
-    Simulation(Arc<Simulated>, Quality, f64),
+    Simulation(Arc<Simulated>, Quality, f64, bool),
     Filtered(Arc<Feasibility>),
     Design(Arc<Design>, Box<Inputs>, Quality, f64),
     Exported(PathBuf),
@@ -262,6 +262,7 @@ impl Studio {
                 let start = Instant::now();
                 let budget = inputs.project.budget.budget_at(quality);
                 let watch = |p| r.report(p);
+                let again = last.is_some();
                 let simulated = match last {
                     // Only what gauges report has changed.
                     Some(last) => design::simulate_again(&inputs, &budget, &last, &watch),
@@ -269,7 +270,12 @@ impl Studio {
                 };
                 let simulated = simulated.map_err(|e| stop(&e))?;
                 let seconds = start.elapsed().as_secs_f64();
-                Ok(Finished::Simulation(Arc::new(simulated), quality, seconds))
+                Ok(Finished::Simulation(
+                    Arc::new(simulated),
+                    quality,
+                    seconds,
+                    again,
+                ))
             });
     }
 
@@ -345,9 +351,9 @@ impl Studio {
 
     fn finished(&mut self, ctx: &egui::Context, finished: Finished, key: String) {
         match finished {
-            Finished::Simulation(simulated, quality, seconds) => {
+            Finished::Simulation(simulated, quality, seconds, again) => {
                 if key == self.document.simulation_key_at(quality) {
-                    self.take_simulation(simulated, quality, key, seconds);
+                    self.take_simulation(simulated, quality, key, (seconds, again));
                 } else {
                     self.dropped("simulation");
                 }
@@ -398,12 +404,13 @@ impl Studio {
         simulated: Arc<Simulated>,
         quality: Quality,
         key: String,
-        seconds: f64,
+        (seconds, again): (f64, bool),
     ) {
         let result = SimulationResult {
             simulated,
             key,
             elements: self.document.elements_key_at(quality),
+            again,
             quality,
             seconds,
         };
@@ -451,6 +458,7 @@ impl Studio {
 
     /// Shows what is there already of the project as it is: after a change was taken back, most often.
     fn show_last(&mut self) {
+        self.forget_promise();
         for quality in Quality::ALL {
             let Some(last) = self.last.get(&quality) else {
                 continue;

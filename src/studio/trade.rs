@@ -23,6 +23,9 @@ const BUNDLED: &str = include_str!("../../assets/trade/trade.json");
 /// Beyond this factor a prediction was wrong.
 const WRONG: f64 = 2.0;
 
+/// A stage that took less (s) was known already.
+const KNOWN_S: f64 = 1e-4;
+
 /// Where a trade was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
@@ -160,10 +163,19 @@ impl Studio {
         Some((m.cpu_seconds * self.clock(), m.error_mm))
     }
 
+    /// Whether what is being measured is of the project as it is.
+    fn measures_this(&self) -> bool {
+        let mut running = self.jobs.running.iter();
+        running.any(|r| r.task == Task::Trade && r.job.key == self.trade.key)
+    }
+
     /// Seconds by the clock here a processor second where it was measured.
     fn clock(&self) -> f64 {
-        let record = self.trade.record.as_ref();
-        record.map_or(1.0, |(r, _)| clock(&r.points)) * self.trade.pace
+        let pace = match self.trade.record {
+            Some((_, Place::Elsewhere)) if !self.measures_this() => self.trade.pace,
+            _ => 1.0,
+        };
+        clock(&self.points()) * pace
     }
 
     /// How the last prediction came out.
@@ -206,7 +218,13 @@ impl Studio {
         for stage in &m.stages {
             // Where others were compared, more was evaluated than was measured.
             let more = compared && stage.stage == "evaluate";
-            let ran = design.seconds.iter().find(|s| s.stage == stage.stage);
+            // Of what was there already, or was only read again, the time says nothing.
+            let again = self.simulation.as_ref().is_some_and(|s| s.again);
+            let more = more || (again && stage.stage == "simulate");
+            let ran = design
+                .seconds
+                .iter()
+                .find(|s| s.stage == stage.stage && s.seconds > KNOWN_S);
             if let Some(ran) = ran.filter(|_| !more) {
                 predicted_s += stage.seconds;
                 achieved_s += ran.seconds;
@@ -215,6 +233,7 @@ impl Studio {
         let select = format!("select {}", design.lead.name());
         if design.seconds.iter().all(|s| s.stage != select) {
             // What was there already took no time.
+            self.trade.promise = None;
             return;
         }
         // As much of the whole as these stages took when it was measured.
@@ -241,6 +260,11 @@ impl Studio {
         self.trade.promise = Some(promise);
     }
 
+    /// What is shown is no longer what was predicted last.
+    pub(super) fn forget_promise(&mut self) {
+        self.trade.promise = None;
+    }
+
     /// The line of the evaluation: predicted beside achieved.
     pub(super) fn promise_line(&self) -> Option<String> {
         let quality = self.design.as_ref()?.quality;
@@ -251,9 +275,14 @@ impl Studio {
     /// Measures the trade of the project in the background, going on from what is known of it.
     pub fn measure_trade(&mut self, ctx: &Context) {
         self.results = super::results::Tab::Trade;
+        if self.jobs.runs(Task::Trade) {
+            return;
+        }
+        self.refresh_trade(ctx);
         let inputs = self.document.inputs();
         let threads = rayon::current_num_threads();
-        let here = self.trade.record.as_ref().filter(|r| r.1 == Place::Here);
+        let here = self.trade.record.as_ref();
+        let here = here.filter(|r| r.1 == Place::Here && r.0.is_of(&inputs));
         let record = here.map_or_else(|| Record::new(&inputs, threads), |r| (*r.0).clone());
         let coming = Shared::<Option<Record>>::default();
         self.trade.coming = Arc::clone(&coming);
@@ -281,12 +310,13 @@ impl Studio {
 
     /// Turns the dial: the setting of the front that keeps the promise, at once.
     pub fn ask_for(&mut self, ctx: &Context, asked: Asked) {
-        let Some((record, _)) = self.trade.record.clone() else {
+        let points = self.points();
+        if points.is_empty() {
             return self.complain(
                 "Nothing is measured of this project yet. Press “Measure the trade” first",
             );
-        };
-        let best = front(&self.document.state.project, &record.points);
+        }
+        let best = front(&self.document.state.project, &points);
         let clock = self.clock();
         let Some((point, m)) = answer(&best, asked, clock).and_then(|p| Some((p, p.measured()?)))
         else {
@@ -341,6 +371,14 @@ fn sweep(
             *coming = Some(record.clone());
         }
     };
+    let walk = Sweep::new(&inputs.project, vec![Quality::Draft]);
+    let left = |record: &Record| count.saturating_sub(record.points.len());
+    if walk.next(&record.points, left(&record)).is_none() {
+        return Err(Stop::Failed(format!(
+            "all {} settings are measured already. Ask for more of them",
+            record.points.len()
+        )));
+    }
     let laying = |p: Progress| {
         r.report(Progress {
             stage: "Laying the judge's elements",
@@ -354,8 +392,7 @@ fn sweep(
         touches: judge.touches(),
     };
     let meter = ProcessMeter::default();
-    let walk = Sweep::new(&inputs.project, vec![Quality::Draft]);
-    while let Some(setting) = walk.next(&record.points, count.saturating_sub(record.points.len())) {
+    while let Some(setting) = walk.next(&record.points, left(&record)) {
         let done = record.points.len();
         let watch = |_: Progress| {
             r.report(Progress {

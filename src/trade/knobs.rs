@@ -113,6 +113,7 @@ fn pairs(knob: Knob, points: &[Point]) -> Vec<(&Measured, &Measured)> {
             if a.setting.rank(knob) < b.setting.rank(knob)
                 && a.setting.differs_in(&b.setting) == Some(knob)
                 && let (Some(x), Some(y)) = (a.measured(), b.measured())
+                && x.error_mm * y.error_mm > 0.0
             {
                 found.push((x, y));
             }
@@ -139,7 +140,11 @@ fn spread(points: &[Point]) -> f64 {
         .iter()
         .filter(same)
         .filter_map(|p| Some(p.measured()?.error_mm))
+        .filter(|mm| mm.is_finite())
         .collect();
+    if errors.is_empty() {
+        return 0.0;
+    }
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     let squares: f64 = errors.iter().map(|e| (e - mean).powi(2)).sum();
     let degrees = errors.len().saturating_sub(1).max(1) as f64;

@@ -213,7 +213,6 @@ impl Setting {
         if let Some(spent) = self.limits {
             budget.point_tip = spent.point_tip;
             budget.folds = spent.folds;
-            budget.tuning_touches = spent.tuning_touches;
             budget.svr_tolerance_mm = spent.svr_tolerance_mm;
         }
         budget
@@ -227,6 +226,7 @@ impl Setting {
             candidates: Some(100_000),
             selection_touches: Some(spent.selection_touches),
             selection_candidates: Some(spent.selection_candidates),
+            tuning_touches: Some(spent.tuning_touches),
         })
     }
 
@@ -468,4 +468,39 @@ fn others<T: Copy + PartialEq>(all: &[T], now: T, with: impl Fn(T) -> Setting) -
         .filter(|&&x| x != now)
         .map(|&x| with(x))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_answers_a_project_can_be_asked_of_it() {
+        let project = Project::around("a.stl", None);
+        let mut settings = vec![
+            Setting::centre(&project),
+            Setting::fine(&project),
+            Setting::named(&project, Quality::Draft),
+        ];
+        for k in 0..2 {
+            let around: Vec<Setting> = (Knob::ALL.iter())
+                .flat_map(|&knob| settings[k].neighbours(knob))
+                .collect();
+            settings.extend(around);
+        }
+        let mut answering = 0;
+        for setting in settings.iter().filter(|s| s.answers(&project)) {
+            let mut applied = project.clone();
+            setting.apply(&mut applied);
+            assert_eq!(
+                setting.budget(&applied),
+                applied.budget.budget(),
+                "{setting:?}"
+            );
+            assert!(setting.is_of(&applied));
+            applied.check().unwrap();
+            answering += 1;
+        }
+        assert!(answering > 20, "{answering}");
+    }
 }

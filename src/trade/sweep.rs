@@ -2,7 +2,7 @@
 
 use super::{Knob, Point, Setting, front, knobs};
 use crate::budget::Quality;
-use crate::project::{PartModel, Project};
+use crate::project::{Elements, PartModel, Project};
 
 /// Repeats of the centre with other seeds: what an error moves by when nothing is turned.
 const REPEATS: u64 = 3;
@@ -61,8 +61,8 @@ impl<'a> Sweep<'a> {
             .into_iter()
             .flat_map(|knob| centre.neighbours(knob))
             .filter(|s| self.is_possible(s));
-        let fine = Setting::fine(self.project);
-        repeats.chain(turned).chain([fine]).collect()
+        let fine = Some(Setting::fine(self.project)).filter(|s| self.is_possible(s));
+        repeats.chain(turned).chain(fine).collect()
     }
 
     /// What lies one step from the front: from its two ends inward, and at each of its points the knobs first that
@@ -110,9 +110,20 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// A solid is no shell whose wall could be taken as one.
+    /// What is another computation at all: a solid is no shell whose wall could be taken as one, touches beyond the
+    /// project's own are not there, and a part's own triangles are as many as they are.
     fn is_possible(&self, setting: &Setting) -> bool {
-        self.project.part.model == PartModel::Shell || !setting.is_as_solid()
+        let project = self.project;
+        let centre = Setting::centre(project);
+        let (Some(spent), Some(usual)) = (setting.limits, centre.limits) else {
+            return true;
+        };
+        let own = project.part.elements == Elements::AsGiven;
+        let counted = project.candidates.count.is_some();
+        (project.part.model == PartModel::Shell || !spent.as_solid)
+            && (spent.touches < 2 * project.touch.count || spent.touches <= usual.touches)
+            && (!own || spent.vertices == usual.vertices)
+            && (!counted || setting.unexplained == centre.unexplained)
     }
 }
 

@@ -254,6 +254,11 @@ fn limits(t: &mut Text, limits: &Limits) {
         limits.selection_candidates,
         "most candidates that it scores",
     );
+    t.maybe(
+        "tuning_touches",
+        limits.tuning_touches,
+        "most touches that hyper-parameters are searched on",
+    );
 }
 
 fn gauge(t: &mut Text, project: &Project) {

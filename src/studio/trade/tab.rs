@@ -46,8 +46,8 @@ impl Studio {
     }
 
     /// What is measured, what is being measured included.
-    fn points(&self) -> Vec<Point> {
-        let running = self.jobs.runs(Task::Trade);
+    pub(super) fn points(&self) -> Vec<Point> {
+        let running = self.measures_this();
         let coming = self.trade.coming.lock().ok().filter(|_| running);
         let coming = coming.and_then(|c| Some(c.as_ref()?.points.clone()));
         match (coming, &self.trade.record) {
@@ -61,7 +61,7 @@ impl Studio {
         let project = &self.document.state.project;
         let points = self.points();
         let best = crate::trade::front(project, &points);
-        let clock = crate::trade::clock(&points) * self.trade.pace;
+        let clock = self.clock();
         let drawn = points.iter().filter(|p| p.setting.answers(project));
         drawn
             .filter_map(|p| {
@@ -142,7 +142,7 @@ impl Studio {
         ctx.set_cursor_icon(egui::CursorIcon::PointingHand);
         shown
             .response
-            .on_hover_text_at_pointer(format!("{}\nClick to compute at this setting", near.words));
+            .on_hover_text_at_pointer(format!("{}\nClick to set the project to this", near.words));
         clicked.then_some(near.setting)
     }
 
