@@ -255,8 +255,8 @@ pub struct Budget {
     /// the target.
     pub svr_tolerance_mm: f64,
 }
-/// Limits in place of a quality's own, each where it is given: the knobs of speed against accuracy that were
-/// measured to buy something (`hapdef trade`).
+/// Limits in place of a quality's own, each where it is given: the knobs of speed against accuracy that a
+/// measured setting turns (`hapdef trade`), without those that were found to buy nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {

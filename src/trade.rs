@@ -178,3 +178,25 @@ fn attempt(
             .collect(),
     })
 }
+
+#[cfg(test)]
+impl Measured {
+    /// A made-up measurement of these processor seconds and this error (mm).
+    fn made_up(cpu_seconds: f64, error_mm: f64) -> Self {
+        Self {
+            cpu_seconds,
+            seconds: cpu_seconds / 2.0,
+            stages: Vec::new(),
+            judge_cpu_seconds: 0.0,
+            memory_mb: None,
+            error_mm,
+            median_mm: error_mm,
+            p95_mm: error_mm,
+            workshop_mm: error_mm,
+            own_error_mm: error_mm,
+            model_percent: 1.0,
+            candidates: 10,
+            sites_mm: Vec::new(),
+        }
+    }
+}

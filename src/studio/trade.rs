@@ -302,7 +302,7 @@ impl Studio {
         }
     }
 
-    /// Computes at a measured setting from now on.
+    /// Sets the project to a measured setting; what is kept computed follows.
     pub fn apply_setting(&mut self, setting: &Setting) {
         setting.apply(&mut self.document.state.project);
         self.document.settle();
@@ -322,10 +322,10 @@ impl Studio {
         else {
             let quickest = best.first().and_then(|p| p.measured());
             return self.complain(quickest.map_or_else(
-                || "No setting was measured that answers".to_owned(),
+                || "No setting that was measured could be computed. Measure more of them".to_owned(),
                 |m| {
                     format!(
-                        "No measured setting answers as quickly: the quickest took {:.1} s",
+                        "No measured setting answers as quickly: the quickest took {:.1} s. Ask for more time, or measure more settings",
                         m.cpu_seconds * clock
                     )
                 },

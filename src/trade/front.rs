@@ -80,21 +80,7 @@ mod tests {
                 repeat,
                 ..Setting::named(&project, Quality::Draft)
             },
-            outcome: Ok(Measured {
-                cpu_seconds,
-                seconds: cpu_seconds / 2.0,
-                stages: Vec::new(),
-                judge_cpu_seconds: 0.0,
-                memory_mb: None,
-                error_mm,
-                median_mm: error_mm,
-                p95_mm: error_mm,
-                workshop_mm: error_mm,
-                own_error_mm: error_mm,
-                model_percent: 1.0,
-                candidates: 10,
-                sites_mm: Vec::new(),
-            }),
+            outcome: Ok(Measured::made_up(cpu_seconds, error_mm)),
         }
     }
 

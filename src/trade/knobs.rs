@@ -173,21 +173,10 @@ mod tests {
                 4.0 * (1200.0 / spent.vertices as f64).sqrt() + 0.02 * setting.repeat as f64;
             Point {
                 setting,
-                outcome: Ok(Measured {
-                    cpu_seconds: spent.folds as f64 + spent.vertices as f64 / 1000.0,
-                    seconds: 1.0,
-                    stages: Vec::new(),
-                    judge_cpu_seconds: 0.0,
-                    memory_mb: None,
-                    error_mm: error,
-                    median_mm: error,
-                    p95_mm: error,
-                    workshop_mm: error,
-                    own_error_mm: error,
-                    model_percent: 1.0,
-                    candidates: 10,
-                    sites_mm: Vec::new(),
-                }),
+                outcome: Ok(Measured::made_up(
+                    spent.folds as f64 + spent.vertices as f64 / 1000.0,
+                    error,
+                )),
             }
         };
         let mut points: Vec<Point> = (0..3)

@@ -191,7 +191,8 @@ impl Setting {
         Self { limits, ..centre }.canonical()
     }
 
-    /// Makes a project compute at this setting: what it costs and achieves is then that of the point.
+    /// Makes a project compute at this setting. What that costs and achieves is that of the point where the setting
+    /// answers the project ([`Self::answers`]); others also take [`Self::part`] and [`Self::budget`].
     pub fn apply(&self, project: &mut Project) {
         project.budget.quality = self.quality;
         project.budget.seed = project.budget.seed.wrapping_add(self.repeat);

@@ -143,21 +143,7 @@ mod tests {
         };
         Point {
             setting: *setting,
-            outcome: Ok(Measured {
-                cpu_seconds: cost,
-                seconds: cost,
-                stages: Vec::new(),
-                judge_cpu_seconds: 0.0,
-                memory_mb: None,
-                error_mm: error,
-                median_mm: error,
-                p95_mm: error,
-                workshop_mm: error,
-                own_error_mm: error,
-                model_percent: 1.0,
-                candidates: 10,
-                sites_mm: Vec::new(),
-            }),
+            outcome: Ok(Measured::made_up(cost, error)),
         }
     }
 
