@@ -41,6 +41,9 @@ pub struct Cli {
     /// Unit of a mesh file that does not say its own.
     #[arg(long)]
     pub unit: Option<UnitArg>,
+    /// Memory that may be taken (GB); 8, or what the machine has, when left out.
+    #[arg(long, global = true, value_parser = memory_gb)]
+    pub memory_gb: Option<f64>,
 }
 
 #[derive(Subcommand, Debug)]
@@ -163,6 +166,22 @@ pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
         mesh_path: path.to_owned(),
         bundled: false,
     })
+}
+
+/// Gigabytes that can be meant.
+fn memory_gb(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(gb) if (0.1..=1e5).contains(&gb) => Ok(gb),
+        _ => Err("a number of gigabytes from 0.1 to 100000".into()),
+    }
+}
+
+impl Cli {
+    /// Says what memory this process may take: what was asked for, or what the machine has.
+    pub fn bound_memory(&self) {
+        let asked = self.memory_gb.map(|gb| (gb * 1e9) as u64);
+        crate::memory::allow(asked.unwrap_or_else(crate::io::source::machine_memory));
+    }
 }
 
 impl Common {

@@ -113,7 +113,6 @@ impl DesignError {
 /// Below this neither folds nor held-out touches mean anything.
 const LEAST_TOUCHES: usize = 20;
 const MOST_SITES: usize = 50_000;
-const MOST_GB: f64 = 8.0;
 /// Vertices of the mesh that sites and touches are laid out on: the same for every quality.
 pub const LAYOUT: usize = 3500;
 /// Seeds of the independent draws, apart from each other.

@@ -9,6 +9,7 @@ pub mod npz;
 pub mod points;
 pub mod project_file;
 pub mod report;
+pub mod source;
 pub mod svg;
 pub mod trade_file;
 pub mod vtu;
@@ -105,7 +106,8 @@ impl FileError {
     pub(crate) fn broken(path: &std::path::Path, message: impl std::fmt::Display) -> Self {
         Self::Broken {
             path: path.to_owned(),
-            message: message.to_string(),
+            // Messages of libraries may carry pieces of the file.
+            message: crate::plain::message(&message.to_string()),
         }
     }
 

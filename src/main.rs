@@ -7,6 +7,7 @@ use hapdef::cli::{self, Cli, Command};
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    cli.bound_memory();
     let outcome = match &cli.command {
         Some(Command::Design(args)) => cli::design::run(args),
         Some(Command::Simulate(args)) => cli::simulate::run(args),

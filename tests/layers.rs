@@ -4,7 +4,9 @@ use std::path::Path;
 
 /// From the bottom up; a module may use those above it in this list, itself included.
 const ORDER: [&[&str]; 14] = [
-    &["budget", "colormap", "eigen", "lanes", "tally", "wire"],
+    &[
+        "budget", "colormap", "eigen", "lanes", "memory", "plain", "tally", "wire",
+    ],
     &["mesh"],
     &["limb", "elasticity"],
     &["dataset"],

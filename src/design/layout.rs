@@ -2,10 +2,11 @@
 
 use glam::DVec3;
 
-use super::{DesignError, Inputs, MOST_GB, MOST_SITES};
+use super::{DesignError, Inputs, MOST_SITES};
 use crate::budget::Budget;
 use crate::dataset::{self, TouchRegion};
 use crate::elasticity::load::Touch;
+use crate::memory;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::unroll::Unrolling;
 use crate::mesh::{SurfacePoint, TriMesh, sample};
@@ -154,10 +155,10 @@ pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
 /// [`DesignError::TooLarge`].
 pub fn check_room(rows: usize, columns: usize) -> Result<(), DesignError> {
     let needed_gb = rows as f64 * columns as f64 * size_of::<f64>() as f64 / 1e9;
-    if needed_gb > MOST_GB {
+    if needed_gb > memory::allowed_gb() {
         return Err(DesignError::TooLarge {
             needed_gb,
-            limit_gb: MOST_GB,
+            limit_gb: memory::allowed_gb(),
             sites: rows / 4,
             touches: columns,
         });

@@ -6,7 +6,7 @@ use super::element::Facet;
 use super::load::{NodalForces, Touch, nodal_forces};
 use super::model::{ElasticError, LoadCheck, Model, range};
 use super::observe::{Face, Observer};
-use super::solver::{BLOCK, FactorError, MOST_GB, SymmetricMatrix};
+use super::solver::{BLOCK, FactorError, SymmetricMatrix};
 use super::system::{HELD, System, number_unknowns};
 use super::{Freedoms, Section};
 use crate::budget::{Cancelled, Watch, report};
@@ -354,7 +354,7 @@ fn explain(mesh: &TriMesh, unknowns: &[u32], error: FactorError) -> ElasticError
         FactorError::Cancelled => ElasticError::Cancelled(Cancelled),
         FactorError::TooLarge { bytes } => ElasticError::TooLarge {
             needed_gb: bytes / 1e9,
-            limit_gb: MOST_GB,
+            limit_gb: crate::memory::allowed_gb(),
         },
         FactorError::NotPositive { row } => {
             let freedom = unknowns.iter().position(|&u| u as usize == row);

@@ -26,9 +26,10 @@ use super::load::{Touch, pressure};
 use super::model::{ElasticError, LoadCheck, Model};
 use super::observe::{Face, Observer, tangent_frame};
 use super::rows::Rows;
-use super::solver::{BLOCK, FactorError, MOST_GB, SymmetricMatrix, bytes, check_bytes};
+use super::solver::{BLOCK, FactorError, SymmetricMatrix, bytes, check_bytes};
 use super::system::{HELD, System, number_unknowns};
 use crate::budget::{Cancelled, Watch, report};
+use crate::memory;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
@@ -384,7 +385,7 @@ fn explain(elements: &dyn Elements, unknowns: &[u32], error: FactorError) -> Ela
         FactorError::Cancelled => ElasticError::Cancelled(Cancelled),
         FactorError::TooLarge { bytes } => ElasticError::TooLarge {
             needed_gb: bytes / 1e9,
-            limit_gb: MOST_GB,
+            limit_gb: memory::allowed_gb(),
         },
         FactorError::NotPositive { row } => {
             let freedom = unknowns.iter().position(|&u| u as usize == row);

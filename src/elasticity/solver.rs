@@ -18,6 +18,7 @@ use faer::sparse::linalg::cholesky::{
 use faer::{Accum, MatMut, MatRef, Par, Side};
 
 use crate::budget::Watch;
+use crate::memory;
 
 /// Right-hand sides solved together. Fixed, so that a load gives the same bytes in any company.
 pub const BLOCK: usize = 64;
@@ -36,9 +37,6 @@ pub enum FactorError {
     },
     Cancelled,
 }
-
-/// Memory that a matrix and its factor may take (GB).
-pub const MOST_GB: f64 = 8.0;
 
 /// The lower triangle of a symmetric matrix, by columns.
 pub struct SymmetricMatrix {
@@ -287,7 +285,7 @@ pub fn bytes(entries: f64) -> f64 {
 /// # Errors
 /// [`FactorError::TooLarge`].
 pub fn check_bytes(bytes: f64) -> Result<(), FactorError> {
-    if bytes > MOST_GB * 1e9 {
+    if bytes > memory::allowed() {
         return Err(FactorError::TooLarge { bytes });
     }
     Ok(())

@@ -1,0 +1,58 @@
+//! Text from outside (files, boards) made safe to show: no control characters, and not without an end.
+
+/// Longest word that is quoted in a message, in characters.
+const WORD: usize = 60;
+/// Longest message: what one screen holds, in characters.
+const MESSAGE: usize = 1600;
+
+/// One word of a file or a board, to stand in a message between quotation marks.
+#[must_use]
+pub fn quote(word: &str) -> String {
+    format!("“{}”", shown(word, WORD))
+}
+
+/// A whole message that may carry text from outside.
+#[must_use]
+pub fn message(text: &str) -> String {
+    shown(text, MESSAGE)
+}
+
+/// At most so many characters, those that a terminal would obey replaced; a line break stays.
+fn shown(text: &str, most: usize) -> String {
+    let safe = |c: char| match c {
+        '\n' => c,
+        '\t' => ' ',
+        c if c.is_control() || is_hidden(c) => '\u{fffd}',
+        c => c,
+    };
+    let mut shown: String = text.chars().take(most).map(safe).collect();
+    if text.chars().nth(most).is_some() {
+        shown.push('…');
+    }
+    shown
+}
+
+/// Marks that turn the direction of what follows, or take no place.
+fn is_hidden(c: char) -> bool {
+    matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_that_a_terminal_obeys_is_left() {
+        assert_eq!(quote("\u{1b}[31mred\u{7}"), "“\u{fffd}[31mred\u{fffd}”");
+        assert_eq!(message("two\nlines\tand é"), "two\nlines and é");
+        assert_eq!(message("\u{9b}2J\u{202e}"), "\u{fffd}2J\u{fffd}");
+    }
+
+    #[test]
+    fn what_is_long_is_cut_and_says_so() {
+        let long = "é".repeat(200_000);
+        assert_eq!(quote(&long).chars().count(), WORD + 3);
+        assert!(message(&long).ends_with('…'));
+        assert_eq!(message(&"a".repeat(MESSAGE)).len(), MESSAGE);
+    }
+}
