@@ -352,6 +352,18 @@ impl TriMesh {
         self.area
     }
 
+    /// What a closed surface encloses (m³).
+    #[must_use]
+    pub fn volume_enclosed(&self) -> f64 {
+        let origin = self.bounds().0;
+        let cone = |t: u32| {
+            let [a, b, c] = self.corners(t).map(|p| p - origin);
+            a.dot(b.cross(c))
+        };
+        let sum: f64 = (0..self.triangles.len() as u32).map(cone).sum();
+        sum.abs() / 6.0
+    }
+
     /// Mean edge length (m): the element size that figures are quoted for.
     #[must_use]
     pub fn mean_edge(&self) -> f64 {

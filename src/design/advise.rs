@@ -8,6 +8,7 @@ use super::layout::size_mm;
 use super::{DesignError, Ground, Inputs, ground};
 use crate::budget::{Budget, Watch};
 use crate::elasticity::solid::ground::SolidGround;
+use crate::elasticity::solid::sizing::Shape;
 use crate::elasticity::{ElasticError, scope};
 use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
@@ -109,18 +110,21 @@ struct Asked {
     /// Thickness of the wall and the radius it is bent to (m).
     wall: f64,
     radius: f64,
+    /// Of the solid.
+    shape: Shape,
 }
 
 impl Asked {
-    fn new(inputs: &Inputs, area: f64, wall: f64, radius: f64) -> Self {
+    fn new(inputs: &Inputs, area: f64, radius: f64, shape: Shape) -> Self {
         let budget = inputs.project.budget.budget();
         Self {
             touches: inputs.project.touch.count.min(budget.touches),
             tip: inputs.project.tip().1,
             budget,
             area,
-            wall,
+            wall: shape.wall,
             radius,
+            shape,
         }
     }
 
@@ -151,13 +155,9 @@ impl Asked {
     }
 
     fn solid(&self) -> Cost {
-        let sizes = SolidGround::foreseen(
-            self.wall,
-            2.0 * self.area,
-            &self.budget.elements,
-            self.touches,
-        );
-        let unknowns = |size: &f64| SolidGround::unknowns(2.0 * self.area, *size);
+        let elements = &self.budget.elements;
+        let sizes = SolidGround::foreseen(&self.shape, self.tip, elements, self.touches);
+        let unknowns = |size: &f64| self.shape.unknowns(*size);
         let size = sizes.last().copied().unwrap_or(self.wall);
         let last = unknowns(&size);
         Cost {
@@ -229,7 +229,7 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround) -> Advice {
         .collect();
     let area: f64 = faces.iter().map(|&t| whole.facet_area(t)).sum();
     let radius = scope::radii(whole, &faces);
-    let asked = Asked::new(inputs, area / 2.0, solid.wall(), radius[0]);
+    let asked = Asked::new(inputs, area / 2.0, radius[0], solid.shape());
     let costs = [asked.shell(), asked.solid()];
     let [shell, cells] = &costs;
     let fits = if cells.total() > MUCH * shell.total() {
@@ -277,7 +277,12 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
     let facets: Vec<u32> = (0..part.triangles().len() as u32).collect();
     let wall = project.part.thickness_mm;
     let radius = scope::radii(part, &facets);
-    let asked = Asked::new(inputs, part.area(), wall * 1e-3, radius[0]);
+    let asked = Asked::new(
+        inputs,
+        part.area(),
+        radius[0],
+        Shape::of_wall(wall * 1e-3, 2.0 * part.area()),
+    );
     let costs = [asked.shell(), asked.solid()];
     let [shell, cells] = &costs;
     let fits = if shell.theory_percent > MOST_THEORY && cells.total() < shell.total() {

@@ -50,6 +50,14 @@ impl Discretization {
         }
     }
 
+    /// The larger of the estimated errors over what was asked for; displacements alone decide where no place is
+    /// far enough from a touch.
+    #[must_use]
+    pub fn excess(&self, aim: &Elements) -> f64 {
+        let displacement = self.displacement_percent / aim.displacement_percent;
+        displacement.max(self.strain_percent / aim.strain_percent)
+    }
+
     /// Whether the estimated errors are within what was asked for.
     #[must_use]
     pub fn meets(&self, aim: &Elements) -> bool {
@@ -59,11 +67,12 @@ impl Discretization {
 }
 
 /// What one mesh says of some loads at some places.
+#[derive(Default)]
 pub struct Sample {
     /// Displacement under each load, along it (m).
-    under: Vec<f64>,
+    pub under: Vec<f64>,
     /// Strains (xx, yy, 2xy) at the places, load by load.
-    strains: Vec<Vec<[f64; 3]>>,
+    pub strains: Vec<Vec<[f64; 3]>>,
     frames: Vec<super::observe::SiteFrame>,
 }
 
@@ -95,6 +104,18 @@ pub fn under_load(load: &[(usize, f64)], touch: &Touch, u: &[f64]) -> f64 {
     work / touch.force
 }
 
+/// Where nothing says how large errors are.
+#[must_use]
+pub fn unknown(loads: usize, places: usize) -> Discretization {
+    Discretization {
+        displacement_mm: f64::NAN,
+        displacement_percent: f64::NAN,
+        strain_percent: f64::NAN,
+        loads,
+        places,
+    }
+}
+
 /// The error left in `fine`, from `coarse` with elements of twice the size.
 #[must_use]
 pub fn between(
@@ -119,10 +140,29 @@ pub fn left(
     places: &[DVec3],
     change: f64,
 ) -> Discretization {
+    let under: Vec<f64> = (coarse.under.iter().zip(&fine.under))
+        .map(|(c, f)| (f - c) / change)
+        .collect();
+    let strain = |load: usize, i: usize| {
+        let turned = turn(coarse.frames[i], fine.frames[i]);
+        let (c, f) = (coarse.strains[load][i], fine.strains[load][i]);
+        std::array::from_fn(|r| ((0..3).map(|k| turned[r][k] * c[k]).sum::<f64>() - f[r]) / change)
+    };
+    of(fine, touches, places, &under, strain)
+}
+
+/// The estimate from what is left of each displacement under its load (m), and of the strain by load and place.
+#[must_use]
+pub fn of(
+    fine: &Sample,
+    touches: &[Touch],
+    places: &[DVec3],
+    under: &[f64],
+    strain: impl Fn(usize, usize) -> [f64; 3],
+) -> Discretization {
     let (mut square, mut relative) = (0.0, 0.0);
     let least = LEAST_MOVED * median(fine.under.iter().map(|f| f.abs()).collect());
-    for (c, f) in coarse.under.iter().zip(&fine.under) {
-        let left = (f - c) / change;
+    for (left, f) in under.iter().zip(&fine.under) {
         square += left * left;
         let moved = f.abs().max(least);
         if moved > 0.0 {
@@ -133,7 +173,7 @@ pub fn left(
     Discretization {
         displacement_mm: (square / loads).sqrt() * 1000.0,
         displacement_percent: (relative / loads).sqrt() * 100.0,
-        strain_percent: 100.0 * strain_apart(coarse, fine, touches, places) / change,
+        strain_percent: 100.0 * strain_apart(fine, touches, places, strain),
         loads: touches.len(),
         places: places.len(),
     }
@@ -144,9 +184,14 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Rms over loads and places beyond the tip (NaN where there is none) of the difference of strains over the load's largest.
-#[must_use]
-pub fn strain_apart(coarse: &Sample, fine: &Sample, touches: &[Touch], places: &[DVec3]) -> f64 {
+/// Rms over loads and places beyond the tip (NaN where there is none) of what strains are off by over the load's
+/// largest.
+fn strain_apart(
+    fine: &Sample,
+    touches: &[Touch],
+    places: &[DVec3],
+    off: impl Fn(usize, usize) -> [f64; 3],
+) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);
     for (load, touch) in touches.iter().enumerate() {
         let far = |i: &usize| places[*i].distance(touch.position) > BEYOND * touch.tip_radius;
@@ -158,12 +203,7 @@ pub fn strain_apart(coarse: &Sample, fine: &Sample, touches: &[Touch], places: &
             continue;
         }
         for i in (0..places.len()).filter(far) {
-            let turned = turn(coarse.frames[i], fine.frames[i]);
-            let c = coarse.strains[load][i];
-            let f = fine.strains[load][i];
-            let apart: [f64; 3] =
-                std::array::from_fn(|r| (0..3).map(|k| turned[r][k] * c[k]).sum::<f64>() - f[r]);
-            sum += (norm(apart) / largest).powi(2);
+            sum += (norm(off(load, i)) / largest).powi(2);
             count += 1;
         }
     }

@@ -12,7 +12,10 @@ pub mod grip;
 pub mod ground;
 pub mod immersed;
 pub mod lagrange;
+pub mod series;
+pub mod sizing;
 pub mod tetrahedra;
+pub mod tip;
 
 use std::sync::Arc;
 

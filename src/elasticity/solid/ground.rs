@@ -8,6 +8,9 @@ use rayon::prelude::*;
 
 use super::SolidModel;
 use super::immersed::{Fineness, Immersed};
+use super::series::Series;
+use super::sizing::{self, FINER, LEAST_GRIDS, Shape};
+use super::tip;
 use crate::budget::{Elements, Watch, report};
 use crate::elasticity::estimate::{self, Discretization, Sample};
 use crate::elasticity::grade::{CHECKED, PLACES, even_size, sample, spread};
@@ -33,6 +36,8 @@ pub struct SolidGround {
     pub outside: Arc<TriMesh>,
     /// What is held at the vertices of the inside.
     pub inside_held: Vec<Freedoms>,
+    /// Places of the surface that are held (m).
+    held: Vec<DVec3>,
 }
 
 /// The cells, with the model built on them.
@@ -48,19 +53,11 @@ pub struct SolidGraded {
 
 /// Vertices of the even triangles, about.
 const VERTICES: usize = 9000;
-/// Size of the first cells in thicknesses of the wall, and of each next ones over the last.
-const FIRST: f64 = 2.5;
-const FINER: f64 = 1.0 / 1.5;
-/// Cells that are not at least this much smaller are not worth a model.
-const WORTH: f64 = 0.85;
-/// Unknowns of quadratic cells for a surface, times the squared size over its area (measured on tubes and
-/// shins, walls half as thick as the cells).
-const UNKNOWNS: f64 = 24.0;
-/// Unknowns that are allowed for each vertex that a shell may have.
-const UNKNOWNS_A_VERTEX: f64 = 16.0;
-/// Unknowns that are never asked for, whatever the quality: those of the truth, which are more than twice as many,
-/// still fit into memory.
-const MOST_UNKNOWNS: f64 = 300_000.0;
+/// Orders at which errors of displacements and of strains on the surface fall (`benches/solid.md`).
+const ORDER: f64 = 2.0;
+const STRAIN_ORDER: f64 = 1.5;
+/// Of the distances between touches and what is held, this share may be left unresolved.
+const NEAREST: f64 = 0.1;
 /// Own tetrahedra of fewer unknowns are halved to judge them.
 const MOST_TO_HALVE: usize = 60_000;
 /// The error is an estimate: stop at this share of the tolerance.
@@ -96,7 +93,12 @@ impl SolidGround {
             face(Side::Inside).ok_or(ElasticError::NoFace { face: "inside" })?;
         let (outside, _) = face(Side::Outside).ok_or(ElasticError::NoFace { face: "outside" })?;
         let at = |&v: &u32| held.held_at(laid.places[v as usize]);
+        let is_held = |v: &u32| at(v).0 != 0;
+        let all = 0..whole.positions().len() as u32;
         Ok(Self {
+            held: (all.filter(is_held))
+                .map(|v| whole.positions()[v as usize])
+                .collect(),
             inside_held: vertices.iter().map(at).collect(),
             inside: Arc::new(inside),
             outside: Arc::new(outside),
@@ -156,16 +158,35 @@ impl SolidGround {
         Fineness::of(size, self.wall())
     }
 
-    /// Size of the smallest cells (m) that a budget allows for so many touches.
+    /// What the size of its cells hangs on.
     #[must_use]
-    pub fn size_allowed(&self, aim: &Elements, touches: usize) -> f64 {
-        self.size_for(unknowns_allowed(aim, touches))
+    pub fn shape(&self) -> Shape {
+        let (lower, upper) = self.whole.bounds();
+        let mut sides = (upper - lower).to_array();
+        sides.sort_by(f64::total_cmp);
+        Shape {
+            area: self.whole.area(),
+            volume: self.whole.volume_enclosed(),
+            wall: self.wall(),
+            across: sides[1],
+        }
     }
 
-    /// Unknowns with cells of a size (m) for a surface of an area (m²), about.
-    #[must_use]
-    pub fn unknowns(area: f64, size: f64) -> f64 {
-        UNKNOWNS * area / (size * size)
+    /// Radius of the smallest tip, and how far all touches but the nearest ones are from what is held (m).
+    fn nearest(&self, touches: &[Touch]) -> (f64, f64) {
+        let tip = touches
+            .iter()
+            .map(|t| t.tip_radius)
+            .fold(f64::INFINITY, f64::min);
+        let distance = |t: &Touch| {
+            (self.held.iter())
+                .map(|h| h.distance(t.position))
+                .fold(f64::INFINITY, f64::min)
+        };
+        let mut away: Vec<f64> = touches.iter().map(distance).collect();
+        away.sort_by(f64::total_cmp);
+        let nearest = (away.len() as f64 * NEAREST) as usize;
+        (tip, away.get(nearest).copied().unwrap_or(f64::INFINITY))
     }
 
     /// Error of the displacement under a touch (%) with cells of a size (m) for a wall (m): between the slotted
@@ -176,16 +197,16 @@ impl SolidGround {
         OF_ONE_WALL * (size / wall).powi(2)
     }
 
-    /// Sizes of the cells (m), one after the other, that [`Self::grade`] would come to for a wall (m) and a
-    /// surface of an area (m²), were the error as on other parts.
+    /// Sizes of the cells (m), one after the other, that [`Self::grade`] would come to for a part and a tip (m), were
+    /// the error as on other parts.
     #[must_use]
-    pub fn foreseen(wall: f64, area: f64, aim: &Elements, touches: usize) -> Vec<f64> {
-        let least_size = size_for(area, unknowns_allowed(aim, touches));
-        let first = (FIRST * wall).max(least_size / FINER);
-        let mut sizes = vec![first, first * FINER];
+    pub fn foreseen(shape: &Shape, tip: f64, aim: &Elements, touches: usize) -> Vec<f64> {
+        let least = shape.least(aim, touches);
+        let mut sizes = vec![shape.first(tip, f64::INFINITY, least)];
         while let Some(&size) = sizes.last()
-            && Self::error_percent(size, wall) > SAFETY * aim.displacement_percent
-            && let Some(next) = next_size(size, least_size)
+            && (sizes.len() < LEAST_GRIDS as usize
+                || Self::error_percent(size, shape.wall) > SAFETY * aim.displacement_percent)
+            && let Some(next) = sizing::next(size, least)
         {
             sizes.push(next);
         }
@@ -195,7 +216,7 @@ impl SolidGround {
     /// Size of cells (m) for about so many unknowns.
     #[must_use]
     pub fn size_for(&self, unknowns: f64) -> f64 {
-        size_for(self.whole.area(), unknowns)
+        self.shape().size_for(unknowns)
     }
 
     /// Makes cells smaller until the error under these touches is small enough or the most unknowns are
@@ -213,40 +234,68 @@ impl SolidGround {
         if let Some(own) = self.immersed.own() {
             return self.as_given(own, touches, places, watch);
         }
-        let least_size = self.size_allowed(aim, touches.len());
+        let shape = self.shape();
+        let least = shape.least(aim, touches.len());
         let touches = sample(touches);
         let places: Vec<DVec3> = spread(places, PLACES);
-        let mut size = (FIRST * self.wall()).max(least_size / FINER);
-        let mut coarse = Solved::new(self, size, &touches, &places, watch)?;
-        let (mut models, mut solves) = (1, touches.len() as u64);
-        let mut next = size * FINER;
-        let mut estimate;
+        let (tip, away) = self.nearest(&touches);
+        let mut grids = Grids::default();
+        let mut size = shape.first(tip, away, least);
         loop {
-            // Errors fall with the square of the size: what changed, over what is left.
-            let change = (size / next).powi(2) - 1.0;
-            size = next;
-            let fine = Solved::new(self, size, &touches, &places, watch)?;
-            models += 1;
-            solves += touches.len() as u64;
-            let (before, after) = (&coarse.sample, &fine.sample);
-            estimate = estimate::left(before, after, &touches, &places, change);
-            let excess = (estimate.displacement_percent / aim.displacement_percent)
-                .max(estimate.strain_percent / aim.strain_percent)
-                / SAFETY;
-            coarse = fine;
-            match next_size(size, least_size) {
-                Some(finer) if excess > 1.0 => next = finer,
+            let solved = Solved::new(self, size, &touches, &places, watch)?;
+            grids.push(solved);
+            let next = sizing::next(size, least);
+            let enough = grids.samples.len() >= LEAST_GRIDS as usize;
+            match next {
+                Some(finer) if !enough => size = finer,
+                Some(finer) if self.left(&grids, &touches, &places).excess(aim) > SAFETY => {
+                    size = finer;
+                }
                 _ => break,
             }
         }
-        let checked = spread(&coarse.solutions, CHECKED);
+        let estimate = self.left(&grids, &touches, &places);
+        let (models, solves) = (grids.sizes.len() as u64, touches.len() as u64);
+        let Some(last) = grids.last else {
+            unreachable!("there is a first grid");
+        };
         Ok(SolidGraded {
-            balance: coarse.model.check_all(&spread(&touches, CHECKED), &checked),
-            fineness: coarse.fineness,
-            model: coarse.model,
+            balance: last.model.check_all(
+                &spread(&touches, CHECKED),
+                &spread(&last.solutions, CHECKED),
+            ),
+            fineness: last.fineness,
+            model: last.model,
             estimate,
             models,
-            solves,
+            solves: models * solves,
+        })
+    }
+
+    /// What the last of several grids is off by; unknown where there is one only.
+    fn left(&self, grids: &Grids, touches: &[Touch], places: &[DVec3]) -> Discretization {
+        let Some(fine) = grids.samples.last().filter(|_| grids.sizes.len() > 1) else {
+            return estimate::unknown(touches.len(), places.len());
+        };
+        let size = grids.sizes[grids.sizes.len() - 1];
+        let wall = self.wall();
+        let (of_displacements, of_strains) = (
+            Series::new(&grids.sizes, ORDER),
+            Series::new(&grids.sizes, STRAIN_ORDER),
+        );
+        let under: Vec<f64> = (0..touches.len())
+            .map(|load| {
+                let off = of_displacements.error(|grid| grids.samples[grid].under[load]);
+                let tip = touches[load].tip_radius;
+                let unseen = tip::unseen(&self.immersed.material, tip, size, wall);
+                off.max(unseen * touches[load].force)
+            })
+            .collect();
+        estimate::of(fine, touches, places, &under, |load, place| {
+            // All grids are read on the same surface, in the same frames.
+            std::array::from_fn(|k| {
+                of_strains.error(|grid| grids.samples[grid].strains[load][place][k])
+            })
         })
     }
 
@@ -276,13 +325,7 @@ impl SolidGround {
             Err(error) if error.is_memory() => None,
             other => other?,
         };
-        let unknown = Discretization {
-            displacement_mm: f64::NAN,
-            displacement_percent: f64::NAN,
-            strain_percent: f64::NAN,
-            loads: touches.len(),
-            places: places.len(),
-        };
+        let unknown = estimate::unknown(touches.len(), places.len());
         let estimate = halved.as_ref().map_or(unknown, |halved| {
             let (given, halved) = (&given.sample, &halved.sample);
             estimate::left(given, halved, &touches, &places, CHANGE / (1.0 + CHANGE))
@@ -377,19 +420,20 @@ impl Solved {
     }
 }
 
-fn unknowns_allowed(aim: &Elements, touches: usize) -> f64 {
-    (UNKNOWNS_A_VERTEX * aim.most_for(touches) as f64).min(MOST_UNKNOWNS)
+/// Models on finer and finer grids: of all but the last only what was read.
+#[derive(Default)]
+struct Grids {
+    sizes: Vec<f64>,
+    samples: Vec<Sample>,
+    last: Option<Solved>,
 }
 
-/// The size (m) after one, if there is one to be had.
-fn next_size(size: f64, least: f64) -> Option<f64> {
-    let next = (size * FINER).max(least);
-    (next < WORTH * size).then_some(next)
-}
-
-/// Size of cells (m) of a surface of an area (m²) for about so many unknowns.
-fn size_for(area: f64, unknowns: f64) -> f64 {
-    (UNKNOWNS * area / unknowns).sqrt()
+impl Grids {
+    fn push(&mut self, mut solved: Solved) {
+        self.sizes.push(solved.fineness.size);
+        self.samples.push(std::mem::take(&mut solved.sample));
+        self.last = Some(solved);
+    }
 }
 
 /// Whether a surface encloses anything: its holes are small, and just behind most of it there is material.
