@@ -91,6 +91,7 @@ pub fn answer(
         linearity,
         ..
     } = built;
+    notes.extend(design::open_solid(&inputs));
     notes.extend(checks.distrust());
     notes.extend(design::cautions(
         &estimate,

@@ -7,6 +7,7 @@ pub mod flatten;
 pub mod geodesic;
 pub mod inside;
 pub mod locate;
+mod numbers;
 pub mod remesh;
 pub mod repair;
 pub mod sample;
@@ -24,6 +25,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
+use numbers::{NumberMap, NumberSet};
 use repair::Repair;
 use volume::VolumeMesh;
 
@@ -57,7 +59,7 @@ pub enum MeshError {
 }
 
 /// What was changed while a mesh was taken in; all zero for a clean one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RepairReport {
     /// Vertices merged because their positions were equal to the bit.
     pub welded_vertices: usize,
@@ -77,6 +79,10 @@ pub struct RepairReport {
     pub filled_holes: usize,
     /// Triangles thinner than a hundredth of their length: kept; graded elements do not have them.
     pub slivers: usize,
+    /// The mesh is open, but closes where vertices within so much (m) of each other are joined.
+    pub closes_within: Option<f64>,
+    /// What the file holds that was left out, or that its reader does not know: whole sentences without a stop.
+    pub notes: Vec<String>,
 }
 
 impl RepairReport {
@@ -106,8 +112,32 @@ impl RepairReport {
             "edges join more than two triangles",
         );
         count(self.slivers, "slivers");
-        (!parts.is_empty()).then(|| parts.join(", "))
+        if let Some(within) = self.closes_within {
+            let mm = significant(within * 1e3);
+            parts.push(format!(
+                "{} edges are open, and the mesh closes when vertices within {mm} mm are joined (part.weld_mm = {mm})",
+                self.boundary_edges
+            ));
+        }
+        let changed = (!parts.is_empty()).then(|| parts.join(", "));
+        let said: Vec<String> = changed.into_iter().chain(self.notes.clone()).collect();
+        (!said.is_empty()).then(|| said.join("; "))
     }
+}
+
+/// A positive number of one significant digit, without the zeros that binary fractions trail.
+fn significant(x: f64) -> String {
+    let decimals = (-x.log10().floor()).max(0.0) as usize;
+    format!("{x:.decimals$}")
+}
+
+/// A surface that was taken in, with what was changed and where its vertices went.
+#[derive(Clone, Debug)]
+pub struct TakenIn {
+    pub mesh: TriMesh,
+    pub repairs: RepairReport,
+    /// For each vertex that was given its number in the mesh; nothing where it is no part of it.
+    pub vertices: Vec<Option<u32>>,
 }
 
 /// An edge between two vertices (`a < b`) and the triangles on it.
@@ -165,35 +195,81 @@ impl TriMesh {
         body: usize,
         repair: &Repair,
     ) -> Result<(Self, RepairReport), MeshError> {
+        let taken = Self::taken_in(positions, triangles, body, repair)?;
+        Ok((taken.mesh, taken.repairs))
+    }
+
+    /// As [`Self::repaired`], with the way from the vertices given to those of the mesh.
+    ///
+    /// # Errors
+    /// [`MeshError`] for anything that cannot be a surface.
+    pub fn taken_in(
+        positions: &[DVec3],
+        triangles: &[[u32; 3]],
+        body: usize,
+        repair: &Repair,
+    ) -> Result<TakenIn, MeshError> {
         check_raw(positions, triangles)?;
         let mut report = RepairReport::default();
-        let (mut positions, mut triangles) = weld(positions, triangles, &mut report);
-        if repair.weld > 0.0 {
-            let (renumber, kept) = repair::join_near(&positions, repair.weld);
-            report.joined_vertices = positions.len() - kept.len();
-            positions = kept;
-            triangles = triangles
-                .iter()
-                .map(|t| t.map(|v| renumber[v as usize]))
-                .collect();
+        let (numbers, points) = weld(positions, repair, &mut report);
+        let renumbered = triangles.iter().map(|t| t.map(|v| numbers[v as usize]));
+        let whole = drop_degenerate(&points, renumbered, &mut report)?;
+        let kept = keep_body(&points, &whole, body, &mut report)?;
+        let mesh = Self::of_body(kept.positions, kept.triangles, repair, &mut report);
+        if report.boundary_edges > 0 {
+            // Of the whole file: what is torn lies apart.
+            report.closes_within = repair::closing_weld(&points, &whole, mesh.mean_edge);
         }
-        let triangles = drop_degenerate(&positions, triangles, &mut report)?;
-        let (mut positions, mut triangles) = keep_body(&positions, &triangles, body, &mut report)?;
-        orient(&mut triangles, &mut report);
-        fill_holes(&mut positions, &mut triangles, repair, &mut report);
-        turn_closed_outward(&positions, &mut triangles, &mut report);
-        let mesh = Self::from_checked(positions, triangles);
+        Ok(TakenIn {
+            mesh,
+            repairs: report,
+            vertices: (numbers.iter())
+                .map(|&v| kept.numbers[v as usize])
+                .collect(),
+        })
+    }
+
+    /// One body, turned and filled where it has to be.
+    fn of_body(
+        mut positions: Vec<DVec3>,
+        mut triangles: Vec<[u32; 3]>,
+        repair: &Repair,
+        report: &mut RepairReport,
+    ) -> Self {
+        let mut sides = Sides::of(&triangles);
+        let mut turned = orient(&mut triangles, &sides, report);
+        fill_holes(&mut positions, &mut triangles, repair, report);
+        if report.filled_holes > 0 {
+            sides = Sides::of(&triangles);
+            turned = false;
+        }
+        if sides.edges.iter().all(|e| e.triangles.len() == 2) {
+            turned |= turn_outward(&positions, &mut triangles, report);
+        }
+        // The numbers of edges follow the winding.
+        if turned {
+            sides = Sides::of(&triangles);
+        }
+        let mesh = Self::with_sides(positions, triangles, sides);
         report.non_manifold_edges = mesh.edges.iter().filter(|e| e.triangles.len() > 2).count();
         report.boundary_edges = mesh.boundary_edges().count();
         report.slivers = (0..mesh.triangles.len() as u32)
             .filter(|&t| mesh.thinness(t) < 0.01)
             .count();
-        Ok((mesh, report))
+        mesh
     }
 
     /// Builds the neighbourhoods of a surface that is known to be sound.
     pub(crate) fn from_checked(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
-        let (edges, triangle_edges) = build_edges(&triangles);
+        let sides = Sides::of(&triangles);
+        Self::with_sides(positions, triangles, sides)
+    }
+
+    fn with_sides(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, sides: Sides) -> Self {
+        let Sides {
+            edges,
+            of_triangles: triangle_edges,
+        } = sides;
         let mut vertex_triangles = vec![Vec::new(); positions.len()];
         for (t, tri) in triangles.iter().enumerate() {
             for &v in tri {
@@ -481,38 +557,40 @@ fn check_raw(positions: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), MeshErro
     Ok(())
 }
 
-fn weld(
-    positions: &[DVec3],
-    triangles: &[[u32; 3]],
-    report: &mut RepairReport,
-) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-    let mut index: HashMap<[u64; 3], u32> = HashMap::with_capacity(positions.len());
-    let mut kept = Vec::with_capacity(positions.len());
-    let renumber: Vec<u32> = positions
+/// For each position the number of the point it became, and the points: those equal to the bit are one, and those
+/// as near as is asked for.
+fn weld(positions: &[DVec3], repair: &Repair, report: &mut RepairReport) -> (Vec<u32>, Vec<DVec3>) {
+    let mut index: NumberMap<[u64; 3], u32> = NumberMap::default();
+    let mut points = Vec::new();
+    let mut numbers: Vec<u32> = positions
         .iter()
         .map(|p| {
             // Adding zero makes -0.0 and 0.0 one point.
             let key = (*p + DVec3::ZERO).to_array().map(f64::to_bits);
             *index.entry(key).or_insert_with(|| {
-                kept.push(*p);
-                (kept.len() - 1) as u32
+                points.push(*p);
+                (points.len() - 1) as u32
             })
         })
         .collect();
-    report.welded_vertices = positions.len() - kept.len();
-    let triangles = triangles
-        .iter()
-        .map(|t| t.map(|v| renumber[v as usize]))
-        .collect();
-    (kept, triangles)
+    report.welded_vertices = positions.len() - points.len();
+    if repair.weld > 0.0 {
+        let (joined, kept) = repair::join_near(&points, repair.weld);
+        report.joined_vertices = points.len() - kept.len();
+        for number in &mut numbers {
+            *number = joined[*number as usize];
+        }
+        points = kept;
+    }
+    (numbers, points)
 }
 
 fn drop_degenerate(
     positions: &[DVec3],
-    triangles: Vec<[u32; 3]>,
+    triangles: impl ExactSizeIterator<Item = [u32; 3]>,
     report: &mut RepairReport,
 ) -> Result<Vec<[u32; 3]>, MeshError> {
-    let mut seen = std::collections::HashSet::with_capacity(triangles.len());
+    let mut seen: NumberSet<[u32; 3]> = NumberSet::default();
     let mut kept = Vec::with_capacity(triangles.len());
     for tri in triangles {
         let [a, b, c] = tri.map(|v| positions[v as usize]);
@@ -539,13 +617,21 @@ fn drop_degenerate(
     Ok(kept)
 }
 
+/// One body of several.
+struct Kept {
+    positions: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+    /// Of each vertex of the whole.
+    numbers: Vec<Option<u32>>,
+}
+
 /// Keeps one connected body (joined at least at a vertex), by falling area, and only the vertices it uses.
 fn keep_body(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     body: usize,
     report: &mut RepairReport,
-) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), MeshError> {
+) -> Result<Kept, MeshError> {
     let labels = components(positions.len(), triangles);
     let mut areas: BTreeMap<u32, f64> = BTreeMap::new();
     for tri in triangles {
@@ -580,7 +666,51 @@ fn keep_body(
     for tri in &mut chosen {
         *tri = tri.map(|v| renumber[v as usize]);
     }
-    Ok((kept, chosen))
+    let numbers = renumber.into_iter().zip(used);
+    Ok(Kept {
+        positions: kept,
+        triangles: chosen,
+        numbers: numbers.map(|(v, used)| used.then_some(v)).collect(),
+    })
+}
+
+/// One of several surfaces.
+struct Enclosing<'t> {
+    triangles: Vec<&'t [u32; 3]>,
+    lower: DVec3,
+    upper: DVec3,
+    /// Six times the volume it encloses (m³), negative where it faces inward.
+    volume: f64,
+}
+
+impl<'t> Enclosing<'t> {
+    const NOTHING: Self = Self {
+        triangles: Vec::new(),
+        lower: DVec3::INFINITY,
+        upper: DVec3::NEG_INFINITY,
+        volume: 0.0,
+    };
+
+    fn add(&mut self, tri: &'t [u32; 3], positions: &[DVec3], origin: DVec3) {
+        let corners = tri.map(|v| positions[v as usize]);
+        for p in corners {
+            self.lower = self.lower.min(p);
+            self.upper = self.upper.max(p);
+        }
+        let [a, b, c] = corners.map(|p| p - origin);
+        self.volume += a.dot(b.cross(c));
+        self.triangles.push(tri);
+    }
+
+    /// Whether it faces outward and a point lies within it.
+    fn surrounds(&self, positions: &[DVec3], point: DVec3) -> bool {
+        let within = point.cmpge(self.lower).all() && point.cmple(self.upper).all();
+        self.volume > 0.0 && within && {
+            let seen =
+                |t: &&[u32; 3]| winding::solid_angle(&t.map(|v| positions[v as usize]), point);
+            self.triangles.iter().map(seen).sum::<f64>() > 2.0 * std::f64::consts::PI
+        }
+    }
 }
 
 /// Surfaces that face inward and lie within another one bound a hollow of it: by their labels, that of the
@@ -595,28 +725,22 @@ fn hollows(
     if by_area.len() < 2 {
         return found;
     }
-    let mut volumes: HashMap<u32, f64> = HashMap::new();
+    let places: NumberMap<u32, usize> = by_area.iter().map(|b| b.0).zip(0..).collect();
+    let mut surfaces: Vec<Enclosing> = by_area.iter().map(|_| Enclosing::NOTHING).collect();
     for tri in triangles {
         let label = labels[tri[0] as usize];
-        let origin = positions[label as usize];
-        let [a, b, c] = tri.map(|v| positions[v as usize] - origin);
-        *volumes.entry(label).or_default() += a.dot(b.cross(c));
+        surfaces[places[&label]].add(tri, positions, positions[label as usize]);
     }
-    for (k, &(inner, _)) in by_area
-        .iter()
-        .enumerate()
-        .filter(|(_, b)| volumes[&b.0] < 0.0)
-    {
+    for (k, &(inner, _)) in by_area.iter().enumerate() {
+        if surfaces[k].volume >= 0.0 {
+            continue;
+        }
         let point = positions[inner as usize];
-        let around = by_area[..k].iter().map(|b| b.0).find(|outer| {
-            let own = triangles.iter().filter(|t| labels[t[0] as usize] == *outer);
-            let angle: f64 = own
-                .map(|t| winding::solid_angle(&t.map(|v| positions[v as usize]), point))
-                .sum();
-            volumes[outer] > 0.0 && angle > 2.0 * std::f64::consts::PI
-        });
+        let around = surfaces[..k]
+            .iter()
+            .position(|outer| outer.surrounds(positions, point));
         if let Some(outer) = around {
-            found.insert(inner, outer);
+            found.insert(inner, by_area[outer].0);
         }
     }
     found
@@ -671,9 +795,8 @@ pub(crate) fn components(vertices: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
 }
 
 /// Turns triangles over until neighbours across every two-triangle edge agree, following the first
-/// triangle of the body, on the side that most were on.
-fn orient(triangles: &mut [[u32; 3]], report: &mut RepairReport) {
-    let (edges, triangle_edges) = build_edges(triangles);
+/// triangle of the body, on the side that most were on. Whether any was turned.
+fn orient(triangles: &mut [[u32; 3]], sides: &Sides, report: &mut RepairReport) -> bool {
     let runs = |tri: [u32; 3], a: u32, b: u32| (0..3).any(|i| tri[i] == a && tri[(i + 1) % 3] == b);
     let mut visited = vec![false; triangles.len()];
     let mut flipped = vec![false; triangles.len()];
@@ -685,8 +808,8 @@ fn orient(triangles: &mut [[u32; 3]], report: &mut RepairReport) {
         let mut members = vec![start];
         let mut queue = VecDeque::from([start]);
         while let Some(t) = queue.pop_front() {
-            for e in triangle_edges[t] {
-                let edge = &edges[e as usize];
+            for e in sides.of_triangles[t] {
+                let edge = &sides.edges[e as usize];
                 if edge.triangles.len() != 2 {
                     continue;
                 }
@@ -712,15 +835,16 @@ fn orient(triangles: &mut [[u32; 3]], report: &mut RepairReport) {
         }
     }
     report.flipped_triangles = flipped.iter().filter(|&&f| f).count();
+    report.flipped_triangles > 0
 }
 
 /// A closed body encloses a positive volume when its triangles face outward; an open one has no outside
-/// of its own and stays as its file says.
-fn turn_closed_outward(positions: &[DVec3], triangles: &mut [[u32; 3]], report: &mut RepairReport) {
-    let (edges, _) = build_edges(triangles);
-    if edges.iter().any(|e| e.triangles.len() != 2) {
-        return;
-    }
+/// of its own and stays as its file says. Whether it was turned.
+fn turn_outward(
+    positions: &[DVec3],
+    triangles: &mut [[u32; 3]],
+    report: &mut RepairReport,
+) -> bool {
     let origin = positions[0];
     let volume: f64 = triangles
         .iter()
@@ -735,32 +859,46 @@ fn turn_closed_outward(positions: &[DVec3], triangles: &mut [[u32; 3]], report: 
         }
         report.flipped_triangles = triangles.len() - report.flipped_triangles;
     }
+    volume < 0.0
 }
 
-fn build_edges(triangles: &[[u32; 3]]) -> (Vec<Edge>, Vec<[u32; 3]>) {
-    let mut index: HashMap<(u32, u32), u32> = HashMap::with_capacity(triangles.len() * 3 / 2);
-    let mut edges: Vec<Edge> = Vec::with_capacity(triangles.len() * 3 / 2);
-    let triangle_edges = triangles
-        .iter()
-        .enumerate()
-        .map(|(t, tri)| {
-            std::array::from_fn(|corner| {
-                let (p, q) = (tri[(corner + 1) % 3], tri[(corner + 2) % 3]);
-                let (a, b) = (p.min(q), p.max(q));
-                let e = *index.entry((a, b)).or_insert_with(|| {
-                    edges.push(Edge {
-                        a,
-                        b,
-                        triangles: Vec::with_capacity(2),
+/// The edges of triangles.
+struct Sides {
+    edges: Vec<Edge>,
+    /// The edge opposite each corner.
+    of_triangles: Vec<[u32; 3]>,
+}
+
+impl Sides {
+    fn of(triangles: &[[u32; 3]]) -> Self {
+        let mut index: NumberMap<(u32, u32), u32> = NumberMap::default();
+        index.reserve(triangles.len() * 3 / 2);
+        let mut edges: Vec<Edge> = Vec::with_capacity(triangles.len() * 3 / 2);
+        let of_triangles = triangles
+            .iter()
+            .enumerate()
+            .map(|(t, tri)| {
+                std::array::from_fn(|corner| {
+                    let (p, q) = (tri[(corner + 1) % 3], tri[(corner + 2) % 3]);
+                    let (a, b) = (p.min(q), p.max(q));
+                    let e = *index.entry((a, b)).or_insert_with(|| {
+                        edges.push(Edge {
+                            a,
+                            b,
+                            triangles: Vec::with_capacity(2),
+                        });
+                        (edges.len() - 1) as u32
                     });
-                    (edges.len() - 1) as u32
-                });
-                edges[e as usize].triangles.push(t as u32);
-                e
+                    edges[e as usize].triangles.push(t as u32);
+                    e
+                })
             })
-        })
-        .collect();
-    (edges, triangle_edges)
+            .collect();
+        Self {
+            edges,
+            of_triangles,
+        }
+    }
 }
 
 fn vertex_normals(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<DVec3> {

@@ -72,6 +72,18 @@ pub fn ground(inputs: &Inputs, watch: Watch) -> Result<Ground, DesignError> {
     Ok(Ground::Shell(Box::new(shell)))
 }
 
+/// What has to be known of a solid whose surface is not closed; its inside is guessed at there.
+#[must_use]
+pub fn open_solid(inputs: &Inputs) -> Option<String> {
+    let solid = inputs.project.part.model == PartModel::Solid;
+    let open = inputs.part.boundary_edges().count();
+    (solid && open > 0).then(|| {
+        format!(
+            "The part is taken as a solid, and {open} edges of its surface are open: what lies behind its holes and seams is a guess. Fill or join them (part.fill_holes_mm, part.weld_mm), or close them in the program that wrote it."
+        )
+    })
+}
+
 /// What the user has said of the faces of a solid, by place (m).
 fn told(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, DesignError> {
     let part = Arc::clone(&inputs.part);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::ground::{Built, Ground, Laid, ground};
+use super::ground::{Built, Ground, Laid, ground, open_solid};
 use super::layout::{check_memory, lay_out_sites, lay_out_touches};
 use super::{DesignError, Inputs};
 use crate::budget::{Achieved, Budget, Quality, StopReason, Watch, Work};
@@ -176,6 +176,7 @@ fn read(
     } else {
         Vec::new()
     };
+    notes.extend(open_solid(inputs));
     notes.extend(on_supports(inputs, &dataset.touches)?);
     notes.extend(checks.distrust());
     notes.extend(cautions(&estimate, linearity.as_ref(), &budget.elements));

@@ -1,23 +1,26 @@
 //! Meshes from files: glTF and GLB, OBJ, STL (both kinds), PLY; tetrahedra from Gmsh, Abaqus and `CalculiX`.
 //!
-//! The libraries that parse them may panic on hostile bytes, so they run behind a boundary; what they
-//! return is checked by [`TriMesh::repaired`] like anything from outside.
+//! What parses them may panic on hostile bytes, so it runs behind a boundary; what it returns is checked by
+//! [`TriMesh::taken_in`] like anything from outside. What a reader does not know, or leaves out, it notes.
 
+mod boundary;
 mod gltf;
 mod inp;
 mod msh;
 mod obj;
 mod ply;
 mod stl;
+mod words;
 
-use std::collections::HashSet;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::collections::{BTreeSet, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::FileError;
+use self::boundary::quietly;
+use super::{FileError, source};
+use crate::memory;
 use crate::mesh::repair::Repair;
 use crate::mesh::volume::VolumeMesh;
 use crate::mesh::{MeshError, RepairReport, TriMesh};
@@ -38,8 +41,8 @@ struct Soup {
     triangles: Vec<[u32; 3]>,
     /// Name, first triangle and the one after the last.
     groups: Vec<(String, usize, usize)>,
-    /// Nodes walked through.
-    visits: usize,
+    /// What was left out of the file, or is not known: whole sentences without a stop.
+    notes: Vec<String>,
     /// Tetrahedra on the positions: their surface is the mesh, whatever triangles there are.
     volume: Option<VolumeMesh>,
     /// Names and positions.
@@ -74,33 +77,28 @@ impl Soup {
         }
     }
 
-    /// Vertices of the mesh that lie in each group, known by their positions.
-    fn masks(&self, mesh: &TriMesh, weld: f64) -> Masks {
-        let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
+    /// Vertices of the mesh that lie in each group: `numbers` are those of the file's vertices in the mesh, which has
+    /// so many.
+    fn masks(&mut self, numbers: &[Option<u32>], vertices: usize) -> Masks {
         let mut masks = Masks::new();
+        let names: BTreeSet<&str> = self.groups.iter().map(|(name, ..)| name.as_str()).collect();
+        if (names.len() as f64) * (vertices as f64) > memory::allowed() / 4.0 {
+            let said = format!(
+                "the {} named groups of the file are too many to be kept as masks",
+                names.len()
+            );
+            self.notes.push(said);
+            return masks;
+        }
         for (name, first, last) in &self.groups {
-            let members: HashSet<[u64; 3]> = self.triangles[*first..*last]
-                .iter()
-                .flatten()
-                .map(|&v| key(self.positions[v as usize]))
-                .collect();
-            let near = |p: DVec3| {
-                // Welding may have kept a neighbour's point in place of the group's own.
-                weld > 0.0
-                    && self.triangles[*first..*last]
-                        .iter()
-                        .flatten()
-                        .any(|&v| self.positions[v as usize].distance(p) <= weld)
-            };
-            let mask = mesh
-                .positions()
-                .iter()
-                .map(|&p| members.contains(&key(p)) || near(p));
-            let known = masks
+            let mask = masks
                 .entry(name.clone())
-                .or_insert_with(|| Arc::new(vec![false; mesh.positions().len()]));
-            for (k, m) in Arc::make_mut(known).iter_mut().zip(mask) {
-                *k |= m;
+                .or_insert_with(|| Arc::new(vec![false; vertices]));
+            let mask = Arc::make_mut(mask);
+            for &v in self.triangles[*first..*last].iter().flatten() {
+                if let Some(number) = numbers[v as usize] {
+                    mask[number as usize] = true;
+                }
             }
         }
         masks.retain(|_, mask| mask.iter().any(|&m| m));
@@ -140,7 +138,7 @@ pub fn read_mesh(
             format!("meshes are read from {} files", ENDINGS.join(", ")),
         ));
     }
-    let bytes = std::fs::read(path).map_err(|e| FileError::of(path, &e))?;
+    let bytes = source::read(path)?;
     if bytes.is_empty() {
         return Err(FileError::broken(
             path,
@@ -173,8 +171,8 @@ pub fn parse_mesh(
         "inp" => inp::read(bytes),
         _ => gltf::read(bytes, folder),
     };
-    let mut soup = catch_unwind(AssertUnwindSafe(parse))
-        .unwrap_or_else(|_| Err("the file is damaged".into()))
+    let mut soup = quietly(parse)
+        .unwrap_or_else(|| Err("the file is damaged".into()))
         .map_err(|m| format!("{m}. Export the mesh again"))?;
     for p in &mut soup.positions {
         *p *= scale;
@@ -182,12 +180,16 @@ pub fn parse_mesh(
     if let Some(volume) = soup.volume.take() {
         return tetrahedral(&soup, volume, scale, body);
     }
-    let taken_in = TriMesh::repaired(&soup.positions, &soup.triangles, body, repair);
-    let (mesh, repairs) = taken_in.map_err(|e: MeshError| e.to_string())?;
+    let taken = TriMesh::taken_in(&soup.positions, &soup.triangles, body, repair);
+    let taken = taken.map_err(|e: MeshError| e.to_string())?;
+    let groups = soup.masks(&taken.vertices, taken.mesh.positions().len());
     Ok(LoadedMesh {
-        groups: soup.masks(&mesh, repair.weld),
-        mesh,
-        repairs,
+        groups,
+        mesh: taken.mesh,
+        repairs: RepairReport {
+            notes: soup.notes,
+            ..taken.repairs
+        },
     })
 }
 
@@ -223,6 +225,7 @@ fn tetrahedral(
         groups: groups.collect(),
         repairs: RepairReport {
             bodies,
+            notes: soup.notes.clone(),
             ..RepairReport::default()
         },
         mesh: mesh.around(piece),

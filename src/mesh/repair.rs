@@ -2,7 +2,9 @@
 
 use std::collections::HashMap;
 
-use glam::{DVec3, IVec3};
+use glam::{DVec3, I64Vec3};
+
+use super::numbers::NumberMap;
 
 /// Repairs that are asked for; without them only what must be is done.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,9 +24,9 @@ pub(super) fn join_near(positions: &[DVec3], tolerance: f64) -> (Vec<u32>, Vec<D
             (l.min(p), h.max(p))
         });
     // Never so fine that cells far apart become one number.
-    let size = tolerance.max(1e-7 * (upper - lower).max_element());
-    let cell = |p: DVec3| ((p - lower) / size).floor().as_ivec3();
-    let mut grid: HashMap<IVec3, Vec<u32>> = HashMap::new();
+    let size = tolerance.max(1e-15 * (upper - lower).max_element());
+    let cell = |p: DVec3| ((p - lower) / size).floor().as_i64vec3();
+    let mut grid: NumberMap<I64Vec3, Vec<u32>> = NumberMap::default();
     let mut kept: Vec<DVec3> = Vec::new();
     let renumber = positions
         .iter()
@@ -32,7 +34,7 @@ pub(super) fn join_near(positions: &[DVec3], tolerance: f64) -> (Vec<u32>, Vec<D
             let home = cell(p);
             let near = (0..27)
                 .flat_map(|k| {
-                    let step = IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+                    let step = I64Vec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
                     grid.get(&home.wrapping_add(step)).into_iter().flatten()
                 })
                 .copied()
@@ -47,6 +49,57 @@ pub(super) fn join_near(positions: &[DVec3], tolerance: f64) -> (Vec<u32>, Vec<D
         })
         .collect();
     (renumber, kept)
+}
+
+/// The distance (m) within which vertices would have to be joined for an open surface to close: at most a thousandth
+/// of its mean edge, as torn seams are; nothing where that does not close it.
+pub(super) fn closing_weld(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    mean_edge: f64,
+) -> Option<f64> {
+    let tolerance = one_digit(mean_edge / 1000.0);
+    let open = open_sides(triangles);
+    let mut vertices: Vec<u32> = open.iter().flatten().copied().collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    let points: Vec<DVec3> = vertices.iter().map(|&v| positions[v as usize]).collect();
+    let (joined, kept) = join_near(&points, tolerance);
+    if kept.len() == points.len() {
+        return None;
+    }
+    let number = |v: u32| joined[vertices.partition_point(|&other| other < v)];
+    let mut sides: NumberMap<(u32, u32), u32> = NumberMap::default();
+    for [a, b] in open.into_iter().map(|side| side.map(number)) {
+        if a != b {
+            *sides.entry((a.min(b), a.max(b))).or_default() += 1;
+        }
+    }
+    sides.values().all(|&count| count == 2).then_some(tolerance)
+}
+
+/// A positive number with its first digit only.
+fn one_digit(x: f64) -> f64 {
+    let unit = 10f64.powf(x.log10().floor());
+    (x / unit).floor() * unit
+}
+
+/// Sides with a triangle on one side only, as that triangle runs along them.
+fn open_sides(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let sides_of = |tri: &[u32; 3]| {
+        let tri = *tri;
+        (0..3).map(move |i| [tri[i], tri[(i + 1) % 3]])
+    };
+    let ends = |[a, b]: [u32; 2]| (a.min(b), a.max(b));
+    let mut counts: NumberMap<(u32, u32), u32> = NumberMap::default();
+    for side in triangles.iter().flat_map(sides_of) {
+        *counts.entry(ends(side)).or_default() += 1;
+    }
+    triangles
+        .iter()
+        .flat_map(sides_of)
+        .filter(|&side| counts[&ends(side)] == 1)
+        .collect()
 }
 
 /// Rims of holes no further across than `across` (m): closed lines of edges with a triangle on one side
@@ -77,22 +130,10 @@ pub(super) fn holes(positions: &[DVec3], triangles: &[[u32; 3]], across: f64) ->
 }
 
 fn rims(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
-    let mut sides: HashMap<(u32, u32), u32> = HashMap::new();
-    for tri in triangles {
-        for i in 0..3 {
-            let (a, b) = (tri[i], tri[(i + 1) % 3]);
-            *sides.entry((a.min(b), a.max(b))).or_default() += 1;
-        }
-    }
     // A filling triangle runs along a rim the other way round than the triangle that is there.
     let mut next: HashMap<u32, Vec<u32>> = HashMap::new();
-    for tri in triangles {
-        for i in 0..3 {
-            let (a, b) = (tri[i], tri[(i + 1) % 3]);
-            if sides[&(a.min(b), a.max(b))] == 1 {
-                next.entry(b).or_default().push(a);
-            }
-        }
+    for [a, b] in open_sides(triangles) {
+        next.entry(b).or_default().push(a);
     }
     let mut starts: Vec<u32> = next.keys().copied().collect();
     starts.sort_unstable();

@@ -35,8 +35,8 @@ pub(super) struct Opened {
 impl Opened {
     fn new(loaded: LoadedProject, path: Option<PathBuf>, before: State) -> Self {
         let document = Document::new(loaded, path);
-        let repairs = document.repairs;
-        let said = repairs.in_words(document.state.project.part.body);
+        let body = document.state.project.part.body;
+        let said = document.repairs.in_words(body);
         Self {
             view: Viewport::new(&document),
             document,

@@ -1,37 +1,66 @@
 //! glTF and GLB: all meshes of the scene, in its frame; named nodes become groups of vertices.
 
+mod data;
+
 use std::path::Path;
 
 use glam::{DMat4, Mat4, Vec3};
+use gltf::mesh::Mode;
 
+use self::data::Buffers;
 use super::Soup;
+use super::boundary::quietly;
+use super::words::no_surface;
+use crate::memory;
 
+/// Reads all meshes of the scene; `folder` is where buffers that it names are looked for.
 pub fn read(bytes: &[u8], folder: Option<&Path>) -> Result<Soup, String> {
     if bytes.starts_with(b"glTF") {
         check_glb_length(bytes)?;
     }
-    let gltf::Gltf { document, blob } =
-        gltf::Gltf::from_slice(bytes).map_err(|e| format!("not a readable glTF file ({e})"))?;
-    let buffers = gltf::import_buffers(&document, folder, blob)
-        .map_err(|e| format!("the data of the glTF file cannot be read ({e})"))?;
+    let gltf::Gltf { document, blob } = parsed(bytes)?;
+    let buffers = Buffers::load(&document, folder, blob)?;
     let scene = document
         .default_scene()
         .or_else(|| document.scenes().next())
         .ok_or("the glTF file has no scene")?;
-    let mut soup = Soup::default();
+    let mut walk = Walk {
+        buffers: &buffers,
+        soup: Soup::default(),
+        visits: 0,
+        without_area: 0,
+        morphed: 0,
+    };
     for node in scene.nodes() {
-        visit(&node, DMat4::IDENTITY, &buffers, &mut soup, 0)?;
+        walk.visit(&node, DMat4::IDENTITY, 0)?;
     }
-    Ok(soup)
+    let others = document.scenes().len() - 1;
+    Ok(walk.finish(others))
 }
 
-/// An accessor that announces more entries than its buffers have bytes is not believed.
-fn check_size(accessor: &gltf::Accessor, buffers: &[gltf::buffer::Data]) -> Result<(), String> {
-    let bytes: usize = buffers.iter().map(|b| b.0.len()).sum();
-    if accessor.count() > bytes {
-        return Err("an array of the glTF file is longer than its data".into());
+fn parsed(bytes: &[u8]) -> Result<gltf::Gltf, String> {
+    match quietly(|| gltf::Gltf::from_slice(bytes)) {
+        Some(Ok(gltf)) => Ok(gltf),
+        Some(Err(e)) => Err(format!("not a readable glTF file ({e})")),
+        None => Err(missing_accessor(bytes)
+            .unwrap_or_else(|| "the glTF file refers to what is not in it".into())),
     }
-    Ok(())
+}
+
+/// The primitive whose positions are not there, which the library stumbles over while it checks the file.
+fn missing_accessor(bytes: &[u8]) -> Option<String> {
+    let gltf = quietly(|| gltf::Gltf::from_slice_without_validation(bytes).ok())??;
+    let root = gltf.document.as_json();
+    let count = root.accessors.len();
+    root.meshes.iter().enumerate().find_map(|(m, mesh)| {
+        mesh.primitives.iter().enumerate().find_map(|(p, primitive)| {
+            let missing = (primitive.attributes.values()).find(|a| a.value() >= count)?;
+            Some(format!(
+                "meshes[{m}].primitives[{p}] of the glTF file names accessor {}, and there are {count}, from 0",
+                missing.value()
+            ))
+        })
+    })
 }
 
 fn check_glb_length(bytes: &[u8]) -> Result<(), String> {
@@ -45,75 +74,164 @@ fn check_glb_length(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-fn visit(
-    node: &gltf::Node,
-    parent: DMat4,
-    buffers: &[gltf::buffer::Data],
-    soup: &mut Soup,
-    depth: usize,
-) -> Result<(), String> {
-    const DEEPEST: usize = 64;
-    /// Far more than a part needs; a file may name the same node again and again.
-    const MOST: usize = 20_000_000;
-    if depth > DEEPEST || soup.visits > 1_000_000 || soup.triangles.len() > MOST {
-        return Err(
-            "the glTF file nests its nodes in a circle, or repeats them without an end".into(),
-        );
-    }
-    soup.visits += 1;
-    let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4();
-    if let Some(mesh) = node.mesh() {
-        let first = soup.triangles.len();
-        for primitive in mesh.primitives() {
-            read_primitive(&primitive, world, buffers, soup)?;
-        }
-        soup.group(node.name().or(mesh.name()).unwrap_or_default(), first);
-    }
-    for child in node.children() {
-        visit(&child, world, buffers, soup, depth + 1)?;
-    }
-    Ok(())
+/// The way through the nodes of a scene.
+struct Walk<'d> {
+    buffers: &'d Buffers,
+    soup: Soup,
+    /// Nodes walked through.
+    visits: usize,
+    /// Primitives of points and lines, and those with shapes to morph into.
+    without_area: usize,
+    morphed: usize,
 }
 
-fn read_primitive(
-    primitive: &gltf::Primitive,
-    world: DMat4,
-    buffers: &[gltf::buffer::Data],
-    soup: &mut Soup,
-) -> Result<(), String> {
-    if primitive.mode() != gltf::mesh::Mode::Triangles {
-        return Ok(());
+impl Walk<'_> {
+    fn visit(&mut self, node: &gltf::Node, parent: DMat4, depth: usize) -> Result<(), String> {
+        const DEEPEST: usize = 64;
+        /// Far more than a part needs; a file may name the same node again and again.
+        const MOST: usize = 1_000_000;
+        if depth > DEEPEST || self.visits > MOST {
+            return Err(
+                "the glTF file nests its nodes in a circle, or repeats them without an end".into(),
+            );
+        }
+        self.visits += 1;
+        let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4();
+        if let Some(mesh) = node.mesh() {
+            let first = self.soup.triangles.len();
+            for primitive in mesh.primitives() {
+                let place = format!("meshes[{}].primitives[{}]", mesh.index(), primitive.index());
+                self.primitive(&primitive, world)
+                    .map_err(|said| format!("{place} of the glTF file {said}"))?;
+            }
+            self.soup
+                .group(node.name().or(mesh.name()).unwrap_or_default(), first);
+        }
+        for child in node.children() {
+            self.visit(&child, world, depth + 1)?;
+        }
+        Ok(())
     }
-    let damaged = "a mesh of the glTF file has no readable positions or indices";
-    let accessor = primitive.get(&gltf::Semantic::Positions).ok_or(damaged)?;
-    if accessor.count() == 0 || accessor.data_type() != gltf::accessor::DataType::F32 {
-        return Err(damaged.into());
+
+    fn primitive(&mut self, primitive: &gltf::Primitive, world: DMat4) -> Result<(), String> {
+        let mode = primitive.mode();
+        if !matches!(
+            mode,
+            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+        ) {
+            self.without_area += 1;
+            return Ok(());
+        }
+        self.morphed += usize::from(primitive.morph_targets().next().is_some());
+        let (positions, indices) = self.arrays(primitive)?;
+        let base = self.soup.positions.len() as u32;
+        let place = |&p: &[f32; 3]| world.transform_point3(Vec3::from_array(p).as_dvec3());
+        self.soup.positions.extend(positions.iter().map(place));
+        // A mirroring node turns the surface inside out.
+        let turned = world.determinant() < 0.0;
+        let oriented = |t: [u32; 3]| {
+            let [a, b, c] = t.map(|v| base + v);
+            if turned { [a, c, b] } else { [a, b, c] }
+        };
+        let triangles = triangles(mode, &indices)?;
+        self.soup
+            .triangles
+            .extend(triangles.into_iter().map(oriented));
+        Ok(())
     }
-    check_size(&accessor, buffers)?;
-    if let Some(indices) = primitive.indices() {
-        check_size(&indices, buffers)?;
+
+    /// Positions of a primitive, and its corners by their numbers among these.
+    fn arrays(&self, primitive: &gltf::Primitive) -> Result<(Vec<[f32; 3]>, Vec<u32>), String> {
+        let buffers = self.buffers;
+        let accessor = primitive
+            .get(&gltf::Semantic::Positions)
+            .ok_or("has no positions")?;
+        let by = primitive.indices();
+        let corners = by.as_ref().map_or(accessor.count(), gltf::Accessor::count);
+        self.check_room(accessor.count(), corners)?;
+        buffers.check_positions(&accessor)?;
+        if let Some(by) = &by {
+            buffers.check_indices(by)?;
+        }
+        let reader = primitive.reader(move |b| buffers.bytes(&b));
+        let unreadable = "has positions or indices that cannot be read";
+        let positions: Vec<[f32; 3]> = reader.read_positions().ok_or(unreadable)?.collect();
+        let indices: Vec<u32> = match reader.read_indices() {
+            Some(indices) => indices.into_u32().collect(),
+            None if by.is_none() => (0..positions.len() as u32).collect(),
+            None => return Err(unreadable.into()),
+        };
+        match indices.iter().find(|&&i| i as usize >= positions.len()) {
+            None => Ok((positions, indices)),
+            Some(index) => Err(format!(
+                "refers to vertex {index}, and there are {}, from 0",
+                positions.len()
+            )),
+        }
     }
-    let reader = primitive.reader(|b| buffers.get(b.index()).map(|d| d.0.as_slice()));
-    let positions: Vec<[f32; 3]> = reader.read_positions().ok_or(damaged)?.collect();
-    let indices: Vec<u32> = match reader.read_indices() {
-        Some(indices) => indices.into_u32().collect(),
-        None if primitive.indices().is_none() => (0..positions.len() as u32).collect(),
-        None => return Err(damaged.into()),
+
+    /// Whether so many more vertices and corners find their place: a small file may repeat a mesh without an end.
+    fn check_room(&self, vertices: usize, corners: usize) -> Result<(), String> {
+        /// Bytes that a vertex, and a corner of a triangle, take until the surface is there.
+        const VERTEX: f64 = 200.0;
+        const CORNER: f64 = 100.0;
+        let vertices = (self.soup.positions.len() as f64) + vertices as f64;
+        let corners = 3.0 * (self.soup.triangles.len() as f64) + corners as f64;
+        let needed = VERTEX * vertices + CORNER * corners;
+        if needed <= memory::allowed() && vertices < f64::from(u32::MAX) {
+            return Ok(());
+        }
+        Err(format!(
+            "would take {:.1} GB with all that comes before it, and {:.1} GB may be taken: decimate the mesh, or allow more with --memory-gb",
+            needed / 1e9,
+            memory::allowed_gb()
+        ))
+    }
+
+    /// What was found, with what was left out.
+    fn finish(mut self, other_scenes: usize) -> Soup {
+        let left_out = [
+            no_surface(self.without_area, "primitives of points or lines"),
+            (self.morphed > 0).then(|| {
+                format!(
+                    "{} meshes of the file have shapes to morph into: they are read as they are at rest",
+                    self.morphed
+                )
+            }),
+            (other_scenes > 0).then(|| {
+                format!("{other_scenes} other scenes of the file were left out")
+            }),
+        ];
+        self.soup.notes.extend(left_out.into_iter().flatten());
+        self.soup
+    }
+}
+
+/// The triangles that the vertices of a primitive span, one way round.
+fn triangles(mode: Mode, vertices: &[u32]) -> Result<Vec<[u32; 3]>, String> {
+    let whole = mode != Mode::Triangles || vertices.len().is_multiple_of(3);
+    if vertices.len() < 3 || !whole {
+        return Err(format!(
+            "has {} corners, which is no number of whole triangles",
+            vertices.len()
+        ));
+    }
+    let strip = |(k, t): (usize, &[u32])| match k % 2 {
+        0 => [t[0], t[1], t[2]],
+        _ => [t[0], t[2], t[1]],
     };
-    if indices.iter().any(|&i| i as usize >= positions.len()) {
-        return Err("a triangle of the glTF file refers to a vertex that is not there".into());
-    }
-    let base = soup.positions.len() as u32;
-    soup.positions.extend(
-        positions
-            .iter()
-            .map(|&p| world.transform_point3(Vec3::from_array(p).as_dvec3())),
-    );
-    // A mirroring node turns the surface inside out.
-    let turned = world.determinant() < 0.0;
-    soup.triangles.extend(indices.chunks_exact(3).map(|t| {
-        let [a, b, c] = [base + t[0], base + t[1], base + t[2]];
-        if turned { [a, c, b] } else { [a, b, c] }
-    }));
-    Ok(())
+    // Strips go on over triangles without area to where they begin anew.
+    let spans = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+    Ok(match mode {
+        Mode::TriangleStrip => (vertices.windows(3).enumerate())
+            .map(strip)
+            .filter(spans)
+            .collect(),
+        Mode::TriangleFan => (vertices[1..].windows(2))
+            .map(|pair| [pair[0], pair[1], vertices[0]])
+            .collect(),
+        _ => (vertices.chunks_exact(3))
+            .map(|t| [t[0], t[1], t[2]])
+            .collect(),
+    })
 }

@@ -1,86 +1,131 @@
 //! PLY, text and binary: vertices (x, y, z) and faces (a list of vertex numbers, of any size).
+//!
+//! Read here value by value: what the header announces is compared with what there is before anything is laid
+//! out, nothing beyond it is passed over, and what is wrong is named by its line or its element.
 
-use std::io::Cursor;
+mod header;
+mod values;
 
 use glam::DVec3;
-use ply_rs_bw::parser::Parser;
-use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
+use self::header::{Element, Header};
+use self::values::Values;
 use super::Soup;
+use super::words::no_surface;
+use crate::plain::quote;
 
-/// Any element: what a mesh needs of it.
-#[derive(Default)]
-struct Element {
-    position: [Option<f64>; 3],
-    corners: Vec<u32>,
-}
-
-impl PropertyAccess for Element {
-    fn new() -> Self {
-        Self::default()
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let axis = ["x", "y", "z"].iter().position(|&a| a == name);
-        match (axis, name) {
-            (Some(axis), _) => self.position[axis] = number(&property),
-            (None, "vertex_indices" | "vertex_index") => match property.to_u32_list() {
-                Some(corners) => self.corners = corners,
-                None => return PropertyAccessResult::UnsupportedType,
-            },
-            _ => return PropertyAccessResult::Ignored,
-        }
-        PropertyAccessResult::Set
-    }
-}
-
-fn number(property: &Property) -> Option<f64> {
-    match *property {
-        Property::Double(v) => Some(v),
-        Property::Float(v) => Some(v.into()),
-        Property::Char(v) => Some(v.into()),
-        Property::UChar(v) => Some(v.into()),
-        Property::Short(v) => Some(v.into()),
-        Property::UShort(v) => Some(v.into()),
-        Property::Int(v) => Some(v.into()),
-        Property::UInt(v) => Some(v.into()),
-        _ => None,
-    }
-}
-
-/// Every element takes at least a byte; a header that announces more is not believed.
-fn check_counts(bytes: &[u8]) -> Result<(), String> {
-    let header = Parser::<Element>::new()
-        .read_ply_header(&mut Cursor::new(bytes))
-        .map_err(|e| format!("not a readable PLY file ({e})"))?;
-    let too_many = |count: usize| count > bytes.len();
-    match header.elements.values().find(|e| too_many(e.count)) {
-        Some(element) => Err(format!(
-            "the PLY file is truncated: it announces {} of \"{}\"",
-            element.count, element.name
-        )),
-        None => Ok(()),
-    }
-}
-
+/// Reads vertices and faces of a file.
 pub fn read(bytes: &[u8]) -> Result<Soup, String> {
-    check_counts(bytes)?;
-    let ply = Parser::<Element>::new()
-        .read_ply(&mut Cursor::new(bytes))
-        .map_err(|e| format!("not a readable PLY file ({e})"))?;
-    let element = |name: &str| ply.payload.get(name).map_or(&[][..], Vec::as_slice);
+    let header = Header::read(bytes)?;
+    let body = &bytes[header.length..];
+    header.check_room(body)?;
     let mut soup = Soup::default();
-    for vertex in element("vertex") {
-        let [Some(x), Some(y), Some(z)] = vertex.position else {
-            return Err("the vertices of the PLY file have no x, y and z".into());
-        };
-        soup.positions.push(DVec3::new(x, y, z));
-    }
-    for face in element("face") {
-        // A polygon as a fan round its first corner.
-        for pair in face.corners.get(1..).unwrap_or_default().windows(2) {
-            soup.triangles.push([face.corners[0], pair[0], pair[1]]);
+    let mut values = Values::of(body, &header)?;
+    let vertices = header.element("vertex").map_or(0, |e| e.count);
+    let mut small = 0;
+    for element in &header.elements {
+        match element.name.as_str() {
+            "vertex" => read_vertices(element, &mut values, &mut soup)?,
+            "face" => small += read_faces(element, vertices, &mut values, &mut soup)?,
+            _ => {
+                pass_over(element, &mut values)?;
+                let what = format!("elements {}", quote(&element.name));
+                soup.notes.extend(no_surface(element.count, &what));
+            }
         }
     }
+    values.end()?;
+    let what = "faces of fewer than three corners";
+    soup.notes.extend(no_surface(small, what));
     Ok(soup)
+}
+
+fn read_vertices(element: &Element, values: &mut Values, soup: &mut Soup) -> Result<(), String> {
+    let column = |axis: &str| {
+        let found = element.properties.iter().position(|p| p.name == axis);
+        found.filter(|&k| element.properties[k].count.is_none())
+    };
+    let (Some(x), Some(y), Some(z)) = (column("x"), column("y"), column("z")) else {
+        return Err("the vertices of the PLY file have no x, y and z".into());
+    };
+    let mut row = vec![0.0; element.properties.len()];
+    for index in 0..element.count {
+        values.begin(&element.name, index)?;
+        for (value, property) in row.iter_mut().zip(&element.properties) {
+            match property.count {
+                None => *value = values.next(property.scalar)?,
+                Some(count) => drop(values.list(count, property.scalar)?),
+            }
+        }
+        let place = DVec3::new(row[x], row[y], row[z]);
+        if !place.is_finite() {
+            return Err(values.wrong("is not a finite point"));
+        }
+        soup.positions.push(place);
+        values.finish()?;
+    }
+    Ok(())
+}
+
+/// Faces as fans round their first corners; how many had no area to have.
+fn read_faces(
+    element: &Element,
+    vertices: usize,
+    values: &mut Values,
+    soup: &mut Soup,
+) -> Result<usize, String> {
+    let corners_of = |name: &str| name == "vertex_indices" || name == "vertex_index";
+    let lists = |k: &usize| element.properties[*k].count.is_some();
+    let column = (0..element.properties.len())
+        .find(|k| corners_of(&element.properties[*k].name) && lists(k))
+        .ok_or("the faces of the PLY file have no list of vertex_indices")?;
+    let mut small = 0;
+    for index in 0..element.count {
+        values.begin(&element.name, index)?;
+        for (k, property) in element.properties.iter().enumerate() {
+            let Some(count) = property.count else {
+                values.next(property.scalar)?;
+                continue;
+            };
+            let list = values.list(count, property.scalar)?;
+            if k != column {
+                continue;
+            }
+            let corners: Vec<u32> = (list.iter())
+                .map(|&v| corner(v, vertices).map_err(|said| values.wrong(&said)))
+                .collect::<Result<_, _>>()?;
+            small += usize::from(corners.len() < 3);
+            if let [first, rest @ ..] = &corners[..] {
+                let fan = rest.windows(2).map(|pair| [*first, pair[0], pair[1]]);
+                soup.triangles.extend(fan);
+            }
+        }
+        values.finish()?;
+    }
+    Ok(small)
+}
+
+fn corner(value: f64, vertices: usize) -> Result<u32, String> {
+    if value.fract() == 0.0 && value >= 0.0 && value < (vertices as f64) {
+        return Ok(value as u32);
+    }
+    Err(format!(
+        "names vertex {value}, and there are {vertices}, from 0"
+    ))
+}
+
+fn pass_over(element: &Element, values: &mut Values) -> Result<(), String> {
+    for index in 0..element.count {
+        values.begin(&element.name, index)?;
+        for property in &element.properties {
+            match property.count {
+                None => {
+                    values.next(property.scalar)?;
+                }
+                Some(count) => drop(values.list(count, property.scalar)?),
+            }
+        }
+        values.finish()?;
+    }
+    Ok(())
 }

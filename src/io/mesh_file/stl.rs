@@ -1,77 +1,163 @@
-//! STL, text and binary.
+//! STL, text and binary: all solids of a file.
 
-use std::io::Cursor;
-
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::Soup;
+use super::words::{at, number};
+use crate::plain::quote;
 
+/// Length of the header of a binary file with the count after it, and of one triangle (bytes).
+const HEADER: usize = 84;
+const TRIANGLE: usize = 50;
+
+/// Reads all triangles of a file.
 pub fn read(bytes: &[u8]) -> Result<Soup, String> {
     // Headers lie: a binary file is known by its length, whatever its first word.
-    let binary = bytes.len() >= 84 && {
-        let count = u32::from_le_bytes([bytes[80], bytes[81], bytes[82], bytes[83]]) as usize;
-        bytes.len() == 84 + 50 * count
-    };
-    if binary {
-        return Ok(binary_stl(bytes));
+    let announced = bytes
+        .get(HEADER - 4..HEADER)
+        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    if announced.is_some_and(|count| bytes.len() == HEADER + TRIANGLE * count) {
+        return binary(&bytes[HEADER..]);
     }
-    if !bytes.trim_ascii_start().starts_with(b"solid") {
-        return Err(
-            "the STL file is truncated: its length does not match the triangles it announces"
-                .into(),
-        );
+    // Text holds no zero bytes.
+    if is_solid(bytes) && !bytes.contains(&0) {
+        return text(&String::from_utf8_lossy(bytes));
     }
-    // The reader wants a name after the first word.
-    let text = [b"solid stl".as_slice(), after_first_line(bytes)].join(&b'\n');
-    let mesh = stl_io::read_stl(&mut Cursor::new(text))
-        .map_err(|e| format!("not a readable STL file ({e})"))?;
-    if !bytes
-        .windows(8)
-        .any(|w| w.eq_ignore_ascii_case(b"endsolid"))
-    {
-        return Err("the STL file is truncated: it has no endsolid".into());
-    }
-    let positions = mesh
-        .vertices
-        .iter()
-        .map(|v| Vec3::from_array(v.0).as_dvec3())
-        .collect();
-    let triangles = mesh
-        .faces
-        .iter()
-        .map(|f| f.vertices.map(|v| v as u32))
-        .collect();
-    Ok(Soup {
-        positions,
-        triangles,
-        ..Soup::default()
+    Err(match announced {
+        Some(count) => format!(
+            "the STL file is truncated or damaged: its header announces {count} triangles ({} bytes), and it has {} bytes",
+            HEADER + TRIANGLE * count,
+            bytes.len()
+        ),
+        None => "the STL file is truncated: it is shorter than its header".into(),
     })
 }
 
-fn after_first_line(bytes: &[u8]) -> &[u8] {
-    let end = bytes
-        .iter()
-        .position(|&b| b == b'\n')
-        .unwrap_or(bytes.len());
-    bytes.get(end + 1..).unwrap_or_default()
+fn is_solid(bytes: &[u8]) -> bool {
+    let start = bytes.trim_ascii_start().get(..5);
+    start.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
 }
 
-fn binary_stl(bytes: &[u8]) -> Soup {
-    let float =
-        |at: usize| f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
-    let count = (bytes.len() - 84) / 50;
-    let positions = (0..3 * count)
-        .map(|i| {
-            let at = 84 + 50 * (i / 3) + 12 + 12 * (i % 3);
-            Vec3::new(float(at), float(at + 4), float(at + 8)).as_dvec3()
-        })
-        .collect();
-    let triangles = (0..count as u32)
-        .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
-        .collect();
-    Soup {
-        positions,
-        triangles,
-        ..Soup::default()
+fn binary(triangles: &[u8]) -> Result<Soup, String> {
+    let mut soup = Soup::default();
+    for (t, triangle) in (0u32..).zip(triangles.chunks_exact(TRIANGLE)) {
+        let float = |k: usize| {
+            let at = 12 + 4 * k;
+            f32::from_le_bytes([
+                triangle[at],
+                triangle[at + 1],
+                triangle[at + 2],
+                triangle[at + 3],
+            ])
+        };
+        for corner in 0..3 {
+            let [x, y, z] = [0, 1, 2].map(|axis| float(3 * corner + axis));
+            let place = Vec3::new(x, y, z);
+            if !place.is_finite() {
+                return Err(format!(
+                    "triangle {} has a corner that is not a finite point ({x} {y} {z})",
+                    t + 1
+                ));
+            }
+            soup.positions.push(place.as_dvec3());
+        }
+        soup.triangles.push([3 * t, 3 * t + 1, 3 * t + 2]);
     }
+    Ok(soup)
+}
+
+/// What the next line may be.
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    Outside,
+    Solid,
+    Facet,
+    Loop,
+    EndOfLoop,
+}
+
+impl Place {
+    fn expects(self) -> &'static str {
+        match self {
+            Self::Outside => "solid",
+            Self::Solid => "facet or endsolid",
+            Self::Facet => "outer loop",
+            Self::Loop => "vertex or endloop",
+            Self::EndOfLoop => "endfacet",
+        }
+    }
+}
+
+fn text(text: &str) -> Result<Soup, String> {
+    let mut soup = Soup::default();
+    let mut place = Place::Outside;
+    // Of the solid that is being read: its name and first triangle.
+    let mut solid = (String::new(), 0);
+    let mut last = 0;
+    for (line, row) in (1..).zip(text.lines()) {
+        let mut words = row.split_ascii_whitespace();
+        let Some(first) = words.next() else { continue };
+        last = line;
+        let is = |keyword: &str| first.eq_ignore_ascii_case(keyword);
+        place = match place {
+            Place::Outside if is("solid") => {
+                let name: Vec<&str> = words.collect();
+                solid = (name.join(" "), soup.triangles.len());
+                Place::Solid
+            }
+            Place::Solid if is("endsolid") => {
+                soup.group(&solid.0, solid.1);
+                Place::Outside
+            }
+            Place::Solid if is("facet") => Place::Facet,
+            Place::Facet if is("outer") => Place::Loop,
+            Place::Loop if is("vertex") => {
+                soup.positions.push(vertex(words, line)?);
+                Place::Loop
+            }
+            Place::Loop if is("endloop") => {
+                facet(&mut soup, line)?;
+                Place::EndOfLoop
+            }
+            Place::EndOfLoop if is("endfacet") => Place::Solid,
+            _ => {
+                let said = format!("{} where {} should be", quote(first), place.expects());
+                return Err(at(line, &said));
+            }
+        };
+    }
+    if place == Place::Outside {
+        return Ok(soup);
+    }
+    Err(at(
+        last,
+        "the STL file is truncated here: it has no endsolid",
+    ))
+}
+
+fn vertex<'w>(mut words: impl Iterator<Item = &'w str>, line: usize) -> Result<DVec3, String> {
+    let mut next = || match words.next() {
+        Some(word) => number(word, line),
+        None => Err(at(line, "a vertex has three coordinates")),
+    };
+    let place = DVec3::new(next()?, next()?, next()?);
+    match words.next() {
+        None => Ok(place),
+        Some(_) => Err(at(line, "a vertex has three coordinates")),
+    }
+}
+
+/// The triangle between the last three vertices, which are all that no triangle has yet.
+fn facet(soup: &mut Soup, line: usize) -> Result<(), String> {
+    let first = 3 * soup.triangles.len();
+    let corners = soup.positions.len() - first;
+    if corners != 3 {
+        return Err(at(
+            line,
+            &format!("a facet of {corners} corners; it has three"),
+        ));
+    }
+    let first = first as u32;
+    soup.triangles.push([first, first + 1, first + 2]);
+    Ok(())
 }
