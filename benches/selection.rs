@@ -224,8 +224,8 @@ fn full_size(text: &mut String, both: &Both) {
             let _ = writeln!(
                 text,
                 "| {name} | {setting} | {seconds:.0} | {:.2}, {:.2} | {} | {:.2} % | {checked} |",
-                sets[4].criterion,
-                sets[9].criterion,
+                sets[4].criterion.unwrap_or(f64::NAN),
+                sets[9].criterion.unwrap_or(f64::NAN),
                 chosen.achieved.effort.fits / 15,
                 100.0 * gap
             );

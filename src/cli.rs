@@ -7,6 +7,7 @@ pub mod design;
 pub mod evaluate;
 pub mod limb;
 pub mod listen;
+pub mod out;
 pub mod progress;
 pub mod render;
 pub mod select;
@@ -82,7 +83,7 @@ pub struct Common {
     #[arg(long)]
     pub seed: Option<u64>,
     /// Worker threads; all cores when left out. The result does not depend on it.
-    #[arg(long)]
+    #[arg(long, value_parser = threads)]
     pub threads: Option<usize>,
     /// What the sites report.
     #[arg(long)]
@@ -176,6 +177,18 @@ fn memory_gb(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Most worker threads. More than a machine has cores bring nothing, the largest have some hundreds, and what
+/// idle ones cost in looking for work grows with their square: 20 000 never come to an end.
+const MOST_THREADS: usize = 1024;
+
+/// A number of threads that can be meant.
+fn threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(count) if (1..=MOST_THREADS).contains(&count) => Ok(count),
+        _ => Err(format!("a number of threads from 1 to {MOST_THREADS}")),
+    }
+}
+
 impl Cli {
     /// Says what memory this process may take: what was asked for, or what the machine has.
     pub fn bound_memory(&self) {
@@ -227,7 +240,7 @@ impl Common {
 /// What was changed or left out while the mesh was taken in, on stderr.
 fn say_repairs(loaded: &LoadedProject) {
     if let Some(said) = loaded.repairs.in_words(loaded.inputs.project.part.body) {
-        eprintln!("{}: {said}", loaded.mesh_path.display());
+        out::say(&format!("{}: {said}", loaded.mesh_path.display()));
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod artifacts;
 pub mod atomic;
 pub mod dataset_file;
+pub mod fingerprint;
 pub mod glb;
 pub mod mesh_file;
 pub mod npz;
@@ -11,6 +12,7 @@ pub mod project_file;
 pub mod report;
 pub mod source;
 pub mod svg;
+pub mod together;
 pub mod trade_file;
 pub mod vtu;
 

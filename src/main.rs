@@ -3,12 +3,31 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use hapdef::cli::{self, Cli, Command};
+use hapdef::cli::{self, Cli, Command, out};
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let outcome = match Cli::try_parse() {
+        Ok(cli) => run(&cli),
+        Err(wrong) if wrong.use_stderr() => {
+            // With stderr closed the exit code alone says it.
+            let _ = wrong.print();
+            return ExitCode::from(2);
+        }
+        Err(help) => out::printed(help.print()),
+    };
+    match outcome {
+        Err(error) if !out::reader_left(&error) => {
+            let message = hapdef::plain::message(&format!("{error:#}"));
+            out::say(&format!("hapdef: {message}"));
+            ExitCode::FAILURE
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+fn run(cli: &Cli) -> anyhow::Result<()> {
     cli.bound_memory();
-    let outcome = match &cli.command {
+    match &cli.command {
         Some(Command::Design(args)) => cli::design::run(args),
         Some(Command::Simulate(args)) => cli::simulate::run(args),
         Some(Command::Advise(args)) => cli::advise::run(args),
@@ -19,14 +38,7 @@ fn main() -> ExitCode {
         Some(Command::Board(args)) => cli::board::run(args),
         Some(Command::Listen(args)) => cli::listen::run(args),
         Some(Command::Limb(args)) => cli::limb::run(args),
-        None => open_studio(&cli),
-    };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("hapdef: {error:#}");
-            ExitCode::FAILURE
-        }
+        None => open_studio(cli),
     }
 }
 

@@ -86,8 +86,8 @@ pub struct Request<'a> {
 pub struct SensorSet {
     /// As numbered in the dataset, in the order they were chosen.
     pub sites: Vec<usize>,
-    /// The selector's own criterion, in its own unit.
-    pub criterion: f64,
+    /// The selector's own criterion, in its own unit; absent where no selector chose the set.
+    pub criterion: Option<f64>,
     /// Cross-validated error of the regression (mm), where it was computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub criterion_mm: Option<f64>,

@@ -5,6 +5,7 @@
 mod advice;
 mod commands;
 mod dialogs;
+mod display;
 mod drive;
 mod fields;
 mod form;
@@ -31,6 +32,7 @@ mod touching;
 mod trade;
 mod viewport;
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -319,6 +321,8 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
         }
         None => (cli::bundled()?, None),
     };
+    let display = display::Display::named();
+    let opened = Cell::new(false);
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("HapDef Studio")
@@ -331,6 +335,8 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
     };
     let open = |cc: &eframe::CreationContext<'_>| -> Result<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>> {
         let mut studio = Studio::new(cc, loaded, path)?;
+        opened.set(true);
+        display.clone().end_with_it();
         if let Some(home) = eframe::storage_dir("hapdef-studio") {
             studio.keep_unsaved_in(&home.join("unsaved"));
             studio.keep_recent_in(&home);
@@ -342,9 +348,11 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
         Ok(Box::new(studio))
     };
     eframe::run_native("hapdef-studio", options, Box::new(open)).map_err(|error| {
-        anyhow::anyhow!(
-            "the window cannot be opened: {error}. It needs a display (X11 or Wayland) and a Vulkan driver (Debian: mesa-vulkan-drivers libxcursor1 libxi6 libxkbcommon-x11-0). Without a display, run `hapdef design --out DIR`"
-        )
+        anyhow::Error::msg(if opened.get() {
+            display.ending(&error)
+        } else {
+            display.refusal(&error)
+        })
     })
 }
 

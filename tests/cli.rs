@@ -191,6 +191,14 @@ fn a_draft_design_leaves_everything_behind() {
     );
     let csv = std::fs::read_to_string(out.join("sites.csv")).unwrap();
     assert!(csv.starts_with("x_mm,y_mm,z_mm,dx,dy,dz,") && csv.lines().count() == 11);
+    // Every file says which run it belongs to.
+    let run = summary["run"].as_str().unwrap();
+    let written = std::fs::read_to_string(out.join("design.json")).unwrap();
+    let project = std::fs::read_to_string(out.join("design.hapdef.toml")).unwrap();
+    assert!(html.contains(run) && written.contains(run) && project.contains(run));
+    assert!(csv.lines().next().unwrap().ends_with(",run"));
+    assert!(csv.lines().skip(1).all(|l| l.ends_with(run)), "{csv}");
+    assert!(hapdef::io::npz::holds(&out.join("dataset.npz"), "run").unwrap());
     // The written project reproduces the run.
     let again = folder.path().join("again");
     let project = out.join("design.hapdef.toml");
@@ -206,6 +214,7 @@ fn a_draft_design_leaves_everything_behind() {
         text(&again),
     ]);
     let repeated: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(repeated["run"], summary["run"]);
     assert_eq!(repeated["sites"], summary["sites"]);
     assert_eq!(repeated["evaluation"], summary["evaluation"]);
     let bytes = |folder: &Path| std::fs::read(folder.join("dataset.npz")).unwrap();
@@ -624,4 +633,137 @@ fn supports_by_mask_and_by_group_of_the_mesh_file() {
     );
     let arguments = ["simulate", text(&both), "--out", "x.npz"];
     refused(&arguments, 1, &["one region"]);
+}
+
+/// Runs with its stdout sent somewhere: what it said on stderr, and its exit code.
+fn sent_to(stdout: impl Into<std::process::Stdio>, arguments: &[&str]) -> (String, Option<i32>) {
+    let output = Command::new(env!("CARGO_BIN_EXE_hapdef"))
+        .args(arguments)
+        .stdout(stdout)
+        .stderr(std::process::Stdio::piped())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    (said, output.status.code())
+}
+
+/// Commands that print an answer and are quick.
+fn quick(folder: &Path) -> [Vec<&str>; 3] {
+    let out = text(folder);
+    [
+        vec!["limb", "--out", out, "--element", "6", "--no-sites"],
+        vec!["--help"],
+        vec!["--version"],
+    ]
+}
+
+#[test]
+fn a_reader_that_leaves_ends_a_command_quietly() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in quick(folder.path()) {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let (said, code) = sent_to(writer, &arguments);
+        assert_eq!((said.as_str(), code), ("", Some(0)), "{arguments:?}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_answer_that_does_not_fit_on_the_disk_is_a_message() {
+    let full = || std::fs::File::options().write(true).open("/dev/full");
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in quick(folder.path()) {
+        let (said, code) = sent_to(full().unwrap(), &arguments);
+        assert_eq!(code, Some(1), "{arguments:?}: {said}");
+        let starts = said.starts_with("hapdef: the answer could not be printed");
+        assert!(starts && !said.contains("panicked"), "{said}");
+        // Nor does a stderr that nobody can read stop anything.
+        let run = Command::new(env!("CARGO_BIN_EXE_hapdef"))
+            .args(&arguments)
+            .stdout(std::process::Stdio::null())
+            .stderr(full().unwrap())
+            .status();
+        assert_eq!(run.unwrap().code(), Some(0), "{arguments:?}");
+    }
+    let wrong = Command::new(env!("CARGO_BIN_EXE_hapdef"))
+        .args(["design", "missing.stl", "--out", text(folder.path())])
+        .stderr(full().unwrap())
+        .status();
+    assert_eq!(wrong.unwrap().code(), Some(1));
+}
+
+#[test]
+fn threads_that_no_machine_has_are_wrong_usage() {
+    let words = ["--threads", "from 1 to 1024"];
+    for threads in ["0", "1025", "20000", "-3", "two"] {
+        let flag = format!("--threads={threads}");
+        refused(&["design", "--out", "x", &flag], 2, &words);
+        refused(&["select", "--data", "x.npz", &flag], 2, &words);
+    }
+}
+
+#[cfg(all(feature = "studio", target_os = "linux"))]
+#[test]
+fn without_a_display_it_says_what_to_do() {
+    let output = hapdef(&[]);
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr);
+    for word in ["DISPLAY", "`hapdef design --out DIR`"] {
+        assert!(said.contains(word), "{said}");
+    }
+    assert!(!said.contains(".rs") && !said.contains(".."), "{said}");
+}
+
+#[test]
+fn a_summary_tells_of_the_gauges_that_were_asked_for_and_other_files_are_left_alone() {
+    let (folder, project) = project(|t| {
+        t.replace("\"standard\"", "\"draft\"")
+            .replace("count = 4000", "count = 200")
+            .replace("spacing_mm = 2.1", "spacing_mm = 4.1")
+            .replace("compare = true", "compare = false")
+    });
+    let out = folder.path().join("report");
+    let design = |sensors: &str| {
+        let arguments = ["design", text(&project), "--selector", "pca-qr", "--out"];
+        let more = [text(&out), "--sensors", sensors];
+        let run = hapdef(&[&arguments[..], &more].concat());
+        assert!(run.status.success(), "{run:?}");
+        String::from_utf8_lossy(&run.stdout).into_owned()
+    };
+    let said = design("8");
+    assert!(said.contains("pca-qr,   8 gauges"), "{said}");
+    // What is somebody's own stays, and so does what he has made of the project.
+    let own = out.join("notes.txt");
+    std::fs::write(&own, "own").unwrap();
+    let written = out.join("design.hapdef.toml");
+    let changed = std::fs::read_to_string(&written).unwrap() + "# changed\n";
+    std::fs::write(&written, &changed).unwrap();
+    let said = design("6");
+    assert!(said.contains("pca-qr,   6 gauges"), "{said}");
+    assert_eq!(std::fs::read_to_string(&own).unwrap(), "own");
+    let backup = out.join("design.hapdef.toml.bak");
+    assert_eq!(std::fs::read_to_string(backup).unwrap(), changed);
+    let mut names: Vec<String> = (std::fs::read_dir(&out).unwrap())
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    let files = "dataset.npz design.hapdef.toml design.hapdef.toml.bak design.json notes.txt report.html sites.csv";
+    assert_eq!(names.join(" "), files);
+}
+
+#[test]
+fn a_folder_that_another_writes_into_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("trade");
+    std::fs::create_dir(&out).unwrap();
+    let other = hapdef::io::together::Together::claim(&out).unwrap();
+    for command in ["trade", "design"] {
+        let words = [text(&out), "another hapdef", "choose another folder"];
+        refused(&[command, "--out", text(&out)], 1, &words);
+    }
+    drop(other);
+    // Asking what was measured disturbs nobody, and answers at once.
+    let arguments = ["trade", "--within-s", "10", "--out", text(&out)];
+    refused(&arguments, 1, &["nothing is measured there yet"]);
 }

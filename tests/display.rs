@@ -224,3 +224,33 @@ fn painted_with_a_real_pointer_and_saved_with_real_keys() {
     let count = painted.iter().filter(|&&m| m).count();
     assert!((20..1500).contains(&count), "{count}");
 }
+
+/// A display that goes away takes the window with it, with a message and not with a panic.
+#[test]
+fn an_x_server_that_ends_is_a_message() {
+    let Some((server, display)) = server() else {
+        return;
+    };
+    let home = tempfile::tempdir().unwrap();
+    let said = home.path().join("stderr");
+    let child = Command::new(env!("CARGO_BIN_EXE_hapdef"))
+        .current_dir(home.path())
+        .env("DISPLAY", &display)
+        .env("HOME", home.path())
+        .env("XDG_DATA_HOME", home.path().join("data"))
+        .env("XDG_RUNTIME_DIR", home.path())
+        .env_remove("WAYLAND_DISPLAY")
+        .stderr(std::fs::File::create(&said).unwrap())
+        .spawn();
+    let mut studio = Ended(child.unwrap());
+    let hand = Hand::on(&display);
+    wait("the window", 60, || {
+        assert!(studio.0.try_wait().unwrap().is_none(), "the program ended");
+        hand.window()
+    });
+    drop(server);
+    let ended = wait("the end", 30, || studio.0.try_wait().unwrap());
+    let said = std::fs::read_to_string(said).unwrap();
+    assert_eq!(ended.code(), Some(1), "{said}");
+    assert!(!said.trim().is_empty() && !said.contains("panicked"), "{said}");
+}

@@ -208,13 +208,24 @@ fn gauges_put_by_hand_are_what_the_report_shows() {
         assert_eq!(row(&hand, sites.len()), Some(judged.rows[0].error_mm));
         assert_eq!(row(&hand, 2), row(&design, 2));
         assert_eq!(hand.evaluation.errors.len(), design.evaluation.errors.len());
-        let table = artifacts::sites_csv(&hand);
+        let table = artifacts::sites_csv(&inputs, &hand);
         assert_eq!(table.lines().count(), 1 + sites.len());
         assert!(table.contains(&format!(",{},2,", sites[1])), "{table}");
         assert!(hand.notes().iter().any(|n| n.contains("by hand")));
         assert!(design.notes().iter().all(|n| !n.contains("by hand")));
         let summary = artifacts::summary(&inputs, &hand);
         assert_eq!(summary["sites"].as_array().unwrap().len(), sites.len());
+        // What the selector said of its own choice is not said of this one.
+        let set = &summary["selections"][0]["sets"][2];
+        assert_eq!(set["sites"], serde_json::json!(sites));
+        for figure in ["criterion", "criterion_mm", "gap", "lead"] {
+            assert!(set[figure].is_null(), "{figure}: {set}");
+        }
+        assert_eq!(summary["by_hand"], true);
+        let own = artifacts::summary(&inputs, &design);
+        assert_eq!(own["by_hand"], false);
+        assert!(own["selections"][0]["sets"][2]["criterion"].is_f64());
+        assert_ne!(summary["run"], own["run"], "other gauges are another run");
         assert!(hand.error_map(&hand.simulated.mesh).is_some());
         let folder = tempfile::tempdir().unwrap();
         let provenance = artifacts::Provenance {

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::Common;
+use super::{Common, out};
 use crate::budget::unwatched;
 use crate::design;
 
@@ -22,11 +22,10 @@ pub fn run(args: &AdviseArgs) -> anyhow::Result<()> {
         .common
         .in_pool(|| Ok(design::advise(&loaded.inputs, &unwatched)?))?;
     if args.common.json {
-        println!("{}", serde_json::to_string(&advice)?);
-        return Ok(());
+        return out::line(&serde_json::to_string(&advice)?);
     }
     for line in &advice.words {
-        println!("{line}");
+        out::line(line)?;
     }
     Ok(())
 }

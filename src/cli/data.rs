@@ -33,7 +33,7 @@ impl DataArgs {
     pub fn load(&self) -> anyhow::Result<(Data, Vec<String>)> {
         let GivenData { data, notes } = dataset_file::read(&self.data, self.touches.as_deref())?;
         for note in &notes {
-            eprintln!("note: {note}");
+            super::out::say(&format!("note: {note}"));
         }
         Ok((data, notes))
     }
@@ -76,7 +76,7 @@ pub struct CriterionArgs {
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
     /// Worker threads; all cores when left out. The result does not depend on it.
-    #[arg(long)]
+    #[arg(long, value_parser = super::threads)]
     pub threads: Option<usize>,
     /// Standard deviation of noise added to the signals, in their unit.
     #[arg(long, default_value_t = 0.0)]

@@ -5,9 +5,11 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::{Common, SelectorArg, prepare_folder, progress::Bar};
-use crate::design;
+use super::{Common, SelectorArg, out, prepare_folder, progress::Bar};
+use crate::design::{self, Design};
+use crate::evaluation::{BASELINE, EvaluationRow};
 use crate::io::artifacts::{self, Provenance};
+use crate::io::together::Together;
 
 #[derive(Args, Debug, Clone)]
 pub struct DesignArgs {
@@ -46,6 +48,8 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
     project.check()?;
     let existed = args.out.exists();
     prepare_folder(&mut loaded, &args.out)?;
+    // Before anything is computed: what nobody else may write into meanwhile.
+    let report = Together::claim(&args.out)?;
     let project = &loaded.inputs.project;
     let kinds = project.selectors();
     let budget = project.budget.budget();
@@ -68,61 +72,63 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
         mesh_path: &loaded.mesh_path,
         version: env!("CARGO_PKG_VERSION"),
     };
-    let files = artifacts::write_all(&args.out, &loaded.inputs, &design, &provenance)?;
+    let files = artifacts::write_into(&report, &loaded.inputs, &design, &provenance)?;
     if args.common.json {
-        println!("{}", artifacts::summary(&loaded.inputs, &design));
-        return Ok(());
+        return out::line(&artifacts::summary(&loaded.inputs, &design).to_string());
     }
-    print_summary(&design);
+    print_summary(&design)?;
     for file in files {
-        eprintln!("wrote {}", file.display());
+        out::say(&format!("wrote {}", file.display()));
     }
     Ok(())
 }
 
-fn print_summary(design: &design::Design) {
-    println!(
+fn print_summary(design: &Design) -> anyhow::Result<()> {
+    out::line(&format!(
         "{} inside sites, {} feasible, {} candidates, {} touches",
         design.simulated.dataset.sites.len(),
         design.reduced.feasible.len(),
         design.reduced.sites.len(),
         design.simulated.dataset.touches.len()
-    );
+    ))?;
     for (filter, count) in design.feasibility.taken() {
-        println!("{count:>6} taken: {}", filter.label().to_lowercase());
+        let label = filter.label().to_lowercase();
+        out::line(&format!("{count:>6} taken: {label}"))?;
     }
-    println!("gauge       x        y        z (mm)   direction");
-    for (k, &s) in design.chosen().iter().enumerate() {
-        let site = &design.simulated.dataset.sites[s];
-        let (p, d) = (site.position * 1000.0, site.direction);
-        println!(
-            "{:>5} {:8.2} {:8.2} {:8.2}   {:+.3} {:+.3} {:+.3}",
-            k + 1,
-            p.x,
-            p.y,
-            p.z,
-            d.x,
-            d.y,
-            d.z
-        );
-    }
-    for row in design
-        .evaluation
-        .rows
-        .iter()
-        .filter(|r| [5, 10].contains(&r.sensors) || r.selector == "all-candidates")
-    {
-        println!(
+    print_gauges(design)?;
+    let chosen = design.chosen().len();
+    for row in design.evaluation.rows.iter().filter(|r| tells(r, chosen)) {
+        out::line(&format!(
             "{:>14}, {:>3} gauges, {:<26} {:7.2} mm mean {:7.2} mm median",
             row.selector, row.sensors, row.region, row.error_mm, row.median_mm
-        );
+        ))?;
     }
     for doubt in design.doubts() {
-        println!("NOT TO BE TRUSTED: {}", doubt.words);
+        out::line(&format!("NOT TO BE TRUSTED: {}", doubt.words))?;
     }
     for note in design.notes() {
-        println!("note: {note}");
+        out::line(&format!("note: {note}"))?;
     }
     let total: f64 = design.seconds.iter().map(|s| s.seconds).sum();
-    eprintln!("{total:.1} s");
+    out::say(&format!("{total:.1} s"));
+    Ok(())
+}
+
+fn print_gauges(design: &Design) -> anyhow::Result<()> {
+    out::line("gauge       x        y        z (mm)   direction")?;
+    for (number, &s) in (1..).zip(design.chosen()) {
+        let site = &design.simulated.dataset.sites[s];
+        let (p, d) = (site.position * 1000.0, site.direction);
+        out::line(&format!(
+            "{number:>5} {:8.2} {:8.2} {:8.2}   {:+.3} {:+.3} {:+.3}",
+            p.x, p.y, p.z, d.x, d.y, d.z
+        ))?;
+    }
+    Ok(())
+}
+
+/// Whether a row stands in the summary: those of as many gauges as were chosen, and of the paper's five and ten to
+/// compare with.
+fn tells(row: &EvaluationRow, chosen: usize) -> bool {
+    [5, 10, chosen].contains(&row.sensors) || row.selector == BASELINE
 }

@@ -4,6 +4,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::data::{CriterionArgs, DataArgs, criterion_json, site_json};
+use super::out;
 use super::progress::Bar;
 use crate::io::cpu_seconds;
 use crate::study::{self, Verdict};
@@ -76,33 +77,34 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let verdict: Verdict = result?;
     if args.criterion.json {
         let sites: Vec<_> = args.sites.iter().map(|&s| site_json(&data, s)).collect();
-        println!(
-            "{}",
-            json!({
-                "version": env!("CARGO_PKG_VERSION"),
-                "sites": sites,
-                "criterion_mm": verdict.criteria_mm,
-                "criterion": criterion_json(&svr),
-                "fold_of_touch": verdict.fold_of_touch,
-                "errors": verdict.errors,
-                "baseline": verdict.baseline,
-                "failures": verdict.failures,
-                "test_touches": verdict.test_touches,
-                "cpu_seconds": cpu_seconds() - before,
-                "notes": notes,
-            })
-        );
-        return Ok(());
+        let summary = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "sites": sites,
+            "criterion_mm": verdict.criteria_mm,
+            "criterion": criterion_json(&svr),
+            "fold_of_touch": verdict.fold_of_touch,
+            "errors": verdict.errors,
+            "baseline": verdict.baseline,
+            "failures": verdict.failures,
+            "test_touches": verdict.test_touches,
+            "cpu_seconds": cpu_seconds() - before,
+            "notes": notes,
+        });
+        return out::line(&summary.to_string());
     }
-    println!("gauges  criterion  held out: mean  median     95 %  (mm)");
+    print_table(&verdict)
+}
+
+fn print_table(verdict: &Verdict) -> anyhow::Result<()> {
+    out::line("gauges  criterion  held out: mean  median     95 %  (mm)")?;
     for (error, criterion) in verdict.errors.iter().zip(&verdict.criteria_mm) {
-        println!(
+        out::line(&format!(
             "{:>6}  {criterion:>9.3}  {:>14.3}  {:>6.3}  {:>7.3}",
             error.sensors, error.error_mm, error.median_mm, error.p95_mm
-        );
+        ))?;
     }
     for row in &verdict.failures {
-        println!(
+        out::line(&format!(
             "{} failed, {}: {:.2} mm, at worst {:.2} ({} of {} subsets)",
             row.failed,
             if row.retrained {
@@ -114,7 +116,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
             row.worst_mm,
             row.subsets,
             row.of
-        );
+        ))?;
     }
     Ok(())
 }

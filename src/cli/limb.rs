@@ -7,6 +7,7 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 
+use super::out;
 use crate::design::Inputs;
 use crate::io::{atomic, glb, project_file};
 use crate::limb::{LimbSpec, LimbSupport};
@@ -144,11 +145,10 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
         "sites": project.selection.sites.len(),
     });
     if args.json {
-        println!("{figures}");
+        out::line(&figures.to_string())
     } else {
-        println!("{}: {figures}", args.out.display());
+        out::line(&format!("{}: {figures}", args.out.display()))
     }
-    Ok(())
 }
 
 /// The project of a limb of the family.

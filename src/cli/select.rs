@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::data::{CriterionArgs, DataArgs, criterion_json, site_json};
-use super::{SelectorArg, progress::Bar};
+use super::{SelectorArg, out, progress::Bar};
 use crate::budget::Watch;
 use crate::gaussian_process::GpKernel;
 use crate::io::cpu_seconds;
@@ -112,18 +112,18 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
     bar.finish();
     let (choice, criterion_seconds, audit) = result?;
     for step in &audit {
-        eprintln!(
+        out::say(&format!(
             "{:>3}: {:.3} mm, the best of {} others {:.3} mm ({:+.2} %)",
             step.sensors,
             step.chosen_mm,
             step.compared,
             step.best_other_mm,
             100.0 * step.excess()
-        );
+        ));
     }
     notes.extend(choice.selection.achieved.notes.iter().cloned());
     for note in &notes {
-        eprintln!("note: {note}");
+        out::say(&format!("note: {note}"));
     }
     if let Some(path) = &args.out {
         write_sites(path, &data, &choice)?;
@@ -133,21 +133,20 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
         summary["audit"] = json!(audit);
     }
     if args.criterion.json {
-        println!("{summary}");
+        out::line(&summary.to_string())
     } else {
-        print_table(&choice);
+        print_table(&choice)
     }
-    Ok(())
 }
 
 fn say(set: &SensorSet) {
     // The others choose in a blink, and PCA-QR chooses anew for each number.
     if let (Some(site), Some(mm), Some(gap)) = (set.sites.last(), set.criterion_mm, set.gap) {
-        eprintln!(
+        out::say(&format!(
             "{:>3}: site {site}, {mm:.3} mm (a better one could be better by {:.2} %)",
             set.sites.len(),
             100.0 * gap
-        );
+        ));
     }
 }
 
@@ -313,18 +312,16 @@ fn summary(
     })
 }
 
-fn print_table(choice: &Choice) {
+fn print_table(choice: &Choice) -> anyhow::Result<()> {
     for set in &choice.selection.sets {
         let sites: Vec<String> = set.sites.iter().map(ToString::to_string).collect();
-        match set.criterion_mm {
-            Some(mm) => println!(
-                "{} gauges, {mm:.3} mm: {}",
-                set.sites.len(),
-                sites.join(",")
-            ),
-            None => println!("{} gauges: {}", set.sites.len(), sites.join(",")),
-        }
+        let (count, sites) = (sites.len(), sites.join(","));
+        out::line(&match set.criterion_mm {
+            Some(mm) => format!("{count} gauges, {mm:.3} mm: {sites}"),
+            None => format!("{count} gauges: {sites}"),
+        })?;
     }
+    Ok(())
 }
 
 fn write_sites(path: &std::path::Path, data: &Data, choice: &Choice) -> anyhow::Result<()> {

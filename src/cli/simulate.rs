@@ -6,7 +6,7 @@ use anyhow::ensure;
 use clap::Args;
 use serde_json::json;
 
-use super::{Common, progress::Bar};
+use super::{Common, out, progress::Bar};
 use crate::design;
 use crate::given;
 use crate::io::artifacts::save_dataset;
@@ -76,7 +76,9 @@ fn check_output(path: &Path, endings: &[&str]) -> anyhow::Result<()> {
 fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()> {
     let budget = loaded.inputs.project.budget.budget();
     let (sites, touches, gigabytes) = design::expected_size(&loaded.inputs, &budget);
-    eprintln!("about {sites} sites × {touches} touches: {gigabytes:.2} GB while they are computed");
+    out::say(&format!(
+        "about {sites} sites × {touches} touches: {gigabytes:.2} GB while they are computed"
+    ));
     let bar = Bar::default();
     let result = args
         .common
@@ -105,8 +107,7 @@ fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()>
         "repairs": loaded.repairs,
         "achieved": simulated.achieved,
     });
-    finish(args, &summary);
-    Ok(())
+    finish(args, &summary)
 }
 
 fn at_points(
@@ -149,20 +150,18 @@ fn at_points(
         "repairs": loaded.repairs,
         "notes": answer.notes,
     });
-    finish(args, &summary);
-    Ok(())
+    finish(args, &summary)
 }
 
 fn say(notes: &[String]) {
     for note in notes {
-        eprintln!("note: {note}");
+        out::say(&format!("note: {note}"));
     }
 }
 
-fn finish(args: &SimulateArgs, summary: &serde_json::Value) {
+fn finish(args: &SimulateArgs, summary: &serde_json::Value) -> anyhow::Result<()> {
     if args.common.json {
-        println!("{summary}");
-        return;
+        return out::line(&summary.to_string());
     }
     let number = |path: &str| summary.pointer(path).and_then(serde_json::Value::as_f64);
     if let (Some(mm), Some(percent), Some(strain), Some(linear)) = (
@@ -171,12 +170,13 @@ fn finish(args: &SimulateArgs, summary: &serde_json::Value) {
         number("/discretization/strain_percent"),
         number("/linearity/largest_percent"),
     ) {
-        eprintln!(
+        out::say(&format!(
             "estimated error of the mesh: {mm:.2e} mm ({percent:.1} %) under the touch, {strain:.1} % of a load's largest strain; of linearity: up to {:.1} %",
             linear.abs()
-        );
+        ));
     }
     for path in std::iter::once(&args.out).chain(&args.vtu) {
-        eprintln!("wrote {}", path.display());
+        out::say(&format!("wrote {}", path.display()));
     }
+    Ok(())
 }

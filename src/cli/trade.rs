@@ -8,10 +8,11 @@ use anyhow::Context;
 use clap::Args;
 
 use super::progress::Bar;
-use super::{Common, QualityArg};
+use super::{Common, QualityArg, out};
 use crate::budget::Quality;
 use crate::design::Finest;
 use crate::io::project_file::LoadedProject;
+use crate::io::together::Together;
 use crate::io::trade_file::{self, Judge, Record};
 use crate::io::{ProcessMeter, project_file};
 use crate::trade::{Asked, Point, Sweep, answer, clock, front, measure};
@@ -55,24 +56,27 @@ pub fn run(args: &TradeArgs) -> anyhow::Result<()> {
         )
     })?;
     let threads = args.common.in_pool(|| Ok(rayon::current_num_threads()))?;
-    let mut record = known(&args.out, &loaded, threads)?;
     let asked = match (args.within_s, args.of_the_best_mm) {
         (Some(seconds), _) => Some(Asked::Within(seconds)),
         (None, Some(mm)) => Some(Asked::OfTheBest(mm)),
         (None, None) => None,
     };
     if let Some(asked) = asked {
+        let record = known(&args.out, &loaded, threads)?;
         super::prepare_folder(&mut loaded, &args.out)?;
         return reply(args, &loaded, &record, asked);
     }
-    args.common.in_pool(|| sweep(args, &loaded, &mut record))?;
+    // To the end: two that measure into one folder would write over each other's points.
+    let place = Together::claim(&args.out)?;
+    let mut record = known(&args.out, &loaded, threads)?;
+    args.common
+        .in_pool(|| sweep(args, &loaded, &place, &mut record))?;
     if args.common.json {
-        println!("{}", serde_json::to_string(&record)?);
-    } else {
-        print!("{}", trade_file::markdown(&loaded.inputs.project, &record));
-        for name in ["trade.json", "trade.csv", "trade.md", "trade.svg"] {
-            eprintln!("wrote {}", args.out.join(name).display());
-        }
+        return out::line(&serde_json::to_string(&record)?);
+    }
+    out::line(trade_file::markdown(&loaded.inputs.project, &record).trim_end())?;
+    for name in ["trade.json", "trade.csv", "trade.md", "trade.svg"] {
+        out::say(&format!("wrote {}", args.out.join(name).display()));
     }
     Ok(())
 }
@@ -98,7 +102,12 @@ fn known(folder: &Path, loaded: &LoadedProject, threads: usize) -> anyhow::Resul
     Ok(record)
 }
 
-fn sweep(args: &TradeArgs, loaded: &LoadedProject, record: &mut Record) -> anyhow::Result<()> {
+fn sweep(
+    args: &TradeArgs,
+    loaded: &LoadedProject,
+    place: &Together,
+    record: &mut Record,
+) -> anyhow::Result<()> {
     let project = &loaded.inputs.project;
     let qualities: Vec<Quality> = args.qualities.iter().map(|&q| q.into()).collect();
     let sweep = Sweep::new(project, qualities);
@@ -115,11 +124,11 @@ fn sweep(args: &TradeArgs, loaded: &LoadedProject, record: &mut Record) -> anyho
         sweep.next(points, left)
     };
     if next(&record.points).is_none() {
-        return Ok(trade_file::write(&args.out, project, record)?);
+        return Ok(trade_file::write(place, project, record)?);
     }
     let bar = Bar::default();
     let watch = |p| -> ControlFlow<()> { bar.show(p) };
-    eprintln!("laying the judge's elements");
+    out::say("laying the judge's elements");
     let judge = Finest::new(&loaded.inputs, &watch)?;
     record.judge = Judge {
         element_mm: judge.element_mm(),
@@ -133,20 +142,20 @@ fn sweep(args: &TradeArgs, loaded: &LoadedProject, record: &mut Record) -> anyho
         say(record.points.len() + 1, &point);
         record.points.push(point);
         // What is measured is kept, whenever this is stopped.
-        trade_file::write(&args.out, project, record)?;
+        trade_file::write(place, project, record)?;
     }
     Ok(())
 }
 
 fn say(number: usize, point: &Point) {
     let words = point.setting.in_words();
-    match &point.outcome {
-        Ok(m) => eprintln!(
+    out::say(&match &point.outcome {
+        Ok(m) => format!(
             "{number:>3}  {:7.1} s  {:7.2} mm  {words}",
             m.cpu_seconds, m.error_mm
         ),
-        Err(message) => eprintln!("{number:>3}  {words}: {message}"),
-    }
+        Err(message) => format!("{number:>3}  {words}: {message}"),
+    });
 }
 
 /// Writes the project that keeps a promise.
@@ -183,17 +192,17 @@ fn reply(
     let painted = inputs.painted.as_ref().map(|m| m.as_slice());
     project_file::save(&path, &project, painted, &inputs.masks)?;
     if args.common.json {
-        println!("{}", serde_json::to_string(point)?);
+        out::line(&serde_json::to_string(point)?)?;
     } else {
-        println!(
+        out::line(&format!(
             "{:.2} mm mean, {:.2} mm median, in {:.1} s ({:.1} s of processors): {}",
             m.error_mm,
             m.median_mm,
             m.cpu_seconds * pace,
             m.cpu_seconds,
             point.setting.in_words()
-        );
+        ))?;
     }
-    eprintln!("wrote {}", path.display());
+    out::say(&format!("wrote {}", path.display()));
     Ok(())
 }

@@ -13,7 +13,7 @@ use crate::budget::{Budget, Watch, Work};
 use crate::evaluation::{Evaluation, EvaluationRow};
 use crate::feasible::Feasibility;
 use crate::mesh::{TriMesh, scatter};
-use crate::placement::{Selection, SelectorKind};
+use crate::placement::{Selection, SelectorKind, SensorSet};
 
 /// Everything a design produced; what it shares with another costs nothing.
 #[derive(Clone)]
@@ -25,6 +25,8 @@ pub struct Design {
     pub selections: Arc<Vec<Selection>>,
     /// Whose sites are shown and reported.
     pub lead: SelectorKind,
+    /// Whether gauges of the chosen set were moved by hand.
+    pub by_hand: bool,
     pub truth: Arc<Truth>,
     pub evaluation: Arc<Evaluation>,
     pub seconds: Vec<StageTime>,
@@ -73,6 +75,7 @@ impl Design {
     #[must_use]
     pub fn with_hand(&self, sites: Vec<usize>, judged: &Evaluation) -> Self {
         let mut design = self.clone();
+        design.by_hand = true;
         let (name, old) = (self.lead.name(), self.chosen().len());
         let set = (self.selections.iter())
             .flat_map(|s| s.sets.iter().map(move |set| (s.selector, set.sites.len())))
@@ -81,10 +84,18 @@ impl Design {
         let selections = Arc::make_mut(&mut design.selections);
         if let Some(led) = selections.iter_mut().find(|s| s.selector == self.lead) {
             led.achieved.notes.push(
-                "Gauges were moved by hand: the chosen set and its errors are those of the gauges as they are, not of the selector.".into(),
+                "Gauges were moved by hand: the chosen set and its errors are those of the gauges as they are, not of the selector. What it says of ties and gaps is of the set that it chose.".into(),
             );
+            // Its figures for that set say nothing of this one.
+            led.achieved.error_estimate = None;
             if let Some(last) = led.sets.last_mut() {
-                last.sites = sites;
+                *last = SensorSet {
+                    sites,
+                    criterion: None,
+                    criterion_mm: None,
+                    gap: None,
+                    lead: None,
+                };
             }
         }
         let evaluation = Arc::make_mut(&mut design.evaluation);
@@ -319,6 +330,7 @@ pub fn run_step_by_step(
         feasibility,
         reduced,
         lead,
+        by_hand: false,
         selections,
         truth,
         evaluation: Arc::new(evaluation),

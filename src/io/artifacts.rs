@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
+use super::fingerprint::Fingerprint;
 use super::npz::NpzFile;
+use super::together::Together;
 use super::{FileError, atomic, project_file, report};
 use crate::dataset::{Dataset, Signal, Site};
 use crate::design::{Design, Inputs};
@@ -19,10 +21,14 @@ pub struct Provenance<'a> {
     pub version: &'static str,
 }
 
-/// Writes all files of a design into a folder, each atomically; returns their paths.
+/// The project among the files of a design.
+const PROJECT: &str = "design.hapdef.toml";
+
+/// Puts all files of a design into a folder, which is made where it is missing, in the place of those of another run:
+/// all of them or none. Returns their paths.
 ///
 /// # Errors
-/// [`FileError`] naming what could not be written.
+/// [`FileError`] naming what could not be written, or that somebody else is writing there.
 pub fn write_all(
     folder: &Path,
     inputs: &Inputs,
@@ -30,34 +36,95 @@ pub fn write_all(
     provenance: &Provenance,
 ) -> Result<Vec<PathBuf>, FileError> {
     std::fs::create_dir_all(folder).map_err(|e| FileError::of(folder, &e))?;
-    let at = |name: &str| folder.join(name);
-    let project_path = at("design.hapdef.toml");
-    atomic::write(&at("sites.csv"), sites_csv(design).as_bytes())?;
-    let summary = summary(inputs, design);
-    let text = format!("{summary:#}\n");
-    atomic::write(&at("design.json"), text.as_bytes())?;
-    save_dataset(&at("dataset.npz"), &design.simulated.dataset)?;
-    let project = with_result(&inputs.project, design, &project_path, provenance.mesh_path);
-    let painted = inputs.painted.as_ref().map(|m| m.as_slice());
-    project_file::save(&project_path, &project, painted, &inputs.masks)?;
-    let html = report::html(inputs, design, provenance);
-    atomic::write(&at("report.html"), html.as_bytes())?;
+    write_into(&Together::claim(folder)?, inputs, design, provenance)
+}
+
+/// As [`write_all`], into a folder that is claimed already.
+///
+/// # Errors
+/// [`FileError`] naming what could not be written.
+pub fn write_into(
+    place: &Together,
+    inputs: &Inputs,
+    design: &Design,
+    provenance: &Provenance,
+) -> Result<Vec<PathBuf>, FileError> {
+    place.replace(|new| {
+        let write = |name: &str, text: &str| atomic::write(&new.join(name), text.as_bytes());
+        write("sites.csv", &sites_csv(inputs, design))?;
+        write("design.json", &format!("{:#}\n", summary(inputs, design)))?;
+        write("report.html", &report::html(inputs, design, provenance))?;
+        let run = run_key(inputs, design);
+        save_arrays(&new.join("dataset.npz"), &design.simulated.dataset, Some(&run))?;
+        write_project(new, place.folder(), inputs, design, provenance)
+    })?;
     Ok([
         "report.html",
         "sites.csv",
         "design.json",
         "dataset.npz",
-        "design.hapdef.toml",
+        PROJECT,
     ]
-    .map(at)
+    .map(|name| place.folder().join(name))
     .to_vec())
+}
+
+/// Writes the project that reproduces the run into a folder, for another one. What stands there under its name, which
+/// somebody may have gone on with, stays as its backup, with its masks.
+fn write_project(
+    new: &Path,
+    place: &Path,
+    inputs: &Inputs,
+    design: &Design,
+    provenance: &Provenance,
+) -> Result<(), FileError> {
+    let (path, target) = (new.join(PROJECT), place.join(PROJECT));
+    bring(&target, &path)?;
+    bring(
+        &project_file::arrays_path(&target),
+        &project_file::arrays_path(&path),
+    )?;
+    let project = with_result(&inputs.project, design, &target, provenance.mesh_path);
+    let painted = inputs.painted.as_ref().map(|m| m.as_slice());
+    let comment = format!("Of run {}.", run_key(inputs, design));
+    project_file::save_under(&path, &comment, &project, painted, &inputs.masks)
+}
+
+/// Copies a file, where there is one.
+fn bring(from: &Path, to: &Path) -> Result<(), FileError> {
+    match std::fs::read(from) {
+        Ok(bytes) => atomic::write(to, &bytes),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(e) => Err(FileError::of(from, &e)),
+    }
+}
+
+/// Which run a file belongs to: a key of everything that its figures depend on, the same whenever the same is computed
+/// again, on whatever machine.
+#[must_use]
+pub fn run_key(inputs: &Inputs, design: &Design) -> String {
+    let mut project = as_computed(&inputs.project, design);
+    // What files are called says nothing of what is in them.
+    project.part.mesh.clear();
+    project.feasible.painted = None;
+    let mut key = Fingerprint::default();
+    key.add(env!("CARGO_PKG_VERSION").bytes());
+    key.add(serde_json::to_string(&project).unwrap_or_default().bytes());
+    key.add_part(inputs);
+    key.hex()
 }
 
 /// The project that reproduces the run, with the chosen sites in it.
 #[must_use]
 pub fn with_result(project: &Project, design: &Design, at: &Path, mesh: &Path) -> Project {
-    let mut project = project.clone();
+    let mut project = as_computed(project, design);
     project.part.mesh = project_file::relative_to(at, mesh);
+    project
+}
+
+/// The project at the quality of the design, with the sites that it chose.
+fn as_computed(project: &Project, design: &Design) -> Project {
+    let mut project = project.clone();
     project.budget.limits = project.budget.limits_at(design.budget.quality);
     project.budget.quality = design.budget.quality;
     project.selection.sites = as_chosen(&design.simulated.dataset.sites, design.chosen());
@@ -82,10 +149,11 @@ pub fn as_chosen(all: &[Site], sites: &[usize]) -> Vec<ChosenSite> {
 
 /// The table of chosen sites; what one command writes another reads.
 #[must_use]
-pub fn sites_csv(design: &Design) -> String {
+pub fn sites_csv(inputs: &Inputs, design: &Design) -> String {
     let dataset = &design.simulated.dataset;
+    let run = run_key(inputs, design);
     let mut text = String::from(
-        "x_mm,y_mm,z_mm,dx,dy,dz,index,gauge,rms_strain_microstrain,peak_strain_microstrain,signal_low,signal_high,signal_unit\n",
+        "x_mm,y_mm,z_mm,dx,dy,dz,index,gauge,rms_strain_microstrain,peak_strain_microstrain,signal_low,signal_high,signal_unit,run\n",
     );
     for (k, &s) in design.chosen().iter().enumerate() {
         let site = &dataset.sites[s];
@@ -94,7 +162,7 @@ pub fn sites_csv(design: &Design) -> String {
         let (low, high) = range(dataset, s);
         let _ = writeln!(
             text,
-            "{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{s},{},{:.2},{:.2},{low:.4},{high:.4},{}",
+            "{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{s},{},{:.2},{:.2},{low:.4},{high:.4},{},{run}",
             p.x,
             p.y,
             p.z,
@@ -138,6 +206,11 @@ pub fn range(dataset: &Dataset, site: usize) -> (f64, f64) {
 /// # Errors
 /// [`FileError`] naming the file.
 pub fn save_dataset(path: &Path, dataset: &Dataset) -> Result<(), FileError> {
+    save_arrays(path, dataset, None)
+}
+
+/// As [`save_dataset`], with the `run` of a design that the file belongs to.
+fn save_arrays(path: &Path, dataset: &Dataset, run: Option<&str>) -> Result<(), FileError> {
     let (sites, touches) = (dataset.sites.len(), dataset.touches.len());
     let flat = |points: Vec<glam::DVec3>| -> Vec<f64> {
         points.into_iter().flat_map(|p| p.to_array()).collect()
@@ -168,6 +241,9 @@ pub fn save_dataset(path: &Path, dataset: &Dataset) -> Result<(), FileError> {
         let forces: Vec<f64> = dataset.touches.iter().map(|t| t.force).collect();
         file.add("force_n", &[touches], &forces)?;
         file.add_text("signal", dataset.signal.name())?;
+        if let Some(run) = run {
+            file.add_text("run", run)?;
+        }
         Ok(file)
     };
     build().map_err(|e| FileError::of(path, &e))?.save(path)
@@ -210,6 +286,8 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         .collect();
     json!({
         "version": env!("CARGO_PKG_VERSION"),
+        "run": run_key(inputs, design),
+        "by_hand": design.by_hand,
         "quality": design.budget.quality,
         "seed": inputs.project.budget.seed,
         "signal": dataset.signal,

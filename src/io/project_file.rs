@@ -208,6 +208,20 @@ pub fn save(
     painted: Option<&[bool]>,
     masks: &Masks,
 ) -> Result<(), FileError> {
+    save_under(path, "", project, painted, masks)
+}
+
+/// As [`save`], with a comment of one line on top.
+///
+/// # Errors
+/// As [`save`].
+pub fn save_under(
+    path: &Path,
+    comment: &str,
+    project: &Project,
+    painted: Option<&[bool]>,
+    masks: &Masks,
+) -> Result<(), FileError> {
     let mut project = project.clone();
     let mut kept: BTreeMap<String, &[bool]> = BTreeMap::new();
     for name in project.mask_names() {
@@ -229,7 +243,12 @@ pub fn save(
         both.extend(kept.iter().map(|(name, mask)| (name.as_str(), *mask)));
         write_arrays(&arrays, &both)?;
     }
-    atomic::write_with_backup(path, to_text(&project).as_bytes())
+    let text = to_text(&project);
+    let text = match comment {
+        "" => text,
+        comment => format!("# {comment}\n{text}"),
+    };
+    atomic::write_with_backup(path, text.as_bytes())
 }
 
 /// The arrays that the project in a file names; none where there is no readable one.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::artifacts::{Provenance, range, signal_to_noise, signal_unit};
+use super::artifacts::{Provenance, range, run_key, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Paint, Series, escape};
 use crate::colormap::ColorMap;
 use crate::design::{Design, Inputs, Simulated};
@@ -59,11 +59,16 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
     let selector = inputs.project.selection.selector;
     let _ = write!(
         page,
-        "<p class=\"lead\">{chosen} strain gauges, chosen by {} on {}, to find where a touch of {} N lands.</p><div class=\"numbers\">",
+        "<p class=\"lead\">{chosen} strain gauges, chosen by {} on {}{}, to find where a touch of {} N lands.</p><div class=\"numbers\">",
         design
             .led()
             .map_or(selector.title(), |s| s.selector.title()),
         dataset.signal.name(),
+        if design.by_hand {
+            " and moved by hand"
+        } else {
+            ""
+        },
         inputs.project.touch.force_n
     );
     for row in design
@@ -607,7 +612,8 @@ fn settings(page: &mut String, inputs: &Inputs, design: &Design, provenance: &Pr
     }
     let _ = write!(
         page,
-        "<tr><td>Version</td><td>HapDef {}</td></tr></table>",
-        provenance.version
+        "<tr><td>Version</td><td>HapDef {}</td></tr><tr><td>Run, as in the files beside this one</td><td>{}</td></tr></table>",
+        provenance.version,
+        run_key(inputs, design)
     );
 }

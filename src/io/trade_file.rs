@@ -5,7 +5,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::fingerprint::Fingerprint;
 use super::svg::escape;
+use super::together::Together;
 use super::{FileError, atomic};
 use crate::dataset::Signal;
 use crate::design::Inputs;
@@ -110,40 +112,10 @@ pub fn without_knobs(project: &Project) -> Project {
 #[must_use]
 pub fn inputs_key(inputs: &Inputs) -> String {
     let project = without_knobs(&inputs.project);
-    let mut hash = Hash::default();
-    hash.add(serde_json::to_string(&project).unwrap_or_default().bytes());
-    for p in inputs.part.positions() {
-        hash.add(p.to_array().into_iter().flat_map(f64::to_le_bytes));
-    }
-    for triangle in inputs.part.triangles() {
-        hash.add(triangle.iter().flat_map(|v| v.to_le_bytes()));
-    }
-    let masks = inputs
-        .masks
-        .iter()
-        .map(|(name, mask)| (name.as_str(), mask));
-    let painted = inputs.painted.iter().map(|mask| ("painted", mask));
-    for (name, mask) in masks.chain(painted) {
-        hash.add(name.bytes().chain(mask.iter().map(|&m| u8::from(m))));
-    }
-    format!("{:016x}", hash.0)
-}
-
-/// Fowler, Noll and Vo's hash (FNV-1a): the same on every machine and in every version.
-struct Hash(u64);
-
-impl Default for Hash {
-    fn default() -> Self {
-        Self(0xcbf2_9ce4_8422_2325)
-    }
-}
-
-impl Hash {
-    fn add(&mut self, bytes: impl Iterator<Item = u8>) {
-        for byte in bytes {
-            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        }
-    }
+    let mut key = Fingerprint::default();
+    key.add(serde_json::to_string(&project).unwrap_or_default().bytes());
+    key.add_part(inputs);
+    key.hex()
 }
 
 /// Reads what [`write`] left in a folder; nothing where there is nothing.
@@ -166,21 +138,20 @@ pub fn read(folder: &Path) -> Result<Option<Record>, FileError> {
     Record::parse(&text).map(Some).map_err(broken)
 }
 
-/// Writes `trade.json`, `trade.csv`, `trade.md` and `trade.svg`, each atomically.
+/// Puts `trade.json`, `trade.csv`, `trade.md` and `trade.svg` into a folder, all of one record.
 ///
 /// # Errors
 /// [`FileError`] naming what could not be written.
-pub fn write(folder: &Path, project: &Project, record: &Record) -> Result<(), FileError> {
+pub fn write(place: &Together, project: &Project, record: &Record) -> Result<(), FileError> {
     let files = [
         ("trade.json", record.to_json()),
         ("trade.csv", csv(project, record)),
         ("trade.md", markdown(project, record)),
         ("trade.svg", plot(project, record)),
     ];
-    for (name, text) in files {
-        atomic::write(&folder.join(name), text.as_bytes())?;
-    }
-    Ok(())
+    place.replace(|new| {
+        (files.iter()).try_for_each(|(name, text)| atomic::write(&new.join(name), text.as_bytes()))
+    })
 }
 
 /// A row a point; `limits` is what goes into the project's `[budget.limits]`.

@@ -47,7 +47,7 @@ impl Selector for Entropy<'_> {
             field.add(place);
             let set = SensorSet {
                 sites: field.sites(),
-                criterion: entropy,
+                criterion: Some(entropy),
                 criterion_mm: None,
                 gap: None,
                 lead: best.lead(),

@@ -82,7 +82,7 @@ impl Selector for GreedySvr {
             field.add(step.place);
             sets.push(SensorSet {
                 sites: field.sites(),
-                criterion: step.error,
+                criterion: Some(step.error),
                 criterion_mm: Some(step.error),
                 gap: Some(step.gap),
                 lead: step.lead,
@@ -103,7 +103,7 @@ impl Selector for GreedySvr {
             criterion_unit: "mm, cross-validated",
             pool: pool.sites.len(),
             achieved: Achieved {
-                error_estimate: sets.last().map(|s| s.criterion),
+                error_estimate: sets.last().and_then(|s| s.criterion),
                 unit: "mm",
                 effort: search.work,
                 stop_reason: stop,
@@ -588,7 +588,8 @@ impl<'a> Search<'a> {
             100.0 * self.widest,
             100.0 * gap
         ));
-        let reached = sets.last().map_or(f64::INFINITY, |s| s.criterion);
+        let reached = sets.last().and_then(|s| s.criterion);
+        let reached = reached.unwrap_or(f64::INFINITY);
         if let Some(target) = wishes.target_mm.filter(|t| reached > *t) {
             notes.push(format!(
                 "The error asked for, {target} mm, was not reached: {reached:.2} mm with {} gauges.",

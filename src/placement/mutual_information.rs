@@ -64,7 +64,7 @@ impl Selector for MutualInformation<'_> {
             field.add(place);
             let set = SensorSet {
                 sites: field.sites(),
-                criterion: information,
+                criterion: Some(information),
                 criterion_mm: None,
                 gap: None,
                 lead: best.lead(),

@@ -59,7 +59,7 @@ pub fn from_components(
             let kept: f64 = pca.variances[..reach].iter().sum();
             let set = SensorSet {
                 sites: chosen,
-                criterion: (1.0 - kept / pca.total).max(0.0),
+                criterion: Some((1.0 - kept / pca.total).max(0.0)),
                 criterion_mm: None,
                 gap: None,
                 lead,
