@@ -11,6 +11,7 @@ mod judge;
 mod layout;
 mod road;
 mod sense;
+mod shortage;
 mod simulate;
 mod walled;
 
@@ -31,6 +32,7 @@ pub use self::judge::*;
 pub use self::layout::*;
 pub use self::road::*;
 pub use self::sense::*;
+pub use self::shortage::*;
 pub use self::simulate::*;
 pub use self::walled::*;
 
@@ -43,10 +45,16 @@ pub enum DesignError {
     Elastic(#[from] ElasticError),
     #[error(transparent)]
     Placement(#[from] PlacementError),
-    #[error(
-        "no touch lands on the part: lower touch.edge_margin_mm ({margin_mm} mm), widen touch.region if there is one, or check the unit of the mesh (the part is {size_mm:.3} mm across)"
-    )]
-    NoTouches { margin_mm: f64, size_mm: f64 },
+    #[error(transparent)]
+    Shortage(#[from] Shortage),
+    #[error("{touches} touches are too few to learn from, which takes at least {least}: {remedy}")]
+    TooFewTouches {
+        touches: usize,
+        least: usize,
+        remedy: String,
+    },
+    #[error("no touch lands on the part: {remedy}")]
+    NoTouches { remedy: String },
     #[error(
         "{count} sites at a spacing of {spacing_mm} mm are more than the {limit} this version handles: widen sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.0} mm across)"
     )]
@@ -74,9 +82,16 @@ pub enum DesignError {
     )]
     ThickerThanWide { size_mm: f64, thickness_mm: f64 },
     #[error(
-        "no site fits on the part: lower sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.3} mm across)"
+        "no site fits on the part: {spacing_mm} mm (sites.spacing_mm) is too wide for a part of {size_mm:.3} mm across and {area_mm2:.3} mm². Lower it to less than {fits_mm:.3}, or check the unit of the mesh"
     )]
-    NoRoom { size_mm: f64 },
+    NoRoom {
+        spacing_mm: f64,
+        size_mm: f64,
+        /// Of the surface that gauges are glued to.
+        area_mm2: f64,
+        /// Where one site fits.
+        fits_mm: f64,
+    },
     #[error(
         "{needed_gb:.1} GB would be needed for {sites} sites × {touches} touches, more than the {limit_gb:.0} GB this version allows: lower touch.count or widen sites.spacing_mm"
     )]

@@ -44,6 +44,18 @@ pub enum Filter {
 }
 
 impl Filter {
+    /// In the order they are applied.
+    pub const ALL: [Self; 8] = [
+        Self::SupportClearance,
+        Self::Edge,
+        Self::Footprint,
+        Self::Flatness,
+        Self::Noise,
+        Self::Range,
+        Self::Painted,
+        Self::KeptOut,
+    ];
+
     #[must_use]
     pub fn label(self) -> &'static str {
         match self {
@@ -78,19 +90,15 @@ impl Feasibility {
     /// How many sites each filter took, of those that had passed the ones before.
     #[must_use]
     pub fn taken(&self) -> Vec<(Filter, usize)> {
-        use Filter::{Edge, Flatness, Footprint, KeptOut, Noise, Painted, Range, SupportClearance};
-        [
-            SupportClearance,
-            Edge,
-            Footprint,
-            Flatness,
-            Noise,
-            Range,
-            Painted,
-            KeptOut,
-        ]
-        .map(|f| (f, self.verdicts.iter().filter(|&&v| v == Some(f)).count()))
-        .to_vec()
+        Filter::ALL
+            .map(|f| (f, self.taken_by(f).count()))
+            .to_vec()
+    }
+
+    /// The sites that a filter took, rising.
+    fn taken_by(&self, filter: Filter) -> impl Iterator<Item = usize> + '_ {
+        let verdicts = self.verdicts.iter().enumerate();
+        verdicts.filter_map(move |(i, &v)| (v == Some(filter)).then_some(i))
     }
 }
 
@@ -111,41 +119,135 @@ pub struct FeasibleInput<'a> {
 /// Applies all filters.
 #[must_use]
 pub fn feasible(input: &FeasibleInput, rules: &FeasibleRules) -> Feasibility {
-    let clearance = geodesic::from_vertices(input.mesh, input.supported, f64::INFINITY);
-    let centred = near_centre_of_mass(input.sites, rules);
-    let verdicts = (0..input.sites.len())
-        .map(|i| {
-            let site = &input.sites[i];
-            let checks: [(Filter, &dyn Fn() -> bool); 8] = [
-                (Filter::SupportClearance, &|| {
-                    input.mesh.interpolate(&clearance, input.points[i]) >= rules.support_clearance
-                }),
-                (Filter::Edge, &|| centred[i]),
-                (Filter::Footprint, &|| {
-                    footprint(input.mesh, input.index, site, rules).on_part
-                }),
-                (Filter::Flatness, &|| {
-                    footprint(input.mesh, input.index, site, rules).height <= rules.flatness
-                }),
-                (Filter::Noise, &|| {
-                    site.rms_strain >= rules.least_signal_to_noise * rules.noise
-                }),
-                (Filter::Range, &|| site.peak_strain <= rules.range),
-                (Filter::Painted, &|| input.painted.is_none_or(|p| p[i])),
-                (Filter::KeptOut, &|| input.kept_out.is_none_or(|k| !k[i])),
-            ];
-            checks.iter().find(|(_, passes)| !passes()).map(|c| c.0)
-        })
-        .collect();
-    Feasibility { verdicts }
+    let filters = Filters::new(input, rules);
+    let verdict = |i: usize| Filter::ALL.into_iter().find(|&f| !filters.passes(f, i));
+    Feasibility {
+        verdicts: (0..input.sites.len()).map(verdict).collect(),
+    }
 }
 
-/// The paper's edge filter: at an edge the centre of mass of the k nearest sites lies to one side.
-fn near_centre_of_mass(sites: &[Site], rules: &FeasibleRules) -> Vec<bool> {
-    let k = rules.edge_neighbours.min(sites.len().saturating_sub(1));
+/// The filter that keeps most sites out, and what would let some of them in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blame {
+    pub filter: Filter,
+    /// How many sites pass all other filters.
+    pub alone: usize,
+    /// The filter's limit at which so many sites would pass it as were asked for, or all that it took where those
+    /// are fewer: lengths in metres, strains as ratios. Nothing for a filter that has no limit.
+    pub limit: Option<f64>,
+}
+
+/// Finds the filter to relax so that `more` sites pass; nothing where none took any. Of several that keep out as
+/// many, the last: what the others took had to pass that one too.
+#[must_use]
+pub fn blame(
+    input: &FeasibleInput,
+    rules: &FeasibleRules,
+    feasibility: &Feasibility,
+    more: usize,
+) -> Option<Blame> {
+    let filters = Filters::new(input, rules);
+    let of = |filter: Filter| {
+        let taken: Vec<usize> = feasibility.taken_by(filter).collect();
+        let alone: Vec<usize> = (taken.iter().copied())
+            .filter(|&i| filters.passes_after(filter, i))
+            .collect();
+        (!taken.is_empty()).then_some((filter, taken, alone))
+    };
+    let all = Filter::ALL.into_iter().filter_map(of);
+    let (filter, taken, alone) = all.max_by_key(|(_, _, alone)| alone.len())?;
+    let among = if alone.is_empty() { &taken } else { &alone };
+    Some(Blame {
+        filter,
+        alone: alone.len(),
+        limit: filters.limit_for(filter, among, more),
+    })
+}
+
+/// The filters with what they look at.
+struct Filters<'a> {
+    input: &'a FeasibleInput<'a>,
+    rules: &'a FeasibleRules,
+    /// From anything held, over the surface (m), a vertex of the mesh.
+    clearance: Vec<f64>,
+    /// From each site to the centre of mass of its neighbours (m).
+    off_centre: Vec<f64>,
+}
+
+impl<'a> Filters<'a> {
+    fn new(input: &'a FeasibleInput<'a>, rules: &'a FeasibleRules) -> Self {
+        Self {
+            clearance: geodesic::from_vertices(input.mesh, input.supported, f64::INFINITY),
+            off_centre: off_centre(input.sites, rules.edge_neighbours),
+            input,
+            rules,
+        }
+    }
+
+    fn passes(&self, filter: Filter, i: usize) -> bool {
+        let (input, rules) = (self.input, self.rules);
+        let site = &input.sites[i];
+        match filter {
+            Filter::SupportClearance => self.distance(i) >= rules.support_clearance,
+            Filter::Edge => self.off_centre[i] <= rules.edge_radius,
+            Filter::Footprint => self.footprint(i).on_part,
+            Filter::Flatness => self.footprint(i).height <= rules.flatness,
+            Filter::Noise => site.rms_strain >= rules.least_signal_to_noise * rules.noise,
+            Filter::Range => site.peak_strain <= rules.range,
+            Filter::Painted => input.painted.is_none_or(|p| p[i]),
+            Filter::KeptOut => input.kept_out.is_none_or(|k| !k[i]),
+        }
+    }
+
+    /// Whether a site passes all filters that come after one.
+    fn passes_after(&self, filter: Filter, i: usize) -> bool {
+        let mut after = Filter::ALL.into_iter().skip_while(|&f| f != filter).skip(1);
+        after.all(|f| self.passes(f, i))
+    }
+
+    /// The limit at which `count` of some sites pass a filter, or all where they are fewer.
+    fn limit_for(&self, filter: Filter, sites: &[usize], count: usize) -> Option<f64> {
+        let measured = sites.iter().filter_map(|&i| self.measured(filter, i));
+        let mut values: Vec<f64> = measured.collect();
+        values.sort_by(f64::total_cmp);
+        if matches!(filter, Filter::SupportClearance | Filter::Noise) {
+            // These want much of what they measure.
+            values.reverse();
+        }
+        let last = count.min(values.len()).max(1) - 1;
+        values.get(last).copied()
+    }
+
+    /// What a filter compares with its limit (m, or strain), where it has one.
+    fn measured(&self, filter: Filter, i: usize) -> Option<f64> {
+        match filter {
+            Filter::SupportClearance => Some(self.distance(i)),
+            Filter::Edge => Some(self.off_centre[i]),
+            Filter::Flatness => Some(self.footprint(i).height),
+            Filter::Noise => Some(self.input.sites[i].rms_strain),
+            Filter::Range => Some(self.input.sites[i].peak_strain),
+            Filter::Footprint | Filter::Painted | Filter::KeptOut => None,
+        }
+    }
+
+    fn distance(&self, i: usize) -> f64 {
+        let at = self.input.points[i];
+        self.input.mesh.interpolate(&self.clearance, at)
+    }
+
+    fn footprint(&self, i: usize) -> Footprint {
+        let input = self.input;
+        footprint(input.mesh, input.index, &input.sites[i], self.rules)
+    }
+}
+
+/// What the paper's edge filter looks at: how far the centre of mass of the k nearest sites lies from each (m). At
+/// an edge it lies to one side.
+fn off_centre(sites: &[Site], neighbours: usize) -> Vec<f64> {
+    let k = neighbours.min(sites.len().saturating_sub(1));
     let positions: Vec<DVec3> = sites.iter().map(|s| s.position).collect();
     if k == 0 {
-        return vec![true; sites.len()];
+        return vec![0.0; sites.len()];
     }
     let lists = nearest(&positions, k);
     lists
@@ -153,7 +255,7 @@ fn near_centre_of_mass(sites: &[Site], rules: &FeasibleRules) -> Vec<bool> {
         .enumerate()
         .map(|(i, list)| {
             let centre = list.iter().map(|&j| positions[j]).sum::<DVec3>() / list.len() as f64;
-            centre.distance(positions[i]) <= rules.edge_radius
+            centre.distance(positions[i])
         })
         .collect()
 }

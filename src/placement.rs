@@ -124,12 +124,10 @@ impl Selection {
 /// Why nothing could be chosen.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlacementError {
-    #[error(
-        "no site is feasible: relax the filters that took the most sites, or paint a larger region"
-    )]
+    #[error("there is no site to choose from: all are left out, or there are none")]
     NoSites,
     #[error(
-        "{wanted} gauges were asked for, but only {available} sites can be chosen from: ask for fewer gauges or relax the filters"
+        "{wanted} gauges were asked for, but only {available} sites can be chosen from: ask for fewer gauges or allow more sites"
     )]
     TooFewSites { wanted: usize, available: usize },
     #[error("{touches} touches are too few to learn from: ask for at least {least}")]

@@ -1,7 +1,9 @@
 //! A project: everything a design depends on, as plain data in the units of its file.
 
 mod live;
+mod ranges;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -10,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::budget::{Budget, Limits, Quality};
 use crate::dataset::Signal;
-use crate::elasticity::support::{MOST, Region};
+use crate::elasticity::support::Region;
 use crate::elasticity::{Freedoms, Material, Section, Support};
 use crate::feasible::FeasibleRules;
 use crate::gaussian_process::GpKernel;
@@ -21,7 +23,10 @@ use crate::placement::SelectorKind;
 use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
 
+use ranges::check;
+
 pub use live::{GluedKeys, LiveKeys};
+pub use ranges::{EDGE_NEIGHBOURS, FARTHEST, GAUGES, TOUCHES};
 
 /// Version of the file format this program writes and the newest it reads.
 pub const FORMAT: u32 = 1;
@@ -34,7 +39,7 @@ const MICRO: f64 = 1e-6;
 #[error("{key} must be {rule}, but is {value}")]
 pub struct BadValue {
     pub key: String,
-    pub rule: &'static str,
+    pub rule: Cow<'static, str>,
     pub value: String,
 }
 
@@ -594,12 +599,22 @@ impl Project {
 
     /// The names of all masks that the project refers to, beside what is painted.
     pub fn mask_names(&mut self) -> impl Iterator<Item = &mut String> {
-        let supports = self.supports.iter_mut().filter_map(|s| s.vertices.as_mut());
+        self.mask_keys().map(|(_, name)| name)
+    }
+
+    /// The same with the key that each stands under.
+    pub fn mask_keys(&mut self) -> impl Iterator<Item = (&'static str, &mut String)> {
+        let supports = self.supports.iter_mut();
+        let supports = supports.map(|s| ("support.vertices", s.vertices.as_mut()));
+        let others = [
+            ("part.inside", self.part.inside.as_mut()),
+            ("part.outside", self.part.outside.as_mut()),
+            ("touch.region", self.touch.region.as_mut()),
+            ("feasible.keep_out", self.feasible.keep_out.as_mut()),
+        ];
         supports
-            .chain(self.part.inside.as_mut())
-            .chain(self.part.outside.as_mut())
-            .chain(self.touch.region.as_mut())
-            .chain(self.feasible.keep_out.as_mut())
+            .chain(others)
+            .filter_map(|(key, name)| Some((key, name?)))
     }
 
     /// A mask that the project names.
@@ -616,7 +631,7 @@ impl Project {
         };
         let found = masks.get(name).ok_or_else(|| BadValue {
             key: key.into(),
-            rule: "the name of an array beside the project file or of a group of the mesh file",
+            rule: "the name of an array beside the project file or of a group of the mesh file".into(),
             value: format!("\"{name}\" (there is {})", names(masks)),
         })?;
         Ok(Some(found))
@@ -692,226 +707,6 @@ impl Project {
     pub fn tip(&self) -> (f64, f64) {
         (self.touch.force_n, self.touch.tip_radius_mm * MM)
     }
-
-    fn check_signs(&self) -> Result<(), BadValue> {
-        let above = [
-            ("part.thickness_mm", self.part.thickness_mm),
-            (
-                "material.youngs_modulus_gpa",
-                self.material.youngs_modulus_gpa,
-            ),
-            ("touch.force_n", self.touch.force_n),
-            ("touch.tip_radius_mm", self.touch.tip_radius_mm),
-            ("sites.spacing_mm", self.sites.spacing_mm),
-            ("gauge.range_microstrain", self.gauge.range_microstrain),
-            ("gauge.grid_length_mm", self.gauge.grid_length_mm),
-            ("gauge.grid_width_mm", self.gauge.grid_width_mm),
-            ("selection.c_mm", self.selection.c_mm),
-            ("selection.gamma", self.selection.gamma),
-        ];
-        for (key, value) in above {
-            check(key, "a number above zero", value, value > 0.0)?;
-        }
-        let least_zero = [
-            ("part.weld_mm", self.part.weld_mm),
-            ("part.fill_holes_mm", self.part.fill_holes_mm),
-            ("touch.edge_margin_mm", self.touch.edge_margin_mm),
-            ("gauge.noise_microstrain", self.gauge.noise_microstrain),
-            (
-                "gauge.least_signal_to_noise",
-                self.gauge.least_signal_to_noise,
-            ),
-            ("gauge.flatness_mm", self.gauge.flatness_mm),
-            (
-                "feasible.support_clearance_mm",
-                self.feasible.support_clearance_mm,
-            ),
-            ("feasible.edge_radius_mm", self.feasible.edge_radius_mm),
-            ("selection.epsilon_mm", self.selection.epsilon_mm),
-            ("selection.spacing_mm", self.selection.spacing_mm),
-            (
-                "selection.gaussian_process.noise",
-                self.selection.gaussian_process.noise,
-            ),
-        ];
-        for (key, value) in least_zero {
-            check(key, "zero or more", value, value >= 0.0)?;
-        }
-        Ok(())
-    }
-
-    fn check_selection(&self) -> Result<(), BadValue> {
-        let failure = self.selection.failure;
-        check(
-            "selection.failure",
-            "between 0 and 1",
-            failure,
-            (0.0..=1.0).contains(&failure),
-        )?;
-        let directions = self.gauge.directions;
-        check(
-            "gauge.directions",
-            "between 1 and 4",
-            directions as f64,
-            (1..=4).contains(&directions),
-        )?;
-        check(
-            "gauge.directions",
-            "1 for displacements, which have no direction of a gauge",
-            directions as f64,
-            directions == 1 || self.gauge.signal == Signal::Strain,
-        )?;
-        for keys in &self.selection.costs {
-            let cost = keys.cost;
-            check(
-                "selection.cost.cost",
-                "a number above zero",
-                cost,
-                cost > 0.0,
-            )?;
-        }
-        let process = &self.selection.gaussian_process;
-        let optional = [
-            ("selection.target_mm", self.selection.target_mm),
-            ("selection.cost_budget", self.selection.cost_budget),
-            ("selection.gaussian_process.length_mm", process.length_mm),
-            ("selection.gaussian_process.power", process.power),
-        ];
-        for (key, value) in optional {
-            if let Some(value) = value {
-                check(key, "a number above zero", value, value > 0.0)?;
-            }
-        }
-        Ok(())
-    }
-
-    fn check_limits(&self) -> Result<(), BadValue> {
-        let limits = &self.budget.limits;
-        let counts = [
-            (
-                "vertices",
-                limits.vertices,
-                "between 100 and 1000000",
-                100..=1_000_000,
-            ),
-            (
-                "touches",
-                limits.touches,
-                "between 3 and 1000000",
-                3..=1_000_000,
-            ),
-            (
-                "candidates",
-                limits.candidates,
-                "between 2 and 100000",
-                2..=100_000,
-            ),
-            (
-                "selection_touches",
-                limits.selection_touches,
-                "between 10 and 1000000",
-                10..=1_000_000,
-            ),
-            (
-                "selection_candidates",
-                limits.selection_candidates,
-                "between 2 and 100000",
-                2..=100_000,
-            ),
-            (
-                "tuning_touches",
-                limits.tuning_touches,
-                "between 10 and 1000000",
-                10..=1_000_000,
-            ),
-        ];
-        for (key, count, rule, range) in counts {
-            let count = count.unwrap_or(*range.start());
-            let key = format!("budget.limits.{key}");
-            check(&key, rule, count as f64, range.contains(&count))?;
-        }
-        let percent = limits.elements_percent.unwrap_or(1.0);
-        check(
-            "budget.limits.elements_percent",
-            "above 0",
-            percent,
-            percent > 0.0,
-        )?;
-        Ok(())
-    }
-
-    /// Checks every number against its range.
-    ///
-    /// # Errors
-    /// [`BadValue`] for the first that cannot be used.
-    pub fn check(&self) -> Result<(), BadValue> {
-        self.check_signs()?;
-        self.check_selection()?;
-        self.check_live()?;
-        self.check_limits()?;
-        let nu = self.material.poissons_ratio;
-        check(
-            "material.poissons_ratio",
-            "above -1 and below 0.5",
-            nu,
-            nu > -1.0 && nu < 0.5,
-        )?;
-        let share = self.candidates.unexplained;
-        check(
-            "candidates.unexplained",
-            "above 0 and below 1",
-            share,
-            share > 0.0 && share < 1.0,
-        )?;
-        let counts = [
-            (
-                "touch.count",
-                self.touch.count,
-                "between 3 and 1000000",
-                3..=1_000_000,
-            ),
-            (
-                "selection.sensors",
-                self.selection.sensors,
-                "between 1 and 100000",
-                1..=100_000,
-            ),
-            (
-                "candidates.count",
-                self.candidates.count.unwrap_or(1),
-                "between 1 and 100000",
-                1..=100_000,
-            ),
-            (
-                "feasible.edge_neighbours",
-                self.feasible.edge_neighbours,
-                "between 0 and 1000",
-                0..=1000,
-            ),
-        ];
-        for (key, count, rule, range) in counts {
-            check(key, rule, count as f64, range.contains(&count))?;
-        }
-        let c = self.selection.c_mm;
-        check("selection.c_mm", "above 0 and at most 1e12", c, c <= 1e12)?;
-        let supports = self.supports.len();
-        check("support", "at most 128", supports as f64, supports <= MOST)?;
-        let boxes = self
-            .supports
-            .iter()
-            .filter_map(|s| Some(("support.box_mm", s.box_mm.as_ref()?)));
-        let regions = self
-            .evaluation
-            .regions
-            .iter()
-            .map(|r| ("evaluation.region.box_mm", &r.box_mm));
-        for (key, corners) in boxes.chain(regions) {
-            for value in corners.iter().flatten() {
-                check(key, "made of finite numbers", *value, true)?;
-            }
-        }
-        Ok(())
-    }
 }
 
 /// Masks of the part's vertices by name: arrays beside the project file, and groups of the mesh file.
@@ -941,7 +736,7 @@ fn region(support: &SupportKeys, masks: &Masks) -> Result<Region, BadValue> {
         }
         (both, _) => Err(BadValue {
             key: "support".into(),
-            rule: "given one region: box_mm or vertices",
+            rule: "given one region: box_mm or vertices".into(),
             value: if both.is_some() {
                 "given both"
             } else {
@@ -950,15 +745,4 @@ fn region(support: &SupportKeys, masks: &Masks) -> Result<Region, BadValue> {
             .into(),
         }),
     }
-}
-
-fn check(key: &str, rule: &'static str, value: f64, ok: bool) -> Result<(), BadValue> {
-    if ok && value.is_finite() {
-        return Ok(());
-    }
-    Err(BadValue {
-        key: key.to_owned(),
-        rule,
-        value: value.to_string(),
-    })
 }

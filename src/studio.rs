@@ -154,38 +154,7 @@ impl Studio {
     ) -> Self {
         crate::render::gpu::install(state);
         theme::apply(ctx);
-        let document = Document::new(loaded, path);
-        let view = viewport::Viewport::new(&document);
-        Self {
-            document,
-            simulation: None,
-            feasibility: None,
-            design: None,
-            messages: Vec::new(),
-            view,
-            touching: touching::Touching::default(),
-            dialog: None,
-            palette: None,
-            recovery: None,
-            recent: recent::Recent::default(),
-            jobs: jobs::Jobs::default(),
-            live: live::Live::default(),
-            drive: drive::Drive::following(true),
-            last: BTreeMap::new(),
-            picked: Vec::new(),
-            by_hand: gauges::ByHand::default(),
-            shown_kept: BTreeSet::new(),
-            focused: None,
-            slow: None,
-            advice: None,
-            trade: trade::Trade::default(),
-            stage: Stage::default(),
-            results: results::Tab::default(),
-            save_next: None,
-            ask_quit: false,
-            quit: false,
-            title: String::new(),
-        }
+        Self::around(Document::new(loaded, path))
     }
 
     /// Whether a job is running that somebody waits for.

@@ -5,12 +5,12 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::{DesignError, HEARD_SEED, Inputs, LEAST_TOUCHES, Simulated};
+use super::{DesignError, HEARD_SEED, Inputs, LEAST_TOUCHES, Shortage, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::{Dataset, Signal, SignalMatrix, Site};
 use crate::elasticity::support::supported_vertices;
 use crate::evaluation;
-use crate::feasible::{Feasibility, FeasibleInput, feasible};
+use crate::feasible::{Feasibility, FeasibleInput, blame, feasible};
 use crate::gaussian_process::{self, Covariance, Distances, GpKernel};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh, geodesic};
@@ -31,24 +31,57 @@ use crate::regression::tune::Effort;
 /// Filters the sites.
 #[must_use]
 pub fn filter(inputs: &Inputs, simulated: &Simulated) -> Feasibility {
-    let mesh = &simulated.mesh;
-    let on =
-        |mask: &std::sync::Arc<Vec<bool>>| painted_sites(&inputs.part, mask, &simulated.dataset);
-    let painted = inputs.painted.as_ref().map(on);
-    let named = inputs.project.feasible.keep_out.as_ref();
-    let kept_out = named.and_then(|name| inputs.masks.get(name)).map(on);
-    feasible(
-        &FeasibleInput {
-            mesh,
-            index: &SurfaceIndex::new(mesh),
-            supported: &supported_vertices(&simulated.held),
+    let looked = LookedAt::of(inputs, simulated);
+    feasible(&looked.input(simulated), &inputs.project.feasible_rules())
+}
+
+/// Why so many gauges have no room.
+fn shortage(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    feasibility: &Feasibility,
+    wanted: usize,
+) -> Shortage {
+    let looked = LookedAt::of(inputs, simulated);
+    let rules = inputs.project.feasible_rules();
+    let more = wanted.saturating_sub(feasibility.sites().len());
+    let blame = blame(&looked.input(simulated), &rules, feasibility, more);
+    Shortage::of(inputs, feasibility, wanted, blame)
+}
+
+/// What the filters look at, beside the simulation.
+struct LookedAt {
+    index: SurfaceIndex,
+    supported: Vec<u32>,
+    painted: Option<Vec<bool>>,
+    kept_out: Option<Vec<bool>>,
+}
+
+impl LookedAt {
+    fn of(inputs: &Inputs, simulated: &Simulated) -> Self {
+        let on = |mask: &std::sync::Arc<Vec<bool>>| {
+            painted_sites(&inputs.part, mask, &simulated.dataset)
+        };
+        let named = inputs.project.feasible.keep_out.as_ref();
+        Self {
+            index: SurfaceIndex::new(&simulated.mesh),
+            supported: supported_vertices(&simulated.held),
+            painted: inputs.painted.as_ref().map(on),
+            kept_out: named.and_then(|name| inputs.masks.get(name)).map(on),
+        }
+    }
+
+    fn input<'a>(&'a self, simulated: &'a Simulated) -> FeasibleInput<'a> {
+        FeasibleInput {
+            mesh: &simulated.mesh,
+            index: &self.index,
+            supported: &self.supported,
             points: &simulated.points,
             sites: &simulated.dataset.sites,
-            painted: painted.as_deref(),
-            kept_out: kept_out.as_deref(),
-        },
-        &inputs.project.feasible_rules(),
-    )
+            painted: self.painted.as_deref(),
+            kept_out: self.kept_out.as_deref(),
+        }
+    }
 }
 
 /// Whether each site lies where the mask (one value a vertex of the part) is mostly set.
@@ -109,7 +142,7 @@ impl Reduced {
 /// Reduces the feasible sites to candidates.
 ///
 /// # Errors
-/// [`DesignError`] where nothing is feasible.
+/// [`DesignError`] where less is feasible than is asked for, and for too few touches.
 pub fn reduce_sites(
     inputs: &Inputs,
     simulated: &Simulated,
@@ -119,24 +152,10 @@ pub fn reduce_sites(
 ) -> Result<Reduced, DesignError> {
     let feasible = feasibility.sites();
     let sensors = inputs.project.selection.sensors;
-    if feasible.is_empty() {
-        return Err(PlacementError::NoSites.into());
+    if sensors.max(1) > feasible.len() {
+        return Err(shortage(inputs, simulated, feasibility, sensors).into());
     }
-    if sensors > feasible.len() {
-        return Err(PlacementError::TooFewSites {
-            wanted: sensors,
-            available: feasible.len(),
-        }
-        .into());
-    }
-    let touches = simulated.dataset.touches.len();
-    if touches < LEAST_TOUCHES {
-        return Err(PlacementError::TooFewTouches {
-            touches,
-            least: LEAST_TOUCHES,
-        }
-        .into());
-    }
+    enough_touches(inputs, simulated, budget)?;
     let x = simulated.dataset.x.select_rows(&feasible);
     let scored = budget.selection_candidates.max(sensors);
     let pca = Pca::new(&x, scored, watch).map_err(PlacementError::from)?;
@@ -158,6 +177,37 @@ pub fn reduce_sites(
         candidates,
         geometry: OnceLock::new(),
         sites,
+    })
+}
+
+/// Refuses to learn from next to nothing, saying what took the touches.
+fn enough_touches(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    budget: &Budget,
+) -> Result<(), DesignError> {
+    let touches = simulated.dataset.touches.len();
+    if touches >= LEAST_TOUCHES {
+        return Ok(());
+    }
+    let asked = &inputs.project.touch;
+    let remedy = if asked.count < LEAST_TOUCHES {
+        format!("raise touch.count from {} to at least {LEAST_TOUCHES}", asked.count)
+    } else if budget.touches < LEAST_TOUCHES {
+        format!(
+            "raise budget.limits.touches from {} to at least {LEAST_TOUCHES}",
+            budget.touches
+        )
+    } else {
+        format!(
+            "hardly any place that was tried may be touched. Widen touch.region if there is one, or lower touch.edge_margin_mm ({} mm)",
+            asked.edge_margin_mm
+        )
+    };
+    Err(DesignError::TooFewTouches {
+        touches,
+        least: LEAST_TOUCHES,
+        remedy,
     })
 }
 

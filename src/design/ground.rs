@@ -196,11 +196,31 @@ impl Ground {
         }
     }
 
-    /// Elements for these touches, finer until the error is small enough or the budget spent.
+    /// Elements for these touches, finer until the error is small enough or the budget spent. Few touches may have
+    /// more elements than many: where memory does not hold those, half as many, down to what any number has.
     ///
     /// # Errors
     /// [`DesignError`] for what cannot be computed.
     pub fn build(
+        &self,
+        touches: &[Touch],
+        places: &[DVec3],
+        aim: &Elements,
+        watch: Watch,
+    ) -> Result<Built, DesignError> {
+        let mut aim = *aim;
+        loop {
+            let most = aim.most_for(touches.len());
+            match self.build_within(touches, places, &aim, watch) {
+                Err(DesignError::Elastic(error)) if error.is_memory() && most > aim.vertices => {
+                    aim.most_vertices = (most / 2).max(aim.vertices);
+                }
+                built => return built,
+            }
+        }
+    }
+
+    fn build_within(
         &self,
         touches: &[Touch],
         places: &[DVec3],
@@ -296,17 +316,40 @@ impl Ground {
     }
 }
 
+/// The part, or where too much of it lies in facets that distances cannot be measured on, even ones on its surface.
 fn even_enough(part: &Arc<TriMesh>, ground: &grade::Ground) -> Arc<TriMesh> {
-    /// Height over length of a triangle, and the share of the area that may be thinner.
-    const THIN: f64 = 0.1;
+    /// Share of the area that may lie in such facets.
     const SHARE: f64 = 0.02;
-    let thin: f64 = (0..part.triangles().len() as u32)
-        .filter(|&t| part.thinness(t) < THIN)
+    let rim = part.boundary_vertices();
+    let size = size_mm(part) * 1e-3;
+    let unfit: f64 = (0..part.triangles().len() as u32)
+        .filter(|&t| is_thin(part, t) || is_blind(part, t, &rim, size))
         .map(|t| part.facet_area(t))
         .sum();
-    if thin < SHARE * part.area() {
+    if unfit < SHARE * part.area() {
         Arc::clone(part)
     } else {
         ground.even(LAYOUT).mesh
     }
+}
+
+fn is_thin(part: &TriMesh, t: u32) -> bool {
+    /// Height over length.
+    const THIN: f64 = 0.1;
+    part.thinness(t) < THIN
+}
+
+/// Whether a facet is large, and all its corners lie on free edges: between them everything then seems to be at an
+/// edge, as on a plate of two triangles.
+fn is_blind(part: &TriMesh, t: u32, rim: &[bool], size: f64) -> bool {
+    /// Radius of the circle in it over the size of the part.
+    const LARGE: f64 = 0.05;
+    let corners = part.corners(t);
+    let around: f64 = (0..3)
+        .map(|i| corners[i].distance(corners[(i + 1) % 3]))
+        .sum();
+    let on_rim = part.triangles()[t as usize]
+        .iter()
+        .all(|&v| rim[v as usize]);
+    on_rim && 2.0 * part.facet_area(t) > LARGE * size * around
 }

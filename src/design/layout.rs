@@ -42,8 +42,12 @@ pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoi
         }
     };
     if points.is_empty() {
+        let area_mm2 = mesh.area() * 1e6;
         return Err(DesignError::NoRoom {
+            spacing_mm: project.sites.spacing_mm,
             size_mm: size_mm(mesh),
+            area_mm2,
+            fits_mm: area_mm2.sqrt(),
         });
     }
     // A place with several directions is as many sites.
@@ -91,12 +95,34 @@ pub(super) fn touches_on(
     let tip = project.tip();
     let touches = dataset::spread_touches(mesh, count, seed, margin, even, tip, region.as_ref());
     if touches.is_empty() {
-        return Err(DesignError::NoTouches {
-            margin_mm: project.touch.edge_margin_mm,
-            size_mm: size_mm(mesh),
-        });
+        return Err(no_touches(mesh, inputs));
     }
     Ok(touches)
+}
+
+/// What keeps all touches away: the region that they are asked for, or the margin.
+fn no_touches(mesh: &TriMesh, inputs: &Inputs) -> DesignError {
+    /// Touches that are tried without the region.
+    const TRIED: usize = 20;
+    let project = &inputs.project;
+    let (seed, margin_mm) = (project.budget.seed, project.touch.edge_margin_mm);
+    let region = project.touch.region.as_ref();
+    let anywhere =
+        || dataset::spread_touches(mesh, TRIED, seed, margin_mm * 1e-3, false, project.tip(), None);
+    let mask = region.and_then(|name| inputs.masks.get(name));
+    let remedy = if mask.is_some_and(|mask| !mask.contains(&true)) {
+        "the region that touches come to (touch.region) is empty. Paint it, or take it out".to_owned()
+    } else if region.is_some() && !anywhere().is_empty() {
+        format!(
+            "the region that touches come to (touch.region) has no place farther than {margin_mm} mm (touch.edge_margin_mm) from a free edge, or lies where touches do not land. Widen it, or lower the margin"
+        )
+    } else {
+        format!(
+            "every place lies nearer to a free edge than touch.edge_margin_mm ({margin_mm} mm). Lower it, or check the unit of the mesh (the part is {:.3} mm across)",
+            size_mm(mesh)
+        )
+    };
+    DesignError::NoTouches { remedy }
 }
 
 /// For each triangle of a mesh whether a mask of the part's vertices may reach into it: whether any of its

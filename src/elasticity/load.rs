@@ -26,6 +26,14 @@ const PIECES_PER_RADIUS: f64 = 4.0;
 /// Facets turned further than this away from the touched one belong to another wall (cos 75°).
 const SAME_WALL: f64 = 0.26;
 
+/// A tip smaller than this share of a facet's coordinates is lost in their rounding: quartering would never end.
+const FINEST: f64 = 1e-12;
+
+/// The largest coordinate of a facet (m).
+fn farthest(corners: &[DVec3; 3]) -> f64 {
+    corners.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max)
+}
+
 /// The nodal forces of a touch, by quadrature of the tip's pressure with the linear shape functions.
 #[must_use]
 pub fn nodal_forces(mesh: &TriMesh, index: &SurfaceIndex, touch: &Touch) -> NodalForces {
@@ -54,7 +62,8 @@ pub fn pressure(
     let centre = mesh.point(at);
     let mut shares: Vec<(SurfacePoint, f64)> = Vec::new();
     for t in index.triangles_near(centre, touch.tip_radius) {
-        if mesh.facet_normal(t).dot(touch.normal) > SAME_WALL {
+        let seen = touch.tip_radius > FINEST * farthest(&mesh.corners(t));
+        if seen && mesh.facet_normal(t).dot(touch.normal) > SAME_WALL {
             integrate(
                 mesh,
                 t,
@@ -167,7 +176,7 @@ mod tests {
         let index = SurfaceIndex::new(&mesh);
         let position = mesh.corners(700).iter().sum::<DVec3>() / 3.0;
         let normal = position.with_z(0.0).normalize();
-        for tip_radius in [1e-6, 1e-3, 5e-3, 0.5] {
+        for tip_radius in [1e-23, 1e-6, 1e-3, 5e-3, 0.5] {
             let touch = Touch {
                 position,
                 normal,

@@ -1,5 +1,6 @@
 //! Project files: readable, commented, versioned TOML, with arrays in NPZ beside them.
 
+mod masks;
 mod text;
 
 use std::collections::BTreeMap;
@@ -8,7 +9,7 @@ use std::sync::Arc;
 
 use super::mesh_file::{LoadedMesh, read_mesh};
 use super::npz::{NpzFile, read_mask};
-use super::{FileError, atomic};
+use super::{FileError, atomic, source};
 use crate::design::Inputs;
 use crate::mesh::RepairReport;
 use crate::project::{FORMAT, Masks, Project};
@@ -37,7 +38,7 @@ const MARK: char = '@';
 /// # Errors
 /// [`FileError`] naming the file, the place in it and the remedy.
 pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
-    let text = std::fs::read_to_string(path).map_err(|e| FileError::of(path, &e))?;
+    let text = source::read_text(path)?;
     let mut project = parse(&text).map_err(|m| FileError::broken(path, m))?;
     let mesh_path = path
         .parent()
@@ -54,11 +55,8 @@ pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
         project.part.repair(),
     )?;
     let vertices = mesh.positions().len();
-    let masks = read_masks(path, &mut project, groups, vertices)?;
-    let painted = match &project.feasible.painted {
-        Some(name) => Some(read_painted(path, name, vertices)?),
-        None => None,
-    };
+    let masks = masks::read(path, &mut project, groups, vertices)?;
+    let painted = masks::read_painted(path, &project, vertices)?;
     if let Some(name) = &mut project.feasible.painted {
         *name = plain(name).to_owned();
     }
@@ -74,31 +72,6 @@ pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
         mesh_path,
         bundled: false,
     })
-}
-
-/// The masks that a project names, which are then named without their fingerprints: arrays beside the
-/// project come before groups of the mesh file.
-fn read_masks(
-    path: &Path,
-    project: &mut Project,
-    groups: Masks,
-    vertices: usize,
-) -> Result<Masks, FileError> {
-    let mut masks = groups;
-    let arrays = arrays_path(path);
-    for name in project.mask_names() {
-        let own = plain(name).to_owned();
-        if arrays.is_file() && super::npz::holds(&arrays, name)? {
-            // A mask for another mesh gives way to the group of that name, where the file has one.
-            match read_painted(path, name, vertices) {
-                Ok(mask) => drop(masks.insert(own.clone(), Arc::new(mask))),
-                Err(_) if masks.contains_key(&own) => {}
-                Err(error) => return Err(error),
-            }
-        }
-        *name = own;
-    }
-    Ok(masks)
 }
 
 /// The name without its fingerprint.
@@ -119,22 +92,6 @@ fn marked(name: &str, mask: &[bool]) -> String {
         (h ^ u64::from(set)).wrapping_mul(0x0100_0000_01b3)
     });
     format!("{}{MARK}{hash:016x}", plain(name))
-}
-
-fn read_painted(path: &Path, name: &str, vertices: usize) -> Result<Vec<bool>, FileError> {
-    let arrays = arrays_path(path);
-    let mask = read_mask(&arrays, name)?;
-    if mask.len() != vertices {
-        return Err(FileError::broken(
-            &arrays,
-            format!(
-                "the mask \"{}\" is for a mesh of {} vertices, but the part has {vertices}. Paint it again, or give that support a box",
-                plain(name),
-                mask.len()
-            ),
-        ));
-    }
-    Ok(mask)
 }
 
 /// Whether a path names a project and not a mesh, by its ending.
@@ -253,13 +210,16 @@ pub fn save_under(
 
 /// The arrays that the project in a file names; none where there is no readable one.
 fn old_arrays(path: &Path) -> BTreeMap<String, Vec<bool>> {
-    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let text = source::read_text(path).unwrap_or_default();
     let Ok(mut old) = parse(&text) else {
         return BTreeMap::new();
     };
     let painted = old.feasible.painted.clone();
     let names: Vec<String> = old.mask_names().map(|n| n.clone()).chain(painted).collect();
     let arrays = arrays_path(path);
+    if source::ordinary(&arrays).is_err() {
+        return BTreeMap::new();
+    }
     names
         .into_iter()
         .filter_map(|name| {

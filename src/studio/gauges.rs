@@ -78,6 +78,25 @@ impl Studio {
         pins.position(|pin| held_by(pin) == Some(number))
     }
 
+    /// Whose gauges are shown before any were selected here; nothing where none are, or some were.
+    pub(super) fn gauges_before_selection(&self) -> Option<String> {
+        let sites = &self.document.state.project.selection.sites;
+        if sites.is_empty() || self.design.is_some() {
+            return None;
+        }
+        let whose = if *sites != self.document.saved().project.selection.sites {
+            "placed by hand"
+        } else if self.document.bundled {
+            "those of the bundled example"
+        } else {
+            "those of the project's file"
+        };
+        Some(match sites.len() {
+            1 => format!("The gauge shown is {whose}").replace("those", "that"),
+            n => format!("The {n} gauges shown are {whose}"),
+        })
+    }
+
     /// The pointer goes down with the gauges in hand: on one it is picked and may be moved, beside them none
     /// is. Shift picks several, Control puts a new one there.
     pub(super) fn grab(&mut self, ui: &Ui, pane: Pane, at: Pos2) {
@@ -414,5 +433,27 @@ impl Studio {
             }
             Ok(Finished::Judged(Arc::new(found)))
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::document::Document;
+
+    #[test]
+    fn gauges_that_nobody_selected_here_are_accounted_for() {
+        let mut studio = Studio::around(Document::new(crate::cli::bundled().unwrap(), None));
+        let said = studio.gauges_before_selection().unwrap();
+        assert_eq!(
+            said,
+            "The 10 gauges shown are those of the bundled example"
+        );
+        let sites = &mut studio.document.state.project.selection.sites;
+        sites.truncate(1);
+        let said = studio.gauges_before_selection().unwrap();
+        assert_eq!(said, "The gauge shown is placed by hand");
+        studio.document.state.project.selection.sites.clear();
+        assert_eq!(studio.gauges_before_selection(), None);
     }
 }

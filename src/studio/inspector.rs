@@ -10,7 +10,10 @@ use crate::document::Layer;
 use crate::limb::BoxMm;
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
-use crate::project::{Lattice, PartModel, Project, RegionKeys, SupportKeys, SupportKind};
+use crate::project::{
+    EDGE_NEIGHBOURS, FARTHEST, GAUGES, Lattice, PartModel, Project, RegionKeys, SupportKeys,
+    SupportKind, TOUCHES,
+};
 
 impl Studio {
     /// The settings of the stage that is looked at.
@@ -357,7 +360,10 @@ fn corners(ui: &mut Ui, of: &str, corners: &mut BoxMm) {
         ui.label(format!("{end} (mm)"));
         ui.horizontal(|ui| {
             for (axis, value) in ["x", "y", "z"].into_iter().zip(corner) {
-                ui.add(DragValue::new(value).speed(0.1).max_decimals(2))
+                // As far as a project may name places: what is typed may be no number at all.
+                let number = DragValue::new(value).range(-FARTHEST..=FARTHEST);
+                let number = number.clamp_existing_to_range(false);
+                ui.add(number.speed(0.1).max_decimals(2))
                     .accessible_name(format!("{of} {end} {axis}"));
             }
         });
@@ -397,7 +403,7 @@ fn touch(ui: &mut Ui, project: &mut Project) {
         ui,
         "Touches",
         &mut touch.count,
-        3..=100_000,
+        TOUCHES,
         "Simulated touches; lower qualities take fewer",
     );
     number(
@@ -547,7 +553,7 @@ fn feasible(ui: &mut Ui, project: &mut Project) {
         ui,
         "Edge neighbours",
         &mut project.feasible.edge_neighbours,
-        0..=200,
+        EDGE_NEIGHBOURS,
         "k of the centre-of-mass filter",
     );
     number(
@@ -618,7 +624,7 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         ui,
         "Gauges",
         &mut project.selection.sensors,
-        1..=200,
+        GAUGES,
         "How many gauges to place",
     );
     number(

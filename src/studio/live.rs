@@ -101,6 +101,22 @@ pub(super) enum Brought {
 }
 
 impl Live {
+    /// As it is for another part: the port, what is shown and how hard it is pressed belong to the desk; the
+    /// connection with its model, known touches, what was trained and recorded belong to the part before.
+    pub fn for_another_part(self) -> Self {
+        Self {
+            feed: fresh_feed(self.estimator),
+            ports: self.ports,
+            port: self.port,
+            baud: self.baud,
+            estimator: self.estimator,
+            compare: self.compare,
+            known_force: self.known_force,
+            forces: self.forces,
+            ..Self::default()
+        }
+    }
+
     /// What is heard at the moment.
     pub fn look<T>(&self, at: impl FnOnce(&Feed) -> T) -> Option<T> {
         self.feed.lock().ok().map(|feed| at(&feed))
@@ -185,11 +201,7 @@ impl Studio {
         self.live.hosted = None;
         self.live.wish = None;
         self.live.gathering = known::Gathering::default();
-        let estimator = self.live.estimator;
-        self.live.feed = Shared::default();
-        if let Ok(mut feed) = self.live.feed.lock() {
-            feed.estimator = estimator;
-        }
+        self.live.feed = fresh_feed(self.live.estimator);
     }
 
     fn go_on_connecting(&mut self, ctx: &Context) {
@@ -474,6 +486,15 @@ impl Studio {
     }
 }
 
+/// Where nothing was heard yet, for an estimator that is shown.
+fn fresh_feed(estimator: Estimator) -> Shared {
+    let feed = Shared::default();
+    if let Ok(mut heard) = feed.lock() {
+        heard.estimator = estimator;
+    }
+    feed
+}
+
 fn doorway() -> crate::link::Doorway {
     #[cfg(unix)]
     return crate::link::Doorway::Terminal;
@@ -521,4 +542,37 @@ fn train(
         &hyper,
     );
     Ok([Some(Arc::new(normalized)), Some(Arc::new(raw))])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::SurfacePoint;
+
+    #[test]
+    fn known_touches_stay_with_their_part_and_the_port_with_the_desk() {
+        let live = Live {
+            port: "/dev/ttyACM3".into(),
+            baud: 9600,
+            known_force: 12.5,
+            known: vec![Known {
+                at: SurfacePoint {
+                    triangle: 7,
+                    barycentric: [1.0, 0.0, 0.0],
+                },
+                force: 12.5,
+                reading: vec![1e-6],
+            }],
+            record_to: "old-part.hapdrec".into(),
+            recorded: Some("old-part.hapdrec".into()),
+            training_for: Some(vec![true]),
+            ..Live::default()
+        };
+        let live = live.for_another_part();
+        assert_eq!((live.port.as_str(), live.baud), ("/dev/ttyACM3", 9600));
+        assert_eq!(live.known_force, 12.5);
+        assert!(live.known.is_empty() && live.sensing.is_none() && live.trained.is_none());
+        assert!(live.record_to.is_empty() && live.recorded.is_none());
+        assert!(live.training_for.is_none() && live.applied.is_none());
+    }
 }

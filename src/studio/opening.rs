@@ -1,6 +1,7 @@
 //! Opening files in the background: what is open stays until the new one is there, and on an error
 //! whatever happens.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use egui::Context;
 use super::drive::Finished;
 use super::jobs::Task;
 use super::viewport::Viewport;
-use super::{Studio, drive, touching};
+use super::{Stage, Studio, drive, gauges, jobs, live, recent, results, touching, trade};
 use crate::cli;
 use crate::design::Inputs;
 use crate::document::{Document, State};
@@ -21,6 +22,7 @@ use crate::project::Unit;
 /// A project ready to be shown.
 pub(super) struct Opened {
     document: Document,
+    /// Made where nobody waits for it.
     view: Viewport,
     /// What the window showed when it was asked for: changes made since are not thrown away.
     before: State,
@@ -93,7 +95,10 @@ impl Studio {
             let gone = |name: &mut Option<String>| {
                 name.take_if(|name| !masks.contains_key(name)).is_some()
             };
-            let regions = gone(&mut project.feasible.keep_out) | gone(&mut project.touch.region);
+            let regions = gone(&mut project.feasible.keep_out)
+                | gone(&mut project.touch.region)
+                | gone(&mut project.part.inside)
+                | gone(&mut project.part.outside);
             let inputs = Inputs {
                 project,
                 part: Arc::new(mesh.mesh),
@@ -174,21 +179,21 @@ impl Studio {
             );
             return;
         }
+        if self.save_next.is_some() {
+            // What waits to be saved would be the new project, in the old one's place.
+            self.complain(
+                "The project is still being saved, and nothing was opened: open the file again",
+            );
+            return;
+        }
         self.jobs.cancel(|task| task != Task::Export);
-        self.document = opened.document;
-        self.view = opened.view;
-        self.touching = touching::Touching::default();
-        self.drive = drive::Drive::following(self.drive.follow);
-        self.simulation = None;
-        self.last.clear();
-        self.feasibility = None;
-        self.design = None;
-        self.picked.clear();
-        self.shown_kept.clear();
-        self.by_hand = super::gauges::ByHand::default();
-        self.slow = None;
+        let was_live = self.live.is_connected();
+        self.go_over_to(opened.document, opened.view);
         for said in opened.said {
             self.tell(said);
+        }
+        if was_live {
+            self.tell("The board was hung up: its readings were taken for the part that was open before. Connect again");
         }
         if let Some(path) = opened.recent {
             self.recent.push(&path);
@@ -196,5 +201,142 @@ impl Studio {
         if opened.recovered {
             self.drop_left();
         }
+    }
+
+    /// The window with nothing known of its project yet.
+    pub(super) fn around(document: Document) -> Self {
+        let view = Viewport::new(&document);
+        Self::showing(document, view)
+    }
+
+    fn showing(document: Document, view: Viewport) -> Self {
+        Self {
+            document,
+            view,
+            simulation: None,
+            feasibility: None,
+            design: None,
+            messages: Vec::new(),
+            touching: touching::Touching::default(),
+            dialog: None,
+            palette: None,
+            recovery: None,
+            recent: recent::Recent::default(),
+            jobs: jobs::Jobs::default(),
+            live: live::Live::default(),
+            drive: drive::Drive::following(true),
+            last: BTreeMap::new(),
+            picked: Vec::new(),
+            by_hand: gauges::ByHand::default(),
+            shown_kept: BTreeSet::new(),
+            slow: None,
+            advice: None,
+            trade: trade::Trade::default(),
+            stage: Stage::default(),
+            results: results::Tab::default(),
+            save_next: None,
+            ask_quit: false,
+            quit: false,
+            title: String::new(),
+            focused: None,
+        }
+    }
+
+    /// Shows another project. Only what is named here, which belongs to the window and the desk it stands on,
+    /// goes over to it: whatever else is known or under way was of the one before.
+    fn go_over_to(&mut self, document: Document, view: Viewport) {
+        let old = std::mem::replace(self, Self::showing(document, view));
+        self.messages = old.messages;
+        self.palette = old.palette;
+        self.recovery = old.recovery;
+        self.recent = old.recent;
+        self.jobs = old.jobs;
+        self.live = old.live.for_another_part();
+        self.drive = drive::Drive::following(old.drive.follow);
+        self.trade = old.trade.for_another_part();
+        self.stage = old.stage;
+        self.results = old.results;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::{Advice, Cost};
+    use crate::mesh::SurfacePoint;
+    use crate::project::PartModel;
+
+    /// The window without a screen, on the bundled limb.
+    fn studio() -> Studio {
+        Studio::around(Document::new(cli::bundled().unwrap(), None))
+    }
+
+    fn another(studio: &Studio) -> Opened {
+        let before = studio.document.state.clone();
+        Opened::new(cli::bundled().unwrap(), None, before)
+    }
+
+    fn advice() -> Advice {
+        let cost = Cost {
+            model: PartModel::Shell,
+            element_mm: 2.0,
+            unknowns: 1e4,
+            seconds: 1.0,
+            memory_gb: 0.1,
+            error_percent: 1.0,
+            theory_percent: 1.0,
+        };
+        Advice {
+            closed: false,
+            wall_mm: [1.5; 3],
+            radius_mm: [20.0; 2],
+            size_mm: 120.0,
+            walls: 0.0,
+            fits: PartModel::Shell,
+            costs: [cost; 2],
+            words: vec!["of the part before".into()],
+            faces: None,
+        }
+    }
+
+    #[test]
+    fn what_is_known_of_one_part_is_not_said_of_another() {
+        let mut s = studio();
+        s.advice = Some((s.document.walls_key(), Arc::new(advice())));
+        s.slow = Some(("Error".into(), Arc::new(vec![1.0])));
+        s.picked = vec![3];
+        s.shown_kept.insert("ten".into());
+        s.dialog = Some(super::super::dialogs::Dialog::save_as(&s.document));
+        let at = SurfacePoint {
+            triangle: 5,
+            barycentric: [1.0, 0.0, 0.0],
+        };
+        s.view.measure.from = Some(at);
+        s.view.hover = Some(at);
+        s.title = "before".into();
+        s.stage = Stage::Live;
+        s.tell("stays to be read");
+        let opened = another(&s);
+        s.take_opened(opened);
+        assert!(s.advice.is_none() && s.slow.is_none());
+        assert!(s.picked.is_empty() && s.shown_kept.is_empty());
+        assert!(s.dialog.is_none(), "it would save in the old one's place");
+        assert!(s.view.measure.from.is_none() && s.view.hover.is_none());
+        assert!(s.title.is_empty());
+        // What is of the window stays.
+        assert_eq!(s.stage, Stage::Live);
+        assert_eq!(s.messages[0].text, "stays to be read");
+    }
+
+    #[test]
+    fn what_waits_to_be_saved_is_not_another_project() {
+        let mut s = studio();
+        let old = Arc::clone(&s.document.part);
+        s.save_next = Some("old.hapdef.toml".into());
+        let opened = another(&s);
+        s.take_opened(opened);
+        assert!(Arc::ptr_eq(&old, &s.document.part));
+        let said = &s.messages[0];
+        assert!(said.error && said.text.contains("still being saved"));
     }
 }

@@ -115,9 +115,15 @@ impl Studio {
         ui.separator();
         let nothing = self.design.is_none() && self.compared().next().is_none();
         if nothing && self.results.is_of_design() {
+            let press =
+                "Press “Select gauges” to choose the sites and judge them on unseen touches";
+            let shown = self.gauges_before_selection();
             empty(
                 ui,
-                "Nothing selected yet. Press “Select gauges” to choose the sites and judge them on unseen touches",
+                &shown.map_or_else(
+                    || format!("Nothing selected yet. {press}"),
+                    |shown| format!("{shown}, and not judged yet. {press}"),
+                ),
             );
             return;
         }

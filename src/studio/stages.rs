@@ -331,7 +331,7 @@ impl Studio {
 
     fn selection_lines(&self) -> Vec<String> {
         let Some(d) = &self.design else {
-            return Vec::new();
+            return self.gauges_before_selection().into_iter().collect();
         };
         let seconds: f64 = (d.design.seconds.iter())
             .filter(|s| s.stage.starts_with("select"))

@@ -70,6 +70,20 @@ impl Default for Trade {
     }
 }
 
+impl Trade {
+    /// As it is for another project: where trades are kept, how quick this machine is, and what was asked for.
+    pub fn for_another_part(self) -> Self {
+        Self {
+            home: self.home,
+            pace: self.pace,
+            asked_s: self.asked_s,
+            asked_mm: self.asked_mm,
+            count: self.count,
+            ..Self::default()
+        }
+    }
+}
+
 /// What was predicted of a run, and what it achieved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Promise {

@@ -241,7 +241,7 @@ impl Setting {
         }
         walled(inputs).ok_or_else(|| BadValue {
             key: "part.model".into(),
-            rule: "\"shell\" for its wall to be taken as a solid",
+            rule: "\"shell\" for its wall to be taken as a solid".into(),
             value: "\"solid\"".into(),
         })
     }

@@ -1,0 +1,454 @@
+//! Which numbers a project may hold. Beyond these nobody can have meant them, and what is computed from them
+//! would overflow, or never end, without a word.
+
+use std::ops::RangeInclusive;
+
+use glam::DVec3;
+
+use super::{BadValue, ChosenSite, Project};
+use crate::dataset::Signal;
+use crate::elasticity::support::MOST;
+
+/// How many gauges can be asked for, how many touches, and how many neighbours the edge filter looks at: in a
+/// file as in the window.
+pub const GAUGES: RangeInclusive<usize> = 1..=10_000;
+pub const TOUCHES: RangeInclusive<usize> = 3..=1_000_000;
+pub const EDGE_NEIGHBOURS: RangeInclusive<usize> = 0..=1000;
+
+/// Of anything that is made (mm): from a nanometre to a kilometre.
+const LENGTH: RangeInclusive<f64> = 1e-6..=1e6;
+/// Of anything that may also not be there (mm).
+const ROOM: RangeInclusive<f64> = 0.0..=1e6;
+/// How far off a place may be (mm), either way.
+pub const FARTHEST: f64 = 1e9;
+
+impl Project {
+    /// Checks every number against its range.
+    ///
+    /// # Errors
+    /// [`BadValue`] for the first that cannot be used.
+    pub fn check(&self) -> Result<(), BadValue> {
+        self.check_model()?;
+        self.check_room()?;
+        self.check_counts()?;
+        self.check_selection()?;
+        self.check_limits()?;
+        self.check_live()?;
+        self.check_places()?;
+        self.check_kept()
+    }
+
+    fn check_model(&self) -> Result<(), BadValue> {
+        let (part, touch) = (&self.part, &self.touch);
+        all_bounded([
+            ("part.thickness_mm", part.thickness_mm, LENGTH),
+            ("part.weld_mm", part.weld_mm, ROOM),
+            ("part.fill_holes_mm", part.fill_holes_mm, ROOM),
+            (
+                "material.youngs_modulus_gpa",
+                self.material.youngs_modulus_gpa,
+                1e-9..=1e6,
+            ),
+            ("touch.force_n", touch.force_n, 1e-12..=1e12),
+            ("touch.tip_radius_mm", touch.tip_radius_mm, LENGTH),
+        ])?;
+        let nu = self.material.poissons_ratio;
+        check(
+            "material.poissons_ratio",
+            "above -1 and below 0.5",
+            nu,
+            nu > -1.0 && nu < 0.5,
+        )
+    }
+
+    fn check_room(&self) -> Result<(), BadValue> {
+        let (gauge, room) = (&self.gauge, &self.feasible);
+        all_bounded([
+            ("touch.edge_margin_mm", self.touch.edge_margin_mm, ROOM),
+            ("sites.spacing_mm", self.sites.spacing_mm, LENGTH),
+            (
+                "gauge.noise_microstrain",
+                gauge.noise_microstrain,
+                0.0..=1e12,
+            ),
+            (
+                "gauge.range_microstrain",
+                gauge.range_microstrain,
+                1e-12..=1e15,
+            ),
+            (
+                "gauge.least_signal_to_noise",
+                gauge.least_signal_to_noise,
+                0.0..=1e12,
+            ),
+            ("gauge.grid_length_mm", gauge.grid_length_mm, LENGTH),
+            ("gauge.grid_width_mm", gauge.grid_width_mm, LENGTH),
+            ("gauge.flatness_mm", gauge.flatness_mm, ROOM),
+            (
+                "feasible.support_clearance_mm",
+                room.support_clearance_mm,
+                ROOM,
+            ),
+            ("feasible.edge_radius_mm", room.edge_radius_mm, ROOM),
+        ])
+    }
+
+    fn check_counts(&self) -> Result<(), BadValue> {
+        let kept = self.candidates.count.unwrap_or(1);
+        let counts = [
+            ("touch.count", self.touch.count, TOUCHES),
+            ("selection.sensors", self.selection.sensors, GAUGES),
+            ("candidates.count", kept, 1..=100_000),
+            (
+                "feasible.edge_neighbours",
+                self.feasible.edge_neighbours,
+                EDGE_NEIGHBOURS,
+            ),
+            ("gauge.directions", self.gauge.directions, 1..=4),
+            ("support", self.supports.len(), 0..=MOST),
+        ];
+        for (key, count, range) in counts {
+            counted(key, count, &range)?;
+        }
+        let directions = self.gauge.directions;
+        check(
+            "gauge.directions",
+            "1 for displacements, which have no direction of a gauge",
+            directions as f64,
+            directions == 1 || self.gauge.signal == Signal::Strain,
+        )?;
+        let largest = i64::MAX as u64;
+        if self.budget.seed > largest {
+            return Err(BadValue {
+                key: "budget.seed".into(),
+                rule: "at most 9223372036854775807, the largest whole number of a project file".into(),
+                value: self.budget.seed.to_string(),
+            });
+        }
+        Ok(())
+    }
+
+    fn check_selection(&self) -> Result<(), BadValue> {
+        let selection = &self.selection;
+        let process = &selection.gaussian_process;
+        all_bounded([
+            ("selection.c_mm", selection.c_mm, 1e-9..=1e12),
+            ("selection.epsilon_mm", selection.epsilon_mm, 0.0..=1e9),
+            ("selection.gamma", selection.gamma, 1e-12..=1e9),
+            ("selection.spacing_mm", selection.spacing_mm, ROOM),
+            ("selection.failure", selection.failure, 0.0..=1.0),
+            (
+                "selection.gaussian_process.noise",
+                process.noise,
+                0.0..=1e6,
+            ),
+        ])?;
+        let optional = [
+            (
+                "selection.target_mm",
+                selection.target_mm,
+                1e-9..=1e9,
+            ),
+            (
+                "selection.cost_budget",
+                selection.cost_budget,
+                1e-9..=1e15,
+            ),
+            (
+                "selection.gaussian_process.length_mm",
+                process.length_mm,
+                LENGTH,
+            ),
+            (
+                "selection.gaussian_process.power",
+                process.power,
+                1e-3..=2.0,
+            ),
+        ];
+        for (key, value, range) in optional {
+            if let Some(value) = value {
+                bounded(key, value, &range)?;
+            }
+        }
+        for keys in &selection.costs {
+            bounded("selection.cost.cost", keys.cost, &(1e-9..=1e9))?;
+        }
+        let share = self.candidates.unexplained;
+        check(
+            "candidates.unexplained",
+            "above 0 and below 1",
+            share,
+            share > 0.0 && share < 1.0,
+        )
+    }
+
+    fn check_limits(&self) -> Result<(), BadValue> {
+        const MANY: usize = 1_000_000;
+        let limits = &self.budget.limits;
+        let counts = [
+            ("budget.limits.vertices", limits.vertices, 100..=MANY),
+            ("budget.limits.touches", limits.touches, 3..=MANY),
+            ("budget.limits.candidates", limits.candidates, 2..=100_000),
+            (
+                "budget.limits.selection_touches",
+                limits.selection_touches,
+                10..=MANY,
+            ),
+            (
+                "budget.limits.selection_candidates",
+                limits.selection_candidates,
+                2..=100_000,
+            ),
+            (
+                "budget.limits.tuning_touches",
+                limits.tuning_touches,
+                10..=MANY,
+            ),
+        ];
+        for (key, count, range) in counts {
+            if let Some(count) = count {
+                counted(key, count, &range)?;
+            }
+        }
+        let percent = limits.elements_percent.unwrap_or(1.0);
+        bounded("budget.limits.elements_percent", percent, &(1e-6..=1e6))
+    }
+
+    fn check_places(&self) -> Result<(), BadValue> {
+        let supports = self.supports.iter().filter_map(|s| s.box_mm.as_ref());
+        let regions = self.evaluation.regions.iter().map(|r| &r.box_mm);
+        let costs = self.selection.costs.iter().map(|c| &c.box_mm);
+        let boxes = (supports.map(|b| ("support.box_mm", b)))
+            .chain(regions.map(|b| ("evaluation.region.box_mm", b)))
+            .chain(costs.map(|b| ("selection.cost.box_mm", b)));
+        for (key, corners) in boxes {
+            for corner in corners {
+                check_place(key, corner)?;
+            }
+        }
+        for at in &self.selection.required_mm {
+            check_place("selection.required_mm", at)?;
+        }
+        check_sites("selection.site", &self.selection.sites)
+    }
+
+    fn check_kept(&self) -> Result<(), BadValue> {
+        for kept in &self.kept {
+            check_sites("kept.site", &kept.sites)?;
+            let own = [("kept.cost", kept.cost), ("kept.seconds", kept.seconds)];
+            let errors = kept.errors.iter().flat_map(|e| {
+                [
+                    ("kept.error.mean_mm", e.mean_mm),
+                    ("kept.error.median_mm", e.median_mm),
+                    ("kept.error.p95_mm", e.p95_mm),
+                ]
+            });
+            let failures = (kept.failures.iter()).map(|f| ("kept.failure.mean_mm", f.mean_mm));
+            for (key, value) in own.into_iter().chain(errors).chain(failures) {
+                bounded(key, value, &(0.0..=1e15))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_sites(table: &str, sites: &[ChosenSite]) -> Result<(), BadValue> {
+    for site in sites {
+        check_place(&format!("{table}.position_mm"), &site.position_mm)?;
+        let length = DVec3::from_array(site.direction).length();
+        check(
+            &format!("{table}.direction"),
+            "a direction, numbers that are not all zero",
+            length,
+            (1e-6..=1e6).contains(&length),
+        )?;
+    }
+    Ok(())
+}
+
+fn check_place(key: &str, place: &[f64; 3]) -> Result<(), BadValue> {
+    for &value in place {
+        let near = value.abs() <= FARTHEST;
+        check(key, "made of numbers between -1e9 and 1e9", value, near)?;
+    }
+    Ok(())
+}
+
+fn all_bounded<const N: usize>(
+    all: [(&str, f64, RangeInclusive<f64>); N],
+) -> Result<(), BadValue> {
+    all.into_iter()
+        .try_for_each(|(key, value, range)| bounded(key, value, &range))
+}
+
+fn bounded(key: &str, value: f64, range: &RangeInclusive<f64>) -> Result<(), BadValue> {
+    // No number at all is in no range.
+    if range.contains(&value) {
+        return Ok(());
+    }
+    Err(BadValue {
+        key: key.to_owned(),
+        rule: format!(
+            "between {} and {}",
+            number(*range.start()),
+            number(*range.end())
+        )
+        .into(),
+        value: number(value),
+    })
+}
+
+fn counted(key: &str, count: usize, range: &RangeInclusive<usize>) -> Result<(), BadValue> {
+    if range.contains(&count) {
+        return Ok(());
+    }
+    Err(BadValue {
+        key: key.to_owned(),
+        rule: format!("between {} and {}", range.start(), range.end()).into(),
+        value: count.to_string(),
+    })
+}
+
+/// A finite number that obeys a rule of its own.
+pub(super) fn check(
+    key: &str,
+    rule: &'static str,
+    value: f64,
+    ok: bool,
+) -> Result<(), BadValue> {
+    if ok && value.is_finite() {
+        return Ok(());
+    }
+    Err(BadValue {
+        key: key.to_owned(),
+        rule: rule.into(),
+        value: number(value),
+    })
+}
+
+/// A number as people write it: nobody reads three hundred digits.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 || !size.is_finite() || (1e-4..1e7).contains(&size) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::project::{CostKeys, RegionKeys};
+
+    fn project() -> Project {
+        let mut project = Project::around("part.stl", None);
+        project.selection.sites.push(ChosenSite {
+            position_mm: [0.0; 3],
+            direction: [0.0, 0.0, 1.0],
+        });
+        project.selection.costs.push(CostKeys {
+            box_mm: [[0.0; 3]; 2],
+            cost: 1.0,
+        });
+        project.evaluation.regions.push(RegionKeys {
+            name: "all".into(),
+            box_mm: [[0.0; 3]; 2],
+        });
+        project
+    }
+
+    type Place = fn(&mut Project) -> &mut f64;
+
+    /// Every number of a project that may not be just any.
+    const NUMBERS: [(&str, Place); 25] = [
+        ("part.thickness_mm", |p| &mut p.part.thickness_mm),
+        ("part.weld_mm", |p| &mut p.part.weld_mm),
+        ("part.fill_holes_mm", |p| &mut p.part.fill_holes_mm),
+        ("material.youngs_modulus_gpa", |p| {
+            &mut p.material.youngs_modulus_gpa
+        }),
+        ("material.poissons_ratio", |p| {
+            &mut p.material.poissons_ratio
+        }),
+        ("touch.force_n", |p| &mut p.touch.force_n),
+        ("touch.tip_radius_mm", |p| &mut p.touch.tip_radius_mm),
+        ("touch.edge_margin_mm", |p| &mut p.touch.edge_margin_mm),
+        ("sites.spacing_mm", |p| &mut p.sites.spacing_mm),
+        ("gauge.noise_microstrain", |p| {
+            &mut p.gauge.noise_microstrain
+        }),
+        ("gauge.range_microstrain", |p| {
+            &mut p.gauge.range_microstrain
+        }),
+        ("gauge.grid_length_mm", |p| &mut p.gauge.grid_length_mm),
+        ("gauge.flatness_mm", |p| &mut p.gauge.flatness_mm),
+        ("feasible.support_clearance_mm", |p| {
+            &mut p.feasible.support_clearance_mm
+        }),
+        ("feasible.edge_radius_mm", |p| {
+            &mut p.feasible.edge_radius_mm
+        }),
+        ("candidates.unexplained", |p| &mut p.candidates.unexplained),
+        ("selection.c_mm", |p| &mut p.selection.c_mm),
+        ("selection.epsilon_mm", |p| &mut p.selection.epsilon_mm),
+        ("selection.gamma", |p| &mut p.selection.gamma),
+        ("selection.failure", |p| &mut p.selection.failure),
+        ("selection.cost.cost", |p| &mut p.selection.costs[0].cost),
+        ("selection.cost.box_mm", |p| {
+            &mut p.selection.costs[0].box_mm[1][2]
+        }),
+        ("evaluation.region.box_mm", |p| {
+            &mut p.evaluation.regions[0].box_mm[0][1]
+        }),
+        ("selection.site.position_mm", |p| {
+            &mut p.selection.sites[0].position_mm[0]
+        }),
+        ("selection.site.direction", |p| {
+            &mut p.selection.sites[0].direction[2]
+        }),
+    ];
+
+    #[test]
+    fn no_number_may_be_none_endless_or_absurd() {
+        assert_eq!(project().check(), Ok(()));
+        for (key, place) in NUMBERS {
+            for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300] {
+                let mut project = project();
+                *place(&mut project) = value;
+                let said = project.check().map_err(|e| e.to_string());
+                let said = said.expect_err(key);
+                assert!(said.starts_with(key) && said.len() < 120, "{said}");
+            }
+        }
+    }
+
+    #[test]
+    fn required_places_are_places() {
+        for bad in [f64::NAN, f64::INFINITY, 1e160] {
+            let mut project = project();
+            project.selection.required_mm = vec![[0.0; 3], [bad, 0.0, 0.0]];
+            let said = project.check().unwrap_err().to_string();
+            assert!(said.starts_with("selection.required_mm"), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_tip_has_a_size() {
+        for radius in [1e-20, 1e-7, 0.0, -0.0] {
+            let mut project = project();
+            project.touch.tip_radius_mm = radius;
+            let said = project.check().unwrap_err().to_string();
+            assert!(said.contains("between 1e-6 and 1000000"), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_seed_can_be_written_and_read() {
+        let mut project = project();
+        project.budget.seed = i64::MAX as u64;
+        assert_eq!(project.check(), Ok(()));
+        project.budget.seed += 1;
+        assert!(project.check().is_err());
+    }
+}

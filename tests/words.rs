@@ -1,0 +1,264 @@
+//! What a user is told: the cause that it really is, and which key to change to what.
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::{Arc, OnceLock};
+
+use glam::DVec3;
+use hapdef::budget::{Budget, Quality, unwatched};
+use hapdef::design::{self, DesignError, Inputs, Simulated};
+use hapdef::feasible::Filter;
+use hapdef::limb::LimbSpec;
+use hapdef::mesh::TriMesh;
+use hapdef::mesh::unroll::Axis;
+use hapdef::project::{Masks, Project, SupportKeys, SupportKind, Unit};
+
+fn budget() -> Budget {
+    Budget {
+        touches: 60,
+        ..Quality::Draft.budget()
+    }
+}
+
+fn limb() -> Inputs {
+    let mut inputs = hapdef::cli::bundled().unwrap().inputs;
+    let coarse = LimbSpec {
+        element: 5.0,
+        ..LimbSpec::default()
+    };
+    inputs.part = Arc::new(coarse.build().unwrap().0);
+    inputs.project.sites.spacing_mm = 4.1;
+    inputs.project.feasible.edge_radius_mm = 4.0;
+    inputs.project.selection.sensors = 2;
+    inputs
+}
+
+/// The coarse limb under its touches: the filters need no other.
+fn simulated() -> &'static Simulated {
+    static SIMULATED: OnceLock<Simulated> = OnceLock::new();
+    SIMULATED.get_or_init(|| design::simulate(&limb(), &budget(), &unwatched).unwrap())
+}
+
+fn feasible(inputs: &Inputs) -> usize {
+    design::filter(inputs, simulated()).sites().len()
+}
+
+/// Why the sites of a changed limb are too few.
+fn refused(change: impl Fn(&mut Inputs)) -> (Option<Filter>, String) {
+    let mut inputs = limb();
+    change(&mut inputs);
+    let verdicts = design::filter(&inputs, simulated());
+    let result = design::reduce_sites(&inputs, simulated(), &verdicts, &budget(), &unwatched);
+    match result.err() {
+        Some(DesignError::Shortage(s)) => (s.blamed, s.to_string()),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The number that a message says to change a key to.
+fn asked_for(said: &str, key: &str) -> f64 {
+    let after = said.split(key).nth(1).unwrap();
+    let number = after.split(" to ").nth(1).unwrap();
+    let number: String = number
+        .chars()
+        .take_while(|c| c.is_ascii_digit() || ".e-".contains(*c))
+        .collect();
+    number.trim_end_matches('.').parse().unwrap()
+}
+
+#[test]
+fn each_filter_is_named_with_what_it_took_and_what_would_help() {
+    type Change = fn(&mut Inputs);
+    let cases: [(Filter, &str, Change); 5] = [
+        (
+            Filter::SupportClearance,
+            "feasible.support_clearance_mm",
+            |i| i.project.feasible.support_clearance_mm = 800.0,
+        ),
+        (Filter::Edge, "feasible.edge_radius_mm", |i| {
+            i.project.feasible.edge_radius_mm = 0.0;
+        }),
+        (Filter::Noise, "gauge.least_signal_to_noise", |i| {
+            i.project.gauge.noise_microstrain = 1e6;
+        }),
+        (Filter::Range, "gauge.range_microstrain", |i| {
+            i.project.gauge.range_microstrain = 1e-9;
+        }),
+        (Filter::Painted, "feasible.painted", |i| {
+            let none = vec![false; i.part.positions().len()];
+            i.painted = Some(Arc::new(none));
+        }),
+    ];
+    assert!(feasible(&limb()) > 20);
+    for (filter, key, change) in cases {
+        let (blamed, said) = refused(change);
+        assert_eq!(blamed, Some(filter), "{said}");
+        assert!(
+            said.contains("no site is feasible") && said.contains(key),
+            "{said}"
+        );
+        assert!(said.contains(&filter.label().to_lowercase()), "{said}");
+        assert!(said.len() < 600, "{said}");
+    }
+}
+
+#[test]
+fn a_gauge_longer_than_the_part_is_to_be_smaller() {
+    let (_, said) = refused(|i| i.project.gauge.grid_length_mm = 300.0);
+    assert!(said.contains("smaller gauge"), "{said}");
+    assert!(said.contains("gauge.grid_length_mm"), "{said}");
+}
+
+#[test]
+fn what_is_asked_for_helps() {
+    let (_, said) = refused(|i| i.project.feasible.support_clearance_mm = 800.0);
+    let mut inputs = limb();
+    inputs.project.feasible.support_clearance_mm =
+        asked_for(&said, "feasible.support_clearance_mm");
+    assert!(feasible(&inputs) >= 2, "{said}");
+
+    let (_, said) = refused(|i| i.project.gauge.range_microstrain = 1e-9);
+    let mut inputs = limb();
+    inputs.project.gauge.range_microstrain = asked_for(&said, "gauge.range_microstrain");
+    assert!(feasible(&inputs) >= 2, "{said}");
+}
+
+#[test]
+fn an_empty_region_and_one_that_is_kept_out_are_told_apart() {
+    let (_, said) = refused(|i| {
+        let none = vec![false; i.part.positions().len()];
+        i.painted = Some(Arc::new(none));
+    });
+    assert!(said.contains("nothing is painted"), "{said}");
+    let (blamed, said) = refused(|i| {
+        let all = vec![true; i.part.positions().len()];
+        i.masks.insert("cable".into(), Arc::new(all));
+        i.project.feasible.keep_out = Some("cable".into());
+    });
+    assert_eq!(blamed, Some(Filter::KeptOut), "{said}");
+    assert!(said.contains("feasible.keep_out"), "{said}");
+}
+
+#[test]
+fn more_gauges_than_sites_are_told_how_many_there_are() {
+    let left = feasible(&limb());
+    let (_, said) = refused(|i| i.project.selection.sensors = 5000);
+    assert!(
+        said.contains("5000 gauges") && said.contains(&left.to_string()),
+        "{said}"
+    );
+    assert!(said.contains("selection.sensors"), "{said}");
+}
+
+#[test]
+fn too_few_touches_are_told_where_they_went() {
+    let mut inputs = limb();
+    inputs.project.touch.count = 11;
+    let few = design::simulate(&inputs, &budget(), &unwatched).unwrap();
+    let verdicts = design::filter(&inputs, &few);
+    let error = design::reduce_sites(&inputs, &few, &verdicts, &budget(), &unwatched).err();
+    let said = error.unwrap().to_string();
+    assert!(said.contains("touch.count from 11 to at least 20"), "{said}");
+}
+
+/// A square plate of 80 mm as CAD programs write it: two triangles, every vertex on its rim.
+#[test]
+fn a_plate_of_two_triangles_is_touched_all_over_but_its_margin() {
+    let side = 0.08;
+    let corners = [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]];
+    let corners = corners.map(|[x, y]| DVec3::new(x, y, 0.0));
+    let mut project = Project::around("plate.stl", Some(Unit::Millimetre));
+    project.supports.push(SupportKeys {
+        kind: SupportKind::Clamped,
+        box_mm: Some([[-1.0, -1.0, -1.0], [1.0, 81.0, 1.0]]),
+        vertices: None,
+        normal: Axis::Z,
+    });
+    project.sites.spacing_mm = 8.0;
+    let part = TriMesh::new(&corners, &[[0, 1, 2], [0, 2, 3]], 0).unwrap().0;
+    let mut inputs = Inputs {
+        project,
+        part: Arc::new(part),
+        painted: None,
+        masks: Masks::new(),
+    };
+    let simulated = design::simulate(&inputs, &budget(), &unwatched).unwrap();
+    let touches = &simulated.dataset.touches;
+    assert_eq!(touches.len(), 60);
+    let margin = inputs.project.touch.edge_margin_mm * 1e-3;
+    let away = |x: f64| x.min(side - x);
+    for touch in touches {
+        let p = touch.position;
+        assert!(away(p.x).min(away(p.y)) > 0.9 * margin, "{p}");
+    }
+    let near = touches.iter().any(|t| away(t.position.x) < 0.01);
+    assert!(near, "the plate is touched near its rim too");
+    // A margin wider than the plate is the margin's fault.
+    inputs.project.touch.edge_margin_mm = 50.0;
+    let error = design::simulate(&inputs, &budget(), &unwatched).err();
+    let said = error.unwrap().to_string();
+    assert!(said.contains("edge_margin_mm (50 mm)"), "{said}");
+    // A region without a vertex is the region's.
+    inputs.project.touch.edge_margin_mm = 2.4;
+    inputs.project.touch.region = Some("grip".into());
+    inputs.masks.insert("grip".into(), Arc::new(vec![false; 4]));
+    let error = design::simulate(&inputs, &budget(), &unwatched).err();
+    let said = error.unwrap().to_string();
+    assert!(said.contains("touch.region") && said.contains("empty"), "{said}");
+}
+
+#[test]
+fn sites_wider_apart_than_the_part_are_told_so() {
+    let mut inputs = limb();
+    inputs.project.sites.lattice = hapdef::project::Lattice::Even;
+    inputs.project.sites.spacing_mm = 5000.0;
+    let error = design::simulate(&inputs, &budget(), &unwatched).err();
+    let said = error.unwrap().to_string();
+    assert!(
+        said.contains("5000 mm (sites.spacing_mm)") && said.contains("Lower it to less than"),
+        "{said}"
+    );
+}
+
+/// The program on the bundled project with a line of it changed: exit code and what it says.
+fn design_with(from: &str, to: &str) -> (Option<i32>, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
+    std::fs::copy(assets.join("limb.glb"), folder.path().join("limb.glb")).unwrap();
+    let text = std::fs::read_to_string(assets.join("limb.hapdef.toml")).unwrap();
+    assert!(text.contains(from));
+    let path = folder.path().join("p.hapdef.toml");
+    std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+    let out = folder.path().join("out");
+    let done = Command::new(env!("CARGO_BIN_EXE_hapdef"))
+        .args(["design", path.to_str().unwrap(), "--out"])
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert!(!out.exists());
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    (done.status.code(), said)
+}
+
+#[test]
+fn numbers_that_nobody_means_are_refused_by_their_key() {
+    let cases = [
+        (
+            "tip_radius_mm = 5.0",
+            "tip_radius_mm = 1e-20",
+            "touch.tip_radius_mm",
+        ),
+        (
+            "spacing_mm = 0.0",
+            "required_mm = [[nan, 0, 0]]\nspacing_mm = 0.0",
+            "selection.required_mm",
+        ),
+        ("force_n = 10.0", "force_n = 1e300", "touch.force_n"),
+    ];
+    for (from, to, key) in cases {
+        let (code, said) = design_with(from, to);
+        assert_eq!(code, Some(1), "{said}");
+        assert!(said.contains("p.hapdef.toml") && said.contains(key), "{said}");
+        assert!(said.len() < 400, "{said}");
+    }
+}
