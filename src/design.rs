@@ -21,6 +21,7 @@ use crate::budget::Cancelled;
 use crate::elasticity::ElasticError;
 use crate::mesh::TriMesh;
 use crate::placement::PlacementError;
+use crate::plain;
 use crate::project::{BadValue, Masks, Project};
 
 pub use self::advise::*;
@@ -65,7 +66,9 @@ pub enum DesignError {
         size_mm: f64,
     },
     #[error(
-        "{what} {number} lies {distance_mm:.0} mm from the part, which is {size_mm:.0} mm across: check the unit of the mesh and of the points (mm)"
+        "{what} {number} lies {} from the part, which is {} across: check the unit of the mesh and of the points (mm)",
+        plain::mm(*distance_mm),
+        plain::mm(*size_mm)
     )]
     OffThePart {
         what: &'static str,

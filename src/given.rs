@@ -65,18 +65,20 @@ pub fn answer(
     watch: Watch,
 ) -> Result<Answer, DesignError> {
     inputs.project.check()?;
+    let index = SurfaceIndex::new(&inputs.part);
+    let reach = Reach::of(&inputs.part, &index);
+    reach.check("touch", touches.iter().map(|t| t.position))?;
+    reach.check("site", sites.iter().map(|s| s.position))?;
     // Solved, read out row by row, and written as text: several times the numbers themselves.
     design::check_room(24 * sites.len(), touches.len())?;
     let mut notes = Vec::new();
-    let inputs = facing_touches(inputs, touches, &mut notes);
+    let inputs = facing_touches(inputs, touches, &index, &mut notes);
     let index = SurfaceIndex::new(&inputs.part);
     let distances = |points: &mut dyn Iterator<Item = DVec3>| -> Vec<f64> {
         points.map(|p| index.nearest(p).1).collect()
     };
     let touch_distances = distances(&mut touches.iter().map(|t| t.position));
     let site_distances = distances(&mut sites.iter().map(|s| s.position));
-    refuse_far("touch", &touch_distances, &inputs.part)?;
-    refuse_far("site", &site_distances, &inputs.part)?;
     askew(touches, &index, &inputs.part, &mut notes);
 
     let ground = design::ground(&inputs, watch)?;
@@ -147,9 +149,13 @@ impl Answer {
 }
 
 /// Touches come from outside: an open part that winds the other way is turned over.
-fn facing_touches(inputs: &Inputs, touches: &[Touch], notes: &mut Vec<String>) -> Inputs {
+fn facing_touches(
+    inputs: &Inputs,
+    touches: &[Touch],
+    index: &SurfaceIndex,
+    notes: &mut Vec<String>,
+) -> Inputs {
     let part = &inputs.part;
-    let index = SurfaceIndex::new(part);
     let against = touches
         .iter()
         .filter(|t| {
@@ -168,18 +174,59 @@ fn facing_touches(inputs: &Inputs, touches: &[Touch], notes: &mut Vec<String>) -
     inputs
 }
 
-fn refuse_far(what: &'static str, distances: &[f64], part: &TriMesh) -> Result<(), DesignError> {
-    let (lower, upper) = part.bounds();
-    let size = (upper - lower).length();
-    let far = distances.iter().position(|&d| d > size);
-    far.map_or(Ok(()), |number| {
-        Err(DesignError::OffThePart {
-            what,
-            number,
-            distance_mm: distances[number] * 1000.0,
-            size_mm: size * 1000.0,
-        })
-    })
+/// How far from a part points can be meant for it: no farther than it is large.
+struct Reach<'a> {
+    index: &'a SurfaceIndex,
+    lower: DVec3,
+    upper: DVec3,
+    /// m.
+    size: f64,
+}
+
+impl<'a> Reach<'a> {
+    fn of(part: &TriMesh, index: &'a SurfaceIndex) -> Self {
+        let (lower, upper) = part.bounds();
+        Self {
+            index,
+            lower,
+            upper,
+            size: (upper - lower).length(),
+        }
+    }
+
+    fn check(
+        &self,
+        what: &'static str,
+        points: impl Iterator<Item = DVec3>,
+    ) -> Result<(), DesignError> {
+        for (number, point) in points.enumerate() {
+            let distance = self.distance(point);
+            if distance > self.size {
+                return Err(DesignError::OffThePart {
+                    what,
+                    number,
+                    distance_mm: distance * 1000.0,
+                    size_mm: self.size * 1000.0,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// From the part (m); of what is out of reach, from the box around it. The box is asked first: very far
+    /// out squares are no numbers any more, and the nearest place is not found.
+    fn distance(&self, point: DVec3) -> f64 {
+        if !point.is_finite() {
+            return f64::INFINITY;
+        }
+        let beyond = (point - point.clamp(self.lower, self.upper)).abs();
+        let widest = beyond.max_element();
+        if widest > self.size {
+            widest * (beyond / widest).length()
+        } else {
+            self.index.nearest(point).1
+        }
+    }
 }
 
 fn askew(touches: &[Touch], index: &SurfaceIndex, part: &TriMesh, notes: &mut Vec<String>) {

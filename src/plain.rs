@@ -1,4 +1,5 @@
-//! Text from outside (files, boards) made safe to show: no control characters, and not without an end.
+//! Text and numbers from outside (files, boards) made safe to show: no control characters, and not without
+//! an end.
 
 /// Longest word that is quoted in a message, in characters.
 const WORD: usize = 60;
@@ -15,6 +16,17 @@ pub fn quote(word: &str) -> String {
 #[must_use]
 pub fn message(text: &str) -> String {
     shown(text, MESSAGE)
+}
+
+/// A length (mm) of any size, in a few characters.
+#[must_use]
+pub fn mm(length: f64) -> String {
+    match length.abs() {
+        size if !size.is_finite() => "endlessly many mm".to_owned(),
+        size if size >= 1e7 || (size > 0.0 && size < 0.01) => format!("{length:.1e} mm"),
+        size if size >= 10.0 => format!("{length:.0} mm"),
+        _ => format!("{length:.2} mm"),
+    }
 }
 
 /// At most so many characters, those that a terminal would obey replaced; a line break stays.
@@ -46,6 +58,20 @@ mod tests {
         assert_eq!(quote("\u{1b}[31mred\u{7}"), "“\u{fffd}[31mred\u{fffd}”");
         assert_eq!(message("two\nlines\tand é"), "two\nlines and é");
         assert_eq!(message("\u{9b}2J\u{202e}"), "\u{fffd}2J\u{fffd}");
+    }
+
+    #[test]
+    fn a_length_is_short_whatever_it_is() {
+        for (length, said) in [
+            (1e160, "1.0e160 mm"),
+            (29_970.4, "29970 mm"),
+            (0.4, "0.40 mm"),
+            (2e-5, "2.0e-5 mm"),
+            (0.0, "0.00 mm"),
+            (f64::INFINITY, "endlessly many mm"),
+        ] {
+            assert_eq!(mm(length), said);
+        }
     }
 
     #[test]

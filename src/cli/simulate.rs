@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Common, out, progress::Bar};
-use crate::design;
+use crate::design::{self, DesignError};
 use crate::given;
 use crate::io::artifacts::save_dataset;
 use crate::io::project_file::LoadedProject;
@@ -116,19 +116,14 @@ fn at_points(
     touches: &Path,
     sites: &Path,
 ) -> anyhow::Result<()> {
+    let placed = |error| in_file(error, touches, sites);
     let touches = points::read_touches(touches)?;
     let sites = points::read_sites(sites)?;
     let budget = loaded.inputs.project.budget.budget();
     let bar = Bar::default();
     let result = args.common.in_pool(|| {
         let watch = |p| bar.show(p);
-        Ok(given::answer(
-            &loaded.inputs,
-            &touches,
-            &sites,
-            &budget,
-            &watch,
-        )?)
+        given::answer(&loaded.inputs, &touches, &sites, &budget, &watch).map_err(placed)
     });
     bar.finish();
     let answer = result?;
@@ -151,6 +146,24 @@ fn at_points(
         "notes": answer.notes,
     });
     finish(args, &summary)
+}
+
+/// An error of one of the given points, with its file and line before it.
+fn in_file(error: DesignError, touches: &Path, sites: &Path) -> anyhow::Error {
+    let (path, number) = match error {
+        DesignError::OffThePart {
+            what: "touch",
+            number,
+            ..
+        } => (touches, number),
+        DesignError::OffThePart { number, .. } | DesignError::AcrossTheWall { number } => {
+            (sites, number)
+        }
+        _ => return error.into(),
+    };
+    let place = points::line(path, number);
+    let place = place.map_or_else(String::new, |line| format!(", line {line}"));
+    anyhow::Error::new(error).context(format!("{}{place}", path.display()))
 }
 
 fn say(notes: &[String]) {

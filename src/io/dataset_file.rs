@@ -1,14 +1,22 @@
 //! Datasets from elsewhere: NPZ, CSV, and folders of nodal results as Ansys Mechanical exports them.
 
-use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+mod exports;
+mod plausible;
+
+use std::path::Path;
 
 use glam::DVec3;
 
+use self::plausible::{Origin, Places};
 use super::FileError;
-use super::npz;
+use super::npz::Arrays;
+use super::table::Table;
 use crate::dataset::SignalMatrix;
+use crate::plain::quote;
 use crate::study::Data;
+
+/// Numbers beyond this, and its inverse, have squares that are none, or nothing.
+const ABSURD: f64 = 1e100;
 
 /// A dataset, and what was left out or assumed, for people.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,20 +34,19 @@ pub struct GivenData {
 /// [`FileError`] naming the file, the place in it and what to do.
 pub fn read(path: &Path, touches: Option<&Path>) -> Result<GivenData, FileError> {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
-    let given = if path.is_dir() {
-        read_folder(path, needed(path, touches)?)
+    let found = if path.is_dir() {
+        exports::read(path, Touches::read(needed(path, touches)?)?)
     } else if ending.eq_ignore_ascii_case("npz") {
         read_npz(path)
     } else if ending.eq_ignore_ascii_case("csv") {
-        read_csv(path, needed(path, touches)?)
+        read_csv(path, Touches::read(needed(path, touches)?)?)
     } else {
         Err(FileError::broken(
             path,
             "a dataset is an .npz, a .csv, or a folder of exported results",
         ))
     }?;
-    check(path, &given.data)?;
-    Ok(given)
+    found.checked(path)
 }
 
 fn needed<'a>(path: &Path, touches: Option<&'a Path>) -> Result<&'a Path, FileError> {
@@ -51,424 +58,228 @@ fn needed<'a>(path: &Path, touches: Option<&'a Path>) -> Result<&'a Path, FileEr
     })
 }
 
-fn check(path: &Path, data: &Data) -> Result<(), FileError> {
+/// What was read, not yet checked.
+struct Found {
+    /// By rows, one a site.
+    values: Vec<f64>,
+    /// Of the touches (mm).
+    targets: Vec<[f64; 3]>,
+    /// Of the sites (m); empty where nobody knows them.
+    positions: Vec<DVec3>,
+    costs: Vec<f64>,
+    touches: Origin,
+    sites: Origin,
+    notes: Vec<String>,
+}
+
+impl Found {
+    fn checked(self, path: &Path) -> Result<GivenData, FileError> {
+        self.check_signals(path)?;
+        for (site, cost) in self.costs.iter().enumerate() {
+            if !(cost.is_finite() && *cost > 0.0) {
+                let what = format!("the cost of site {site} is {cost:e}: it must be above zero");
+                return Err(FileError::broken(path, what));
+            }
+        }
+        let touches = self.targets.iter().map(|&p| DVec3::from_array(p));
+        let sites = self.positions.iter().map(|&p| p * 1e3);
+        let mut notes = self.notes;
+        notes.extend(plausible::check(
+            &Places::new(&self.touches, touches),
+            &Places::new(&self.sites, sites),
+        )?);
+        Ok(GivenData {
+            data: Data {
+                x: SignalMatrix::new(self.targets.len(), self.values),
+                targets: self.targets,
+                positions: self.positions,
+                costs: self.costs,
+            },
+            notes,
+        })
+    }
+
+    fn check_signals(&self, path: &Path) -> Result<(), FileError> {
+        let touches = self.targets.len();
+        let largest = self.values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let wrong = |v: &f64| !v.is_finite() || v.abs() > ABSURD;
+        if let Some(at) = self.values.iter().position(wrong) {
+            let value = self.values[at];
+            let what = if value.is_finite() {
+                format!("is {value:e}, which nothing can be computed with: choose another unit")
+            } else {
+                "is no finite number: take one of them out".to_owned()
+            };
+            let (site, touch) = (at / touches, at % touches);
+            let what = format!("the signal of site {site} under touch {touch} {what}");
+            return Err(FileError::broken(path, what));
+        }
+        if largest > 0.0 && largest < 1.0 / ABSURD {
+            let what = format!(
+                "the largest signal is {largest:e}, which nothing can be computed with: choose another unit"
+            );
+            return Err(FileError::broken(path, what));
+        }
+        Ok(())
+    }
+}
+
+fn metres(mm: &[[f64; 3]]) -> Vec<DVec3> {
+    mm.iter().map(|&p| DVec3::from_array(p) * 1e-3).collect()
+}
+
+fn read_npz(path: &Path) -> Result<Found, FileError> {
     let broken = |message: String| Err(FileError::broken(path, message));
-    let (sites, touches) = (data.x.rows(), data.x.columns());
+    let mut arrays = Arrays::open(path)?;
+    let x = arrays.numbers("X")?;
+    let [sites, touches] = x.shape[..] else {
+        return broken(format!(
+            "X has {} dimensions: it must be sites × touches",
+            x.shape.len()
+        ));
+    };
     if sites == 0 || touches == 0 {
         return broken("there is no signal in it: X needs sites × touches".into());
     }
-    if data.targets.len() != touches {
+    let pressed = positions(path, &mut arrays, "p_m")?;
+    if pressed.len() != touches {
         return broken(format!(
-            "X has {touches} touches (columns), but there are {} touch positions: X must be sites × touches",
-            data.targets.len()
+            "X has {touches} touches (columns), but there are {} touch positions (rows of p_m): X must be sites × touches",
+            pressed.len()
         ));
     }
-    if !data.positions.is_empty() && data.positions.len() != sites {
+    let known = if arrays.holds("site_m") {
+        positions(path, &mut arrays, "site_m")?
+    } else {
+        Vec::new()
+    };
+    if !known.is_empty() && known.len() != sites {
         return broken(format!(
             "X has {sites} sites (rows), but site_m has {}",
-            data.positions.len()
+            known.len()
         ));
     }
-    if !data.costs.is_empty() && data.costs.len() != sites {
-        return broken(format!(
-            "X has {sites} sites, but cost has {}",
-            data.costs.len()
-        ));
-    }
-    if let Some(at) = data.x.values().iter().position(|v| !v.is_finite()) {
-        return broken(format!(
-            "the signal of site {} under touch {} is no finite number: take one of them out",
-            at / touches,
-            at % touches
-        ));
-    }
-    let wild = |p: &[f64; 3]| p.iter().any(|v| !v.is_finite());
-    if let Some(at) = data.targets.iter().position(wild) {
-        return broken(format!("the position of touch {at} is no finite number"));
-    }
-    if let Some(at) = data.positions.iter().position(|p| !p.is_finite()) {
-        return broken(format!("the position of site {at} is no finite number"));
-    }
-    Ok(())
-}
-
-fn read_npz(path: &Path) -> Result<GivenData, FileError> {
-    let (shape, values) = npz::read_numbers(path, "X")?;
-    let [_, touches] = shape[..] else {
-        return Err(FileError::broken(
-            path,
-            format!(
-                "X has {} dimensions: it must be sites × touches",
-                shape.len()
-            ),
-        ));
+    let costs = if arrays.holds("cost") {
+        arrays.numbers("cost")?.values
+    } else {
+        Vec::new()
     };
-    let triples = |name: &str| -> Result<Vec<[f64; 3]>, FileError> {
-        let (shape, values) = npz::read_numbers(path, name)?;
-        if shape.len() != 2 || shape[1] != 3 {
-            return Err(FileError::broken(
-                path,
-                format!("{name} must have three columns: x, y, z in metres"),
-            ));
-        }
-        Ok(values.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect())
-    };
-    let optional = |name: &str| npz::holds(path, name);
-    let data = Data {
-        x: SignalMatrix::new(touches, values),
-        targets: triples("p_m")?
-            .into_iter()
-            .map(|p| p.map(|v| v * 1e3))
-            .collect(),
-        positions: if optional("site_m")? {
-            triples("site_m")?
-                .into_iter()
-                .map(DVec3::from_array)
-                .collect()
-        } else {
-            Vec::new()
-        },
-        costs: if optional("cost")? {
-            npz::read_numbers(path, "cost")?.1
-        } else {
-            Vec::new()
-        },
-    };
-    Ok(GivenData {
-        data,
+    if !costs.is_empty() && costs.len() != sites {
+        return broken(format!("X has {sites} sites, but cost has {}", costs.len()));
+    }
+    Ok(Found {
+        values: x.values,
+        targets: pressed.iter().map(|&p| (p * 1e3).to_array()).collect(),
+        positions: known,
+        costs,
+        touches: Origin::array(path, "touches", "p_m"),
+        sites: Origin::array(path, "sites", "site_m"),
         notes: Vec::new(),
     })
 }
 
-/// A table with a header.
-struct Table {
-    columns: HashMap<String, usize>,
-    header: Vec<String>,
-    /// With the line each row stands in.
-    rows: Vec<(usize, Vec<String>)>,
+/// Places in an array (m).
+fn positions(path: &Path, arrays: &mut Arrays, name: &str) -> Result<Vec<DVec3>, FileError> {
+    let array = arrays.numbers(name)?;
+    let [_, 3] = array.shape[..] else {
+        return Err(FileError::broken(
+            path,
+            format!("{name} must have three columns: x, y, z in metres"),
+        ));
+    };
+    let wrong = |v: &f64| !v.is_finite() || v.abs() > ABSURD;
+    if let Some(at) = array.values.iter().position(wrong) {
+        let (row, column) = (at / 3, at % 3);
+        let value = array.values[at];
+        return Err(FileError::broken(
+            path,
+            format!("{name}[{row}, {column}] is {value:e}: a place is three numbers in metres"),
+        ));
+    }
+    Ok(array
+        .values
+        .chunks_exact(3)
+        .map(DVec3::from_slice)
+        .collect())
 }
 
-impl Table {
-    fn csv(path: &Path) -> Result<Self, FileError> {
-        let broken = |e: csv::Error| FileError::broken(path, format!("{e}"));
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .comment(Some(b'#'))
-            .from_path(path)
-            .map_err(broken)?;
-        let header: Vec<String> = reader
-            .headers()
-            .map_err(broken)?
-            .iter()
-            .map(|h| h.trim_start_matches('\u{feff}').to_owned())
-            .collect();
-        let mut rows = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(broken)?;
-            let line = record.position().map_or(0, |p| p.line() as usize);
-            rows.push((line, record.iter().map(str::to_owned).collect()));
+const PLACE: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
+
+/// Where the touches were, and the file of each where the table names one.
+struct Touches {
+    mm: Vec<[f64; 3]>,
+    origin: Origin,
+    files: Option<Vec<String>>,
+}
+
+impl Touches {
+    fn read(path: &Path) -> Result<Self, FileError> {
+        let table = Table::read(path)?;
+        let columns = table.columns(&PLACE)?;
+        let file = table.column("file")?;
+        let (mut mm, mut lines, mut files) = (Vec::new(), Vec::new(), Vec::new());
+        for row in table.rows() {
+            let row = row?;
+            mm.push(row.numbers(&columns)?);
+            lines.push(row.line());
+            files.extend(file.map(|column| row.text(column).to_owned()));
+        }
+        if mm.is_empty() {
+            return Err(table.wrong("there is no row below the first line: one is needed a touch"));
         }
         Ok(Self {
-            columns: header.iter().cloned().zip(0..).collect(),
-            header,
-            rows,
+            mm,
+            origin: Origin::lines(path, "touches", lines),
+            files: file.map(|_| files),
         })
-    }
-
-    fn numbers(&self, path: &Path, column: usize) -> Result<Vec<f64>, FileError> {
-        self.rows
-            .iter()
-            .map(|(line, row)| {
-                row.get(column).and_then(|v| v.parse().ok()).ok_or_else(|| {
-                    FileError::broken(
-                        path,
-                        format!(
-                            "line {line}: {} is no number",
-                            self.header.get(column).map_or("a column", String::as_str)
-                        ),
-                    )
-                })
-            })
-            .collect()
-    }
-
-    fn positions_mm(&self, path: &Path) -> Result<Vec<[f64; 3]>, FileError> {
-        let column = |name: &str| {
-            let place = self
-                .columns
-                .get(name)
-                .ok_or_else(|| FileError::broken(path, format!("the column {name} is missing")))?;
-            self.numbers(path, *place)
-        };
-        let (x, y, z) = (column("x_mm")?, column("y_mm")?, column("z_mm")?);
-        Ok((0..x.len()).map(|i| [x[i], y[i], z[i]]).collect())
     }
 }
 
 /// A row a site: `x_mm,y_mm,z_mm`, `dx,dy,dz` and `cost` where there are some, and then a column a touch.
-fn read_csv(path: &Path, touches: &Path) -> Result<GivenData, FileError> {
+fn read_csv(path: &Path, touches: Touches) -> Result<Found, FileError> {
     const KNOWN: [&str; 7] = ["x_mm", "y_mm", "z_mm", "dx", "dy", "dz", "cost"];
-    let table = Table::csv(path)?;
-    let positions = table.positions_mm(path)?;
-    let signals: Vec<usize> = (0..table.header.len())
-        .filter(|&c| !KNOWN.contains(&table.header[c].as_str()))
+    let table = Table::read(path)?;
+    let place = table.columns(&PLACE)?;
+    let cost = table.column("cost")?;
+    let signals: Vec<usize> = (0..)
+        .zip(table.names())
+        .filter(|(_, name)| !KNOWN.contains(name))
+        .map(|(column, _)| column)
         .collect();
-    let mut values = vec![0.0; positions.len() * signals.len()];
-    for (k, &column) in signals.iter().enumerate() {
-        for (site, v) in table.numbers(path, column)?.into_iter().enumerate() {
-            values[site * signals.len() + k] = v;
+    let count = touches.mm.len();
+    if signals.len() != count {
+        let first = signals.first().map(|&column| quote(table.name(column)));
+        let from = first.map_or_else(String::new, |name| format!(" (from {name})"));
+        return Err(table.wrong(format!(
+            "beside {} it has {} columns{from}, but {} has {count} touches: it needs one column a touch and no other",
+            KNOWN.join(","),
+            signals.len(),
+            touches.origin.path().display()
+        )));
+    }
+    let (mut mm, mut lines, mut costs, mut values) = (vec![], vec![], vec![], vec![]);
+    for row in table.rows() {
+        let row = row?;
+        mm.push(row.numbers(&place)?);
+        lines.push(row.line());
+        if let Some(column) = cost {
+            costs.push(row.number(column)?);
+        }
+        for &column in &signals {
+            values.push(row.number(column)?);
         }
     }
-    let costs = match table.columns.get("cost") {
-        Some(&column) => table.numbers(path, column)?,
-        None => Vec::new(),
-    };
-    let data = Data {
-        x: SignalMatrix::new(signals.len(), values),
-        targets: Table::csv(touches)?.positions_mm(touches)?,
-        positions: metres(&positions),
+    if mm.is_empty() {
+        return Err(table.wrong("there is no row below the first line: one is needed a site"));
+    }
+    Ok(Found {
+        values,
+        targets: touches.mm,
+        positions: metres(&mm),
         costs,
-    };
-    Ok(GivenData {
-        data,
+        touches: touches.origin,
+        sites: Origin::lines(path, "sites", lines),
         notes: Vec::new(),
-    })
-}
-
-fn metres(positions: &[[f64; 3]]) -> Vec<DVec3> {
-    positions
-        .iter()
-        .map(|&p| DVec3::from_array(p) * 1e-3)
-        .collect()
-}
-
-/// A folder of exports of nodal results, one file a touch: in the order of the column `file` of the
-/// touches, or of the names of the files (numbers in them count as numbers). Nodes that are not in every
-/// file are left out.
-fn read_folder(folder: &Path, touches: &Path) -> Result<GivenData, FileError> {
-    let table = Table::csv(touches)?;
-    let targets = table.positions_mm(touches)?;
-    let files: Vec<PathBuf> = match table.columns.get("file") {
-        Some(&column) => table
-            .rows
-            .iter()
-            .map(|(_, row)| folder.join(row.get(column).map_or("", String::as_str)))
-            .collect(),
-        None => exports_in(folder)?,
-    };
-    if files.len() != targets.len() {
-        return Err(FileError::broken(
-            folder,
-            format!(
-                "there are {} exports (.txt, .xls, .csv, .dat) for {} touches: one is needed for each, or a column `file` in the touches",
-                files.len(),
-                targets.len()
-            ),
-        ));
-    }
-    let exports: Result<Vec<Export>, FileError> = files.iter().map(|f| read_export(f)).collect();
-    join(folder, &exports?, targets)
-}
-
-fn exports_in(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
-    let entries = std::fs::read_dir(folder).map_err(|e| FileError::of(folder, &e))?;
-    let mut files: Vec<PathBuf> = entries
-        .filter_map(|e| Some(e.ok()?.path()))
-        .filter(|p| {
-            let ending = p.extension().unwrap_or_default().to_string_lossy();
-            ["txt", "xls", "csv", "dat"].contains(&ending.to_lowercase().as_str())
-        })
-        .collect();
-    files.sort_by_cached_key(|p| natural(&p.file_name().unwrap_or_default().to_string_lossy()));
-    Ok(files)
-}
-
-/// A name cut into text and numbers, so that `touch 10` comes after `touch 9`.
-fn natural(name: &str) -> Vec<(String, u64)> {
-    let mut parts = Vec::new();
-    let (mut text, mut digits) = (String::new(), String::new());
-    for c in name.chars() {
-        if c.is_ascii_digit() {
-            digits.push(c);
-        } else {
-            if !digits.is_empty() {
-                parts.push((
-                    std::mem::take(&mut text),
-                    digits.parse().unwrap_or(u64::MAX),
-                ));
-                digits.clear();
-            }
-            text.push(c);
-        }
-    }
-    parts.push((text, digits.parse().unwrap_or(0)));
-    parts
-}
-
-/// One exported result: node numbers, their places (m) and values.
-struct Export {
-    nodes: Vec<u64>,
-    positions: Vec<DVec3>,
-    values: Vec<f64>,
-}
-
-/// Reads what Ansys Mechanical writes by “Export Text File”: tab-separated, one header line with the unit
-/// in parentheses (“X Location (mm)”), decimal points or commas, in UTF-8, UTF-16 or an older encoding.
-fn read_export(path: &Path) -> Result<Export, FileError> {
-    let bytes = std::fs::read(path).map_err(|e| FileError::of(path, &e))?;
-    let text = decode(&bytes);
-    let mut lines = text
-        .lines()
-        .zip(1..)
-        .map(|(line, number)| (number, line.trim_end_matches(['\t', ' ', '\r'])))
-        .filter(|(_, line)| !line.is_empty());
-    let broken = |message: String| FileError::broken(path, message);
-    let (_, header) = lines
-        .next()
-        .ok_or_else(|| broken("the file is empty".into()))?;
-    let labels: Vec<&str> = header.split('\t').map(str::trim).collect();
-    let place = |axis: &str| {
-        labels.iter().position(|l| {
-            let l = l.to_lowercase();
-            l.starts_with(&format!("{axis} location"))
-                || l.starts_with(&format!("{axis}-position"))
-                || l.starts_with(&format!("{axis} position"))
-        })
-    };
-    let [Some(x), Some(y), Some(z)] = ["x", "y", "z"].map(place) else {
-        return Err(broken(format!(
-            "the first line has no columns “X Location (mm)”, … but “{header}”: export with “Include Node Location” switched on"
-        )));
-    };
-    let value = z + 1;
-    if labels.len() != value + 1 {
-        return Err(broken(format!(
-            "{} columns of results: export one scalar result (a total, or one direction)",
-            labels.len().saturating_sub(value)
-        )));
-    }
-    let unit = length_unit(labels[x])
-        .ok_or_else(|| broken(format!("the unit of “{}” is not known", labels[x])))?;
-    let rows: Vec<(usize, Vec<&str>)> = lines.map(|(n, l)| (n, l.split('\t').collect())).collect();
-    let has = |c: char| rows.iter().any(|(_, r)| r.iter().any(|v| v.contains(c)));
-    let comma = match (has(','), has('.')) {
-        (true, true) => {
-            return Err(broken(
-                "numbers have decimal points and commas: export again with one of them".into(),
-            ));
-        }
-        (comma, _) => comma,
-    };
-    let mut export = Export {
-        nodes: Vec::new(),
-        positions: Vec::new(),
-        values: Vec::new(),
-    };
-    for (line, row) in rows {
-        let number = |column: usize| -> Result<f64, FileError> {
-            let cell = row.get(column).map_or("", |c| c.trim());
-            let cell = if comma {
-                cell.replace(',', ".")
-            } else {
-                cell.to_owned()
-            };
-            cell.parse()
-                .map_err(|_| broken(format!("line {line}: “{cell}” is no number")))
-        };
-        export.nodes.push(number(0)? as u64);
-        export
-            .positions
-            .push(DVec3::new(number(x)?, number(y)?, number(z)?) * unit);
-        export.values.push(number(value)?);
-    }
-    Ok(export)
-}
-
-fn decode(bytes: &[u8]) -> String {
-    let wide = |rest: &[u8], little: bool| {
-        let units: Vec<u16> = rest
-            .chunks_exact(2)
-            .map(|c| {
-                if little {
-                    u16::from_le_bytes([c[0], c[1]])
-                } else {
-                    u16::from_be_bytes([c[0], c[1]])
-                }
-            })
-            .collect();
-        String::from_utf16_lossy(&units)
-    };
-    match bytes {
-        [0xff, 0xfe, rest @ ..] => wide(rest, true),
-        [0xfe, 0xff, rest @ ..] => wide(rest, false),
-        [0xef, 0xbb, 0xbf, rest @ ..] => String::from_utf8_lossy(rest).into_owned(),
-        _ => match std::str::from_utf8(bytes) {
-            Ok(text) => text.to_owned(),
-            // Older encodings share their first 256 characters with Unicode, near enough for labels.
-            Err(_) => bytes.iter().map(|&b| char::from(b)).collect(),
-        },
-    }
-}
-
-/// Metres in the unit that stands in the last parentheses of a label.
-fn length_unit(label: &str) -> Option<f64> {
-    let unit = label.rsplit_once('(')?.1.trim_end_matches([')', ' ']);
-    Some(match unit {
-        "m" => 1.0,
-        "cm" => 1e-2,
-        "mm" => 1e-3,
-        "µm" | "μm" | "um" => 1e-6,
-        "in" => 0.0254,
-        "ft" => 0.3048,
-        _ => return None,
-    })
-}
-
-fn join(folder: &Path, exports: &[Export], targets: Vec<[f64; 3]>) -> Result<GivenData, FileError> {
-    let Some(first) = exports.first() else {
-        return Err(FileError::broken(folder, "there are no exports in it"));
-    };
-    let mut seen: HashMap<u64, usize> = HashMap::new();
-    for export in exports {
-        let mut own: Vec<u64> = export.nodes.clone();
-        own.sort_unstable();
-        own.dedup();
-        if own.len() < export.nodes.len() {
-            return Err(FileError::broken(
-                folder,
-                "a node stands more than once in an export (shells list top and bottom): export one face",
-            ));
-        }
-        for node in own {
-            *seen.entry(node).or_default() += 1;
-        }
-    }
-    let kept: Vec<usize> = (0..first.nodes.len())
-        .filter(|&i| seen[&first.nodes[i]] == exports.len())
-        .collect();
-    let touches = exports.len();
-    let mut values = vec![0.0; kept.len() * touches];
-    for (t, export) in exports.iter().enumerate() {
-        let of: HashMap<u64, f64> = (export.nodes.iter().copied())
-            .zip(export.values.iter().copied())
-            .collect();
-        for (s, &i) in kept.iter().enumerate() {
-            values[s * touches + t] = of[&first.nodes[i]];
-        }
-    }
-    let dropped = seen.len() - kept.len();
-    let data = Data {
-        x: SignalMatrix::new(touches, values),
-        targets,
-        positions: kept.iter().map(|&i| first.positions[i]).collect(),
-        costs: Vec::new(),
-    };
-    Ok(GivenData {
-        data,
-        notes: (dropped > 0)
-            .then(|| format!("{dropped} nodes are not in every export and were left out."))
-            .into_iter()
-            .collect(),
     })
 }
 
@@ -476,87 +287,23 @@ fn join(folder: &Path, exports: &[Export], targets: Vec<[f64; 3]>) -> Result<Giv
 mod tests {
     use super::*;
 
-    fn folder(files: &[(&str, &[u8])]) -> tempfile::TempDir {
-        let folder = tempfile::tempdir().unwrap();
-        for (name, bytes) in files {
-            std::fs::write(folder.path().join(name), bytes).unwrap();
-        }
-        folder
-    }
-
-    const HEADER: &str =
-        "Node Number\tX Location (mm)\tY Location (mm)\tZ Location (mm)\tTotal Deformation (m)\r\n";
-
-    #[test]
-    fn exports_are_joined_by_their_nodes() {
-        let one = format!("{HEADER}7\t1.\t2.5\t-3.e+000\t5.e-003\r\n9\t0.\t0.\t1.\t2.\r\n");
-        // Decimal commas, other order, a node more, UTF-16.
-        let two: Vec<u8> = [0xff, 0xfe]
-            .into_iter()
-            .chain(
-                format!("{HEADER}9\t0,\t0,\t1,\t4,5\t\r\n11\t1,\t1,\t1,\t1,\r\n7\t1,\t2,5\t-3,\t6,e-003\r\n")
-                    .encode_utf16()
-                    .flat_map(u16::to_le_bytes),
-            )
-            .collect();
-        let folder = folder(&[("t 2.txt", &one.clone().into_bytes()), ("t 10.txt", &two)]);
-        let touches = folder.path().join("where").with_extension("touches");
-        std::fs::write(&touches, "x_mm,y_mm,z_mm\n1,2,3\n4,5,6\n").unwrap();
-        let GivenData { data, notes } = read(folder.path(), Some(&touches)).unwrap();
-        assert_eq!(data.x.values(), [5e-3, 6e-3, 2.0, 4.5]);
-        assert_eq!(data.targets, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
-        assert!((data.positions[0] - DVec3::new(1e-3, 2.5e-3, -3e-3)).length() < 1e-15);
-        assert!(notes[0].contains("1 nodes"));
-    }
-
-    #[test]
-    fn what_cannot_be_read_is_named() {
-        let cases: [(&str, &str); 5] = [
-            (
-                "Node Number\tTotal Deformation (m)\n1\t2\n",
-                "Include Node Location",
-            ),
-            (&format!("{HEADER}1\t2\t3\t4\tx\n"), "line 2"),
-            (&format!("{HEADER}1\t2,5\t3.5\t4\t1\n"), "points and commas"),
-            (&HEADER.replace("(mm)", "(furlong)"), "unit"),
-            (
-                &format!("{HEADER}1\t2\t3\t4\t1\n1\t2\t3\t4\t1\n"),
-                "more than once",
-            ),
-        ];
-        for (text, expected) in cases {
-            let folder = folder(&[("a.txt", text.as_bytes())]);
-            let touches = folder.path().join("where").with_extension("touches");
-            std::fs::write(&touches, "x_mm,y_mm,z_mm\n1,2,3\n").unwrap();
-            let said = read(folder.path(), Some(&touches)).unwrap_err().to_string();
-            assert!(said.contains(expected), "{said}");
-        }
-    }
-
     #[test]
     fn a_csv_has_a_row_a_site_and_a_column_a_touch() {
-        let folder = folder(&[
-            (
-                "d.csv",
-                b"x_mm,y_mm,z_mm,cost,t0,t1\n1,0,0,2,0.5,0.25\n0,1,0,3,1,2\n",
-            ),
-            ("t.csv", b"x_mm,y_mm,z_mm\n0,0,0\n1,1,1\n"),
-        ]);
-        let GivenData { data, .. } = read(
-            &folder.path().join("d.csv"),
-            Some(&folder.path().join("t.csv")),
-        )
-        .unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let signals = file(
+            "d.csv",
+            "x_mm,y_mm,z_mm,cost,t0,t1\n1,0,0,2,0.5,0.25\n0,1,0,3,1,2\n",
+        );
+        let touches = file("t.csv", "x_mm,y_mm,z_mm\n0,0,0\n1,1,1\n");
+        let GivenData { data, .. } = read(&signals, Some(&touches)).unwrap();
         assert_eq!(data.x.values(), [0.5, 0.25, 1.0, 2.0]);
         assert_eq!(data.costs, [2.0, 3.0]);
-        let alone = read(&folder.path().join("d.csv"), None).unwrap_err();
+        let alone = read(&signals, None).unwrap_err();
         assert!(alone.to_string().contains("--touches"));
-    }
-
-    #[test]
-    fn names_sort_by_their_numbers() {
-        let mut names = ["b2", "a10", "a9", "a", "b"];
-        names.sort_by_cached_key(|n| natural(n));
-        assert_eq!(names, ["a", "a9", "a10", "b", "b2"]);
     }
 }

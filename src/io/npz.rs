@@ -1,13 +1,18 @@
-//! Arrays in NPZ, the same bytes every time: no time stamps, a fixed order.
+//! Arrays in NPZ: written with the same bytes every time (no time stamps, a fixed order), read from anywhere.
 
-use std::io::{Cursor, Read, Write};
-use std::path::Path;
+use std::fmt::Display;
+use std::fs::File;
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
 
 use npyz::WriterBuilder;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
-use super::{FileError, atomic};
+use super::npy::{self, Array};
+use super::{FileError, atomic, source};
+use crate::memory;
+use crate::plain::quote;
 
 /// An NPZ file being put together.
 pub struct NpzFile {
@@ -92,95 +97,121 @@ impl NpzFile {
     }
 }
 
+/// The arrays of an NPZ file from anywhere.
+pub struct Arrays {
+    path: PathBuf,
+    archive: ZipArchive<File>,
+}
+
+impl Arrays {
+    /// Opens a file and reads its list of arrays.
+    ///
+    /// # Errors
+    /// [`FileError`] for what is no ordinary file, is larger than memory, or is no NPZ.
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let length = source::ordinary(path)?.len();
+        if length as f64 > memory::allowed() {
+            return Err(FileError::broken(
+                path,
+                format!(
+                    "the file has {:.1} GB, and {:.1} GB of memory may be used. Save fewer arrays in it, or allow more with --memory-gb",
+                    length as f64 / 1e9,
+                    memory::allowed_gb()
+                ),
+            ));
+        }
+        let file = File::open(path).map_err(|e| FileError::of(path, &e))?;
+        let archive = ZipArchive::new(file).map_err(|e| {
+            FileError::broken(
+                path,
+                format!(
+                    "this is not a readable NPZ file ({e}): it may be cut off, or a single array (NPY). Write it with numpy.savez"
+                ),
+            )
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            archive,
+        })
+    }
+
+    /// Whether there is an array of this name.
+    #[must_use]
+    pub fn holds(&self, name: &str) -> bool {
+        self.archive.index_for_name(&member(name)).is_some()
+    }
+
+    /// Reads one array of numbers by name: of any type, byte order and order of rows and columns.
+    ///
+    /// # Errors
+    /// [`FileError`] naming the file and the array.
+    pub fn numbers(&mut self, name: &str) -> Result<Array, FileError> {
+        let Some(index) = self.archive.index_for_name(&member(name)) else {
+            return Err(self.missing(name));
+        };
+        let unreadable = |what: &dyn Display| {
+            FileError::broken(
+                &self.path,
+                format!("the array {} cannot be read: {what}", quote(name)),
+            )
+        };
+        let bytes = self.archive.by_index(index);
+        let bytes = bytes.map_err(|e| unreadable(&e))?;
+        npy::read(bytes).map_err(|e| unreadable(&e))
+    }
+
+    fn missing(&self, name: &str) -> FileError {
+        let others: Vec<String> = self
+            .archive
+            .file_names()
+            .filter_map(Result::ok)
+            .take(12)
+            .map(|n| quote(n.trim_end_matches(".npy")))
+            .collect();
+        let others = if others.is_empty() {
+            "nothing".to_owned()
+        } else {
+            others.join(", ")
+        };
+        FileError::broken(
+            &self.path,
+            format!(
+                "there is no array {} in it, but {others}. Save the array under that name",
+                quote(name)
+            ),
+        )
+    }
+}
+
+fn member(name: &str) -> String {
+    format!("{name}.npy")
+}
+
 /// Whether the file has an array of this name.
 ///
 /// # Errors
 /// [`FileError`] when it is no readable archive.
 pub fn holds(path: &Path, name: &str) -> Result<bool, FileError> {
-    let file = std::fs::File::open(path).map_err(|e| FileError::of(path, &e))?;
-    let archive = ZipArchive::new(file)
-        .map_err(|e| FileError::broken(path, format!("this is not a readable NPZ file ({e})")))?;
-    Ok(archive.index_for_name(&format!("{name}.npy")).is_some())
+    Ok(Arrays::open(path)?.holds(name))
 }
 
-/// Reads one array of numbers by name: its shape, and its values by rows whatever their order in the
-/// file.
+/// Reads one mask by name: an array of booleans, or of zeros and ones of any type.
 ///
 /// # Errors
-/// [`FileError`] naming the file and the array.
-pub fn read_numbers(path: &Path, name: &str) -> Result<(Vec<usize>, Vec<f64>), FileError> {
-    let broken = |e: &dyn std::fmt::Display| {
-        FileError::broken(path, format!("the array \"{name}\" cannot be read ({e})"))
-    };
-    if !holds(path, name)? {
+/// [`FileError`] naming the file and the mask.
+pub fn read_mask(path: &Path, name: &str) -> Result<Vec<bool>, FileError> {
+    let values = Arrays::open(path)?.numbers(name)?.values;
+    if let Some(at) = values.iter().position(|&v| v != 0.0 && v != 1.0) {
         return Err(FileError::broken(
             path,
-            format!("there is no array \"{name}\" in it"),
+            format!(
+                "the mask {} is {} at vertex {at}: a mask has 1 where it is painted and 0 elsewhere. Paint it again",
+                quote(name),
+                values[at]
+            ),
         ));
     }
-    let bytes = entry(path, name, &broken)?;
-    let header = npyz::NpyFile::new(&bytes[..]).map_err(|e| broken(&e))?;
-    let shape: Vec<usize> = header.shape().iter().map(|&n| n as usize).collect();
-    let fortran = header.order() == npyz::Order::Fortran;
-    let array = || npyz::NpyFile::new(&bytes[..]);
-    let read = || -> std::io::Result<Vec<f64>> {
-        if let Ok(values) = array()?.into_vec::<f64>() {
-            return Ok(values);
-        }
-        if let Ok(values) = array()?.into_vec::<f32>() {
-            return Ok(values.into_iter().map(f64::from).collect());
-        }
-        if let Ok(values) = array()?.into_vec::<i32>() {
-            return Ok(values.into_iter().map(f64::from).collect());
-        }
-        let values = array()?.into_vec::<i64>()?;
-        Ok(values.into_iter().map(|v| v as f64).collect())
-    };
-    let values = read().map_err(|e| broken(&e))?;
-    if values.len() != shape.iter().product::<usize>() {
-        return Err(broken(&"it ends too early"));
-    }
-    let values = match shape[..] {
-        [rows, columns] if fortran => (0..rows)
-            .flat_map(|r| (0..columns).map(move |c| c * rows + r))
-            .map(|k| values[k])
-            .collect(),
-        _ => values,
-    };
-    Ok((shape, values))
-}
-
-/// Reads one array of bytes or booleans by name.
-///
-/// # Errors
-/// [`FileError`] naming the file and the array.
-pub fn read_mask(path: &Path, name: &str) -> Result<Vec<bool>, FileError> {
-    let broken = |e: &dyn std::fmt::Display| {
-        FileError::broken(
-            path,
-            format!("the mask \"{name}\" cannot be read ({e}). Paint it again"),
-        )
-    };
-    let bytes = entry(path, name, &broken)?;
-    let array = npyz::NpyFile::new(&bytes[..]).map_err(|e| broken(&e))?;
-    array.into_vec::<bool>().map_err(|e| broken(&e))
-}
-
-/// The bytes of one array, as NPY; `broken` says what it means that they cannot be read.
-fn entry(
-    path: &Path,
-    name: &str,
-    broken: &dyn Fn(&dyn std::fmt::Display) -> FileError,
-) -> Result<Vec<u8>, FileError> {
-    let file = std::fs::File::open(path).map_err(|e| FileError::of(path, &e))?;
-    let mut archive = ZipArchive::new(file).map_err(|e| broken(&e))?;
-    let mut bytes = Vec::new();
-    archive
-        .by_name(&format!("{name}.npy"))
-        .map_err(|e| broken(&e))?
-        .read_to_end(&mut bytes)
-        .map_err(|e| broken(&e))?;
-    Ok(bytes)
+    Ok(values.into_iter().map(|v| v == 1.0).collect())
 }
 
 #[cfg(test)]

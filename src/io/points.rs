@@ -1,12 +1,13 @@
 //! Given touches and sites, and the answers to them, as CSV with the units in the column names.
 
-use std::collections::HashMap;
 use std::io::Write as _;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use glam::DVec3;
 
 use super::npz::NpzFile;
+use super::table::{Row, Table};
 use super::{FileError, atomic};
 use crate::elasticity::Touch;
 use crate::given::{Answer, GivenSite};
@@ -23,34 +24,32 @@ const TOUCHES: [&str; 8] = [
 ];
 const SITES: [&str; 6] = ["x_mm", "y_mm", "z_mm", "dx", "dy", "dz"];
 
-/// Reads touches: `x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm`, n being the outward normal.
+/// Forces (N) and tip radii (mm) that a robot may meet; beyond them the numbers of the model leave their range.
+const FORCES: RangeInclusive<f64> = 1e-9..=1e9;
+const TIPS: RangeInclusive<f64> = 1e-3..=1e6;
+
+/// Reads touches: `x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm`, n being the outward normal. Further
+/// columns are ignored.
 ///
 /// # Errors
 /// [`FileError`] naming the file, the line and the column.
 pub fn read_touches(path: &Path) -> Result<Vec<Touch>, FileError> {
-    let table = read(path, &TOUCHES)?;
-    table
-        .into_iter()
-        .map(|(line, v)| {
-            let normal = DVec3::new(v[3], v[4], v[5]);
-            let wrong = |what: &str| Err(FileError::broken(path, format!("line {line}: {what}")));
-            if normal.length() < 1e-9 {
-                return wrong("nx, ny, nz is no direction: give the outward unit normal");
-            }
-            if v[6] <= 0.0 {
-                return wrong("force_n must be above zero: it presses along -n");
-            }
-            if v[7] <= 0.0 {
-                return wrong("tip_radius_mm must be above zero");
-            }
-            Ok(Touch {
-                position: DVec3::new(v[0], v[1], v[2]) * 1e-3,
-                normal: normal.normalize(),
-                force: v[6],
-                tip_radius: v[7] * 1e-3,
-            })
+    read(path, &TOUCHES, |row, [x, y, z, nx, ny, nz, force, tip]| {
+        Ok(Touch {
+            position: DVec3::new(x, y, z) * 1e-3,
+            normal: direction(DVec3::new(nx, ny, nz)).ok_or_else(|| {
+                row.wrong("nx, ny, nz is no direction: give the outward unit normal")
+            })?,
+            force: ranged(
+                row,
+                "force_n",
+                force,
+                &FORCES,
+                "above zero, as it presses along -n",
+            )?,
+            tip_radius: 1e-3 * ranged(row, "tip_radius_mm", tip, &TIPS, "above zero")?,
         })
-        .collect()
+    })
 }
 
 /// Reads gauges: `x_mm,y_mm,z_mm,dx,dy,dz`, d being the direction the gauge measures along. Further
@@ -59,67 +58,66 @@ pub fn read_touches(path: &Path) -> Result<Vec<Touch>, FileError> {
 /// # Errors
 /// [`FileError`] naming the file, the line and the column.
 pub fn read_sites(path: &Path) -> Result<Vec<GivenSite>, FileError> {
-    let table = read(path, &SITES)?;
-    table
-        .into_iter()
-        .map(|(line, v)| {
-            let direction = DVec3::new(v[3], v[4], v[5]);
-            if direction.length() < 1e-9 {
-                return Err(FileError::broken(
-                    path,
-                    format!("line {line}: dx, dy, dz is no direction"),
-                ));
-            }
-            Ok(GivenSite {
-                position: DVec3::new(v[0], v[1], v[2]) * 1e-3,
-                direction: direction.normalize(),
-            })
+    read(path, &SITES, |row, [x, y, z, dx, dy, dz]| {
+        Ok(GivenSite {
+            position: DVec3::new(x, y, z) * 1e-3,
+            direction: direction(DVec3::new(dx, dy, dz)).ok_or_else(|| {
+                row.wrong("dx, dy, dz is no direction: give the one the gauge measures along")
+            })?,
         })
-        .collect()
+    })
 }
 
-/// The columns asked for of every row, with the row's line; columns may come in any order.
-fn read<const N: usize>(path: &Path, names: &[&str; N]) -> Result<Vec<(u64, [f64; N])>, FileError> {
-    let bytes = std::fs::read(path).map_err(|e| FileError::of(path, &e))?;
-    let broken = |message: String| FileError::broken(path, message);
-    // Programs that write tables like to begin them with a byte-order mark.
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_reader(text);
-    let header = reader
-        .headers()
-        .map_err(|e| broken(format!("this is not a readable table ({e})")))?
-        .clone();
-    let known: HashMap<&str, usize> = header.iter().enumerate().map(|(k, h)| (h, k)).collect();
-    let mut columns = [0; N];
-    for (column, name) in columns.iter_mut().zip(names) {
-        *column = *known.get(name).ok_or_else(|| {
-            broken(format!(
-                "the column {name} is missing: the first line must name {}",
-                names.join(",")
-            ))
-        })?;
+/// The line of a table of touches or gauges that one of them stands in, counted as they were read, from 0.
+#[must_use]
+pub fn line(path: &Path, number: usize) -> Option<u64> {
+    let table = Table::read(path).ok()?;
+    let row = table.rows().nth(number)?.ok()?;
+    Some(row.line())
+}
+
+/// The unit vector along `v`, if it has a direction. Its size is taken out first: the squares of what is very
+/// large or very small are no numbers.
+fn direction(v: DVec3) -> Option<DVec3> {
+    let size = v.abs().max_element();
+    (size > 0.0).then(|| (v / size).normalize())
+}
+
+fn ranged(
+    row: &Row,
+    name: &str,
+    value: f64,
+    range: &RangeInclusive<f64>,
+    rule: &str,
+) -> Result<f64, FileError> {
+    if range.contains(&value) {
+        return Ok(value);
     }
-    let mut rows = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|e| broken(format!("this is not a readable table ({e})")))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let mut values = [0.0; N];
-        for ((value, &column), name) in values.iter_mut().zip(&columns).zip(names) {
-            let text = record.get(column).unwrap_or_default();
-            let number = text.parse::<f64>().ok().filter(|x| x.is_finite());
-            *value = number.ok_or_else(|| {
-                broken(format!(
-                    "line {line}: {name} is \"{text}\", which is no number"
-                ))
-            })?;
-        }
-        rows.push((line, values));
-    }
+    Err(row.wrong(format!(
+        "{name} must be {rule}, and from {:e} to {:e}",
+        range.start(),
+        range.end()
+    )))
+}
+
+/// What `take` makes of the columns asked for of every row; columns may come in any order.
+fn read<const N: usize, T>(
+    path: &Path,
+    names: &[&str; N],
+    take: impl Fn(&Row, [f64; N]) -> Result<T, FileError>,
+) -> Result<Vec<T>, FileError> {
+    let table = Table::read(path)?;
+    let columns = table.columns(names)?;
+    let rows: Result<Vec<T>, FileError> = table
+        .rows()
+        .map(|row| {
+            let row = row?;
+            take(&row, row.numbers(&columns)?)
+        })
+        .collect();
+    let rows = rows?;
     if rows.is_empty() {
-        return Err(broken("there is no row below the first line".into()));
+        return Err(table.wrong("there is no row below the first line"));
     }
     Ok(rows)
 }
@@ -207,12 +205,14 @@ mod tests {
     fn what_is_wrong_is_named_with_its_line() {
         let head = "x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm\n";
         for (rows, part) in [
-            ("1,2,3,0,0,1,10,5\n1,2,x,0,0,1,10,5\n", "line 3: z_mm"),
+            ("1,2,3,0,0,1,10,5\n1,2,x,0,0,1,10,5\n", "line 3: “z_mm” is “x”"),
             ("1,2,3,0,0,0,10,5\n", "nx, ny, nz"),
             ("1,2,3,0,0,1,-10,5\n", "force_n"),
             ("1,2,3,0,0,1,10,0\n", "tip_radius_mm"),
             ("1,2,nan,0,0,1,10,5\n", "no number"),
-            ("1,2,3\n", "readable"),
+            ("1,2,3\n", "line 2: there are 3 values for the 8 columns"),
+            ("1,,3,0,0,1,10,5\n", "“y_mm” is empty"),
+            ("1,2,1e999,0,0,1,10,5\n", "finite"),
             ("", "no row"),
         ] {
             let (_keep, path) = file(&format!("{head}{rows}"));

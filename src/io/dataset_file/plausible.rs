@@ -1,0 +1,201 @@
+//! Places that cannot be meant: too far from the others, in another unit, or all the same.
+
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::FileError;
+use crate::plain::mm;
+
+/// Wider than any part that is pressed by hand (mm): a place in another unit, or a slip.
+const WIDEST: f64 = 20_000.0;
+/// Touches and sites lie on one part; spreads as different as this are worth a word.
+const UNLIKE: f64 = 100.0;
+/// A spread that is wide, and so much wider than the other, is in another unit (mm).
+const WIDE: f64 = 2_000.0;
+/// Places nearer than this are one (mm).
+const ONE: f64 = 1e-6;
+
+/// Where places stand in a file, so that a message can name one.
+pub struct Origin {
+    path: PathBuf,
+    /// Touches or sites.
+    what: &'static str,
+    kind: Kind,
+}
+
+enum Kind {
+    /// Rows of an array, in metres.
+    Array(&'static str),
+    /// Lines of a table, in millimetres.
+    Lines(Vec<u64>),
+    /// Nodes of exported results.
+    Nodes(Vec<u64>),
+}
+
+impl Origin {
+    pub fn array(path: &Path, what: &'static str, name: &'static str) -> Self {
+        Self::of(path, what, Kind::Array(name))
+    }
+
+    pub fn lines(path: &Path, what: &'static str, lines: Vec<u64>) -> Self {
+        Self::of(path, what, Kind::Lines(lines))
+    }
+
+    pub fn nodes(path: &Path, what: &'static str, nodes: Vec<u64>) -> Self {
+        Self::of(path, what, Kind::Nodes(nodes))
+    }
+
+    fn of(path: &Path, what: &'static str, kind: Kind) -> Self {
+        Self {
+            path: path.to_owned(),
+            what,
+            kind,
+        }
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn name(&self, number: usize) -> String {
+        match &self.kind {
+            Kind::Array(name) => format!("{name}[{number}]"),
+            Kind::Lines(lines) => format!("line {}", lines[number]),
+            Kind::Nodes(nodes) => format!("node {}", nodes[number]),
+        }
+    }
+
+    /// What to do about a unit.
+    fn unit(&self) -> String {
+        match self.kind {
+            Kind::Array(name) => {
+                format!("{name} is in metres: divide it by 1000 if it is in millimetres")
+            }
+            Kind::Lines(_) => "x_mm, y_mm and z_mm are in millimetres".to_owned(),
+            Kind::Nodes(_) => "check the unit in the first line of the exports".to_owned(),
+        }
+    }
+
+    fn wrong(&self, what: impl Display) -> FileError {
+        FileError::broken(&self.path, what)
+    }
+}
+
+/// Places, and where they stand.
+pub struct Places<'a> {
+    origin: &'a Origin,
+    /// mm.
+    points: Vec<DVec3>,
+}
+
+impl<'a> Places<'a> {
+    /// Of finite points (mm).
+    pub fn new(origin: &'a Origin, points: impl Iterator<Item = DVec3>) -> Self {
+        Self {
+            origin,
+            points: points.collect(),
+        }
+    }
+
+    /// mm.
+    fn spread(&self) -> f64 {
+        spread(&self.points)
+    }
+
+    /// The median of each coordinate (mm): one place far away does not move it.
+    fn middle(&self) -> DVec3 {
+        let of = |axis: usize| median(self.points.iter().map(|p| p[axis]));
+        DVec3::new(of(0), of(1), of(2))
+    }
+
+    /// Refuses what is wider than any part: one place by its name, or all for their unit.
+    fn within_reach(&self) -> Result<(), FileError> {
+        let spread = self.spread();
+        if spread <= WIDEST {
+            return Ok(());
+        }
+        let origin = self.origin;
+        let middle = self.middle();
+        let distances: Vec<f64> = self
+            .points
+            .iter()
+            .map(|&p| (p - middle).abs().max_element())
+            .collect();
+        let near = median(distances.iter().copied());
+        let farthest = (distances.into_iter().zip(0..)).max_by(|a, b| a.0.total_cmp(&b.0));
+        Err(match farthest {
+            Some((distance, number)) if 2.0 * near < WIDE => origin.wrong(format!(
+                "{}: this one of the {} lies {} from their middle, and half of them lie within {} of it. Check the number, or take it out",
+                origin.name(number),
+                origin.what,
+                mm(distance),
+                mm(near)
+            )),
+            _ => origin.wrong(format!(
+                "the {} are spread over {}, wider than any part. {}",
+                origin.what,
+                mm(spread),
+                origin.unit()
+            )),
+        })
+    }
+
+    fn check_touches(&self) -> Result<(), FileError> {
+        if self.spread() > ONE {
+            return Ok(());
+        }
+        Err(self.origin.wrong(match self.points.len() {
+            1 => "there is one touch only: to tell places apart takes touches at several".to_owned(),
+            n => format!("all {n} touches lie at one place: there is nothing to tell apart"),
+        }))
+    }
+}
+
+/// What a reader of a dataset must know about its places.
+///
+/// # Errors
+/// [`FileError`] naming the file and, where one is to blame, the place.
+pub fn check(touches: &Places, sites: &Places) -> Result<Vec<String>, FileError> {
+    touches.within_reach()?;
+    sites.within_reach()?;
+    touches.check_touches()?;
+    let (pressed, read) = (touches.spread(), sites.spread());
+    let (narrow, wide) = (pressed.min(read), pressed.max(read));
+    if sites.points.len() < 2 || wide <= UNLIKE * narrow {
+        return Ok(Vec::new());
+    }
+    let unlike = format!(
+        "the sites are spread over {} and the touches over {}, though both lie on one part",
+        mm(read),
+        mm(pressed)
+    );
+    let odd = if read > pressed { sites } else { touches };
+    if wide > WIDE {
+        return Err(odd.origin.wrong(format!("{unlike}. {}", odd.origin.unit())));
+    }
+    Ok(vec![format!("Check the units: {unlike}.")])
+}
+
+/// The longest side of the box around some points, in their unit; zero of none. No square is taken: it may leave
+/// the range of numbers.
+pub fn spread(points: &[DVec3]) -> f64 {
+    let Some(&first) = points.first() else {
+        return 0.0;
+    };
+    let (lower, upper) = points
+        .iter()
+        .fold((first, first), |(l, u), &p| (l.min(p), u.max(p)));
+    (upper - lower).max_element()
+}
+
+/// The middle one of some numbers; zero of none.
+fn median(numbers: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = numbers.collect();
+    if sorted.is_empty() {
+        return 0.0;
+    }
+    let half = sorted.len() / 2;
+    *sorted.select_nth_unstable_by(half, f64::total_cmp).1
+}
