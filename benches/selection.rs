@@ -19,9 +19,9 @@ use hapdef::placement::information::Geometry;
 use hapdef::placement::mutual_information::MutualInformation;
 use hapdef::placement::pca_qr::PcaQr;
 use hapdef::placement::{Pool, Request, Selection, Selector, Wishes};
-use hapdef::regression::Hyper;
 use hapdef::regression::folds::evenly;
 use hapdef::regression::tune::Effort;
+use hapdef::regression::{Grouping, Hyper};
 use timing::{cpu_seconds, reference_seconds};
 
 const FILE: &str = "benches/selection.md";
@@ -143,6 +143,7 @@ fn svr(hyper: Hyper) -> GreedySvr {
         hyper,
         folds: 5,
         seed: 0,
+        grouping: Grouping::Touch,
         effort: Effort {
             tolerance: 0.05,
             max_steps: 1_000_000,

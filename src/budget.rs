@@ -79,6 +79,8 @@ pub enum StopReason {
     EffortSpent,
     /// The data carry no more information (numerical rank reached).
     Exhausted,
+    /// What was wished (spacing, what all may cost) leaves no room for more.
+    NoRoom,
 }
 
 /// What was really reached, beside what was asked for.

@@ -9,6 +9,7 @@ pub mod limb;
 pub mod listen;
 pub mod out;
 pub mod progress;
+pub mod ranges;
 pub mod render;
 pub mod select;
 pub mod simulate;

@@ -15,7 +15,7 @@ use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Signal, SignalMatrix};
 use crate::regression::folds::evenly;
 use crate::regression::tune::{self, CrossValidation, Effort, Grid, distances};
-use crate::regression::{Hyper, PositionModel};
+use crate::regression::{Grouping, Hyper, PositionModel, scale};
 
 /// A named part of the touches.
 #[derive(Clone, Debug, PartialEq)]
@@ -171,7 +171,7 @@ fn fail(
                     test: &noisy.test.select_rows(&set.rows),
                     test_targets: trial.test_targets,
                     hyper: hypers[k],
-                    effort: tuning_effort(budget),
+                    effort: tuning_effort(budget, trial),
                     failed: MOST_FAILED,
                     subsets: budget.failure_subsets,
                     seed: trial.seed,
@@ -260,8 +260,11 @@ fn tune_sets(
     let validation = CrossValidation {
         folds: budget.folds.min(3),
         seed: trial.seed,
-        effort: tuning_effort(budget),
+        // Computed touches lie apart.
+        grouping: Grouping::Touch,
+        effort: tuning_effort(budget, trial),
     };
+    let grid = Grid::default().scaled(scale::decade(trial.train_targets));
     let columns = evenly(trial.train_targets.len(), budget.tuning_touches);
     let targets: Vec<[f64; 3]> = columns.iter().map(|&c| trial.train_targets[c]).collect();
     let mut hypers: Vec<Hyper> = Vec::with_capacity(sets.len());
@@ -286,7 +289,7 @@ fn tune_sets(
             }
         } else {
             let x = noisy.train.select_rows(&set.rows).select_columns(&columns);
-            let (search, cost) = tune::search(&x, &targets, &Grid::default(), &validation, watch)?;
+            let (search, cost) = tune::search(&x, &targets, &grid, &validation, watch)?;
             *work += cost;
             known.push((set.selector.clone(), size, search.best()));
             search.best()
@@ -297,11 +300,12 @@ fn tune_sets(
 }
 
 /// A search needs the order of the settings, not their last digit.
-fn tuning_effort(budget: &Budget) -> Effort {
-    Effort {
+fn tuning_effort(budget: &Budget, trial: &Trial) -> Effort {
+    let effort = Effort {
         tolerance: budget.svr_tolerance_mm.max(0.1),
         max_steps: budget.svr_steps.min(200_000),
-    }
+    };
+    effort.scaled(scale::decade(trial.train_targets))
 }
 
 fn judge(
@@ -315,6 +319,7 @@ fn judge(
         tolerance: budget.svr_tolerance_mm,
         max_steps: budget.svr_steps,
     };
+    let effort = effort.scaled(scale::decade(trial.train_targets));
     let train = noisy.train.select_rows(&set.rows);
     let model = PositionModel::train(&train, trial.train_targets, hyper, effort);
     let predicted = model.predict(&noisy.test.select_rows(&set.rows));

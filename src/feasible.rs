@@ -90,9 +90,7 @@ impl Feasibility {
     /// How many sites each filter took, of those that had passed the ones before.
     #[must_use]
     pub fn taken(&self) -> Vec<(Filter, usize)> {
-        Filter::ALL
-            .map(|f| (f, self.taken_by(f).count()))
-            .to_vec()
+        Filter::ALL.map(|f| (f, self.taken_by(f).count())).to_vec()
     }
 
     /// The sites that a filter took, rising.

@@ -8,21 +8,27 @@ use hapdef::cli::{self, Cli, Command, out};
 fn main() -> ExitCode {
     let outcome = match Cli::try_parse() {
         Ok(cli) => run(&cli),
-        Err(wrong) if wrong.use_stderr() => {
-            // With stderr closed the exit code alone says it.
-            let _ = wrong.print();
-            return ExitCode::from(2);
-        }
+        Err(wrong) if wrong.use_stderr() => return misused(&wrong),
         Err(help) => out::printed(help.print()),
     };
     match outcome {
         Err(error) if !out::reader_left(&error) => {
+            if let Some(wrong) = error.downcast_ref() {
+                return misused(wrong);
+            }
             let message = hapdef::plain::message(&format!("{error:#}"));
             out::say(&format!("hapdef: {message}"));
             ExitCode::FAILURE
         }
         _ => ExitCode::SUCCESS,
     }
+}
+
+/// Says what is wrong with the arguments.
+fn misused(wrong: &clap::Error) -> ExitCode {
+    // With stderr closed the exit code alone says it.
+    let _ = wrong.print();
+    ExitCode::from(2)
 }
 
 fn run(cli: &Cli) -> anyhow::Result<()> {

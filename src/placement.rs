@@ -133,6 +133,25 @@ pub enum PlacementError {
     #[error("{touches} touches are too few to learn from: ask for at least {least}")]
     TooFewTouches { touches: usize, least: usize },
     #[error(
+        "{places} places are too few to learn from and to judge on in {folds} folds: at least {least} are needed, or fewer folds (the {touches} touches are repeats of them, which are never divided)"
+    )]
+    TooFewPlaces {
+        places: usize,
+        touches: usize,
+        folds: usize,
+        least: usize,
+    },
+    #[error(
+        "{touches} touches are too few to learn from and to judge on in {folds} folds: at least {least} are needed, or fewer folds"
+    )]
+    TooFewForFolds {
+        touches: usize,
+        folds: usize,
+        least: usize,
+    },
+    #[error("no gauge can be placed: {why}")]
+    NoRoom { why: String },
+    #[error(
         "the covariance of the sites is singular: raise the noise of the Gaussian process or merge sites that lie together"
     )]
     Singular,

@@ -631,7 +631,8 @@ impl Project {
         };
         let found = masks.get(name).ok_or_else(|| BadValue {
             key: key.into(),
-            rule: "the name of an array beside the project file or of a group of the mesh file".into(),
+            rule: "the name of an array beside the project file or of a group of the mesh file"
+                .into(),
             value: format!("\"{name}\" (there is {})", names(masks)),
         })?;
         Ok(Some(found))

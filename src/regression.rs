@@ -5,10 +5,13 @@ pub mod features;
 pub mod folds;
 pub mod kernel;
 pub mod lowrank;
+pub mod places;
 pub mod predictor;
+pub mod scale;
 pub mod svr;
 pub mod tune;
 
 pub use features::Standardizer;
+pub use places::Grouping;
 pub use svr::{Fit, SvrParams};
 pub use tune::{Hyper, PositionModel};

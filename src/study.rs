@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::budget::{Cancelled, Watch};
+use crate::budget::Watch;
 use crate::dataset::SignalMatrix;
 use crate::evaluation::add_noise;
 use crate::evaluation::failures::{FailureRow, FailureTrial, failures};
@@ -18,9 +18,9 @@ use crate::placement::pca_qr::PcaQr;
 use crate::placement::{
     PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes,
 };
-use crate::regression::folds::{Folds, evenly};
+use crate::regression::folds::{Folds, evenly, hold_out, number_of};
 use crate::regression::tune::{self, CrossValidation, Grid, distances};
-use crate::regression::{Hyper, PositionModel};
+use crate::regression::{Hyper, PositionModel, Standardizer, scale};
 
 /// Signals of sites under touches.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -79,10 +79,24 @@ pub fn select(
     watch: Watch,
     found: &(dyn Fn(&SensorSet) + Sync),
 ) -> Result<Choice, PlacementError> {
+    /// A choice that is not learned from needs signals that differ.
+    const LEAST: usize = 2;
+    let touches = data.targets.len();
+    if touches < LEAST {
+        return Err(PlacementError::TooFewTouches {
+            touches,
+            least: 2 * settings.svr.folds,
+        });
+    }
     let noisy = add_noise(&data.x, settings.noise, settings.svr.seed);
     let open: Vec<usize> = (0..noisy.rows())
         .filter(|s| !kept_out.contains(s))
         .collect();
+    if open.is_empty() {
+        return Err(PlacementError::Wish {
+            what: "every site is kept out: leave some to choose from",
+        });
+    }
     let place = |site: &usize| open.iter().position(|o| o == site);
     let required: Option<Vec<usize>> = wishes.required.iter().map(place).collect();
     let wishes = Wishes {
@@ -202,14 +216,14 @@ fn straight(
 /// the first that reaches the wished error are dropped.
 ///
 /// # Errors
-/// [`Cancelled`] when the watch asks for it.
+/// [`PlacementError`] for too few touches, or when the watch asks for a stop.
 pub fn add_criteria(
     data: &Data,
     selection: &mut Selection,
     wishes: &Wishes,
     settings: &Settings,
     watch: Watch,
-) -> Result<(), Cancelled> {
+) -> Result<(), PlacementError> {
     let noisy = add_noise(&data.x, settings.noise, settings.svr.seed);
     let all: Vec<usize> = (0..noisy.rows()).collect();
     let pool = Pool {
@@ -274,8 +288,40 @@ pub fn audit(
 /// The fold that each touch is tested in, so that anyone can compute the criterion again.
 #[must_use]
 pub fn folds(data: &Data, settings: &Settings) -> Vec<usize> {
-    let svr = &settings.svr;
-    Folds::draw(data.targets.len(), svr.folds, svr.seed).of_touches()
+    fold_of_touch(&settings.svr, &data.targets)
+}
+
+fn fold_of_touch(svr: &GreedySvr, targets: &[[f64; 3]]) -> Vec<usize> {
+    Folds::of_groups(&svr.grouping.of(targets), svr.folds, svr.seed).of_touches()
+}
+
+/// How many groups of touches there are that are never divided between learning and judging.
+#[must_use]
+pub fn places(svr: &GreedySvr, targets: &[[f64; 3]]) -> usize {
+    number_of(&svr.grouping.of(targets))
+}
+
+/// A word on touches that repeat places, where some do.
+#[must_use]
+pub fn place_note(svr: &GreedySvr, targets: &[[f64; 3]]) -> Option<String> {
+    let (places, touches) = (places(svr, targets), targets.len());
+    (places < touches).then(|| {
+        format!(
+            "{touches} touches lie at {places} places: none is learned from and judged on at the same place (--split touch divides them one by one)."
+        )
+    })
+}
+
+/// A word on each of the sites whose signal never changes.
+fn constant_notes(x: &SignalMatrix, sites: &[usize]) -> Vec<String> {
+    let constant = Standardizer::of(&x.select_rows(sites)).constant_rows();
+    let said = |row: usize| {
+        format!(
+            "Site {} reports the same under every touch: it tells nothing.",
+            sites[row]
+        )
+    };
+    constant.into_iter().map(said).collect()
 }
 
 /// What is asked about given sites.
@@ -315,6 +361,9 @@ pub struct Verdict {
     pub failures: Vec<FailureRow>,
     /// The touches that were held out.
     pub test_touches: Vec<usize>,
+    /// Groups of touches that were not divided.
+    pub places: usize,
+    pub notes: Vec<String>,
 }
 
 /// Judges given sites.
@@ -323,14 +372,11 @@ pub struct Verdict {
 /// [`PlacementError`] for too few touches, or when the watch asks for a stop.
 pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdict, PlacementError> {
     let svr = question.svr;
-    let count = data.targets.len();
-    let tests = (question.held_out * count as f64).round() as usize;
-    let least = 2 * svr.folds;
-    if tests == 0 || count - tests < least {
-        return Err(PlacementError::TooFewTouches {
-            touches: count,
-            least: least + 1,
-        });
+    let groups = svr.grouping.of(&data.targets);
+    let places = number_of(&groups);
+    if !question.divides(places) {
+        let least = (places..=MOST_PLACES).find(|&n| question.divides(n));
+        return Err(svr.too_few(&groups, least.unwrap_or(MOST_PLACES)));
     }
     let noisy = add_noise(&data.x, question.noise, svr.seed);
     let all: Vec<usize> = (0..noisy.rows()).collect();
@@ -345,9 +391,9 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
         .collect();
     let criteria_mm = svr.criteria(&pool, &prefixes, watch)?;
     // Another draw than the folds'.
-    let order = Folds::draw(count, 2, svr.seed.wrapping_add(0x7e57)).order;
-    let (test, train) = order.split_at(tests);
-    let split = Split::new(&noisy, &data.targets, train, test);
+    let draw = svr.seed.wrapping_add(0x7e57);
+    let (mut test, train) = hold_out(&groups, question.tests(places), draw);
+    let split = Split::new(&noisy, &data.targets, &train, &test);
     let errors: Result<Vec<HeldOut>, PlacementError> = prefixes
         .iter()
         .map(|rows| split.judge(rows, question, watch))
@@ -372,16 +418,35 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
         },
         watch,
     )?;
-    let mut test_touches = test.to_vec();
-    test_touches.sort_unstable();
+    test.sort_unstable();
+    let mut notes = constant_notes(&noisy, question.sites);
+    notes.extend(place_note(svr, &data.targets));
     Ok(Verdict {
         criteria_mm,
-        fold_of_touch: Folds::draw(count, svr.folds, svr.seed).of_touches(),
+        fold_of_touch: fold_of_touch(svr, &data.targets),
         errors,
         baseline,
         failures,
-        test_touches,
+        test_touches: test,
+        places,
+        notes,
     })
+}
+
+/// More places than any data have.
+const MOST_PLACES: usize = 10_000_000;
+
+impl Question<'_> {
+    /// How many of so many places are held out.
+    fn tests(&self, places: usize) -> usize {
+        (self.held_out * places as f64).round() as usize
+    }
+
+    /// Whether so many places leave some to judge on and enough to learn from.
+    fn divides(&self, places: usize) -> bool {
+        let tests = self.tests(places);
+        tests > 0 && places.saturating_sub(tests) >= 2 * self.svr.folds
+    }
 }
 
 /// Touches to learn from and touches to judge on.
@@ -419,10 +484,12 @@ impl Split {
             let validation = CrossValidation {
                 folds: 3,
                 seed: svr.seed,
+                grouping: svr.grouping,
                 effort: svr.effort,
             };
             let x = train.select_columns(&some);
-            tune::search(&x, &targets, &Grid::default(), &validation, watch)?
+            let grid = Grid::default().scaled(scale::relative(&self.train_targets));
+            tune::search(&x, &targets, &grid, &validation, watch)?
                 .0
                 .best()
         } else {

@@ -141,7 +141,9 @@ fn attempt(
     if own_mm <= judge.element_mm() {
         return Err(BadValue {
             key: "the elements of this setting".into(),
-            rule: "larger than those of the model that judges it, which memory does not let be finer".into(),
+            rule:
+                "larger than those of the model that judges it, which memory does not let be finer"
+                    .into(),
             value: format!("{own_mm:.2} mm"),
         }
         .into());

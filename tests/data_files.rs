@@ -61,10 +61,7 @@ fn floats(shape: &str, values: &[f64]) -> Vec<u8> {
 
 /// Three touches, a few centimetres apart.
 fn touches() -> Vec<u8> {
-    floats(
-        "(3, 3)",
-        &[0.0, 0.0, 0.0, 0.03, 0.0, 0.0, 0.0, 0.05, 0.01],
-    )
+    floats("(3, 3)", &[0.0, 0.0, 0.0, 0.03, 0.0, 0.0, 0.0, 0.05, 0.01])
 }
 
 fn signals() -> Vec<u8> {
@@ -89,7 +86,8 @@ fn refused(path: &Path, touches: Option<&Path>, words: &[&str]) {
 fn counts_and_floats_of_any_type_and_order_are_numbers() {
     let folder = Folder::new();
     let counts = [0u8, 1, 1, 2, 3, 100];
-    let wide = |bytes: fn(u8) -> Vec<u8>| -> Vec<u8> { counts.iter().flat_map(|&v| bytes(v)).collect() };
+    let wide =
+        |bytes: fn(u8) -> Vec<u8>| -> Vec<u8> { counts.iter().flat_map(|&v| bytes(v)).collect() };
     let cases: [(&str, Vec<u8>); 16] = [
         ("'|i1'", wide(|v| vec![v])),
         ("'|u1'", wide(|v| vec![v])),
@@ -168,7 +166,11 @@ fn an_array_is_not_taken_before_it_is_known_to_fit() {
     ] {
         let x = npy("'<f8'", false, shape, &[0; 400_000]);
         let path = folder.npz("bomb.npz", &[("X", &x), ("p_m", &touches())]);
-        refused(&path, None, &[&["bomb.npz", "“X”"][..], &words[..]].concat());
+        refused(
+            &path,
+            None,
+            &[&["bomb.npz", "“X”"][..], &words[..]].concat(),
+        );
     }
     // Brackets that a reader of Python would follow down, and a header that is longer than the file.
     let deep = npy(&"(".repeat(60_000), false, "(2, 3)", &[]);
@@ -284,10 +286,18 @@ fn a_point_farther_than_the_part_is_large_is_named() {
         says(&said, words);
         assert!(!folder.path("r.csv").exists());
     };
-    for (x, distance) in [("1e160", "1.0e160 mm"), ("-1e90", "1.0e90 mm"), ("5000", " mm from")] {
+    for (x, distance) in [
+        ("1e160", "1.0e160 mm"),
+        ("-1e90", "1.0e90 mm"),
+        ("5000", " mm from"),
+    ] {
         let rows = format!("{TOUCHES}31.8,0,60,1,0,0,5,4\n# far\n{x},0,60,1,0,0,5,4\n");
         let touches = folder.file("far.csv", rows);
-        simulate(&touches, &sites, &["far.csv, line 4: touch 1", distance, "across"]);
+        simulate(
+            &touches,
+            &sites,
+            &["far.csv, line 4: touch 1", distance, "across"],
+        );
     }
     let far = folder.file("far.csv", "x_mm,y_mm,z_mm,dx,dy,dz\n30,8,1e200,0,0,1\n");
     simulate(&near, &far, &["far.csv, line 2: site 0", "1.0e200 mm"]);
@@ -366,16 +376,44 @@ fn what_is_wrong_in_a_table_is_named_with_its_cause() {
     let cases: [(&str, &str, &[&str]); 12] = [
         (data, "x_mm;y_mm;z_mm\n1;2;3\n", &["t.csv", "semicolons"]),
         (data, "x_mm\ty_mm\tz_mm\n1\t2\t3\n", &["t.csv", "tabs"]),
-        (data, "x_mm,y_mm,z_mm\n1,5,2,3\n", &["t.csv", "line 2", "4 values for the 3"]),
-        (data, "x_mm,y_mm,z_mm,x_mm\n1,2,3,4\n", &["t.csv", "x_mm stands twice"]),
+        (
+            data,
+            "x_mm,y_mm,z_mm\n1,5,2,3\n",
+            &["t.csv", "line 2", "4 values for the 3"],
+        ),
+        (
+            data,
+            "x_mm,y_mm,z_mm,x_mm\n1,2,3,4\n",
+            &["t.csv", "x_mm stands twice"],
+        ),
         (data, "x_mm,y_mm\n1,2\n", &["t.csv", "z_mm is missing"]),
         (data, "x_mm,y_mm,z_mm\n", &["t.csv", "no row"]),
         (data, "", &["t.csv", "empty"]),
-        (data, "x_mm,y_mm,z_mm\n1,2,3\n4,5,6\n", &["d.csv", "3 columns (from “a”)", "2 touches"]),
-        ("x_mm,y_mm,z_mm,a,b,c\n1,0,0,1,two,3\n", good, &["d.csv", "line 2", "“b” is “two”"]),
-        ("x_mm,y_mm,z_mm,a,b,c\n1,0,0,1,nan,3\n", good, &["d.csv", "line 2", "“b” is “nan”"]),
-        ("x_mm,y_mm,z_mm,a,b,c\n\n1,0,0,1,,3\n", good, &["d.csv", "line 3", "“b” is empty"]),
-        ("x_mm,y_mm,z_mm,cost,a,b,c\n1,0,0,-1,1,2,3\n", good, &["d.csv", "cost of site 0"]),
+        (
+            data,
+            "x_mm,y_mm,z_mm\n1,2,3\n4,5,6\n",
+            &["d.csv", "3 columns (from “a”)", "2 touches"],
+        ),
+        (
+            "x_mm,y_mm,z_mm,a,b,c\n1,0,0,1,two,3\n",
+            good,
+            &["d.csv", "line 2", "“b” is “two”"],
+        ),
+        (
+            "x_mm,y_mm,z_mm,a,b,c\n1,0,0,1,nan,3\n",
+            good,
+            &["d.csv", "line 2", "“b” is “nan”"],
+        ),
+        (
+            "x_mm,y_mm,z_mm,a,b,c\n\n1,0,0,1,,3\n",
+            good,
+            &["d.csv", "line 3", "“b” is empty"],
+        ),
+        (
+            "x_mm,y_mm,z_mm,cost,a,b,c\n1,0,0,-1,1,2,3\n",
+            good,
+            &["d.csv", "cost of site 0"],
+        ),
     ];
     for (data, touches, words) in cases {
         let data = folder.file("d.csv", data);
@@ -389,15 +427,31 @@ fn what_is_wrong_in_a_table_is_named_with_its_cause() {
 
 #[test]
 fn exports_of_other_meshes_and_units_are_not_joined() {
-    let header = "Node Number\tX Location (mm)\tY Location (mm)\tZ Location (mm)\tTotal Deformation (m)\n";
+    let header =
+        "Node Number\tX Location (mm)\tY Location (mm)\tZ Location (mm)\tTotal Deformation (m)\n";
     let first = format!("{header}1\t0\t0\t0\t5\n2\t40\t0\t0\t6\n");
     let cases = [
-        (format!("{header}1\t0\t0\t0\t5\n2\t50\t0\t0\t6\n"), "different meshes"),
+        (
+            format!("{header}1\t0\t0\t0\t5\n2\t50\t0\t0\t6\n"),
+            "different meshes",
+        ),
         (first.replace("(m)", "(mm)"), "“mm”"),
-        (first.replace("\n2\t", "\n1.7\t"), "line 3: “1.7” is no number of a node"),
-        (first.replace("\t6\n", "\tnan\n"), "line 3: “nan” is no number"),
-        (first.replace("\t6\n", "\n"), "line 3: there are 4 values for the 5 columns"),
-        (format!("{header}7\t0\t0\t0\t5\n"), "no node stands in every export"),
+        (
+            first.replace("\n2\t", "\n1.7\t"),
+            "line 3: “1.7” is no number of a node",
+        ),
+        (
+            first.replace("\t6\n", "\tnan\n"),
+            "line 3: “nan” is no number",
+        ),
+        (
+            first.replace("\t6\n", "\n"),
+            "line 3: there are 4 values for the 5 columns",
+        ),
+        (
+            format!("{header}7\t0\t0\t0\t5\n"),
+            "no node stands in every export",
+        ),
     ];
     let folder = Folder::new();
     let exports = folder.path("exports");
@@ -420,7 +474,8 @@ fn what_the_program_writes_it_reads() {
     let folder = Folder::new();
     let mut file = NpzFile::default();
     file.add("X", &[1, 2], &[1.0f32, 2.0]).unwrap();
-    file.add("p_m", &[2, 3], &[0.0, 0.0, 0.0, 0.1, 0.0, 0.0]).unwrap();
+    file.add("p_m", &[2, 3], &[0.0, 0.0, 0.0, 0.1, 0.0, 0.0])
+        .unwrap();
     let path = folder.path("w.npz");
     file.save(&path).unwrap();
     let GivenData { data, notes } = dataset_file::read(&path, None).unwrap();

@@ -10,8 +10,8 @@ use hapdef::placement::information::Geometry;
 use hapdef::placement::mutual_information::MutualInformation;
 use hapdef::placement::pca_qr::PcaQr;
 use hapdef::placement::{PlacementError, Pool, Request, Selection, Selector, Wishes};
-use hapdef::regression::Hyper;
 use hapdef::regression::tune::Effort;
+use hapdef::regression::{Grouping, Hyper};
 
 /// Sites and touches on a bent strip; each site feels touches near it, more along the strip than across,
 /// and a little of everything.
@@ -90,6 +90,7 @@ fn svr(hyper: Hyper) -> GreedySvr {
         hyper,
         folds: 4,
         seed: 7,
+        grouping: Grouping::Place,
         effort: Effort {
             tolerance: 0.01,
             max_steps: 1_000_000,
@@ -396,7 +397,12 @@ fn kernels_and_targets_at_the_edge_are_answered_in_words() {
     let strip = Strip::new(12, 100);
     let said = |hyper: Hyper, strip: &Strip| {
         let selection = choose(&svr(hyper), strip, &Wishes::count(2)).unwrap();
-        assert!(selection.sets.iter().all(|s| s.criterion.unwrap().is_finite()));
+        assert!(
+            selection
+                .sets
+                .iter()
+                .all(|s| s.criterion.unwrap().is_finite())
+        );
         selection.achieved.notes.join(" ")
     };
     for gamma in [1e-14, 1e7] {

@@ -28,9 +28,18 @@ fn json(arguments: &[&str]) -> Value {
 }
 
 fn refused(arguments: &[&str], word: &str) {
+    ends(arguments, 1, word);
+}
+
+/// Flags that cannot be meant.
+fn misused(arguments: &[&str], word: &str) {
+    ends(arguments, 2, word);
+}
+
+fn ends(arguments: &[&str], code: i32, word: &str) {
     let output = hapdef(arguments);
     let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
     assert!(
         said.contains(word) && !said.contains("panicked"),
         "{word}: {said}"
@@ -267,7 +276,7 @@ fn what_cannot_be_done_is_said() {
     );
     refused(&["select", "--data", bare, "--spacing-mm", "5"], "site_m");
     refused(&["select", "--data", data, "--sensors", "25"], "25 gauges");
-    refused(&["select", "--data", data, "--gamma", "0"], "--gamma");
+    misused(&["select", "--data", data, "--gamma", "0"], "--gamma");
     refused(&["select", "--data", data, "--require", "99"], "24 sites");
     refused(
         &[
@@ -297,4 +306,305 @@ fn what_cannot_be_done_is_said() {
         &["select", "--data", wild.to_str().unwrap()],
         "site 0 under touch 2",
     );
+}
+
+/// The same plate with other places of touches (m) and signals, in a file of its own.
+fn saved(folder: &Path, name: &str, x: &[f64], p: &[f64]) -> String {
+    let (_, _, s) = signals();
+    let touches = p.len() / 3;
+    let mut file = NpzFile::default();
+    file.add("X", &[SITES, touches], x).unwrap();
+    file.add("p_m", &[touches, 3], p).unwrap();
+    file.add("site_m", &[SITES, 3], &s).unwrap();
+    let path = folder.join(name);
+    file.save(&path).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// The first touches of the plate.
+fn first_touches(folder: &Path, count: usize) -> String {
+    let (x, p, _) = signals();
+    let rows = x.chunks(TOUCHES).flat_map(|row| &row[..count]);
+    let x: Vec<f64> = rows.copied().collect();
+    saved(folder, &format!("{count}.npz"), &x, &p[..3 * count])
+}
+
+fn notes(answer: &Value) -> String {
+    let notes = answer["notes"].as_array().unwrap();
+    let notes: Vec<&str> = notes.iter().map(|n| n.as_str().unwrap()).collect();
+    notes.join("\n")
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let values = value.as_array().unwrap();
+    values.iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+const SELECTORS: [&str; 4] = ["greedy-svr", "pca-qr", "entropy", "mutual-information"];
+
+#[test]
+fn a_site_that_never_changes_is_chosen_only_where_it_must_be_and_ends_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut x, p, _) = signals();
+    x[3 * TOUCHES..4 * TOUCHES].fill(7e-4);
+    x[9 * TOUCHES..10 * TOUCHES].fill(0.0);
+    let data = saved(folder.path(), "c.npz", &x, &p);
+    let data = data.as_str();
+    for selector in SELECTORS {
+        let base = ["select", "--data", data, "--selector", selector];
+        let free = json(&[&base[..], &["--sensors", "6"]].concat());
+        let chosen = indices(&free);
+        assert_eq!(chosen.len(), 6, "{selector}");
+        assert!(!chosen.contains(&3) && !chosen.contains(&9), "{selector}");
+        assert!(notes(&free).contains("2 sites report the same"), "{free}");
+        let bound = json(&[&base[..], &["--sensors", "4", "--require", "3"]].concat());
+        let chosen = indices(&bound);
+        assert_eq!((chosen.len(), chosen[0]), (4, 3), "{selector}");
+        assert!(notes(&bound).contains("Site 3 must be there"), "{bound}");
+        assert!(notes(&bound).contains("1 sites report the same"), "{bound}");
+        let mm = numbers(&bound["criterion_mm"]);
+        assert!(mm[3] < 0.8 * mm[0], "{selector}: {mm:?}");
+    }
+    let judged = json(&["evaluate", "--data", data, "--sites", "3,0,5"]);
+    let said = notes(&judged);
+    assert!(said.contains("Site 3 reports the same"), "{said}");
+    x.fill(1.0);
+    let data = saved(folder.path(), "all.npz", &x, &p);
+    let data = data.as_str();
+    for selector in SELECTORS {
+        refused(
+            &["select", "--data", data, "--selector", selector],
+            "no site's signal varies",
+        );
+    }
+}
+
+#[test]
+fn spacing_that_cannot_be_met_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = dataset(folder.path(), true);
+    let data = data.to_str().unwrap();
+    for selector in SELECTORS {
+        let answer = json(&[
+            "select",
+            "--data",
+            data,
+            "--selector",
+            selector,
+            "--sensors",
+            "12",
+            "--spacing-mm",
+            "45",
+        ]);
+        let reached = indices(&answer).len();
+        assert!((1..12).contains(&reached), "{selector}");
+        assert_eq!(answer["achieved"]["stop_reason"], "no-room", "{selector}");
+        let said = notes(&answer);
+        assert!(
+            said.contains(&format!("Only {reached} of 12 gauges fit"))
+                && said.contains("nearer than 45 mm")
+                && said.contains("lower the spacing"),
+            "{selector}: {said}"
+        );
+    }
+    refused(
+        &["select", "--data", data, "--cost-budget", "0.5"],
+        "raise the budget",
+    );
+    let out = "0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,21,22,23";
+    refused(&["select", "--data", data, "--keep-out", out], "kept out");
+}
+
+#[test]
+fn too_few_touches_are_refused_with_how_many_would_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let one = first_touches(folder, 1);
+    let one = one.as_str();
+    for selector in SELECTORS {
+        let arguments = ["select", "--data", one, "--selector", selector];
+        refused(&[&arguments[..], &["--sensors", "2"]].concat(), "too few");
+    }
+    refused(&["evaluate", "--data", one, "--sites", "0,1"], "too few");
+    // What is asked for is what does.
+    let eleven = first_touches(folder, 11);
+    let flags = ["evaluate", "--data", eleven.as_str(), "--sites", "0,1"];
+    refused(&flags, "11 touches are too few");
+    refused(&flags, "at least 12 are needed");
+    let twelve = first_touches(folder, 12);
+    let judged = json(&["evaluate", "--data", &twelve, "--sites", "0,1"]);
+    assert_eq!(judged["test_touches"].as_array().unwrap().len(), 2);
+    let all = dataset(folder, true);
+    let all = all.to_str().unwrap();
+    for selector in ["greedy-svr", "pca-qr"] {
+        refused(
+            &[
+                "select",
+                "--data",
+                all,
+                "--selector",
+                selector,
+                "--folds",
+                "80",
+            ],
+            "at least 160 are needed, or fewer folds",
+        );
+    }
+    // Touches that all lie at one place are one.
+    let (x, _, _) = signals();
+    let same = saved(folder, "same.npz", &x, &[0.01; 3 * TOUCHES]);
+    refused(&["select", "--data", &same], "1 places are too few");
+    refused(&["evaluate", "--data", &same, "--sites", "0,1"], "too few");
+}
+
+#[test]
+fn numbers_that_cannot_be_meant_are_refused_as_they_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = dataset(folder.path(), true);
+    let data = data.to_str().unwrap();
+    let wrong = [
+        ("select", "--target-mm", "nan"),
+        ("select", "--target-mm", "0"),
+        ("select", "--cost-budget", "inf"),
+        ("select", "--spacing-mm", "nan"),
+        ("select", "--failure", "1.5"),
+        ("select", "--power", "3"),
+        ("select", "--length-mm", "nan"),
+        ("select", "--kernel-noise", "inf"),
+        ("select", "--inside", "0,0,0,nan,1,1"),
+        ("select", "--selection-tolerance", "1"),
+        ("select", "--landmarks", "0"),
+        ("select", "--sensors", "0"),
+        ("select", "--c", "1e300"),
+        ("select", "--epsilon", "nan"),
+        ("select", "--gamma", "inf"),
+        ("select", "--tolerance", "0"),
+        ("select", "--folds", "1"),
+        ("select", "--max-steps", "0"),
+        ("select", "--noise", "nan"),
+        ("select", "--place-mm", "0"),
+        ("evaluate", "--held-out", "nan"),
+        ("evaluate", "--held-out", "1"),
+        ("evaluate", "--subsets", "0"),
+        ("evaluate", "--c", "nan"),
+    ];
+    for (command, flag, value) in wrong {
+        let mut arguments = vec![command, "--data", data, flag, value];
+        if command == "evaluate" {
+            arguments.extend(["--sites", "0,1"]);
+        }
+        misused(&arguments, flag);
+    }
+    // Finite, but beyond what can be computed with for touches of this size.
+    misused(&["select", "--data", data, "--c", "9e8"], "--c");
+    refused(&["select", "--data", data, "--keep-out", "99"], "24 sites");
+}
+
+#[test]
+fn flags_without_effect_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = dataset(folder.path(), true);
+    let data = data.to_str().unwrap();
+    let idle: [(&str, &[&str]); 10] = [
+        ("greedy-svr", &["--length-mm", "20"]),
+        ("greedy-svr", &["--power", "1.5"]),
+        ("greedy-svr", &["--kernel-noise", "0.1"]),
+        ("greedy-svr", &["--no-criterion"]),
+        ("pca-qr", &["--length-mm", "20"]),
+        ("pca-qr", &["--landmarks", "2"]),
+        ("entropy", &["--selection-tolerance", "0.1"]),
+        ("mutual-information", &["--audit", "3"]),
+        ("pca-qr", &["--no-criterion", "--target-mm", "5"]),
+        ("pca-qr", &["--split", "touch", "--place-mm", "5"]),
+    ];
+    for (selector, flags) in idle {
+        let base = ["select", "--data", data, "--selector", selector];
+        misused(&[&base[..], flags].concat(), flags[0]);
+    }
+}
+
+#[test]
+fn the_size_of_the_part_changes_nothing_but_the_size_of_the_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let (x, p, _) = signals();
+    let asked = |by: f64| {
+        let p: Vec<f64> = p.iter().map(|v| v * by).collect();
+        let data = saved(folder.path(), &format!("{by}.npz"), &x, &p);
+        let chosen = json(&["select", "--data", &data, "--sensors", "3"]);
+        let tuned = json(&["evaluate", "--data", &data, "--sites", "3,9,14", "--tune"]);
+        let tuned = tuned["errors"].as_array().unwrap();
+        let tuned: Vec<f64> = (tuned.iter())
+            .map(|row| row["error_mm"].as_f64().unwrap())
+            .collect();
+        (indices(&chosen), numbers(&chosen["criterion_mm"]), tuned)
+    };
+    let off = |errors: &[f64], scaled: &[f64], by: f64| {
+        let pairs = errors.iter().zip(scaled);
+        pairs.fold(0.0, |most: f64, (e, s)| most.max((s / by / e - 1.0).abs()))
+    };
+    let (sites, criteria, tuned) = asked(1.0);
+    // A power of two moves no digit; other factors move what fits leave open.
+    for (by, within) in [(1.0 / 128.0, 1e-12), (0.01, 0.02), (100.0, 0.02)] {
+        let (other_sites, other_criteria, other_tuned) = asked(by);
+        assert_eq!(sites, other_sites, "{by}");
+        assert!(off(&criteria, &other_criteria, by) < within, "{by}");
+        assert!(off(&tuned, &other_tuned, by) < 5.0 * within, "{by}");
+    }
+    // What is given is taken as it is, and said where it cannot suit.
+    let far = folder.path().join("100.npz");
+    let far = far.to_str().unwrap();
+    let given = json(&["select", "--data", far, "--sensors", "2", "--c", "200"]);
+    assert_eq!(given["criterion"]["c_mm"], 200.0);
+    assert!(notes(&given).contains("C (200 mm) is small"), "{given}");
+}
+
+#[test]
+fn repeats_of_a_place_are_judged_together() {
+    /// Times that each place is pressed.
+    const TURNS: usize = 3;
+    let folder = tempfile::tempdir().unwrap();
+    let places = TOUCHES / TURNS;
+    let (x, p, _) = signals();
+    // Each press is off by what a machine is off by, and deeper than the one before.
+    let p: Vec<f64> = (0..TOUCHES)
+        .flat_map(|t| {
+            let place = &p[3 * (t % places)..][..3];
+            let turn = (t / places) as f64;
+            [place[0] + 2e-8 * turn, place[1], place[2] + 5e-4 * turn]
+        })
+        .collect();
+    let x: Vec<f64> = x
+        .chunks(TOUCHES)
+        .enumerate()
+        .flat_map(|(s, row)| {
+            (0..TOUCHES).map(move |t| row[t % places] + 1e-4 * ((7 * s + t) as f64).sin())
+        })
+        .collect();
+    let data = saved(folder.path(), "r.npz", &x, &p);
+    let data = data.as_str();
+    let judge = |split: &[&str]| {
+        let base = ["evaluate", "--data", data, "--sites", "3,9,14"];
+        json(&[&base[..], split].concat())
+    };
+    let (together, apart) = (judge(&[]), judge(&["--split", "touch"]));
+    assert_eq!(together["places"], places);
+    assert_eq!(together["criterion"]["split"], "place");
+    assert!(notes(&together).contains("150 touches lie at 50 places"));
+    let folds = together["fold_of_touch"].as_array().unwrap();
+    assert!((places..TOUCHES).all(|t| folds[t] == folds[t - places]));
+    let held: Vec<u64> = (together["test_touches"].as_array().unwrap().iter())
+        .map(|t| t.as_u64().unwrap())
+        .collect();
+    assert_eq!(held.len(), 8 * TURNS);
+    let again = |t: &u64| (t + places as u64) % TOUCHES as u64;
+    assert!(held.iter().all(|t| held.contains(&again(t))));
+    assert_eq!(apart["places"], TOUCHES);
+    // What is asked for is what was told: the error looks smaller than it is.
+    let last = |v: &Value| numbers(&v["criterion_mm"])[2];
+    assert!(last(&together) > 1.3 * last(&apart), "{together} {apart}");
+    // Greedy SVR's own criterion is that of the same folds.
+    let chosen = json(&["select", "--data", data, "--sensors", "1"]);
+    assert_eq!(chosen["fold_of_touch"], together["fold_of_touch"]);
+    assert_eq!(chosen["counts"]["places"], places);
+    assert!(notes(&chosen).contains("150 touches lie at 50 places"));
 }

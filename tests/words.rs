@@ -158,7 +158,10 @@ fn too_few_touches_are_told_where_they_went() {
     let verdicts = design::filter(&inputs, &few);
     let error = design::reduce_sites(&inputs, &few, &verdicts, &budget(), &unwatched).err();
     let said = error.unwrap().to_string();
-    assert!(said.contains("touch.count from 11 to at least 20"), "{said}");
+    assert!(
+        said.contains("touch.count from 11 to at least 20"),
+        "{said}"
+    );
 }
 
 /// A square plate of 80 mm as CAD programs write it: two triangles, every vertex on its rim.
@@ -175,7 +178,9 @@ fn a_plate_of_two_triangles_is_touched_all_over_but_its_margin() {
         normal: Axis::Z,
     });
     project.sites.spacing_mm = 8.0;
-    let part = TriMesh::new(&corners, &[[0, 1, 2], [0, 2, 3]], 0).unwrap().0;
+    let part = TriMesh::new(&corners, &[[0, 1, 2], [0, 2, 3]], 0)
+        .unwrap()
+        .0;
     let mut inputs = Inputs {
         project,
         part: Arc::new(part),
@@ -204,7 +209,10 @@ fn a_plate_of_two_triangles_is_touched_all_over_but_its_margin() {
     inputs.masks.insert("grip".into(), Arc::new(vec![false; 4]));
     let error = design::simulate(&inputs, &budget(), &unwatched).err();
     let said = error.unwrap().to_string();
-    assert!(said.contains("touch.region") && said.contains("empty"), "{said}");
+    assert!(
+        said.contains("touch.region") && said.contains("empty"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -258,7 +266,10 @@ fn numbers_that_nobody_means_are_refused_by_their_key() {
     for (from, to, key) in cases {
         let (code, said) = design_with(from, to);
         assert_eq!(code, Some(1), "{said}");
-        assert!(said.contains("p.hapdef.toml") && said.contains(key), "{said}");
+        assert!(
+            said.contains("p.hapdef.toml") && said.contains(key),
+            "{said}"
+        );
         assert!(said.len() < 400, "{said}");
     }
 }

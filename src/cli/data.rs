@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
+use super::ranges::{between, misuse, whole};
 use crate::io::dataset_file::{self, GivenData};
 use crate::placement::greedy_svr::{GreedySvr, TOLERANCE};
-use crate::regression::Hyper;
 use crate::regression::tune::Effort;
+use crate::regression::{Grouping, Hyper, scale};
 use crate::study::Data;
 
 /// The dataset.
@@ -47,31 +48,62 @@ pub enum TargetUnit {
     M,
 }
 
+/// What is never divided between learning and judging.
+#[derive(ValueEnum, Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum SplitArg {
+    /// Each touch by itself.
+    Touch,
+    /// All touches at one place.
+    #[default]
+    Place,
+}
+
+/// The paper's settings, of targets in metres: C 20, epsilon 1e-6.
+const PAPER: Hyper = Hyper {
+    c: 20e3,
+    epsilon: 1e-3,
+    gamma: 2e-3,
+};
+/// Tolerance on the bundled limb (mm).
+const USUAL_TOLERANCE_MM: f64 = 0.05;
+/// Largest C over the spread of the touches: beyond it sums of coefficients lose the touches in their rounding,
+/// and fits do not end.
+const LARGEST_C: f64 = 1e7;
+
 /// What the criterion is made of.
 #[derive(Args, Debug, Clone)]
 pub struct CriterionArgs {
     /// Unit of the targets that C, epsilon and the tolerance are in.
     #[arg(long, value_enum, default_value_t)]
     pub target_unit: TargetUnit,
-    /// Bound of the coefficients; 200 in mm, 20 (the paper's) in m.
-    #[arg(long)]
+    /// Bound of the coefficients; when left out 200 mm for touches that spread as far as on the bundled limb
+    /// (48.7 mm rms) and in proportion for others; 20 (the paper's) in m.
+    #[arg(long, value_parser = between(1e-9, 1e9))]
     pub c: Option<f64>,
-    /// Half-width of the tube without loss; 0.1 in mm, 1e-6 (the paper's) in m.
-    #[arg(long)]
+    /// Half-width of the tube without loss; when left out 0.1 mm for touches that spread as on the bundled limb
+    /// and in proportion for others; 1e-6 (the paper's) in m.
+    #[arg(long, value_parser = between(0.0, 1e9))]
     pub epsilon: Option<f64>,
     /// Of the Gaussian kernel exp(-γ d²) of standardized signals; 0.3 in mm, 2e-3 (the paper's) in m.
-    #[arg(long)]
+    #[arg(long, value_parser = between(1e-15, 1e9))]
     pub gamma: Option<f64>,
-    /// Largest violation of the optimality conditions at which a fit counts as solved; 0.05 mm, or the
-    /// same in m.
-    #[arg(long)]
+    /// Largest violation of the optimality conditions at which a fit counts as solved; when left out 0.05 mm (or
+    /// the same in m) for touches that spread as on the bundled limb and in proportion for others.
+    #[arg(long, value_parser = between(1e-12, 1e9))]
     pub tolerance: Option<f64>,
     /// Most steps of one fit.
-    #[arg(long, default_value_t = 1_000_000)]
+    #[arg(long, default_value_t = 1_000_000, value_parser = whole(1, 1_000_000_000))]
     pub max_steps: usize,
     /// Parts of the cross-validation.
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, default_value_t = 5, value_parser = whole(2, 1_000_000))]
     pub folds: usize,
+    /// What is never divided between learning and judging: single touches, or all touches at one place. Touches
+    /// are at one place when they are nearer than 1e-5 of the extent of all; on a flat skin whatever their depth.
+    #[arg(long, value_enum, default_value_t)]
+    pub split: SplitArg,
+    /// Touches no farther apart than this are at one place (mm).
+    #[arg(long, value_parser = between(1e-9, 1e9))]
+    pub place_mm: Option<f64>,
     /// Seed of the folds and of every other draw.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -79,7 +111,7 @@ pub struct CriterionArgs {
     #[arg(long, value_parser = super::threads)]
     pub threads: Option<usize>,
     /// Standard deviation of noise added to the signals, in their unit.
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 1e100))]
     pub noise: f64,
     /// Print one JSON object on stdout.
     #[arg(long)]
@@ -87,50 +119,55 @@ pub struct CriterionArgs {
 }
 
 impl CriterionArgs {
-    /// The criterion, in millimetres whatever the unit asked in: with targets in metres the same model
-    /// has a C a thousand times smaller.
+    /// The criterion for touches at these positions (mm), in millimetres whatever the unit asked in: with targets
+    /// in metres the same model has a C a thousand times smaller. What is left out is in proportion to how far the
+    /// touches spread, except for the paper's settings; what is given is taken as it is.
     ///
     /// # Errors
-    /// A message for values out of range.
-    pub fn criterion(&self) -> anyhow::Result<GreedySvr> {
-        let (mm, c, epsilon, gamma) = match self.target_unit {
-            TargetUnit::Mm => (1.0, 200.0, 0.1, 0.3),
-            TargetUnit::M => (1e3, 20.0, 1e-6, 2e-3),
+    /// A message for flags that do not go together.
+    pub fn criterion(&self, targets: &[[f64; 3]]) -> anyhow::Result<GreedySvr> {
+        let size = scale::relative(targets);
+        let (unit, usual) = match self.target_unit {
+            TargetUnit::Mm => (1.0, Hyper::default().scaled(size)),
+            TargetUnit::M => (1e3, PAPER),
         };
-        let above = [
-            ("--c", self.c.unwrap_or(c)),
-            ("--gamma", self.gamma.unwrap_or(gamma)),
-            ("--tolerance", self.tolerance.unwrap_or(0.05 / mm)),
-        ];
-        for (name, value) in above {
-            anyhow::ensure!(
-                value > 0.0 && value.is_finite(),
-                "{name} must be a number above zero, but is {value}"
-            );
+        let mm = |given: Option<f64>, usual: f64| given.map_or(usual, |value| value * unit);
+        let hyper = Hyper {
+            c: mm(self.c, usual.c),
+            epsilon: mm(self.epsilon, usual.epsilon),
+            gamma: self.gamma.unwrap_or(usual.gamma),
+        };
+        let spread = size * scale::USUAL_SPREAD_MM;
+        if hyper.c > LARGEST_C * spread {
+            return Err(misuse(&format!(
+                "--c is {} mm for touches that spread over {spread:.3} mm: nothing above {:e} mm can be computed",
+                hyper.c,
+                LARGEST_C * spread
+            )));
         }
-        let epsilon = self.epsilon.unwrap_or(epsilon);
-        for (name, value) in [("--epsilon", epsilon), ("--noise", self.noise)] {
-            anyhow::ensure!(
-                value >= 0.0 && value.is_finite(),
-                "{name} must be zero or more, but is {value}"
-            );
-        }
-        anyhow::ensure!(self.folds >= 2, "--folds must be at least 2");
         Ok(GreedySvr {
-            hyper: Hyper {
-                c: above[0].1 * mm,
-                epsilon: epsilon * mm,
-                gamma: above[1].1,
-            },
+            hyper,
             folds: self.folds,
             seed: self.seed,
+            grouping: self.grouping()?,
             effort: Effort {
-                tolerance: above[2].1 * mm,
+                tolerance: mm(self.tolerance, USUAL_TOLERANCE_MM * size),
                 max_steps: self.max_steps,
             },
             tolerance: TOLERANCE,
             landmarks: 1.0,
         })
+    }
+
+    fn grouping(&self) -> anyhow::Result<Grouping> {
+        match (self.split, self.place_mm) {
+            (SplitArg::Touch, None) => Ok(Grouping::Touch),
+            (SplitArg::Touch, Some(_)) => Err(misuse(
+                "--place-mm has no effect with --split touch: leave one of them out",
+            )),
+            (SplitArg::Place, None) => Ok(Grouping::Place),
+            (SplitArg::Place, Some(mm)) => Ok(Grouping::Within(mm)),
+        }
     }
 
     /// Runs `work` on as many threads as were asked for.
@@ -158,6 +195,7 @@ pub fn criterion_json(svr: &GreedySvr) -> Value {
         "gamma": svr.hyper.gamma,
         "tolerance_mm": svr.effort.tolerance,
         "folds": svr.folds,
+        "split": svr.grouping.name(),
         "seed": svr.seed,
     })
 }

@@ -6,6 +6,7 @@ use serde_json::json;
 use super::data::{CriterionArgs, DataArgs, criterion_json, site_json};
 use super::out;
 use super::progress::Bar;
+use super::ranges::{between, whole};
 use crate::io::cpu_seconds;
 use crate::study::{self, Verdict};
 
@@ -22,13 +23,13 @@ pub struct EvaluateArgs {
     #[arg(long)]
     pub tune: bool,
     /// Share of the touches held out for the errors (the rest is learned from).
-    #[arg(long, default_value_t = 0.15)]
+    #[arg(long, default_value_t = 0.15, value_parser = between(0.001, 0.95))]
     pub held_out: f64,
     /// Most failed gauges that are tried.
     #[arg(long, default_value_t = 5)]
     pub failed: usize,
     /// Most subsets of failed gauges that the regression is trained anew for.
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 20, value_parser = whole(1, 100_000))]
     pub subsets: usize,
     /// Also the error with all sites of the dataset.
     #[arg(long)]
@@ -40,8 +41,8 @@ pub struct EvaluateArgs {
 /// # Errors
 /// A message in the user's terms.
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
-    let (data, notes) = args.data.load()?;
-    let svr = args.criterion.criterion()?;
+    let (data, mut notes) = args.data.load()?;
+    let svr = args.criterion.criterion(&data.targets)?;
     for (k, &site) in args.sites.iter().enumerate() {
         anyhow::ensure!(
             site < data.x.rows(),
@@ -53,10 +54,6 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
             "--sites {site} stands twice: every gauge has a site of its own"
         );
     }
-    anyhow::ensure!(
-        args.held_out > 0.0 && args.held_out < 1.0,
-        "--held-out is a share of the touches, between 0 and 1"
-    );
     let question = study::Question {
         sites: &args.sites,
         svr: &svr,
@@ -75,6 +72,10 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     });
     bar.finish();
     let verdict: Verdict = result?;
+    for note in &verdict.notes {
+        out::say(&format!("note: {note}"));
+    }
+    notes.extend(verdict.notes.iter().cloned());
     if args.criterion.json {
         let sites: Vec<_> = args.sites.iter().map(|&s| site_json(&data, s)).collect();
         let summary = json!({
@@ -87,6 +88,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
             "baseline": verdict.baseline,
             "failures": verdict.failures,
             "test_touches": verdict.test_touches,
+            "places": verdict.places,
             "cpu_seconds": cpu_seconds() - before,
             "notes": notes,
         });

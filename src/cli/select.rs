@@ -7,6 +7,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::data::{CriterionArgs, DataArgs, criterion_json, site_json};
+use super::ranges::{between, misuse, whole};
 use super::{SelectorArg, out, progress::Bar};
 use crate::budget::Watch;
 use crate::gaussian_process::GpKernel;
@@ -25,7 +26,7 @@ pub struct SelectArgs {
     #[arg(long, value_enum, default_value = "greedy-svr")]
     pub selector: SelectorArg,
     /// Most gauges.
-    #[arg(long, default_value_t = 10)]
+    #[arg(long, default_value_t = 10, value_parser = whole(1, 1_000_000))]
     pub sensors: usize,
     /// Sites that must be chosen, first (zero-based, with commas).
     #[arg(long, value_delimiter = ',')]
@@ -34,43 +35,56 @@ pub struct SelectArgs {
     #[arg(long, value_delimiter = ',')]
     pub keep_out: Vec<usize>,
     /// Choose only inside this box: x0,y0,z0,x1,y1,z1 (mm).
-    #[arg(long, value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true,
+        value_parser = between(-1e9, 1e9)
+    )]
     pub inside: Vec<f64>,
     /// Choose only outside this box: x0,y0,z0,x1,y1,z1 (mm).
-    #[arg(long, value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true,
+        value_parser = between(-1e9, 1e9)
+    )]
     pub outside: Vec<f64>,
     /// Least distance between two gauges (mm).
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 1e9))]
     pub spacing_mm: f64,
     /// What all gauges together may cost (with costs in the dataset; one each otherwise).
-    #[arg(long)]
+    #[arg(long, value_parser = between(1e-9, 1e15))]
     pub cost_budget: Option<f64>,
     /// Stop at this cross-validated error (mm).
-    #[arg(long)]
+    #[arg(long, value_parser = between(1e-9, 1e9))]
     pub target_mm: Option<f64>,
     /// Probability that one gauge has failed when it is needed (greedy SVR only).
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 1.0))]
     pub failure: f64,
-    /// Share of the criterion by which a choice of greedy SVR may be worse than the best.
-    #[arg(long, default_value_t = crate::placement::greedy_svr::TOLERANCE)]
-    pub selection_tolerance: f64,
+    /// Share of the criterion by which a choice of greedy SVR may be worse than the best; 0.002 when left out.
+    #[arg(long, value_parser = between(0.0, 0.999))]
+    pub selection_tolerance: Option<f64>,
     /// Landmarks of greedy SVR's screens, relative to the default: fewer are faster and leave more to be
-    /// fitted exactly.
-    #[arg(long, default_value_t = 1.0)]
-    pub landmarks: f64,
+    /// fitted exactly (1 when left out).
+    #[arg(long, value_parser = between(0.01, 100.0))]
+    pub landmarks: Option<f64>,
     /// Fit so many of the best and so many random other sites exactly at each step of greedy SVR, and say
     /// whether one of them would have been better (slow).
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = whole(0, 1_000_000))]
     pub audit: usize,
-    /// Length of the kernel of entropy and mutual information (mm); searched when left out.
-    #[arg(long)]
+    /// Length of the kernel of entropy and mutual information (mm); searched when left out with its power,
+    /// else the paper's (33).
+    #[arg(long, value_parser = between(1e-6, 1e9))]
     pub length_mm: Option<f64>,
-    /// Its power, up to 2; searched when left out.
-    #[arg(long)]
+    /// Its power, up to 2; searched when left out with the length, else the paper's (1.9).
+    #[arg(long, value_parser = between(0.01, 2.0))]
     pub power: Option<f64>,
-    /// Variance of a measurement's noise over the field's.
-    #[arg(long, default_value_t = GpKernel::default().noise)]
-    pub kernel_noise: f64,
+    /// Variance of a measurement's noise over the field's; the paper's (0.001) when left out.
+    #[arg(long, value_parser = between(0.0, 1e9))]
+    pub kernel_noise: Option<f64>,
     /// Do not compute the criterion in mm of what the other selectors choose.
     #[arg(long)]
     pub no_criterion: bool,
@@ -84,8 +98,9 @@ pub struct SelectArgs {
 /// # Errors
 /// A message in the user's terms.
 pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
+    args.check()?;
     let (data, mut notes) = args.data.load()?;
-    let settings = args.settings()?;
+    let settings = args.settings(&data)?;
     let wishes = args.wishes(&data)?;
     let kept_out = args.kept_out(&data)?;
     let bar = Bar::default();
@@ -103,7 +118,8 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
         )?;
         let before = cpu_seconds();
         if !args.no_criterion {
-            study::add_criteria(&data, &mut choice.selection, &wishes, &settings, &watch)?;
+            study::add_criteria(&data, &mut choice.selection, &wishes, &settings, &watch)
+                .context("the criterion in mm (left out with --no-criterion)")?;
         }
         let criterion_seconds = cpu_seconds() - before;
         let audit = args.audited(&data, &kept_out, &choice, &settings, &watch)?;
@@ -121,10 +137,14 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
             100.0 * step.excess()
         ));
     }
-    notes.extend(choice.selection.achieved.notes.iter().cloned());
-    for note in &notes {
+    let said = study::place_note(&settings.svr, &data.targets).into_iter();
+    let said: Vec<String> = said
+        .chain(choice.selection.achieved.notes.iter().cloned())
+        .collect();
+    for note in &said {
         out::say(&format!("note: {note}"));
     }
+    notes.extend(said);
     if let Some(path) = &args.out {
         write_sites(path, &data, &choice)?;
     }
@@ -162,10 +182,6 @@ impl SelectArgs {
         if self.audit == 0 {
             return Ok(Vec::new());
         }
-        ensure!(
-            settings.kind == SelectorKind::GreedySvr,
-            "--audit compares the steps of greedy-svr; the other selectors choose by another criterion"
-        );
         let audit = Audit {
             top: self.audit,
             random: self.audit,
@@ -176,54 +192,68 @@ impl SelectArgs {
         )?)
     }
 
-    fn settings(&self) -> anyhow::Result<Settings> {
-        let mut svr = self.criterion.criterion()?;
-        ensure!(
-            (0.0..1.0).contains(&self.selection_tolerance),
-            "--selection-tolerance is a share of the criterion, between 0 and 1"
-        );
-        svr.tolerance = self.selection_tolerance;
-        ensure!(
-            (0.01..=100.0).contains(&self.landmarks),
-            "--landmarks must lie between 0.01 and 100, but is {}",
-            self.landmarks
-        );
-        svr.landmarks = self.landmarks;
-        for (name, value) in [("--length-mm", self.length_mm), ("--power", self.power)] {
-            ensure!(
-                value.is_none_or(|v| v > 0.0 && v.is_finite()),
-                "{name} must be a number above zero"
-            );
+    /// That no flag is given in vain.
+    fn check(&self) -> anyhow::Result<()> {
+        let kind = SelectorKind::from(self.selector);
+        let svr = kind == SelectorKind::GreedySvr;
+        let geometric = [SelectorKind::Entropy, SelectorKind::MutualInformation].contains(&kind);
+        let flags = [
+            ("--length-mm", self.length_mm.is_some(), geometric),
+            ("--power", self.power.is_some(), geometric),
+            ("--kernel-noise", self.kernel_noise.is_some(), geometric),
+            (
+                "--selection-tolerance",
+                self.selection_tolerance.is_some(),
+                svr,
+            ),
+            ("--landmarks", self.landmarks.is_some(), svr),
+            ("--audit", self.audit > 0, svr),
+            ("--no-criterion", self.no_criterion, !svr),
+        ];
+        if let Some((flag, ..)) = flags.iter().find(|(_, given, heeded)| *given && !heeded) {
+            return Err(misuse(&format!(
+                "{flag} has no effect with --selector {}: leave it out",
+                kind.name()
+            )));
         }
-        ensure!(
-            self.kernel_noise >= 0.0,
-            "--kernel-noise must be zero or more"
-        );
+        let fit = &self.criterion;
+        let judged = [
+            ("--target-mm", self.target_mm.is_some()),
+            ("--c", fit.c.is_some()),
+            ("--epsilon", fit.epsilon.is_some()),
+            ("--gamma", fit.gamma.is_some()),
+            ("--tolerance", fit.tolerance.is_some()),
+        ];
+        match judged.iter().find(|(_, given)| *given) {
+            Some((flag, _)) if self.no_criterion => Err(misuse(&format!(
+                "{flag} is about the criterion, which --no-criterion leaves out: give one of them"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    fn settings(&self, data: &Data) -> anyhow::Result<Settings> {
+        let mut svr = self.criterion.criterion(&data.targets)?;
+        svr.tolerance = self.selection_tolerance.unwrap_or(svr.tolerance);
+        svr.landmarks = self.landmarks.unwrap_or(svr.landmarks);
         let paper = GpKernel::default();
+        let kernel_noise = self.kernel_noise.unwrap_or(paper.noise);
         let kernel = (self.length_mm.is_some() || self.power.is_some()).then(|| GpKernel {
             length_m: self.length_mm.map_or(paper.length_m, |l| l * 1e-3),
             power: self.power.unwrap_or(paper.power),
-            noise: self.kernel_noise,
+            noise: kernel_noise,
         });
         Ok(Settings {
             kind: self.selector.into(),
             svr,
             kernel,
-            kernel_noise: self.kernel_noise,
+            kernel_noise,
             noise: self.criterion.noise,
         })
     }
 
     fn wishes(&self, data: &Data) -> anyhow::Result<Wishes> {
-        ensure!(self.sensors > 0, "--sensors must be at least 1");
-        ensure!(
-            self.spacing_mm >= 0.0,
-            "--spacing-mm must be zero or more, but is {}",
-            self.spacing_mm
-        );
-        if let Some(site) = self.require.iter().find(|&&s| s >= data.x.rows()) {
-            bail!("--require {site}: there are only {} sites", data.x.rows());
-        }
+        known("--require", &self.require, data)?;
         Ok(Wishes {
             sensors: self.sensors,
             required: self.require.clone(),
@@ -236,6 +266,7 @@ impl SelectArgs {
     }
 
     fn kept_out(&self, data: &Data) -> anyhow::Result<Vec<usize>> {
+        known("--keep-out", &self.keep_out, data)?;
         let mut out = self.keep_out.clone();
         for (name, given, keep_inside) in [
             ("--inside", &self.inside, true),
@@ -260,6 +291,15 @@ impl SelectArgs {
             }));
         }
         Ok(out)
+    }
+}
+
+/// That the sites of a flag are there.
+fn known(flag: &str, sites: &[usize], data: &Data) -> anyhow::Result<()> {
+    let count = data.x.rows();
+    match sites.iter().find(|&&site| site >= count) {
+        Some(site) => bail!("{flag} {site}: there are only {count} sites, counted from 0"),
+        None => Ok(()),
     }
 }
 
@@ -301,7 +341,12 @@ fn summary(
         "criterion_unit": selection.criterion_unit,
         "criterion": criterion_json(&settings.svr),
         "fold_of_touch": study::folds(data, settings),
-        "counts": { "sites": data.x.rows(), "touches": data.x.columns(), "pool": selection.pool },
+        "counts": {
+            "sites": data.x.rows(),
+            "touches": data.x.columns(),
+            "places": study::places(&settings.svr, &data.targets),
+            "pool": selection.pool,
+        },
         "geometry": choice.geometry,
         "cpu_seconds": choice.seconds.selection,
         "distance_cpu_seconds": choice.seconds.distances,

@@ -25,6 +25,7 @@ use crate::placement::{
     pca_qr,
 };
 use crate::project::{CostKeys, Elements};
+use crate::regression::Grouping;
 use crate::regression::folds::evenly;
 use crate::regression::tune::Effort;
 
@@ -192,7 +193,10 @@ fn enough_touches(
     }
     let asked = &inputs.project.touch;
     let remedy = if asked.count < LEAST_TOUCHES {
-        format!("raise touch.count from {} to at least {LEAST_TOUCHES}", asked.count)
+        format!(
+            "raise touch.count from {} to at least {LEAST_TOUCHES}",
+            asked.count
+        )
     } else if budget.touches < LEAST_TOUCHES {
         format!(
             "raise budget.limits.touches from {} to at least {LEAST_TOUCHES}",
@@ -498,6 +502,8 @@ fn select_by_svr(
         hyper: inputs.project.hyper(),
         folds: budget.folds,
         seed: inputs.project.budget.seed,
+        // Computed touches lie apart.
+        grouping: Grouping::Touch,
         effort: Effort {
             tolerance: budget.svr_tolerance_mm,
             max_steps: budget.svr_steps,

@@ -107,11 +107,21 @@ fn no_touches(mesh: &TriMesh, inputs: &Inputs) -> DesignError {
     let project = &inputs.project;
     let (seed, margin_mm) = (project.budget.seed, project.touch.edge_margin_mm);
     let region = project.touch.region.as_ref();
-    let anywhere =
-        || dataset::spread_touches(mesh, TRIED, seed, margin_mm * 1e-3, false, project.tip(), None);
+    let anywhere = || {
+        dataset::spread_touches(
+            mesh,
+            TRIED,
+            seed,
+            margin_mm * 1e-3,
+            false,
+            project.tip(),
+            None,
+        )
+    };
     let mask = region.and_then(|name| inputs.masks.get(name));
     let remedy = if mask.is_some_and(|mask| !mask.contains(&true)) {
-        "the region that touches come to (touch.region) is empty. Paint it, or take it out".to_owned()
+        "the region that touches come to (touch.region) is empty. Paint it, or take it out"
+            .to_owned()
     } else if region.is_some() && !anywhere().is_empty() {
         format!(
             "the region that touches come to (touch.region) has no place farther than {margin_mm} mm (touch.edge_margin_mm) from a free edge, or lies where touches do not land. Widen it, or lower the margin"

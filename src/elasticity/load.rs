@@ -31,7 +31,10 @@ const FINEST: f64 = 1e-12;
 
 /// The largest coordinate of a facet (m).
 fn farthest(corners: &[DVec3; 3]) -> f64 {
-    corners.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max)
+    corners
+        .iter()
+        .map(|p| p.abs().max_element())
+        .fold(0.0, f64::max)
 }
 
 /// The nodal forces of a touch, by quadrature of the tip's pressure with the linear shape functions.

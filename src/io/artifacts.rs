@@ -55,7 +55,11 @@ pub fn write_into(
         write("design.json", &format!("{:#}\n", summary(inputs, design)))?;
         write("report.html", &report::html(inputs, design, provenance))?;
         let run = run_key(inputs, design);
-        save_arrays(&new.join("dataset.npz"), &design.simulated.dataset, Some(&run))?;
+        save_arrays(
+            &new.join("dataset.npz"),
+            &design.simulated.dataset,
+            Some(&run),
+        )?;
         write_project(new, place.folder(), inputs, design, provenance)
     })?;
     Ok([

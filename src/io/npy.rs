@@ -252,7 +252,13 @@ mod tests {
     fn array(kind: &str, shape: &str, bytes: &[u8]) -> Vec<u8> {
         let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
         let length = (header.len() as u16).to_le_bytes();
-        [&b"\x93NUMPY\x01\x00"[..], &length[..], header.as_bytes(), bytes].concat()
+        [
+            &b"\x93NUMPY\x01\x00"[..],
+            &length[..],
+            header.as_bytes(),
+            bytes,
+        ]
+        .concat()
     }
 
     #[test]
@@ -293,6 +299,9 @@ mod tests {
             assert!(read(&array("<f8", shape, &[])[..]).is_err(), "{shape}");
         }
         assert!(read(&b"\x93NUMPY\x02\x00\xff\xff\xff\xff{"[..]).is_err());
-        assert_eq!(read(&array("<f8", "(0, 3)", &[])[..]).unwrap().shape, [0, 3]);
+        assert_eq!(
+            read(&array("<f8", "(0, 3)", &[])[..]).unwrap().shape,
+            [0, 3]
+        );
     }
 }

@@ -205,7 +205,10 @@ mod tests {
     fn what_is_wrong_is_named_with_its_line() {
         let head = "x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm\n";
         for (rows, part) in [
-            ("1,2,3,0,0,1,10,5\n1,2,x,0,0,1,10,5\n", "line 3: “z_mm” is “x”"),
+            (
+                "1,2,3,0,0,1,10,5\n1,2,x,0,0,1,10,5\n",
+                "line 3: “z_mm” is “x”",
+            ),
             ("1,2,3,0,0,0,10,5\n", "nx, ny, nz"),
             ("1,2,3,0,0,1,-10,5\n", "force_n"),
             ("1,2,3,0,0,1,10,0\n", "tip_radius_mm"),

@@ -80,7 +80,9 @@ impl Table {
     pub fn columns<const N: usize>(&self, names: &[&str; N]) -> Result<[usize; N], FileError> {
         let mut columns = [0; N];
         for (column, name) in columns.iter_mut().zip(names) {
-            *column = self.column(name)?.ok_or_else(|| self.missing(name, names))?;
+            *column = self
+                .column(name)?
+                .ok_or_else(|| self.missing(name, names))?;
         }
         Ok(columns)
     }

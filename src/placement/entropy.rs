@@ -61,6 +61,7 @@ impl Selector for Entropy<'_> {
             pool,
             request,
             self.geometry,
+            &field,
             sets,
         )
     }

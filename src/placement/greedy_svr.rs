@@ -19,14 +19,14 @@ use self::exact::{Judge, Judged};
 use self::race::{Raced, Relation, Rules, Scored, race};
 use self::screen::{Base, LEVELS, Sieve, Stop};
 use super::lead;
-use super::wishes::{Field, Wishes};
+use super::wishes::{Field, Wishes, shortage};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Achieved, Cancelled, Progress, StopReason, Watch, Work, report};
 use crate::dataset::SignalMatrix;
 use crate::regression::features::Standardizer;
-use crate::regression::folds::{Folds, evenly};
+use crate::regression::folds::{Folds, evenly, number_of};
 use crate::regression::tune::Effort;
-use crate::regression::{Hyper, kernel};
+use crate::regression::{Grouping, Hyper, kernel};
 
 /// Settings of the selector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +34,8 @@ pub struct GreedySvr {
     pub hyper: Hyper,
     pub folds: usize,
     pub seed: u64,
+    /// What is never divided between folds.
+    pub grouping: Grouping,
     pub effort: Effort,
     /// A choice may be worse than the best by this share of the criterion.
     pub tolerance: f64,
@@ -62,21 +64,14 @@ impl Selector for GreedySvr {
     }
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
+        let folds = self.split(pool.targets)?;
         let mut field = Field::new(pool, request.wishes)?;
-        let least = 2 * self.folds.max(2);
-        if pool.targets.len() < least {
-            return Err(PlacementError::TooFewTouches {
-                touches: pool.targets.len(),
-                least,
-            });
-        }
-        let folds = Folds::draw(pool.targets.len(), self.folds, self.seed);
         let mut search = Search::new(self, pool, request, &folds);
         let mut sets: Vec<SensorSet> = Vec::new();
         let mut stop = StopReason::Converged;
         while !field.full() {
             let Some(step) = search.best_addition(&field)? else {
-                stop = StopReason::Exhausted;
+                stop = StopReason::NoRoom;
                 break;
             };
             field.add(step.place);
@@ -92,10 +87,16 @@ impl Selector for GreedySvr {
                 break;
             }
         }
-        if sets.is_empty() {
-            return Err(PlacementError::NoSites);
+        let no_room = field.closed().filter(|_| stop == StopReason::NoRoom);
+        let mut notes = field.constant_notes();
+        match no_room {
+            Some(why) if sets.is_empty() => return Err(PlacementError::NoRoom { why }),
+            Some(why) => notes.push(shortage(&why, sets.len(), request.wishes.sensors)),
+            None if sets.is_empty() => return Err(PlacementError::NoSites),
+            None => {}
         }
-        if !search.converged {
+        notes.extend(search.notes(&sets, request.wishes));
+        if !search.converged && stop == StopReason::Converged {
             stop = StopReason::EffortSpent;
         }
         Ok(Selection {
@@ -107,7 +108,7 @@ impl Selector for GreedySvr {
                 unit: "mm",
                 effort: search.work,
                 stop_reason: stop,
-                notes: search.notes(&sets, request.wishes),
+                notes,
             },
             sets,
         })
@@ -115,18 +116,50 @@ impl Selector for GreedySvr {
 }
 
 impl GreedySvr {
-    /// The criterion of given sets (places in the pool): mean over folds of the mean Euclidean error
-    /// (mm), fitted to the tolerance. Absent for a set without a signal.
+    /// The folds of the criterion over touches at these positions (mm).
     ///
     /// # Errors
-    /// [`Cancelled`] when the watch asks for it.
+    /// [`PlacementError`] where there are too few for so many folds.
+    pub fn split(&self, targets: &[[f64; 3]]) -> Result<Folds, PlacementError> {
+        let groups = self.grouping.of(targets);
+        let least = 2 * self.folds.max(2);
+        if number_of(&groups) < least {
+            return Err(self.too_few(&groups, least));
+        }
+        Ok(Folds::of_groups(&groups, self.folds, self.seed))
+    }
+
+    /// That there are fewer groups of touches than the least.
+    pub(crate) fn too_few(&self, groups: &[usize], least: usize) -> PlacementError {
+        let (places, touches, folds) = (number_of(groups), groups.len(), self.folds);
+        if places < touches {
+            PlacementError::TooFewPlaces {
+                places,
+                touches,
+                folds,
+                least,
+            }
+        } else {
+            PlacementError::TooFewForFolds {
+                touches,
+                folds,
+                least,
+            }
+        }
+    }
+
+    /// The criterion of given sets (places in the pool): mean over folds of the mean Euclidean error
+    /// (mm), fitted to the tolerance.
+    ///
+    /// # Errors
+    /// [`PlacementError`] for too few touches, or when the watch asks for a stop.
     pub fn criteria(
         &self,
         pool: &Pool,
         sets: &[Vec<usize>],
         watch: Watch,
-    ) -> Result<Vec<f64>, Cancelled> {
-        let folds = Folds::draw(pool.targets.len(), self.folds, self.seed);
+    ) -> Result<Vec<f64>, PlacementError> {
+        let folds = self.split(pool.targets)?;
         let features = Standardizer::of(pool.x)
             .apply(pool.x)
             .select_columns(&folds.order);
@@ -240,11 +273,7 @@ impl<'a> Search<'a> {
 
     /// The best place to add, taken; none when nothing may be added any more.
     fn best_addition(&mut self, field: &Field) -> Result<Option<Step>, PlacementError> {
-        let open: Vec<usize> = field
-            .open()
-            .into_iter()
-            .filter(|p| !self.constant.contains(p))
-            .collect();
+        let open = field.open();
         if open.is_empty() {
             return Ok(None);
         }
@@ -568,13 +597,7 @@ impl<'a> Search<'a> {
 
     fn notes(&self, sets: &[SensorSet], wishes: &Wishes) -> Vec<String> {
         let mut notes = Vec::new();
-        if !self.constant.is_empty() {
-            notes.push(format!(
-                "{} sites report the same under every touch and were left out.",
-                self.constant.len()
-            ));
-        }
-        notes.extend(self.degenerate());
+        notes.extend(self.degenerate().or_else(|| self.out_of_scale()));
         notes.extend(lead::ties(sets, self.settings.tolerance));
         if !self.converged {
             notes.push(
@@ -634,6 +657,28 @@ impl Search<'_> {
         } else {
             None
         }
+    }
+}
+
+impl Search<'_> {
+    /// That C or ε, which are in millimetres, were meant for parts of another size.
+    fn out_of_scale(&self) -> Option<String> {
+        /// The least C and the largest ε over the spread of the targets at which most of it can be learned: a
+        /// tenth and ten times of what suits the bundled limb.
+        const LEAST_C: f64 = 0.5;
+        const LARGEST_EPSILON: f64 = 0.03;
+        let Hyper { c, epsilon, .. } = self.settings.hyper;
+        let spread = self.judge.spread();
+        let (what, way) = if epsilon > LARGEST_EPSILON * spread {
+            (format!("ε ({epsilon} mm) is wide"), "lower it")
+        } else if c < LEAST_C * spread {
+            (format!("C ({c} mm) is small"), "raise it")
+        } else {
+            return None;
+        };
+        Some(format!(
+            "{what} for touches that spread over {spread:.3} mm: {way} in proportion to the part, or less is learned than could be."
+        ))
     }
 }
 

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::wishes::Field;
+use super::wishes::{Field, shortage};
 use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet, lead};
 use crate::budget::{Achieved, StopReason, Work};
 use crate::gaussian_process::{Covariance, GpKernel, GpTrial};
@@ -133,13 +133,23 @@ pub(super) fn finish(
     pool: &Pool,
     request: &Request,
     geometry: &Geometry,
+    field: &Field,
     sets: Vec<SensorSet>,
 ) -> Result<Selection, PlacementError> {
     if sets.is_empty() {
-        return Err(PlacementError::NoSites);
+        return Err(match field.closed() {
+            Some(why) => PlacementError::NoRoom { why },
+            None => PlacementError::NoSites,
+        });
     }
     let wanted = request.wishes.sensors;
     let short = sets.len() < wanted;
+    let no_room = field.closed();
+    let stop_reason = match &no_room {
+        Some(_) => StopReason::NoRoom,
+        None if short => StopReason::Exhausted,
+        None => StopReason::Converged,
+    };
     let mut notes = geometry.covariance.notes();
     if geometry.coinciding > 0 {
         notes.push(format!(
@@ -147,8 +157,11 @@ pub(super) fn finish(
             geometry.coinciding
         ));
     }
+    notes.extend(field.constant_notes());
     notes.extend(lead::ties(&sets, lead::TOLERANCE));
-    if short {
+    if let Some(why) = no_room {
+        notes.push(shortage(&why, sets.len(), wanted));
+    } else if short {
         notes.push(format!(
             "Only {} of {wanted} gauges: beyond them nothing uncertain is left that wishes allow.",
             sets.len()
@@ -162,11 +175,7 @@ pub(super) fn finish(
             error_estimate: None,
             unit: "",
             effort: Work::default(),
-            stop_reason: if short {
-                StopReason::Exhausted
-            } else {
-                StopReason::Converged
-            },
+            stop_reason,
             notes,
         },
         sets,

@@ -78,6 +78,7 @@ impl Selector for MutualInformation<'_> {
             pool,
             request,
             self.geometry,
+            &field,
             sets,
         )
     }

@@ -1,6 +1,6 @@
 //! PCA with pivoted QR as a selector: exact, deterministic, without a seed.
 
-use super::wishes::Field;
+use super::wishes::{self, Field};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, lead};
 use crate::budget::{Achieved, StopReason, Work, report};
 use crate::pca::Pca;
@@ -42,11 +42,15 @@ pub fn from_components(
     }
     let whole = Field::new(pool, wishes)?;
     let mut sets: Vec<SensorSet> = Vec::new();
+    let mut no_room = None;
     for k in counts(wishes.sensors, wishes.target_mm.is_some()) {
         report(request.watch, "Selecting by PCA-QR", k - 1, wishes.sensors)?;
         let (mut field, mut lead) = choose(pca, &whole, k);
         let mut chosen = field.sites();
         let all = chosen.len() == k;
+        if !all {
+            no_room = field.closed();
+        }
         // Where so many cannot be had, as many as can.
         let mut wanted = k;
         while chosen.len() < wanted {
@@ -72,10 +76,14 @@ pub fn from_components(
         }
     }
     if sets.is_empty() {
-        return Err(PlacementError::NoSites);
+        return Err(match no_room {
+            Some(why) => PlacementError::NoRoom { why },
+            None => PlacementError::NoSites,
+        });
     }
     let reached = sets.last().map_or(0, |s| s.sites.len());
-    let short = reached < wishes.sensors;
+    let wanted = wishes.sensors;
+    let short = reached < wanted;
     Ok(Selection {
         selector: SelectorKind::PcaQr,
         criterion_unit: "share of variance beyond the components",
@@ -84,14 +92,15 @@ pub fn from_components(
             error_estimate: None,
             unit: "",
             effort: Work::default(),
-            stop_reason: if short {
-                StopReason::Exhausted
-            } else {
-                StopReason::Converged
+            stop_reason: match &no_room {
+                Some(_) => StopReason::NoRoom,
+                None if short => StopReason::Exhausted,
+                None => StopReason::Converged,
             },
-            notes: short
-                .then(|| shortage(pca, reached, wishes.sensors))
+            notes: (no_room.map(|why| wishes::shortage(&why, reached, wanted)))
+                .or_else(|| short.then(|| shortage(pca, reached, wanted)))
                 .into_iter()
+                .chain(whole.constant_notes())
                 .chain(lead::ties(&sets, lead::TOLERANCE))
                 .collect(),
         },

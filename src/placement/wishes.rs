@@ -1,6 +1,8 @@
 //! What is asked of a choice beside its number of gauges, the same for every selector.
 
 use super::{PlacementError, Pool};
+use crate::pca::PcaError;
+use crate::regression::Standardizer;
 
 /// Wishes; the default asks for nothing but the count.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,7 +34,13 @@ impl Wishes {
     }
 }
 
-/// Which places may still be chosen, as the choice grows.
+/// A note on a choice that ended short of what was wanted, with what [`Field::closed`] says.
+#[must_use]
+pub fn shortage(why: &str, reached: usize, wanted: usize) -> String {
+    format!("Only {reached} of {wanted} gauges fit: {why}.")
+}
+
+/// Which places may still be chosen, as the choice grows: none whose signal never changes.
 #[derive(Clone)]
 pub struct Field<'a> {
     pool: &'a Pool<'a>,
@@ -40,6 +48,8 @@ pub struct Field<'a> {
     /// In the order they were chosen.
     pub chosen: Vec<usize>,
     open: Vec<bool>,
+    /// Places whose signal is the same under every touch: chosen only where they must be.
+    constant: Vec<bool>,
     spent: f64,
 }
 
@@ -57,16 +67,26 @@ impl<'a> Field<'a> {
         if wanted > available {
             return Err(PlacementError::TooFewSites { wanted, available });
         }
+        let mut constant = vec![false; available];
+        for place in Standardizer::of(pool.x).constant_rows() {
+            if let Some(constant) = constant.get_mut(place) {
+                *constant = true;
+            }
+        }
+        if !constant.contains(&false) {
+            return Err(PcaError::Constant.into());
+        }
         let mut field = Self {
             pool,
             wishes,
             chosen: Vec::new(),
             open: vec![true; available],
+            constant,
             spent: 0.0,
         };
         field.check()?;
         field.chosen.clear();
-        field.open = vec![true; available];
+        field.open = field.constant.iter().map(|constant| !constant).collect();
         field.spent = 0.0;
         Ok(field)
     }
@@ -113,7 +133,7 @@ impl<'a> Field<'a> {
         self.chosen.len() >= self.wishes.sensors
     }
 
-    /// Whether something may be chosen; the next that must be, alone, while there is one.
+    /// What may be chosen; the next that must be, alone, while there is one.
     #[must_use]
     pub fn open(&self) -> Vec<usize> {
         if let Some(&next) = self.wishes.required.get(self.chosen.len()) {
@@ -165,6 +185,70 @@ impl<'a> Field<'a> {
                 *open &= apart >= self.wishes.spacing || apart == 0.0;
             }
         }
+    }
+
+    /// Why nothing more may be chosen, and what to change; absent while something may.
+    #[must_use]
+    pub fn closed(&self) -> Option<String> {
+        if self.full() || !self.open().is_empty() {
+            return None;
+        }
+        let (mut constant, mut near, mut costly) = (0, 0, 0);
+        for place in (0..self.open.len()).filter(|p| !self.chosen.contains(p)) {
+            if self.constant[place] {
+                constant += 1;
+            } else if self.open[place] {
+                costly += 1;
+            } else {
+                near += 1;
+            }
+        }
+        // Without what rounds in metres.
+        let spacing = (self.wishes.spacing * 1e6).round() / 1e3;
+        let reasons = [
+            (near, format!("nearer than {spacing} mm to a gauge")),
+            (costly, "dearer than what is left of the budget".to_owned()),
+            (constant, "the same under every touch".to_owned()),
+        ];
+        let reasons: Vec<String> = (reasons.into_iter().filter(|(sites, _)| *sites > 0))
+            .map(|(sites, why)| format!("{sites} {why}"))
+            .collect();
+        let ways = [
+            (near, "lower the spacing"),
+            (costly, "raise the budget"),
+            (1, "ask for fewer gauges"),
+        ];
+        let ways: Vec<&str> = (ways.iter().filter(|(sites, _)| *sites > 0))
+            .map(|(_, way)| *way)
+            .collect();
+        Some(format!(
+            "the sites left are {}; {}",
+            reasons.join(", "),
+            ways.join(" or ")
+        ))
+    }
+
+    /// What is to be said of sites whose signal never changes.
+    #[must_use]
+    pub fn constant_notes(&self) -> Vec<String> {
+        let required = |place: &usize| self.wishes.required.contains(place);
+        let (kept, left_out): (Vec<usize>, Vec<usize>) = (0..self.constant.len())
+            .filter(|&place| self.constant[place])
+            .partition(required);
+        let mut notes = Vec::new();
+        if !left_out.is_empty() {
+            notes.push(format!(
+                "{} sites report the same under every touch and were left out.",
+                left_out.len()
+            ));
+        }
+        notes.extend(kept.iter().map(|&place| {
+            format!(
+                "Site {} must be there but reports the same under every touch: it tells nothing.",
+                self.pool.sites[place]
+            )
+        }));
+        notes
     }
 
     /// The choice as numbered in the dataset.

@@ -121,7 +121,8 @@ impl Project {
         if self.budget.seed > largest {
             return Err(BadValue {
                 key: "budget.seed".into(),
-                rule: "at most 9223372036854775807, the largest whole number of a project file".into(),
+                rule: "at most 9223372036854775807, the largest whole number of a project file"
+                    .into(),
                 value: self.budget.seed.to_string(),
             });
         }
@@ -137,23 +138,11 @@ impl Project {
             ("selection.gamma", selection.gamma, 1e-12..=1e9),
             ("selection.spacing_mm", selection.spacing_mm, ROOM),
             ("selection.failure", selection.failure, 0.0..=1.0),
-            (
-                "selection.gaussian_process.noise",
-                process.noise,
-                0.0..=1e6,
-            ),
+            ("selection.gaussian_process.noise", process.noise, 0.0..=1e6),
         ])?;
         let optional = [
-            (
-                "selection.target_mm",
-                selection.target_mm,
-                1e-9..=1e9,
-            ),
-            (
-                "selection.cost_budget",
-                selection.cost_budget,
-                1e-9..=1e15,
-            ),
+            ("selection.target_mm", selection.target_mm, 1e-9..=1e9),
+            ("selection.cost_budget", selection.cost_budget, 1e-9..=1e15),
             (
                 "selection.gaussian_process.length_mm",
                 process.length_mm,
@@ -274,9 +263,7 @@ fn check_place(key: &str, place: &[f64; 3]) -> Result<(), BadValue> {
     Ok(())
 }
 
-fn all_bounded<const N: usize>(
-    all: [(&str, f64, RangeInclusive<f64>); N],
-) -> Result<(), BadValue> {
+fn all_bounded<const N: usize>(all: [(&str, f64, RangeInclusive<f64>); N]) -> Result<(), BadValue> {
     all.into_iter()
         .try_for_each(|(key, value, range)| bounded(key, value, &range))
 }
@@ -310,12 +297,7 @@ fn counted(key: &str, count: usize, range: &RangeInclusive<usize>) -> Result<(),
 }
 
 /// A finite number that obeys a rule of its own.
-pub(super) fn check(
-    key: &str,
-    rule: &'static str,
-    value: f64,
-    ok: bool,
-) -> Result<(), BadValue> {
+pub(super) fn check(key: &str, rule: &'static str, value: f64, ok: bool) -> Result<(), BadValue> {
     if ok && value.is_finite() {
         return Ok(());
     }

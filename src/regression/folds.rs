@@ -27,10 +27,25 @@ impl Folds {
     /// `count` touches in `number` parts (at least two) whose sizes differ by at most one.
     #[must_use]
     pub fn draw(count: usize, number: usize, seed: u64) -> Self {
-        let mut order: Vec<usize> = (0..count).collect();
-        order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+        let order = shuffled(count, seed);
         let k = number.clamp(2, count.max(2));
         let parts = (0..k).map(|f| f * count / k..(f + 1) * count / k).collect();
+        Self { order, parts }
+    }
+
+    /// As [`Self::draw`], with the touches of a group (numbered from zero) always in the same part; the number
+    /// of groups in each differs by at most one.
+    #[must_use]
+    pub fn of_groups(groups: &[usize], number: usize, seed: u64) -> Self {
+        let members = members(groups);
+        let drawn = Self::draw(members.len(), number, seed);
+        let mut order = Vec::with_capacity(groups.len());
+        let mut parts = Vec::with_capacity(drawn.parts.len());
+        for part in drawn.parts {
+            let start = order.len();
+            order.extend(drawn.order[part].iter().flat_map(|&g| &members[g]));
+            parts.push(start..order.len());
+        }
         Self { order, parts }
     }
 
@@ -61,6 +76,40 @@ impl Folds {
     }
 }
 
+/// Touches of so many groups, drawn by a seed, to judge on; and all others, to learn from.
+#[must_use]
+pub fn hold_out(groups: &[usize], number: usize, seed: u64) -> (Vec<usize>, Vec<usize>) {
+    let members = members(groups);
+    let order = shuffled(members.len(), seed);
+    let (test, train) = order.split_at(number.min(order.len()));
+    let touches = |chosen: &[usize]| -> Vec<usize> {
+        let all = chosen.iter().flat_map(|&g| &members[g]);
+        all.copied().collect()
+    };
+    (touches(test), touches(train))
+}
+
+/// How many groups there are, numbered from zero without gaps.
+#[must_use]
+pub fn number_of(groups: &[usize]) -> usize {
+    groups.iter().max().map_or(0, |g| g + 1)
+}
+
+/// The touches of each group.
+fn members(groups: &[usize]) -> Vec<Vec<usize>> {
+    let mut members = vec![Vec::new(); number_of(groups)];
+    for (touch, &group) in groups.iter().enumerate() {
+        members[group].push(touch);
+    }
+    members
+}
+
+fn shuffled(count: usize, seed: u64) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..count).collect();
+    order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+    order
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,5 +135,25 @@ mod tests {
             let (places, parts) = folds.thinned(4);
             assert!(parts.iter().all(|p| !p.is_empty()) && places.len() >= parts.len());
         }
+    }
+
+    #[test]
+    fn groups_stay_together_and_groups_of_one_are_drawn_as_before() {
+        let single: Vec<usize> = (0..40).collect();
+        assert_eq!(Folds::of_groups(&single, 5, 3), Folds::draw(40, 5, 3));
+        let (test, train) = hold_out(&single, 6, 9);
+        let order = Folds::draw(40, 2, 9).order;
+        assert_eq!((&test[..], &train[..]), (&order[..6], &order[6..]));
+        let groups: Vec<usize> = (0..60).map(|t| t % 12).collect();
+        let folds = Folds::of_groups(&groups, 5, 3);
+        let fold = folds.of_touches();
+        assert!((0..60).all(|t| fold[t] == fold[groups[t]]));
+        assert!(folds.parts.iter().all(|p| [10, 15].contains(&p.len())));
+        let (test, train) = hold_out(&groups, 3, 9);
+        assert_eq!((test.len(), train.len()), (15, 45));
+        assert!(
+            test.iter()
+                .all(|&t| train.iter().all(|&o| groups[o] != groups[t]))
+        );
     }
 }

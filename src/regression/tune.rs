@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::features::Standardizer;
 use super::folds::Folds;
 use super::kernel::{gaussian, squared_distances};
+use super::places::Grouping;
 use super::svr::{self, Fit, Problem, Start};
 use crate::budget::{Cancelled, Progress, Watch, Work, report};
 use crate::dataset::SignalMatrix;
@@ -22,7 +23,8 @@ pub struct Hyper {
 }
 
 impl Default for Hyper {
-    /// What a trial found good with ten gauges on the bundled limb.
+    /// What a trial found good with ten gauges on the bundled limb; for parts of another size see
+    /// [`super::scale`].
     fn default() -> Self {
         Self {
             c: 200.0,
@@ -40,7 +42,28 @@ pub struct Effort {
     pub max_steps: usize,
 }
 
+impl Effort {
+    /// For targets so many times as large.
+    #[must_use]
+    pub fn scaled(self, by: f64) -> Self {
+        Self {
+            tolerance: self.tolerance * by,
+            ..self
+        }
+    }
+}
+
 impl Hyper {
+    /// For targets so many times as large: the same model of them.
+    #[must_use]
+    pub fn scaled(self, by: f64) -> Self {
+        Self {
+            c: self.c * by,
+            epsilon: self.epsilon * by,
+            ..self
+        }
+    }
+
     #[must_use]
     pub fn params(&self, effort: Effort) -> svr::SvrParams {
         svr::SvrParams {
@@ -161,7 +184,7 @@ impl Search {
 }
 
 /// The values a search looks at. γ is multiplied by 10 / sensors, because the squared distance between
-/// standardized signals grows with their number.
+/// standardized signals grows with their number. The default is for parts of the bundled limb's size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     pub c: Vec<f64>,
@@ -179,11 +202,24 @@ impl Default for Grid {
     }
 }
 
+impl Grid {
+    /// For targets so many times as large.
+    #[must_use]
+    pub fn scaled(mut self, by: f64) -> Self {
+        for value in self.c.iter_mut().chain(&mut self.epsilon) {
+            *value *= by;
+        }
+        self
+    }
+}
+
 /// What cross-validation spends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrossValidation {
     pub folds: usize,
     pub seed: u64,
+    /// What is never divided between folds.
+    pub grouping: Grouping,
     pub effort: Effort,
 }
 
@@ -199,7 +235,8 @@ pub fn search(
     validation: &CrossValidation,
     watch: Watch,
 ) -> Result<(Search, Work), Cancelled> {
-    let folds = Folds::draw(targets.len(), validation.folds, validation.seed);
+    let groups = validation.grouping.of(targets);
+    let folds = Folds::of_groups(&groups, validation.folds, validation.seed);
     let z = Standardizer::of(x).apply(x).select_columns(&folds.order);
     let axis = |a: usize| folds.order.iter().map(|&t| targets[t][a]).collect();
     let bench = Bench {

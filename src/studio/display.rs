@@ -194,7 +194,10 @@ mod tests {
         drop(server);
         assert!(!there.answers(), "its socket still lies there");
         let said = there.farewell();
-        assert!(said.contains("WAYLAND_DISPLAY=w") && said.contains("not saved"), "{said}");
+        assert!(
+            said.contains("WAYLAND_DISPLAY=w") && said.contains("not saved"),
+            "{said}"
+        );
     }
 
     #[test]
@@ -203,6 +206,9 @@ mod tests {
         assert_eq!(cause(raw), "neither is set");
         assert_eq!(cause("WGPU error: no adapter"), "WGPU error: no adapter");
         let error = eframe::Error::AppCreation("no graphics adapter was found".into());
-        assert_eq!(Display::None.refusal(&error), "no graphics adapter was found");
+        assert_eq!(
+            Display::None.refusal(&error),
+            "no graphics adapter was found"
+        );
     }
 }

@@ -445,10 +445,7 @@ mod tests {
     fn gauges_that_nobody_selected_here_are_accounted_for() {
         let mut studio = Studio::around(Document::new(crate::cli::bundled().unwrap(), None));
         let said = studio.gauges_before_selection().unwrap();
-        assert_eq!(
-            said,
-            "The 10 gauges shown are those of the bundled example"
-        );
+        assert_eq!(said, "The 10 gauges shown are those of the bundled example");
         let sites = &mut studio.document.state.project.selection.sites;
         sites.truncate(1);
         let said = studio.gauges_before_selection().unwrap();

@@ -306,7 +306,10 @@ fn join(folder: &Path, exports: &[Export], touches: Touches) -> Result<Found, Fi
             "no node stands in every export: they are of different meshes, or empty",
         ));
     }
-    let all: HashSet<u64> = exports.iter().flat_map(|e| e.nodes.iter().copied()).collect();
+    let all: HashSet<u64> = exports
+        .iter()
+        .flat_map(|e| e.nodes.iter().copied())
+        .collect();
     let dropped = all.len() - kept.len();
     let nodes: Vec<u64> = kept.iter().map(|&k| first.nodes[k]).collect();
     let values = nodes

@@ -147,7 +147,9 @@ impl<'a> Places<'a> {
             return Ok(());
         }
         Err(self.origin.wrong(match self.points.len() {
-            1 => "there is one touch only: to tell places apart takes touches at several".to_owned(),
+            1 => {
+                "there is one touch only: to tell places apart takes touches at several".to_owned()
+            }
             n => format!("all {n} touches lie at one place: there is nothing to tell apart"),
         }))
     }

@@ -220,7 +220,14 @@ mod tests {
         let path = project(folder.path(), &[]);
         for name in ["p.hapdef.npz", "pipe.hapdef.toml"] {
             let pipe = folder.path().join(name);
-            mknodat(CWD, pipe.as_path(), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+            mknodat(
+                CWD,
+                pipe.as_path(),
+                FileType::Fifo,
+                Mode::RUSR | Mode::WUSR,
+                0,
+            )
+            .unwrap();
         }
         for path in [path, folder.path().join("pipe.hapdef.toml")] {
             let said = load(&path).err().unwrap().to_string();

@@ -8,7 +8,6 @@ use serde::Serialize;
 use super::screen::LEVELS;
 use super::{GreedySvr, PlacementError, Pool, Request, Scored, Search, Wishes};
 use crate::budget::Watch;
-use crate::regression::folds::Folds;
 
 /// How many others are compared at each step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +49,7 @@ impl GreedySvr {
     /// Compares each step of a choice (places in the pool, in order) with others by the criterion itself.
     ///
     /// # Errors
-    /// [`PlacementError`] when the watch asks for a stop.
+    /// [`PlacementError`] for too few touches, or when the watch asks for a stop.
     pub fn audit(
         &self,
         pool: &Pool,
@@ -64,7 +63,7 @@ impl GreedySvr {
             watch,
             found: &|_| (),
         };
-        let folds = Folds::draw(pool.targets.len(), self.folds, self.seed);
+        let folds = self.split(pool.targets)?;
         let mut search = Search::new(self, pool, &request, &folds);
         (0..chosen.len())
             .map(|step| search.compare(chosen, step, audit))
