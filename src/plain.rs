@@ -29,6 +29,12 @@ pub fn mm(length: f64) -> String {
     }
 }
 
+/// Line breaks before a byte of a text: the number of its line, counted from 0.
+#[must_use]
+pub fn lines_before(text: &[u8], byte: usize) -> usize {
+    text[..byte.min(text.len())].split(|&b| b == b'\n').count() - 1
+}
+
 /// At most so many characters, those that a terminal would obey replaced; a line break stays.
 fn shown(text: &str, most: usize) -> String {
     let safe = |c: char| match c {

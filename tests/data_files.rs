@@ -164,7 +164,7 @@ fn an_array_is_not_taken_before_it_is_known_to_fit() {
         ("(2, 3)", ["more follows", "6 numbers"]),
         ("(2, 30000)", ["of its 60000 numbers", "Write it again"]),
     ] {
-        let x = npy("'<f8'", false, shape, &[0; 400_000]);
+        let x = npy("'<f8'", false, shape, &vec![0; 400_000]);
         let path = folder.npz("bomb.npz", &[("X", &x), ("p_m", &touches())]);
         refused(
             &path,

@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::FileError;
-use crate::memory;
+use crate::{memory, plain};
 
 /// What is read may become this many times as large in memory while it is taken apart.
 const GROWTH: f64 = 8.0;
@@ -50,7 +50,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, FileError> {
 pub fn read_text(path: &Path) -> Result<String, FileError> {
     String::from_utf8(read(path)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
-        let line = 1 + e.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count();
+        let line = 1 + plain::lines_before(e.as_bytes(), at);
         FileError::broken(
             path,
             format!("line {line} is not text (UTF-8). Save it as UTF-8 text"),

@@ -133,7 +133,7 @@ impl Reader {
         let count = self.soup.positions.len();
         let index = match vertex.parse::<i64>() {
             Ok(from_one @ 1..) => usize::try_from(from_one - 1).ok(),
-            Ok(backward @ ..0) => usize::try_from(backward.unsigned_abs())
+            Ok(backward @ ..=-1) => usize::try_from(backward.unsigned_abs())
                 .ok()
                 .and_then(|back| count.checked_sub(back)),
             _ => None,

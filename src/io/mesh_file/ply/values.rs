@@ -4,7 +4,7 @@ use std::str::{Lines, SplitAsciiWhitespace};
 
 use super::super::words::{at, number};
 use super::header::{Form, Header, Scalar};
-use crate::plain::quote;
+use crate::plain::{lines_before, quote};
 
 pub struct Values<'b> {
     source: Source<'b>,
@@ -30,8 +30,7 @@ impl<'b> Values<'b> {
     pub fn of(body: &'b [u8], header: &Header) -> Result<Self, String> {
         let source = if header.form == Form::Text {
             let text = str::from_utf8(body).map_err(|e| {
-                let before = body[..e.valid_up_to()].iter();
-                let line = header.lines + 1 + before.filter(|&&b| b == b'\n').count();
+                let line = header.lines + 1 + lines_before(body, e.valid_up_to());
                 at(line, "this is not text")
             })?;
             Source::Text {
