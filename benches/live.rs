@@ -389,7 +389,12 @@ impl Lab {
             faults,
             &unwatched,
         );
-        let hosted = host(made.expect("the board"), &doorway(), |_| {}).expect("a port");
+        let hosted = host(
+            made.expect("the board"),
+            doorway().open().expect("a port"),
+            |_| {},
+        )
+        .expect("a thread");
         let gauges = self.sensing.gauges.len();
         let live = &self.inputs.project.live;
         let pipeline = Pipeline::new(self.sensing.map_for(live), live.settings(gauges));

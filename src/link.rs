@@ -10,8 +10,8 @@ mod socket;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-pub use host::{Doorway, Hosted, host};
-pub use recording::{Recorder, note};
+pub use host::{Doorway, Entrance, Hosted, host};
+pub use recording::{Recorder, old_note};
 pub use serial::{PortInfo, ports};
 pub use session::{Command, Connection, Heard, Listener, State, Timing};
 
@@ -105,6 +105,14 @@ impl Address {
             Self::Socket(address) => socket::open(address),
             Self::Recording { path, pace } => replay::open(path, *pace),
         }
+    }
+
+    /// Whether there is anything to listen to, before time is spent on anything else.
+    ///
+    /// # Errors
+    /// A message that says what is wrong with the port, the host or the recording.
+    pub fn check(&self) -> Result<(), String> {
+        self.open().map(drop)
     }
 
     /// Whether it has an end.

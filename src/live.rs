@@ -7,5 +7,5 @@ pub mod tare;
 
 pub use health::Health;
 pub use pipeline::{Estimator, Guess, Pipeline, Settings, UNCALIBRATED, Update};
-pub use receiver::{Input, Receiver, Sample, Traffic};
+pub use receiver::{Doubt, Input, Receiver, Sample, Traffic};
 pub use tare::Rest;

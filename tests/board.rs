@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use hapdef::wire::{Decoder, Event, Message, encode};
+use hapdef::wire::{Decoder, Event, Hello, Message, VERSION, encode};
 use serde_json::Value;
 
 /// A program that ends with the test.
@@ -359,4 +359,206 @@ fn what_is_no_board_is_said() {
     );
     refused(&["board", "--simulate", "--fault", "deaf:3"], "is no fault");
     assert!(!Path::new("/dev/no-such-port").exists());
+}
+
+/// How a command ended, and what it said on stderr; what it prints goes where it is told.
+fn ended(args: &[&str], stdout: Stdio) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_hapdef"))
+        .args(args)
+        .stdin(Stdio::null())
+        .stdout(stdout)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+        .wait_with_output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    (output.status.code(), said)
+}
+
+#[test]
+fn numbers_out_of_range_are_wrong_usage() {
+    for (command, flag, value, range) in [
+        ("listen", "--every", "nan", "from 0.001 to 1000000"),
+        ("listen", "--every", "0", "from 0.001"),
+        ("listen", "--seconds", "nan", "from 0 to"),
+        ("listen", "--seconds", "inf", "from 0 to"),
+        ("listen", "--rate", "0", "1..=65535"),
+        ("listen", "--baud", "0", "50..="),
+        ("board", "--seconds", "nan", "from 0 to"),
+        ("board", "--rate", "0", "1..=10000"),
+        ("board", "--bits", "25", "1..=24"),
+        ("board", "--channels", "0", "1..=64"),
+        ("board", "--channels", "65", "1..=64"),
+        ("board", "--noise", "nan", "from 0 to 100000"),
+        ("board", "--drift", "inf", "from 0 to 100000"),
+        ("board", "--flip", "1.5", "from 0 to 1"),
+        ("board", "--drop", "nan", "from 0 to 1"),
+        ("board", "--duplicate", "nan", "from 0 to 1"),
+        ("board", "--lose", "2", "from 0 to 1"),
+        ("board", "--workshop", "any", "exact, gains or all"),
+        ("board", "--fault", "dead:x", "is no fault"),
+    ] {
+        let first = if command == "listen" {
+            "COM99"
+        } else {
+            "--simulate"
+        };
+        let (code, said) = ended(&[command, first, flag, value], Stdio::null());
+        assert!(
+            code == Some(2) && said.contains(range) && said.contains(flag),
+            "{command} {flag} {value}: {code:?} {said}"
+        );
+    }
+}
+
+fn hello(version: u8) -> Message {
+    Message::Hello(Hello {
+        version,
+        board: 7,
+        channels: 16,
+        bits: 12,
+        reference_mv: 3300,
+        supply_mv: 5000,
+        gain_milli: 330_000,
+        rate_hz: 1000,
+        name: "limb".into(),
+    })
+}
+
+/// A board at rest.
+fn recording(samples: u16) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    encode(&hello(VERSION), 0, 0, 12, &mut bytes);
+    for k in 1..=samples {
+        let count = |c: u32| 2000 + (u32::from(k) * 7 + c * 3) % 5;
+        let counts = Message::Data((0..16).map(count).collect());
+        encode(&counts, k, 1000 * u32::from(k), 12, &mut bytes);
+    }
+    bytes
+}
+
+/// With a quality that takes minutes: what is wrong is said in seconds.
+#[test]
+fn what_is_wrong_is_said_before_the_model_is_computed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let (garbage, far, sound) = (at("garbage.hapdrec"), at("far.csv"), at("sound.hapdrec"));
+    let (nowhere, csv) = (at("none/a"), at("a.csv"));
+    let head = "start_s,duration_s,x_mm,y_mm,z_mm,force_n";
+    std::fs::write(&garbage, vec![0x41; 20_000]).unwrap();
+    std::fs::write(&far, format!("{head}\n1,1,1e160,0,0,5\n")).unwrap();
+    std::fs::write(&sound, recording(1)).unwrap();
+    let begun = Instant::now();
+    let cases: Vec<(Vec<&str>, &str)> = vec![
+        (
+            vec!["listen", "127.0.0.1:1", "--csv", &csv],
+            "does not answer",
+        ),
+        (vec!["listen", &garbage], "no recording"),
+        (
+            vec!["listen", &sound, "--record", &nowhere],
+            "cannot be begun",
+        ),
+        (
+            vec!["listen", &sound, "--csv", &nowhere],
+            "cannot be written",
+        ),
+        (
+            vec!["listen", &sound, "--csv", &sound],
+            "the recording itself",
+        ),
+        (
+            vec!["listen", &sound, "--serve", "nowhere"],
+            "--serve nowhere",
+        ),
+        (
+            vec!["board", "--simulate", "--script", &nowhere],
+            "no such file",
+        ),
+        (
+            vec!["board", "--simulate", "--script", &far],
+            "away from the part",
+        ),
+        (
+            vec!["board", "--simulate", "--truth", &nowhere],
+            "cannot be written",
+        ),
+        (
+            vec!["board", "--simulate", "--tcp", "127.0.0.1:99999"],
+            "nothing can be listened to",
+        ),
+        (vec!["board", "--simulate", "--fault", "dead:99"], "from 0"),
+        (
+            vec!["board", "--simulate", "--channels", "1"],
+            "--channels 1",
+        ),
+        (
+            vec!["board", "--simulate", "--force", "9", "2"],
+            "smaller one first",
+        ),
+    ];
+    for (args, why) in cases {
+        let args = [&args[..], &["--quality", "reference"]].concat();
+        let (code, said) = ended(&args, Stdio::null());
+        assert!(
+            code == Some(1) && said.contains(why),
+            "{args:?}: {code:?} {said}"
+        );
+    }
+    assert!(begun.elapsed() < Duration::from_secs(30));
+    assert!(!Path::new(&csv).exists(), "nothing was begun");
+    assert_eq!(std::fs::read(&sound).unwrap(), recording(1));
+}
+
+/// Nobody is left to believe that all is there: a full disk ends with a message, a closed pipe quietly.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_cannot_be_written_ends_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rest.hapdrec");
+    std::fs::write(&file, recording(2000)).unwrap();
+    let file = file.to_str().unwrap();
+    let args = ["listen", file, "--fast", "--quality", "draft"];
+    let full = std::fs::File::options()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let no_room = |(code, said): (Option<i32>, String)| {
+        assert!(
+            code == Some(1) && said.contains("No space left"),
+            "{code:?} {said}"
+        );
+    };
+    no_room(ended(&args, full.into()));
+    let csv = [&args[..], &["--csv", "/dev/full"]].concat();
+    no_room(ended(&csv, Stdio::null()));
+    no_room(ended(
+        &["board", "--simulate", "--truth", "/dev/full"],
+        Stdio::null(),
+    ));
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let (code, said) = ended(&args, writer.into());
+    assert!(
+        code == Some(0) && !said.contains("panicked"),
+        "{code:?} {said}"
+    );
+}
+
+/// A board that cannot be understood is not waited for without a word.
+#[test]
+fn why_a_board_is_not_understood_is_said() {
+    let address = other_board(|stream| {
+        let mut greeting = vec![0];
+        encode(&hello(9), 0, 0, 12, &mut greeting);
+        loop {
+            stream.write_all(&greeting)?;
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    });
+    let args = ["listen", &address, "--quality", "draft", "--seconds", "2"];
+    let (code, said) = ended(&args, Stdio::null());
+    let reasons = said.lines().filter(|l| l.contains("version 9")).count();
+    assert!(code == Some(0) && reasons == 1, "{code:?} {said}");
 }

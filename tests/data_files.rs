@@ -187,7 +187,7 @@ fn the_budget_of_memory_holds_for_datasets() {
     let x = npy("'<f8'", false, "(2000, 2000)", &[]);
     let path = folder.npz("large.npz", &[("X", &x), ("p_m", &touches())]);
     let output = Command::new(env!("CARGO_BIN_EXE_hapdef"))
-        .args(["--memory-gb", "0.1", "select", "--data"])
+        .args(["select", "--memory-gb", "0.1", "--data"])
         .arg(&path)
         .output()
         .unwrap();

@@ -310,12 +310,16 @@ fn what_cannot_be_done_is_said() {
 
 /// The same plate with other places of touches (m) and signals, in a file of its own.
 fn saved(folder: &Path, name: &str, x: &[f64], p: &[f64]) -> String {
-    let (_, _, s) = signals();
+    saved_with(folder, name, x, p, &signals().2)
+}
+
+/// As [`saved`], with sites at places of their own.
+fn saved_with(folder: &Path, name: &str, x: &[f64], p: &[f64], s: &[f64]) -> String {
     let touches = p.len() / 3;
     let mut file = NpzFile::default();
     file.add("X", &[SITES, touches], x).unwrap();
     file.add("p_m", &[touches, 3], p).unwrap();
-    file.add("site_m", &[SITES, 3], &s).unwrap();
+    file.add("site_m", &[SITES, 3], s).unwrap();
     let path = folder.join(name);
     file.save(&path).unwrap();
     path.to_str().unwrap().to_owned()
@@ -423,9 +427,15 @@ fn too_few_touches_are_refused_with_how_many_would_do() {
     let one = one.as_str();
     for selector in SELECTORS {
         let arguments = ["select", "--data", one, "--selector", selector];
-        refused(&[&arguments[..], &["--sensors", "2"]].concat(), "too few");
+        refused(
+            &[&arguments[..], &["--sensors", "2"]].concat(),
+            "one touch only",
+        );
     }
-    refused(&["evaluate", "--data", one, "--sites", "0,1"], "too few");
+    refused(
+        &["evaluate", "--data", one, "--sites", "0,1"],
+        "one touch only",
+    );
     // What is asked for is what does.
     let eleven = first_touches(folder, 11);
     let flags = ["evaluate", "--data", eleven.as_str(), "--sites", "0,1"];
@@ -453,8 +463,11 @@ fn too_few_touches_are_refused_with_how_many_would_do() {
     // Touches that all lie at one place are one.
     let (x, _, _) = signals();
     let same = saved(folder, "same.npz", &x, &[0.01; 3 * TOUCHES]);
-    refused(&["select", "--data", &same], "1 places are too few");
-    refused(&["evaluate", "--data", &same, "--sites", "0,1"], "too few");
+    refused(&["select", "--data", &same], "touches lie at one place");
+    refused(
+        &["evaluate", "--data", &same, "--sites", "0,1"],
+        "one place",
+    );
 }
 
 #[test]
@@ -526,10 +539,11 @@ fn flags_without_effect_are_refused() {
 #[test]
 fn the_size_of_the_part_changes_nothing_but_the_size_of_the_errors() {
     let folder = tempfile::tempdir().unwrap();
-    let (x, p, _) = signals();
+    let (x, p, s) = signals();
     let asked = |by: f64| {
-        let p: Vec<f64> = p.iter().map(|v| v * by).collect();
-        let data = saved(folder.path(), &format!("{by}.npz"), &x, &p);
+        let scaled = |of: &[f64]| -> Vec<f64> { of.iter().map(|v| v * by).collect() };
+        let name = format!("{by}.npz");
+        let data = saved_with(folder.path(), &name, &x, &scaled(&p), &scaled(&s));
         let chosen = json(&["select", "--data", &data, "--sensors", "3"]);
         let tuned = json(&["evaluate", "--data", &data, "--sites", "3,9,14", "--tune"]);
         let tuned = tuned["errors"].as_array().unwrap();

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 use anyhow::Context;
@@ -11,15 +12,21 @@ use glam::DVec3;
 use serde::Deserialize;
 use serde_json::json;
 
-use super::{Common, progress::Bar};
+use super::ranges::{between, whole};
+use super::{Common, out, progress::Bar};
 use crate::board::{
-    Fault, Faults, Options, Press, Script, SimulatedBoard, Truth, fitting_gain, script_seed,
+    ChannelFault, Fault, Faults, Options, Press, Script, SimulatedBoard, Truth, fitting_gain,
+    script_seed,
 };
 use crate::budget::Watch;
 use crate::design::{self, Inputs, Sensing, Workshop};
 use crate::elasticity::Touch;
 use crate::inference::Chain;
+use crate::io::source;
 use crate::link::{Doorway, host, ports};
+use crate::mesh::TriMesh;
+use crate::plain;
+use crate::wire::MOST_CHANNELS;
 
 #[derive(Args, Debug, Clone)]
 pub struct BoardArgs {
@@ -32,25 +39,25 @@ pub struct BoardArgs {
     #[arg(long, num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
     pub tcp: Option<String>,
     /// Samples a second, until the studio asks for others.
-    #[arg(long, default_value_t = 1000)]
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub rate: u16,
     /// Channels; as many as gauges when left out.
-    #[arg(long)]
+    #[arg(long, value_parser = whole(1, MOST_CHANNELS as u64))]
     pub channels: Option<usize>,
     /// Bits of the converter.
-    #[arg(long, default_value_t = 12)]
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u8).range(1..=24))]
     pub bits: u8,
     /// Standard deviation of a reading (microstrain); the project's when left out.
-    #[arg(long)]
+    #[arg(long, value_parser = between(0.0, MOST_MICROSTRAIN))]
     pub noise: Option<f64>,
     /// What readings drift by in a second (microstrain).
-    #[arg(long, default_value_t = 0.1)]
+    #[arg(long, default_value_t = 0.1, value_parser = between(0.0, MOST_MICROSTRAIN))]
     pub drift: f64,
     /// What the gauges are off by: exact, gains (3 %), or all (gains, 1 mm, 3°).
-    #[arg(long, default_value = "all")]
-    pub workshop: String,
+    #[arg(long, default_value = "all", value_parser = workshop)]
+    pub workshop: Workshop,
     /// Smallest and largest force of random touches (N).
-    #[arg(long, num_args = 2, default_values_t = [2.0, 15.0])]
+    #[arg(long, num_args = 2, default_values_t = [2.0, 15.0], value_parser = between(0.001, MOST_NEWTONS))]
     pub force: Vec<f64>,
     /// Touches instead of random ones (.csv): `start_s,duration_s,x_mm,y_mm,z_mm,force_n`.
     #[arg(long)]
@@ -60,22 +67,36 @@ pub struct BoardArgs {
     pub truth: Option<PathBuf>,
     /// A channel (from 0) that fails, or an unplug: `dead:7@5`, `stuck:2@3+4`, `saturated:1`, `noisy:0`, `unplug@10+1`.
     #[arg(long)]
-    pub fault: Vec<String>,
+    pub fault: Vec<Fault>,
     /// Probability of a byte to have a bit turned over.
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 1.0))]
     pub flip: f64,
     /// Probability of a byte to be left out.
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 1.0))]
     pub drop: f64,
     /// Probability of a frame to come twice.
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 1.0))]
     pub duplicate: f64,
     /// Probability of a frame to be lost.
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 1.0))]
     pub lose: f64,
     /// Seconds after which it ends by itself.
-    #[arg(long)]
+    #[arg(long, value_parser = between(0.0, 1e9))]
     pub seconds: Option<f64>,
+}
+
+/// More than any gauge bears, and harder than any press.
+const MOST_MICROSTRAIN: f64 = 1e5;
+const MOST_NEWTONS: f64 = 1e4;
+
+/// What the gauges are off by, as it is written.
+fn workshop(text: &str) -> Result<Workshop, String> {
+    match text {
+        "exact" => Ok(Workshop::Exact),
+        "gains" => Ok(Workshop::Gains),
+        "all" => Ok(Workshop::All),
+        _ => Err("choose exact, gains or all".into()),
+    }
 }
 
 /// Runs the command.
@@ -84,57 +105,69 @@ pub struct BoardArgs {
 /// A message in the user's terms.
 pub fn run(args: &BoardArgs) -> anyhow::Result<()> {
     if !args.simulate {
-        list(args.common.json);
-        return Ok(());
+        return list(args.common.json);
     }
     let loaded = args.common.load()?;
+    // All that may be wrong is found before the model is computed.
+    let plan = Plan::new(args, &loaded.inputs)?;
+    let (failed, failures) = channel();
+    let mut truth = match &args.truth {
+        Some(path) => Some(TruthFile::create(path, failed)?),
+        None => None,
+    };
+    let entrance = doorway(args)?.open().map_err(anyhow::Error::msg)?;
     let bar = Bar::default();
     let board = args.common.in_pool(|| {
         let watch = |p| bar.show(p);
-        build(args, &loaded.inputs, &watch)
+        build(args, plan, &loaded.inputs, &watch)
     });
     bar.finish();
-    let board = board?;
-    let mut truth = match &args.truth {
-        Some(path) => Some(TruthFile::create(path)?),
-        None => None,
-    };
-    let hosted = host(board, &doorway(args)?, move |t| {
+    let hosted = host(board?, entrance, move |t| {
         if let Some(file) = &mut truth {
             file.write(&t);
         }
     })
     .map_err(anyhow::Error::msg)?;
-    println!("{}", json!({ "port": hosted.port }));
-    std::io::stdout()
-        .flush()
-        .context("the port's name cannot be printed")?;
+    out::line(&json!({ "port": hosted.port }).to_string())?;
     while args.seconds.is_none_or(|s| hosted.seconds() < s) {
+        check_truth(args, &failures)?;
         std::thread::sleep(Duration::from_millis(20));
     }
-    Ok(())
+    // Its end brings what was not written yet.
+    drop(hosted);
+    check_truth(args, &failures)
 }
 
-fn list(as_json: bool) {
+/// Ends where the truth can be written no more: a table that is cut would be believed.
+fn check_truth(args: &BoardArgs, failures: &Receiver<std::io::Error>) -> anyhow::Result<()> {
+    let Ok(failure) = failures.try_recv() else {
+        return Ok(());
+    };
+    let path = args.truth.as_deref().unwrap_or(Path::new("--truth"));
+    let what = format!(
+        "{}: the truth ends here, because it can be written no more",
+        path.display()
+    );
+    Err(anyhow::Error::new(failure).context(what))
+}
+
+fn list(as_json: bool) -> anyhow::Result<()> {
     let all = ports();
     for port in &all {
+        // What a device calls itself comes from outside.
+        let product = plain::message(&port.product);
         if as_json {
-            println!(
-                "{}",
-                json!({ "port": port.path, "product": port.product, "likely": port.likely })
-            );
+            let port = json!({ "port": port.path, "product": product, "likely": port.likely });
+            out::line(&port.to_string())?;
         } else {
-            println!(
-                "{}{}  {}",
-                port.path,
-                if port.likely { " *" } else { "" },
-                port.product
-            );
+            let mark = if port.likely { " *" } else { "" };
+            out::line(&format!("{}{mark}  {product}", port.path))?;
         }
     }
     if all.is_empty() {
-        eprintln!("There is no serial port. `hapdef board --simulate` starts a simulated board.");
+        out::say("There is no serial port. `hapdef board --simulate` starts a simulated board.");
     }
+    Ok(())
 }
 
 #[cfg(unix)]
@@ -152,37 +185,68 @@ fn doorway(args: &BoardArgs) -> anyhow::Result<Doorway> {
     Ok(Doorway::Socket(address))
 }
 
-fn build(args: &BoardArgs, inputs: &Inputs, watch: Watch) -> anyhow::Result<SimulatedBoard> {
-    let workshop = match args.workshop.as_str() {
-        "exact" => Workshop::Exact,
-        "gains" => Workshop::Gains,
-        "all" => Workshop::All,
-        other => anyhow::bail!("--workshop {other}: choose exact, gains or all"),
-    };
-    anyhow::ensure!(
-        (1..=24).contains(&args.bits),
-        "--bits {}: a converter has between 1 and 24",
-        args.bits
-    );
-    anyhow::ensure!(args.rate > 0, "--rate 0: at least one sample a second");
-    anyhow::ensure!(
-        args.force[0] > 0.0 && args.force[0] <= args.force[1] && args.force[1].is_finite(),
-        "--force: the smaller one first, both above zero"
-    );
+/// What was asked for, as far as it can be known to make sense without the model.
+struct Plan {
+    channels: usize,
+    faults: Faults,
+    /// Instead of random touches.
+    rows: Option<Vec<Row>>,
+}
+
+impl Plan {
+    fn new(args: &BoardArgs, inputs: &Inputs) -> anyhow::Result<Self> {
+        inputs.project.check()?;
+        let gauges = inputs.project.selection.sites.len();
+        let channels = args.channels.unwrap_or(gauges);
+        anyhow::ensure!(
+            (gauges..=MOST_CHANNELS).contains(&channels),
+            "--channels {channels}: the project has {gauges} gauges, and a board at most {MOST_CHANNELS} channels"
+        );
+        anyhow::ensure!(
+            args.force[0] <= args.force[1],
+            "--force {} {}: the smaller one first",
+            args.force[0],
+            args.force[1]
+        );
+        let script = args.script.as_deref();
+        Ok(Self {
+            channels,
+            faults: faults(args, channels)?,
+            rows: script.map(|path| rows(path, &inputs.part)).transpose()?,
+        })
+    }
+}
+
+fn faults(args: &BoardArgs, channels: usize) -> anyhow::Result<Faults> {
     let mut faults = Faults {
-        flip: probability("--flip", args.flip)?,
-        drop: probability("--drop", args.drop)?,
-        duplicate: probability("--duplicate", args.duplicate)?,
-        lose: probability("--lose", args.lose)?,
+        flip: args.flip,
+        drop: args.drop,
+        duplicate: args.duplicate,
+        lose: args.lose,
         ..Faults::default()
     };
-    for text in &args.fault {
-        faults.add(text.parse::<Fault>().map_err(anyhow::Error::msg)?);
+    for &fault in &args.fault {
+        if let Fault::Channel(ChannelFault { channel, .. }) = fault {
+            anyhow::ensure!(
+                channel < channels,
+                "--fault on channel {channel}: the board has {channels} channels, from 0"
+            );
+        }
+        faults.add(fault);
     }
+    Ok(faults)
+}
+
+fn build(
+    args: &BoardArgs,
+    plan: Plan,
+    inputs: &Inputs,
+    watch: Watch,
+) -> anyhow::Result<SimulatedBoard> {
     let seed = inputs.project.budget.seed;
     let sensing = design::sense(inputs, &inputs.project.budget.budget(), watch)?;
-    let script = match &args.script {
-        Some(path) => given(path, inputs, &sensing)?,
+    let script = match &plan.rows {
+        Some(rows) => given(rows, inputs, &sensing),
         None => Script::random(
             places(inputs, &sensing, seed)?,
             [args.force[0], args.force[1]],
@@ -192,33 +256,24 @@ fn build(args: &BoardArgs, inputs: &Inputs, watch: Watch) -> anyhow::Result<Simu
     let most = strongest(&script).unwrap_or(args.force[1]);
     let options = Options {
         rate_hz: args.rate,
-        channels: args.channels.unwrap_or(sensing.gauges.len()),
         noise: args.noise.unwrap_or(inputs.project.gauge.noise_microstrain) * 1e-6,
         drift: args.drift * 1e-6,
         chain: Chain {
             bits: args.bits,
             ..Chain::default()
         },
-        ..options(inputs, sensing.gauges.len())
+        ..options(inputs, plan.channels)
     };
-    anyhow::ensure!(
-        options.channels >= sensing.gauges.len() && options.channels <= crate::wire::MOST_CHANNELS,
-        "--channels {}: the project has {} gauges, and a board at most {} channels",
-        options.channels,
-        sensing.gauges.len(),
-        crate::wire::MOST_CHANNELS
-    );
     Ok(simulated(
-        inputs, &sensing, workshop, script, most, options, faults, watch,
+        inputs,
+        &sensing,
+        args.workshop,
+        script,
+        most,
+        options,
+        plan.faults,
+        watch,
     )?)
-}
-
-fn probability(name: &str, value: f64) -> anyhow::Result<f64> {
-    anyhow::ensure!(
-        (0.0..=1.0).contains(&value),
-        "{name} {value}: a probability lies between 0 and 1"
-    );
-    Ok(value)
 }
 
 /// What a simulated board of a project is like where nothing else is asked for.
@@ -282,7 +337,7 @@ fn strongest(script: &Script) -> Option<f64> {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Row {
     start_s: f64,
@@ -293,36 +348,71 @@ struct Row {
     force_n: f64,
 }
 
-/// Touches from a file, put onto the part's surface.
-fn given(path: &Path, inputs: &Inputs, sensing: &Sensing) -> anyhow::Result<Script> {
+/// Touches from a file.
+fn rows(path: &Path, part: &TriMesh) -> anyhow::Result<Vec<Row>> {
     let shown = path.display();
-    let mut reader = csv::Reader::from_path(path)
-        .with_context(|| format!("{shown}: the script cannot be read"))?;
-    let mut presses = Vec::new();
-    for (number, row) in reader.deserialize().enumerate() {
-        let row: Row = row.with_context(|| {
-            format!(
-                "{shown}, touch {}: the columns are start_s,duration_s,x_mm,y_mm,z_mm,force_n",
-                number + 1
-            )
+    let bytes = source::read(path)?;
+    let mut reader = csv::Reader::from_reader(&bytes[..]);
+    let mut rows = Vec::new();
+    for (number, row) in (1..).zip(reader.deserialize()) {
+        let row: Row = row.map_err(|e| {
+            let why = plain::message(&e.to_string());
+            anyhow::anyhow!("{shown}, touch {number}: the columns are start_s,duration_s,x_mm,y_mm,z_mm,force_n ({why})")
         })?;
-        let sound = [
-            row.start_s,
-            row.duration_s,
-            row.x_mm,
-            row.y_mm,
-            row.z_mm,
-            row.force_n,
+        if let Err(why) = row.check(part) {
+            anyhow::bail!("{shown}, touch {number}: {why}");
+        }
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+impl Row {
+    /// m.
+    fn place(&self) -> DVec3 {
+        DVec3::new(self.x_mm, self.y_mm, self.z_mm) * 1e-3
+    }
+
+    /// Whether somebody could press so.
+    fn check(&self, part: &TriMesh) -> Result<(), String> {
+        const LONGEST_S: f64 = 1e9;
+        let bounds = [
+            ("start_s", self.start_s, 0.0, LONGEST_S),
+            ("duration_s", self.duration_s, 0.001, LONGEST_S),
+            ("force_n", self.force_n, 0.001, MOST_NEWTONS),
         ];
-        anyhow::ensure!(
-            sound.iter().all(|v| v.is_finite()) && row.duration_s > 0.0 && row.force_n > 0.0,
-            "{shown}, touch {}: duration and force must be above zero",
-            number + 1
-        );
-        let place = DVec3::new(row.x_mm, row.y_mm, row.z_mm) * 1e-3;
-        let map = &sensing.drawn.map;
-        let (at, _) = map.index.nearest(place);
-        presses.push(Press {
+        for (name, value, least, most) in bounds {
+            if !(least..=most).contains(&value) {
+                return Err(format!(
+                    "{name} must be from {least} to {most}, but is {value}"
+                ));
+            }
+        }
+        let place = self.place();
+        if !place.is_finite() {
+            return Err("x_mm, y_mm and z_mm must be finite numbers".to_owned());
+        }
+        let (lower, upper) = part.bounds();
+        let size = (upper - lower).length();
+        // By the axis that is worst: squares of what is far may be infinite.
+        let away = (place - place.clamp(lower, upper)).abs().max_element();
+        if away > size {
+            return Err(format!(
+                "x_mm, y_mm, z_mm lie {:.1e} mm away from the part, which is {:.1} mm large",
+                away * 1e3,
+                size * 1e3
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Touches put onto the part's surface.
+fn given(rows: &[Row], inputs: &Inputs, sensing: &Sensing) -> Script {
+    let map = &sensing.drawn.map;
+    let press = |row: &Row| {
+        let (at, _) = map.index.nearest(row.place());
+        Press {
             start_s: row.start_s,
             duration_s: row.duration_s,
             touch: Touch {
@@ -331,21 +421,31 @@ fn given(path: &Path, inputs: &Inputs, sensing: &Sensing) -> anyhow::Result<Scri
                 force: row.force_n,
                 tip_radius: inputs.project.tip().1,
             },
-        });
-    }
-    Ok(Script::Given(presses))
+        }
+    };
+    Script::Given(rows.iter().map(press).collect())
 }
 
-struct TruthFile(BufWriter<File>);
+/// What really happens, as a table. What goes wrong with it is told to `failed`, once.
+struct TruthFile {
+    file: BufWriter<File>,
+    failed: Option<Sender<std::io::Error>>,
+}
 
 impl TruthFile {
-    fn create(path: &Path) -> anyhow::Result<Self> {
-        let file = File::create(path)
+    fn create(path: &Path, failed: Sender<std::io::Error>) -> anyhow::Result<Self> {
+        let begin = || {
+            let mut file = BufWriter::new(File::create(path)?);
+            writeln!(file, "t_us,x_mm,y_mm,z_mm,force_n")?;
+            file.flush()?;
+            Ok::<_, std::io::Error>(file)
+        };
+        let file = begin()
             .with_context(|| format!("{}: the truth cannot be written there", path.display()))?;
-        let mut file = BufWriter::new(file);
-        writeln!(file, "t_us,x_mm,y_mm,z_mm,force_n")?;
-        file.flush()?;
-        Ok(Self(file))
+        Ok(Self {
+            file,
+            failed: Some(failed),
+        })
     }
 
     fn write(&mut self, truth: &Truth) {
@@ -361,10 +461,64 @@ impl TruthFile {
             }
             None => format!("{},,,,", truth.time_us),
         };
-        // A full disk must not stop the board.
-        let _ = writeln!(self.0, "{line}");
+        let written = writeln!(self.file, "{line}");
+        self.note(written);
         if truth.time_us % 100_000 < 1000 {
-            let _ = self.0.flush();
+            self.flush();
         }
+    }
+
+    fn flush(&mut self) {
+        let flushed = self.file.flush();
+        self.note(flushed);
+    }
+
+    fn note(&mut self, outcome: std::io::Result<()>) {
+        if let Err(error) = outcome
+            && let Some(failed) = self.failed.take()
+        {
+            // Who no longer listens is about to end anyway.
+            let _ = failed.send(error);
+        }
+    }
+}
+
+impl Drop for TruthFile {
+    fn drop(&mut self) {
+        self.flush();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn touches_that_nobody_can_press_are_refused() {
+        let inputs = super::super::bundled().unwrap().inputs;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("touches.csv");
+        let read = |text: &str| {
+            let head = "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n";
+            std::fs::write(&path, format!("{head}{text}")).unwrap();
+            rows(&path, &inputs.part).map_err(|e| format!("{e:#}"))
+        };
+        assert_eq!(read("1,1,22.5,22.5,60,8\n2,1,0,0,0,1\n").unwrap().len(), 2);
+        for (text, why) in [
+            ("1,1,22.5,22.5,60,8\n1,1,1e160,0,0,8\n", "touch 2"),
+            ("1,1,nan,0,0,8\n", "finite"),
+            ("1,1,0,1e309,0,8\n", "finite"),
+            ("-1,1,22.5,22.5,60,8\n", "start_s"),
+            ("1,nan,22.5,22.5,60,8\n", "duration_s"),
+            ("1,1,22.5,22.5,60,1e300\n", "force_n"),
+            ("1,1,22.5\n", "touch 1: the columns are"),
+        ] {
+            let said = read(text).unwrap_err();
+            assert!(said.contains(why) && said.contains("touches.csv"), "{said}");
+        }
+        let long = format!("\u{1b}[31m{}\n1\n", "x".repeat(200_000));
+        std::fs::write(&path, long).unwrap();
+        let said = format!("{:#}", rows(&path, &inputs.part).err().unwrap());
+        assert!(said.len() < 4000 && !said.contains('\u{1b}'));
     }
 }

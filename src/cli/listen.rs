@@ -1,8 +1,8 @@
 //! `hapdef listen`: live touch without a window.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::net::TcpListener;
+use std::io::{BufWriter, ErrorKind, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
@@ -10,10 +10,13 @@ use std::sync::mpsc::channel;
 use anyhow::Context as _;
 use clap::Args;
 
-use super::{Common, progress::Bar};
+use super::ranges::between;
+use super::{Common, out, progress::Bar};
 use crate::design;
-use crate::link::{Address, BAUD, Command, Heard, Listener, Pace, State};
+use crate::io::project_file::LoadedProject;
+use crate::link::{Address, BAUD, Heard, Listener, Pace, Recorder, State};
 use crate::live::{Pipeline, Sample, Update};
+use crate::plain;
 
 #[derive(Args, Debug, Clone)]
 pub struct ListenArgs {
@@ -25,13 +28,13 @@ pub struct ListenArgs {
     #[command(flatten)]
     pub common: Common,
     /// Rate of a serial port (baud); native USB does not care.
-    #[arg(long, default_value_t = BAUD)]
+    #[arg(long, default_value_t = BAUD, value_parser = clap::value_parser!(u32).range(50..=20_000_000))]
     pub baud: u32,
     /// Samples a second that the board is asked for.
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     pub rate: Option<u16>,
     /// At most so many lines a second; all samples when left out.
-    #[arg(long)]
+    #[arg(long, value_parser = between(0.001, 1e6))]
     pub every: Option<f64>,
     /// Record the raw counts here (.hapdrec).
     #[arg(long)]
@@ -39,14 +42,15 @@ pub struct ListenArgs {
     /// Replay a recording as fast as it can be read.
     #[arg(long)]
     pub fast: bool,
-    /// Write a table of counts and touches here too (.csv), with the truth where a recording has it.
+    /// Write a table of counts and touches here too (.csv), with the truth where a recording has it. Where the
+    /// number of channels changes it goes on in a file beside it.
     #[arg(long)]
     pub csv: Option<PathBuf>,
     /// Serve the same lines to whoever connects to HOST:PORT.
     #[arg(long)]
     pub serve: Option<String>,
     /// End after so many seconds.
-    #[arg(long)]
+    #[arg(long, value_parser = between(0.0, 1e9))]
     pub seconds: Option<f64>,
 }
 
@@ -55,45 +59,56 @@ pub struct ListenArgs {
 /// # Errors
 /// A message in the user's terms.
 pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
+    let loaded = load(args)?;
     let pace = if args.fast { Pace::Fast } else { Pace::Real };
     let address = Address::parse(&args.port, args.baud, pace);
-    let pipeline = pipeline(args)?;
+    // All that may be wrong is found before the model is computed.
+    address.check().map_err(anyhow::Error::msg)?;
+    let mut output = Output::new(args, &address)?;
+    let recorder = args.record.as_deref().map(Recorder::create).transpose();
+    let recorder = recorder.map_err(anyhow::Error::msg)?;
+    let listener = Listener::new(address, pipeline(args, &loaded)?)
+        .at_rate(args.rate)
+        .recording(recorder);
+
     let stop = AtomicBool::new(false);
-    let (commands, inbox) = channel();
-    if let Some(path) = &args.record {
-        let _ = commands.send(Command::Record(path.clone()));
-    }
-    let mut out = Output::new(args)?;
+    let (_commands, inbox) = channel();
     let begun = std::time::Instant::now();
-    let listener = Listener::new(address, pipeline).at_rate(args.rate);
-    listener
-        .run(&stop, &inbox, |heard| {
-            if args
-                .seconds
-                .is_some_and(|s| begun.elapsed().as_secs_f64() >= s)
-                || !out.hear(&heard)
-            {
-                stop.store(true, Ordering::Relaxed);
-            }
-        })
-        .map_err(anyhow::Error::msg)
+    let mut told: anyhow::Result<()> = Ok(());
+    let ended = listener.run(&stop, &inbox, |heard| {
+        let over = |s: f64| begun.elapsed().as_secs_f64() >= s;
+        if told.is_ok() {
+            told = output.hear(&heard);
+        }
+        if told.is_err() || args.seconds.is_some_and(over) {
+            stop.store(true, Ordering::Relaxed);
+        }
+    });
+    told?;
+    ended.map_err(anyhow::Error::msg)?;
+    output.flush()
 }
 
-fn pipeline(args: &ListenArgs) -> anyhow::Result<Pipeline> {
+/// The project, whose gauges, channels and calibration fit each other.
+fn load(args: &ListenArgs) -> anyhow::Result<LoadedProject> {
     anyhow::ensure!(
         args.from.is_none() || args.common.project.is_none(),
         "name the project once: --project {}",
-        args.from
-            .as_deref()
-            .unwrap_or(std::path::Path::new("FILE"))
-            .display()
+        args.from.as_deref().unwrap_or(Path::new("FILE")).display()
     );
     let mut common = args.common.clone();
     common.project = args.from.clone().or(common.project);
     let loaded = common.load()?;
     let project = &loaded.inputs.project;
+    project.check()?;
+    project.live.check_gauges(project.selection.sites.len())?;
+    Ok(loaded)
+}
+
+fn pipeline(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Pipeline> {
+    let project = &loaded.inputs.project;
     let bar = Bar::default();
-    let sensing = common.in_pool(|| {
+    let sensing = args.common.in_pool(|| {
         let watch = |p| bar.show(p);
         Ok(design::sense(
             &loaded.inputs,
@@ -110,89 +125,87 @@ fn pipeline(args: &ListenArgs) -> anyhow::Result<Pipeline> {
     ))
 }
 
+/// A line for people.
+fn say(text: &str) {
+    out::say(&format!("hapdef: {text}"));
+}
+
 /// Where lines go.
 struct Output {
     stdout: BufWriter<std::io::Stdout>,
     csv: Option<Table>,
-    served: Option<(TcpListener, Vec<std::net::TcpStream>)>,
+    served: Option<(TcpListener, Vec<TcpStream>)>,
     period_us: u64,
     last_us: Option<u64>,
 }
 
 impl Output {
-    fn new(args: &ListenArgs) -> anyhow::Result<Self> {
-        let csv = args.csv.as_deref().map(Table::create).transpose()?;
-        let served = match &args.serve {
-            Some(address) => {
-                let listener = TcpListener::bind(address)
-                    .map_err(|e| anyhow::anyhow!("--serve {address}: nothing can be served there ({e}). Choose another address"))?;
-                listener.set_nonblocking(true)?;
-                Some((listener, Vec::new()))
-            }
-            None => None,
-        };
-        let period_us = args
-            .every
-            .filter(|r| *r > 0.0)
-            .map_or(0, |r| (1e6 / r) as u64);
+    fn new(args: &ListenArgs, address: &Address) -> anyhow::Result<Self> {
+        if let (Some(csv), Address::Recording { path, .. }) = (&args.csv, address) {
+            anyhow::ensure!(
+                !is_same_file(csv, path),
+                "--csv {}: this is the recording itself. Choose another name for the table",
+                csv.display()
+            );
+        }
         Ok(Self {
+            served: args.serve.as_deref().map(serve).transpose()?,
+            csv: args.csv.as_deref().map(Table::create).transpose()?,
             stdout: BufWriter::new(std::io::stdout()),
-            csv,
-            served,
-            period_us,
+            period_us: args.every.map_or(0, |r| (1e6 / r) as u64),
             last_us: None,
         })
     }
 
-    /// Whether anybody still wants to know.
-    fn hear(&mut self, heard: &Heard) -> bool {
+    fn hear(&mut self, heard: &Heard) -> anyhow::Result<()> {
         match heard {
-            Heard::State(state) => {
-                let said = match state {
-                    State::Waiting => "waiting for the board",
-                    State::Live => "live",
-                    State::Silent => "the board has fallen silent",
-                    State::Gone => "unplugged; waiting for the board to come back",
-                    State::Ended => "the recording is over",
-                };
-                eprintln!("hapdef: {said}");
-                true
-            }
-            Heard::Hello(hello) => {
-                eprintln!(
-                    "hapdef: {} ({:08x}), {} channels, {} bits, {} Hz",
-                    hello.name, hello.board, hello.channels, hello.bits, hello.rate_hz
-                );
-                true
-            }
-            Heard::Message(text) => {
-                eprintln!("hapdef: {text}");
-                true
-            }
+            Heard::State(state) => say(in_words(state)),
+            Heard::Hello(hello) => say(&format!(
+                "{} ({:08x}), {} channels, {} bits, {} Hz",
+                plain::quote(&hello.name),
+                hello.board,
+                hello.channels,
+                hello.bits,
+                hello.rate_hz
+            )),
+            Heard::Message(text) | Heard::Trouble(text) => say(text),
+            // Nobody wants to find out afterwards.
+            Heard::Unrecorded(why) => anyhow::bail!("{why}"),
             Heard::Truth(touch) => {
                 if let Some(csv) = &mut self.csv {
                     csv.truth = *touch;
                 }
-                true
             }
             Heard::Sample { sample, update, .. } => {
-                let written = self
-                    .csv
-                    .as_mut()
-                    .is_none_or(|t| t.row(sample, update).is_ok());
-                written && self.line(update)
+                self.row(sample, update)?;
+                self.line(update)?;
             }
-            // Lines that wait are written as soon as nothing more is there.
-            Heard::Turn { .. } => self.stdout.flush().is_ok(),
+            // What waits is written as soon as nothing more is there.
+            Heard::Turn { .. } => self.flush()?,
         }
+        Ok(())
     }
 
-    fn line(&mut self, update: &Update) -> bool {
+    fn row(&mut self, sample: &Sample, update: &Update) -> anyhow::Result<()> {
+        let Some(csv) = &mut self.csv else {
+            return Ok(());
+        };
+        if let Some(next) = csv.take(sample, update)? {
+            say(&format!(
+                "the board has {} channels now: the table goes on in {}",
+                sample.counts.len(),
+                next.display()
+            ));
+        }
+        Ok(())
+    }
+
+    fn line(&mut self, update: &Update) -> anyhow::Result<()> {
         if self
             .last_us
             .is_some_and(|last| update.time_us.abs_diff(last) < self.period_us)
         {
-            return true;
+            return Ok(());
         }
         self.last_us = Some(update.time_us);
         let line = line(update);
@@ -204,15 +217,48 @@ impl Output {
             // One who does not keep up is let go rather than waited for.
             clients.retain_mut(|c| c.write_all(format!("{line}\n").as_bytes()).is_ok());
         }
-        writeln!(self.stdout, "{line}").is_ok()
+        out::printed(writeln!(self.stdout, "{line}"))
+    }
+
+    fn flush(&mut self) -> anyhow::Result<()> {
+        if let Some(csv) = &mut self.csv {
+            csv.flush()?;
+        }
+        out::printed(self.stdout.flush())
     }
 }
 
-/// A table of samples, with the truth where a simulated board has told it.
+fn in_words(state: &State) -> &'static str {
+    match state {
+        State::Waiting => "waiting for the board",
+        State::Live => "live",
+        State::Silent => "the board has fallen silent",
+        State::Gone => "unplugged; waiting for the board to come back",
+        State::Ended => "the recording is over",
+    }
+}
+
+fn serve(address: &str) -> anyhow::Result<(TcpListener, Vec<TcpStream>)> {
+    let listener = TcpListener::bind(address).with_context(|| {
+        format!("--serve {address}: nothing can be served there. Choose another address")
+    })?;
+    listener.set_nonblocking(true)?;
+    Ok((listener, Vec::new()))
+}
+
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let whole = |p: &Path| std::fs::canonicalize(p).ok();
+    whole(a).is_some_and(|a| whole(b) == Some(a))
+}
+
+/// A table of samples, with the truth where a simulated board has told it. Each file has as many columns in every
+/// row: one for each number of channels.
 struct Table {
+    /// The last one is being written.
+    paths: Vec<PathBuf>,
     file: BufWriter<File>,
     truth: Option<(glam::DVec3, f64)>,
-    headed: bool,
+    channels: Option<usize>,
 }
 
 impl Table {
@@ -220,10 +266,61 @@ impl Table {
         let file = File::create(path)
             .with_context(|| format!("{}: the table cannot be written there", path.display()))?;
         Ok(Self {
+            paths: vec![path.to_owned()],
             file: BufWriter::new(file),
             truth: None,
-            headed: false,
+            channels: None,
         })
+    }
+
+    fn path(&self) -> &Path {
+        self.paths.last().map_or(Path::new(""), PathBuf::as_path)
+    }
+
+    fn unwritten(&self) -> String {
+        let path = self.path().display();
+        format!("{path}: the table ends here, because it can be written no more")
+    }
+
+    /// Takes a sample in; the file that the table goes on in where the number of channels has changed.
+    fn take(&mut self, sample: &Sample, update: &Update) -> anyhow::Result<Option<PathBuf>> {
+        let channels = sample.counts.len();
+        let before = self.channels.replace(channels);
+        let moved = before.is_some_and(|b| b != channels);
+        if moved {
+            self.go_on(channels)?;
+        }
+        let head = if before == Some(channels) {
+            Ok(())
+        } else {
+            self.head(channels)
+        };
+        head.and_then(|()| self.row(sample, update))
+            .with_context(|| self.unwritten())?;
+        Ok(moved.then(|| self.path().to_owned()))
+    }
+
+    /// Another file beside the first, never over an older one.
+    fn go_on(&mut self, channels: usize) -> anyhow::Result<()> {
+        /// A board that changes its mind more often is ill.
+        const MOST: usize = 99;
+        self.flush()?;
+        let first = self.paths[0].clone();
+        let ordinary = self.file.get_ref().metadata().is_ok_and(|m| m.is_file());
+        anyhow::ensure!(
+            ordinary && self.paths.len() < MOST,
+            "{}: the board has {channels} channels now, and the rows of a table are all alike: it ends here. Listen again for another table",
+            self.path().display()
+        );
+        let (path, file) = another(&first)?;
+        self.file = BufWriter::new(file);
+        self.paths.push(path);
+        Ok(())
+    }
+
+    fn flush(&mut self) -> anyhow::Result<()> {
+        let flushed = self.file.flush();
+        flushed.with_context(|| self.unwritten())
     }
 
     fn head(&mut self, channels: usize) -> std::io::Result<()> {
@@ -238,10 +335,6 @@ impl Table {
     }
 
     fn row(&mut self, sample: &Sample, update: &Update) -> std::io::Result<()> {
-        if !self.headed {
-            self.headed = true;
-            self.head(sample.counts.len())?;
-        }
         write!(self.file, "{}", sample.time_us)?;
         for count in &sample.counts {
             write!(self.file, ",{count}")?;
@@ -268,11 +361,42 @@ impl Table {
     }
 }
 
-/// Replays a recording into a table.
+/// The first file after this one that is not there yet.
+fn another(first: &Path) -> anyhow::Result<(PathBuf, File)> {
+    let mut number = 2;
+    loop {
+        let path = numbered(first, number);
+        match File::create_new(&path) {
+            Ok(file) => return Ok((path, file)),
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => number += 1,
+            Err(e) => {
+                let what = format!("{}: the table cannot go on there", path.display());
+                return Err(anyhow::Error::new(e).context(what));
+            }
+        }
+    }
+}
+
+/// `touches.csv`, `touches-2.csv`, …
+fn numbered(first: &Path, number: usize) -> PathBuf {
+    let mut name = first.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{number}"));
+    if let Some(ending) = first.extension() {
+        name.push(".");
+        name.push(ending);
+    }
+    first.with_file_name(name)
+}
+
+/// Replays a recording into a table; the files that it takes, more than one where the number of channels changes.
 ///
 /// # Errors
 /// When the one cannot be read or the other not written.
-pub fn write_table(recording: &Path, table: &Path, pipeline: Pipeline) -> anyhow::Result<()> {
+pub fn write_table(
+    recording: &Path,
+    table: &Path,
+    pipeline: Pipeline,
+) -> anyhow::Result<Vec<PathBuf>> {
     let address = Address::Recording {
         path: recording.to_owned(),
         pace: Pace::Fast,
@@ -280,19 +404,20 @@ pub fn write_table(recording: &Path, table: &Path, pipeline: Pipeline) -> anyhow
     let mut rows = Table::create(table)?;
     let (_commands, inbox) = channel();
     let stop = AtomicBool::new(false);
-    let mut written = Ok(());
+    let mut written: anyhow::Result<Option<PathBuf>> = Ok(None);
     Listener::new(address, pipeline)
         .run(&stop, &inbox, |heard| match heard {
             Heard::Truth(touch) => rows.truth = touch,
             Heard::Sample { sample, update, .. } if written.is_ok() => {
-                written = rows.row(sample, update);
+                written = rows.take(sample, update);
+                stop.store(written.is_err(), Ordering::Relaxed);
             }
             _ => {}
         })
         .map_err(anyhow::Error::msg)?;
-    written
-        .and_then(|()| rows.file.flush())
-        .with_context(|| format!("{}: the table could not be written", table.display()))
+    written?;
+    rows.flush()?;
+    Ok(rows.paths)
 }
 
 /// One sample as JSON: nulls where nothing touches. `uncertainty_mm` is the radius within which the touch lies
@@ -314,4 +439,58 @@ fn line(update: &Update) -> String {
         c.force,
         c.region.radius * 1e3
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(time_us: u64, channels: usize) -> (Sample, Update) {
+        let counts = vec![7.0; channels];
+        let update = Update {
+            time_us,
+            strain: None,
+            contact: None,
+            guesses: [None; 2],
+            good: 0,
+        };
+        (Sample { time_us, counts }, update)
+    }
+
+    /// Rows never stand under a head of another number of channels, and no file is written over.
+    #[test]
+    fn a_table_goes_on_in_another_file_where_the_channels_change() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("a-2.csv"), "older").unwrap();
+        let mut table = Table::create(&at("a.csv")).unwrap();
+        let mut moved = Vec::new();
+        for (time, channels) in [(1, 2), (2, 2), (3, 4), (4, 4), (5, 2)] {
+            let (sample, update) = sample(time, channels);
+            moved.push(table.take(&sample, &update).unwrap());
+        }
+        table.flush().unwrap();
+        let next = [None, None, Some(at("a-3.csv")), None, Some(at("a-4.csv"))];
+        assert_eq!(moved, next);
+        for (name, rows) in [("a.csv", 3), ("a-3.csv", 3), ("a-4.csv", 2)] {
+            let text = std::fs::read_to_string(at(name)).unwrap();
+            let columns: Vec<usize> = text.lines().map(|l| l.split(',').count()).collect();
+            assert_eq!(columns.len(), rows, "{text}");
+            assert!(columns.iter().all(|c| *c == columns[0]), "{text}");
+        }
+        assert_eq!(std::fs::read_to_string(at("a-2.csv")).unwrap(), "older");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_table_on_a_full_disk_says_so() {
+        let mut table = Table::create(Path::new("/dev/full")).unwrap();
+        let (first, update) = sample(1, 2);
+        table.take(&first, &update).unwrap();
+        let said = format!("{:#}", table.flush().unwrap_err());
+        assert!(
+            said.contains("/dev/full") && said.contains("space"),
+            "{said}"
+        );
+    }
 }

@@ -9,6 +9,7 @@ use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use super::FileError;
 use super::atomic::{step, sync_folder};
@@ -137,17 +138,23 @@ impl Together {
 
 /// The folder locked for this program; unlocked where a system or a network drive cannot lock folders.
 fn locked(folder: &Path) -> Result<Option<File>, FileError> {
+    /// A program that is just being started holds, for a moment, what this one holds.
+    const TRIES: u32 = 10;
+    const APART: Duration = Duration::from_millis(20);
     let Ok(file) = File::open(folder) else {
         return Ok(None);
     };
-    match file.try_lock() {
-        Ok(()) => Ok(Some(file)),
-        Err(TryLockError::Error(_)) => Ok(None),
-        Err(TryLockError::WouldBlock) => Err(FileError::broken(
-            folder,
-            "another hapdef is writing into this folder. Wait until it has ended, or choose another folder",
-        )),
+    for _ in 0..TRIES {
+        match file.try_lock() {
+            Ok(()) => return Ok(Some(file)),
+            Err(TryLockError::Error(_)) => return Ok(None),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(APART),
+        }
     }
+    Err(FileError::broken(
+        folder,
+        "another hapdef is writing into this folder. Wait until it has ended, or choose another folder",
+    ))
 }
 
 /// Names of the files in a folder, always in the same order.

@@ -58,24 +58,41 @@ trait Door: Send {
     fn plug(&mut self);
 }
 
-/// Starts a board. `tell` hears what really happened at every sample.
+/// A doorway that is open, before there is a board behind it.
+pub struct Entrance {
+    door: Box<dyn Door>,
+    port: String,
+}
+
+impl Doorway {
+    /// Opens it.
+    ///
+    /// # Errors
+    /// When there is no such port, or it is taken.
+    pub fn open(&self) -> Result<Entrance, String> {
+        let (door, port): (Box<dyn Door>, String) = match self {
+            #[cfg(unix)]
+            Self::Terminal => terminal::open()?,
+            Self::Socket(address) => {
+                let door = SocketDoor::open(address)?;
+                let port = door.name.clone();
+                (Box::new(door), port)
+            }
+        };
+        Ok(Entrance { door, port })
+    }
+}
+
+/// Starts a board behind an entrance. `tell` hears what really happened at every sample.
 ///
 /// # Errors
-/// When no port can be opened.
+/// When no thread can be had.
 pub fn host(
     board: SimulatedBoard,
-    doorway: &Doorway,
+    entrance: Entrance,
     mut tell: impl FnMut(Truth) + Send + 'static,
 ) -> Result<Hosted, String> {
-    let (mut door, port): (Box<dyn Door>, String) = match doorway {
-        #[cfg(unix)]
-        Doorway::Terminal => terminal::open()?,
-        Doorway::Socket(address) => {
-            let door = SocketDoor::open(address)?;
-            let port = door.name.clone();
-            (Box::new(door), port)
-        }
-    };
+    let Entrance { mut door, port } = entrance;
     let board = Arc::new(Mutex::new(board));
     let stop = Arc::new(AtomicBool::new(false));
     let begun = Instant::now();

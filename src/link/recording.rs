@@ -1,7 +1,7 @@
 //! Recordings: the board's own frames, written as they come, with what the studio did between them.
 //!
-//! A recording is a stream of the protocol: HELLO, DATA, and LOG frames of level 0 whose text begins with
-//! “hapdef”. It is only ever appended to, so that a program that is killed loses the last moment and no more.
+//! A recording is a stream of the protocol: HELLO, DATA, and NOTE frames, which no board sends. It is only ever
+//! appended to, so that a program that is killed loses the last moment and no more.
 
 use std::fs::File;
 use std::io::Write;
@@ -15,8 +15,10 @@ use crate::wire::{Hello, Message, encode};
 
 /// How long a sample may wait in memory.
 const FLUSH: Duration = Duration::from_millis(100);
-/// What texts of our own begin with.
-const OWN: &str = "hapdef ";
+/// What notes began with when they were LOG frames of level 0.
+const OLD_NOTE: &str = "hapdef ";
+/// Values of a line that surely fit into one frame.
+const VALUES: usize = 8;
 
 /// A recording being written.
 pub struct Recorder {
@@ -25,9 +27,8 @@ pub struct Recorder {
     pending: Vec<u8>,
     flushed: Instant,
     sequence: u16,
-    bits: u8,
-    /// Whether a board has said what its samples look like; one that prints lines never does.
-    greeted: bool,
+    /// Channels and bits of a sample, once a board has said them; one that prints lines never does.
+    layout: Option<(usize, u8)>,
     time_us: u64,
     pub samples: u64,
     pub bytes: u64,
@@ -48,28 +49,32 @@ impl Recorder {
             ),
             _ => format!("{}: the recording cannot be begun ({e})", path.display()),
         })?;
-        Ok(Self {
+        Ok(Self::begun(path, file))
+    }
+
+    fn begun(path: &Path, file: File) -> Self {
+        Self {
             path: path.to_owned(),
             file,
             pending: Vec::new(),
             flushed: Instant::now(),
             sequence: 0,
-            bits: 12,
-            greeted: false,
+            layout: None,
             time_us: 0,
             samples: 0,
             bytes: 0,
             failed: None,
-        })
+        }
     }
 
     fn put(&mut self, message: &Message) {
         let before = self.pending.len();
+        let bits = self.layout.map_or(12, |(_, bits)| bits);
         encode(
             message,
             self.sequence,
             self.time_us as u32,
-            self.bits,
+            bits,
             &mut self.pending,
         );
         self.bytes += (self.pending.len() - before) as u64;
@@ -79,32 +84,41 @@ impl Recorder {
         }
     }
 
-    /// What the board says of itself; its samples have this many bits from now on.
+    /// What the board says of itself; its samples have this many channels and bits from now on.
     pub fn hello(&mut self, hello: &Hello) {
-        (self.bits, self.greeted) = (hello.bits, true);
+        self.layout = Some((usize::from(hello.channels), hello.bits));
         self.put(&Message::Hello(hello.clone()));
     }
 
     pub fn sample(&mut self, sample: &Sample) {
         self.time_us = sample.time_us;
         self.samples += 1;
-        let whole = |c: &f64| c.fract() == 0.0 && *c >= 0.0 && *c < f64::from(1_u32 << self.bits);
-        if self.greeted && sample.counts.iter().all(whole) {
+        let fits = self.layout.is_some_and(|(channels, bits)| {
+            let whole = |c: &f64| c.fract() == 0.0 && *c >= 0.0 && *c < f64::from(1_u32 << bits);
+            sample.counts.len() == channels && sample.counts.iter().all(whole)
+        });
+        if fits {
             let counts = sample.counts.iter().map(|c| *c as u32).collect();
             self.put(&Message::Data(counts));
         } else {
-            // Plain lines may hold anything.
-            let words: Vec<String> = sample.counts.iter().map(f64::to_string).collect();
-            self.own(&format!("line {}", words.join(",")));
+            self.line(&sample.counts);
+        }
+    }
+
+    /// Plain lines may hold anything, and more than a frame does.
+    fn line(&mut self, counts: &[f64]) {
+        let last = counts.len().saturating_sub(1) / VALUES;
+        for (k, piece) in counts.chunks(VALUES).enumerate() {
+            // As short as can be read back, and with an exponent where it would be long.
+            let words: Vec<String> = piece.iter().map(|v| format!("{v:?}")).collect();
+            let what = if k == last { "line" } else { "part" };
+            self.own(&format!("{what} {} {}", k * VALUES, words.join(",")));
         }
     }
 
     /// What was done: “tare”, “rest …”, “truth …”.
     pub fn own(&mut self, text: &str) {
-        self.put(&Message::Log {
-            level: 0,
-            text: format!("{OWN}{text}"),
-        });
+        self.put(&Message::Note(text.to_owned()));
     }
 
     /// Where the rest lay when the recording began, so that it can be replayed from there.
@@ -144,13 +158,52 @@ impl Recorder {
 }
 
 impl Drop for Recorder {
+    /// One that was begun and never written to leaves nothing that would be in the way of the next.
     fn drop(&mut self) {
         self.flush();
+        if self.bytes == 0 {
+            let _ = std::fs::remove_file(&self.path);
+        }
     }
 }
 
-/// A text of our own in a recording, without its mark.
+/// A note in a recording that was made before there were notes, without its mark. Of a live board it is a text as
+/// any other.
 #[must_use]
-pub fn note(level: u8, text: &str) -> Option<&str> {
-    (level == 0).then(|| text.strip_prefix(OWN)).flatten()
+pub fn old_note(level: u8, text: &str) -> Option<&str> {
+    (level == 0).then(|| text.strip_prefix(OLD_NOTE)).flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_that_was_never_written_to_is_not_in_the_way() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hapdrec");
+        drop(Recorder::create(&path).unwrap());
+        let mut recorder = Recorder::create(&path).unwrap();
+        recorder.own("tare");
+        drop(recorder);
+        assert!(std::fs::metadata(&path).unwrap().len() > 10);
+        assert!(Recorder::create(&path).is_err_and(|e| e.contains("already")));
+        let nowhere = folder.path().join("none").join("a.hapdrec");
+        assert!(Recorder::create(&nowhere).is_err_and(|e| e.contains("cannot be begun")));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_said() {
+        let full = Path::new("/dev/full");
+        let file = File::options().write(true).open(full).unwrap();
+        let mut recorder = Recorder::begun(full, file);
+        recorder.own("tare");
+        recorder.flush();
+        let said = recorder.failed.take().unwrap();
+        assert!(
+            said.contains("/dev/full") && said.contains("space"),
+            "{said}"
+        );
+    }
 }

@@ -4,77 +4,196 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use super::{Got, Pace, Port};
+use crate::memory;
 use crate::wire::{Decoder, Event};
+
+/// The longest that is waited for between two frames (µs): no board is slower than one sample a second, and a
+/// clock that leapt would be waited for in vain.
+const LONGEST_PAUSE: u32 = 2_000_000;
+/// Bytes of memory for each byte of a recording, at most: itself, and where its frames are.
+const GROWTH: f64 = 8.0;
 
 struct Replay {
     bytes: Vec<u8>,
-    /// Where each frame ends, and the time it says of itself (µs).
-    frames: Vec<(usize, u32)>,
+    /// Where each frame ends with what stands before it, and when it is due (µs from the first).
+    frames: Vec<(usize, u64)>,
+    /// The first that is not due yet, and where those before it end.
     next: usize,
+    due: usize,
     sent: usize,
     pace: Pace,
-    begun: Option<(Instant, u32)>,
+    begun: Option<Instant>,
 }
 
 pub(super) fn open(path: &Path, pace: Pace) -> Result<Box<dyn Port>, String> {
-    let bytes = std::fs::read(path)
-        .map_err(|e| format!("{}: the recording cannot be read ({e})", path.display()))?;
-    let mut frames = Vec::new();
-    let mut decoder = Decoder::default();
-    let mut start = 0;
-    while let Some(length) = bytes[start..].iter().position(|&b| b == 0) {
-        let end = start + length + 1;
-        decoder.push(&bytes[start..end], |event| {
-            if let Event::Message { time_us, .. } = event {
-                frames.push((end, time_us));
-            }
-        });
-        start = end;
-    }
-    if frames.is_empty() {
-        return Err(format!(
-            "{}: this is no recording, or an empty one",
-            path.display()
-        ));
-    }
+    let bytes = whole(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let frames = frames(&bytes).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(Box::new(Replay {
         bytes,
         frames,
         next: 0,
+        due: 0,
         sent: 0,
         pace,
         begun: None,
     }))
 }
 
+/// All of an ordinary file that memory has room for: a pipe or a device could be waited for without an end.
+fn whole(path: &Path) -> Result<Vec<u8>, String> {
+    let unreadable = |e: std::io::Error| format!("the recording cannot be read ({e})");
+    let about = std::fs::metadata(path).map_err(unreadable)?;
+    if !about.is_file() {
+        return Err("this is no file that a recording could be in".to_owned());
+    }
+    let size = about.len() as f64;
+    if GROWTH * size > memory::allowed() {
+        return Err(format!(
+            "the recording has {:.1} GB, and at most {:.1} GB are read with {:.1} GB of memory. Allow more with --memory-gb",
+            size / 1e9,
+            memory::allowed_gb() / GROWTH,
+            memory::allowed_gb()
+        ));
+    }
+    std::fs::read(path).map_err(unreadable)
+}
+
+/// Where frames end and when they are due; the last one takes what stands behind it.
+fn frames(bytes: &[u8]) -> Result<Vec<(usize, u64)>, String> {
+    let mut frames = Vec::new();
+    let mut decoder = Decoder::default();
+    let (mut end, mut due, mut last) = (0_usize, 0_u64, None::<u32>);
+    let mut why = None::<String>;
+    for piece in bytes.split_inclusive(|&b| b == 0) {
+        end += piece.len();
+        decoder.push(piece, |event| match event {
+            Event::Message { time_us, .. } => {
+                due += u64::from(last.map_or(0, |last| step(last, time_us)));
+                last = Some(time_us);
+                frames.push((end, due));
+            }
+            Event::Refused(refusal) if why.is_none() => why = refusal.in_words(),
+            _ => {}
+        });
+    }
+    match frames.last_mut() {
+        Some(last) => last.0 = bytes.len(),
+        None => return Err(nothing(why)),
+    }
+    Ok(frames)
+}
+
+fn nothing(why: Option<String>) -> String {
+    let said = "this is no recording, or an empty one";
+    why.map_or(said.to_owned(), |why| format!("{said}: {why}"))
+}
+
+/// How long (µs) is waited from one frame's time to the next. A clock that went back began anew.
+fn step(from: u32, to: u32) -> u32 {
+    let step = to.wrapping_sub(from);
+    if step < u32::MAX / 2 {
+        step.min(LONGEST_PAUSE)
+    } else {
+        0
+    }
+}
+
 impl Port for Replay {
     fn read(&mut self, buffer: &mut [u8]) -> Got {
-        if self.next >= self.frames.len() {
+        if self.sent == self.bytes.len() {
             return Got::Gone;
         }
-        let (begun, first) = *self.begun.get_or_insert((Instant::now(), self.frames[0].1));
-        let due = |time: u32| {
-            Duration::from_micros(u64::from(time.wrapping_sub(first).min(u32::MAX / 2)))
-        };
-        let mut end = self.sent;
-        while let Some(&(until, time)) = self.frames.get(self.next) {
-            let waits = self.pace == Pace::Real
-                && time.wrapping_sub(first) < u32::MAX / 2
-                && due(time) > begun.elapsed();
-            if waits || until - self.sent > buffer.len() {
-                break;
-            }
-            (end, self.next) = (until, self.next + 1);
+        let since = self.begun.get_or_insert_with(Instant::now).elapsed();
+        while let Some(&(end, due)) = self.frames.get(self.next)
+            && (self.pace == Pace::Fast || Duration::from_micros(due) <= since)
+        {
+            (self.due, self.next) = (end, self.next + 1);
         }
-        let count = end - self.sent;
+        // In pieces: what stands between two frames may be longer than any buffer.
+        let count = (self.due - self.sent).min(buffer.len());
         if count == 0 {
             std::thread::sleep(Duration::from_millis(1));
             return Got::Nothing;
         }
-        buffer[..count].copy_from_slice(&self.bytes[self.sent..end]);
-        self.sent = end;
+        buffer[..count].copy_from_slice(&self.bytes[self.sent..self.sent + count]);
+        self.sent += count;
         Got::Bytes(count)
     }
 
     fn write(&mut self, _: &[u8]) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{Message, encode};
+
+    fn note(time_us: u32, sequence: u16) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        encode(
+            &Message::Note("tare".into()),
+            sequence,
+            time_us,
+            12,
+            &mut bytes,
+        );
+        bytes
+    }
+
+    /// All that comes, and how long that took.
+    fn replayed(bytes: &[u8], pace: Pace) -> (Vec<u8>, Duration) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hapdrec");
+        std::fs::write(&path, bytes).unwrap();
+        let mut port = open(&path, pace).unwrap();
+        let (mut buffer, mut all) = ([0; 1000], Vec::new());
+        let begun = Instant::now();
+        loop {
+            match port.read(&mut buffer) {
+                Got::Gone => return (all, begun.elapsed()),
+                Got::Nothing => assert!(begun.elapsed().as_secs() < 10, "it hangs"),
+                Got::Bytes(count) => all.extend(&buffer[..count]),
+            }
+        }
+    }
+
+    #[test]
+    fn garbage_longer_than_any_buffer_is_passed_over() {
+        let garbage = vec![0x41; 20_000];
+        let all = [&note(0, 0)[..], &garbage, &[0], &note(9, 1), &garbage].concat();
+        for pace in [Pace::Fast, Pace::Real] {
+            assert_eq!(replayed(&all, pace).0, all);
+        }
+    }
+
+    /// A clock that leaps by half an hour, or goes back, is not waited for.
+    #[test]
+    fn a_clock_that_leaps_is_not_waited_for() {
+        assert_eq!(step(10, 1010), 1000);
+        assert_eq!(step(u32::MAX - 9, 990), 1000);
+        assert_eq!(step(5_000_000, 0), 0);
+        assert_eq!(step(0, 1_800_000_000), LONGEST_PAUSE);
+        let leaps = [note(50_000_000, 0), note(0, 1), note(100_000, 2)].concat();
+        let (all, took) = replayed(&leaps, Pace::Real);
+        assert_eq!(all, leaps);
+        assert!((Duration::from_millis(100)..Duration::from_secs(5)).contains(&took));
+    }
+
+    #[test]
+    fn what_is_no_recording_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = |path: &Path, why: &str| {
+            let said = open(path, Pace::Fast).err().unwrap();
+            assert!(said.contains(why), "{said}");
+        };
+        refused(folder.path(), "no file");
+        let path = folder.path().join("sparse.hapdrec");
+        std::fs::File::create(&path)
+            .unwrap()
+            .set_len(1 << 42)
+            .unwrap();
+        refused(&path, "--memory-gb");
+        std::fs::write(&path, b"\0nothing\0").unwrap();
+        refused(&path, "no recording");
+    }
 }

@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use super::{Address, Got, Port, Recorder, note, ports};
-use crate::live::{Input, Pipeline, Receiver, Rest, Sample, Traffic, Update};
-use crate::wire::{Hello, Message, encode};
+use super::{Address, Got, Port, Recorder, old_note, ports};
+use crate::live::{Doubt, Input, Pipeline, Receiver, Rest, Sample, Traffic, Update};
+use crate::plain;
+use crate::wire::{Hello, MOST_CHANNELS, Message, encode};
 
 /// How the connection stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,8 +38,12 @@ pub enum Heard<'a> {
     },
     /// From a recording of a simulated board: where it is really touched (m, N).
     Truth(Option<(DVec3, f64)>),
-    /// What the board says, or what happened to a recording.
+    /// What the board says, or how a recording was; safe to show.
     Message(&'a str),
+    /// Why nothing that comes can be used; each reason once.
+    Trouble(&'a str),
+    /// Why a recording could not begin, or ended by itself.
+    Unrecorded(&'a str),
     /// After every look at the port.
     Turn {
         traffic: Traffic,
@@ -94,6 +99,10 @@ impl Timing {
 const ASK: Duration = Duration::from_millis(400);
 const SILENCE: Duration = Duration::from_millis(700);
 const AGAIN: Duration = Duration::from_millis(150);
+/// How long a board may take to be understood before it is said why it is not.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// The most reasons that are told of one connection.
+const REASONS: usize = 8;
 /// How long another port has to say which board it is.
 const WHO: Duration = Duration::from_millis(400);
 
@@ -107,8 +116,16 @@ pub struct Listener {
     hello: Option<Hello>,
     rate: Option<u16>,
     state: State,
-    /// A rest that a recording brings.
+    /// When the last sample came, or the port was opened.
+    heard: Instant,
+    /// Why nothing can be used, as far as it was told.
+    explained: Vec<Doubt>,
+    /// What a recording brings in pieces: a rest, and the counts of a line.
     rest: Rest,
+    line: Vec<f64>,
+    /// Whether a recording has notes. Texts of the board are never taken for them then.
+    noted: bool,
+    measured: u64,
     begun: Instant,
     said: u16,
 }
@@ -125,7 +142,12 @@ impl Listener {
             hello: None,
             rate: None,
             state: State::Waiting,
+            heard: Instant::now(),
+            explained: Vec::new(),
             rest: Rest::default(),
+            line: Vec::new(),
+            noted: false,
+            measured: 0,
             begun: Instant::now(),
             said: 0,
         }
@@ -138,10 +160,17 @@ impl Listener {
         self
     }
 
+    /// Records from the beginning.
+    #[must_use]
+    pub fn recording(mut self, recorder: Option<Recorder>) -> Self {
+        self.recorder = recorder;
+        self
+    }
+
     /// Listens until it is told to stop, or a recording ends. Unplugged boards are waited for.
     ///
     /// # Errors
-    /// When the port cannot be opened at first.
+    /// When the port cannot be opened at first, or nothing in a recording can be used.
     pub fn run(
         mut self,
         stop: &AtomicBool,
@@ -149,18 +178,18 @@ impl Listener {
         mut tell: impl FnMut(Heard),
     ) -> Result<(), String> {
         let mut port = self.address.open()?;
+        if self.recorder.is_some() {
+            self.begin_recording();
+        }
         loop {
             self.enter(State::Waiting, &mut tell);
             self.listen(&mut *port, stop, inbox, &mut tell);
-            if let Some(recorder) = &mut self.recorder {
-                recorder.flush();
-            }
+            self.flush_recording(&mut tell);
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
             if self.address.is_recording() {
-                self.enter(State::Ended, &mut tell);
-                return Ok(());
+                return self.end(&mut tell);
             }
             self.enter(State::Gone, &mut tell);
             match self.find_again(stop, inbox, &mut tell) {
@@ -168,6 +197,26 @@ impl Listener {
                 None => return Ok(()),
             }
         }
+    }
+
+    /// The recording is over; whether it was of any use.
+    fn end(&mut self, tell: &mut impl FnMut(Heard)) -> Result<(), String> {
+        let refused = self.receiver.traffic.refused;
+        if self.measured > 0 {
+            if refused > 0 {
+                tell(Heard::Message(&format!(
+                    "frames of the recording that are damaged or not understood, and were left out: {refused}"
+                )));
+            }
+            self.enter(State::Ended, tell);
+            return Ok(());
+        }
+        let why = self.receiver.doubt().and_then(Doubt::in_words);
+        let why = why.map_or(String::new(), |why| format!(": {why}"));
+        Err(format!(
+            "{}: there is no reading in this recording that can be used{why}",
+            self.address
+        ))
     }
 
     fn enter(&mut self, state: State, tell: &mut impl FnMut(Heard)) {
@@ -184,9 +233,11 @@ impl Listener {
         tell: &mut impl FnMut(Heard),
     ) {
         self.receiver.reset();
+        self.explained.clear();
+        (self.noted, self.heard) = (false, Instant::now());
         let mut buffer = vec![0; 16 * 1024];
         let mut inputs = Vec::new();
-        let (mut asked, mut heard) = (None::<Instant>, Instant::now());
+        let mut asked = None::<Instant>;
         while !stop.load(Ordering::Relaxed) {
             while let Ok(command) = inbox.try_recv() {
                 self.obey(command, port, tell);
@@ -198,9 +249,6 @@ impl Listener {
             }
             match port.read(&mut buffer) {
                 Got::Gone => return,
-                Got::Nothing if live && heard.elapsed() > SILENCE => {
-                    self.enter(State::Silent, tell);
-                }
                 Got::Nothing => {}
                 Got::Bytes(count) => {
                     let arrived = Instant::now();
@@ -208,21 +256,57 @@ impl Listener {
                     self.receiver
                         .push(&buffer[..count], now_us, |input| inputs.push(input));
                     for input in inputs.drain(..) {
-                        if matches!(input, Input::Sample(_)) {
-                            heard = arrived;
-                        }
                         self.take(input, arrived, port, tell);
                     }
                 }
             }
-            let (traffic, recorder) = (self.receiver.traffic, self.recorder.as_ref());
-            tell(Heard::Turn {
-                traffic,
-                timing: &self.timing,
-                pipeline: &self.pipeline,
-                recorder,
-            });
+            // Bytes that cannot be used are silence too.
+            if self.state == State::Live && self.heard.elapsed() > SILENCE {
+                self.enter(State::Silent, tell);
+            }
+            self.explain(tell);
+            self.turn(tell);
         }
+    }
+
+    /// Says why nothing that comes can be used: at once where waiting will not help.
+    fn explain(&mut self, tell: &mut impl FnMut(Heard)) {
+        let Some(doubt) = self.receiver.doubt() else {
+            return;
+        };
+        let due = doubt.is_lasting() || self.heard.elapsed() > PATIENCE;
+        if !due || self.explained.contains(&doubt) || self.explained.len() >= REASONS {
+            return;
+        }
+        self.explained.push(doubt);
+        if let Some(words) = doubt.in_words() {
+            tell(Heard::Trouble(&words));
+        }
+    }
+
+    fn turn(&mut self, tell: &mut impl FnMut(Heard)) {
+        self.check_recording(tell);
+        tell(Heard::Turn {
+            traffic: self.receiver.traffic,
+            timing: &self.timing,
+            pipeline: &self.pipeline,
+            recorder: self.recorder.as_ref(),
+        });
+    }
+
+    /// A recording that can be written no more has ended, and that is said.
+    fn check_recording(&mut self, tell: &mut impl FnMut(Heard)) {
+        if let Some(why) = self.recorder.as_mut().and_then(|r| r.failed.take()) {
+            self.recorder = None;
+            tell(Heard::Unrecorded(&why));
+        }
+    }
+
+    fn flush_recording(&mut self, tell: &mut impl FnMut(Heard)) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.flush();
+        }
+        self.check_recording(tell);
     }
 
     fn say(&mut self, port: &mut dyn Port, message: &Message) {
@@ -253,9 +337,12 @@ impl Listener {
                     self.recorder = Some(recorder);
                     self.begin_recording();
                 }
-                Err(message) => tell(Heard::Message(&message)),
+                Err(why) => tell(Heard::Unrecorded(&why)),
             },
-            Command::StopRecording => self.recorder = None,
+            Command::StopRecording => {
+                self.flush_recording(tell);
+                self.recorder = None;
+            }
             Command::Truth(touch) => self.record(|r| r.truth(touch)),
             Command::Do(work) => work(&mut self.pipeline),
         }
@@ -305,18 +392,31 @@ impl Listener {
                 level,
                 text,
                 time_us,
-            } => match note(level, &text) {
+            } => match old_note(level, &text).filter(|_| self.has_old_notes()) {
                 Some(own) => self.replay(own, time_us, arrived, tell),
-                None => tell(Heard::Message(&text)),
+                None => tell(Heard::Message(&plain::message(&in_one_line(&text)))),
             },
-            Input::Pong(_) => {}
+            Input::Note { text, time_us } if self.address.is_recording() => {
+                self.noted = true;
+                self.replay(&text, time_us, arrived, tell);
+            }
+            // What a board says is never a command.
+            Input::Note { .. } | Input::Pong(_) => {}
         }
+    }
+
+    /// Recordings from before there were notes held texts in their place, and no other texts.
+    fn has_old_notes(&self) -> bool {
+        self.address.is_recording() && !self.noted
     }
 
     fn greet(&mut self, hello: Hello, port: &mut dyn Port, tell: &mut impl FnMut(Heard)) {
         self.pipeline.hello(&hello);
         self.record(|r| r.hello(&hello));
-        tell(Heard::Hello(&hello));
+        tell(Heard::Hello(&Hello {
+            name: plain::message(&in_one_line(&hello.name)),
+            ..hello.clone()
+        }));
         let channels = self.pipeline.settings.channels.iter().enumerate();
         if let Some((gauge, channel)) =
             { channels }.find(|(_, c)| **c >= usize::from(hello.channels))
@@ -338,6 +438,7 @@ impl Listener {
     }
 
     fn measure(&mut self, sample: &Sample, arrived: Instant, tell: &mut impl FnMut(Heard)) {
+        self.measured += 1;
         if self.state != State::Live {
             self.enter(State::Live, tell);
         }
@@ -351,21 +452,18 @@ impl Listener {
             self.timing.push(arrived.elapsed().as_secs_f32() * 1e6);
         }
         self.record(|r| r.sample(sample));
-        if let Some(message) = self.recorder.as_mut().and_then(|r| r.failed.take()) {
-            self.recorder = None;
-            tell(Heard::Message(&message));
-        }
         tell(Heard::Sample {
             sample,
             update: &update,
             pipeline: &self.pipeline,
         });
+        // Not when it arrived: one that is slow to compute is not silent.
+        self.heard = Instant::now();
     }
 
     /// What the studio did when this was recorded.
     fn replay(&mut self, own: &str, time_us: u64, arrived: Instant, tell: &mut impl FnMut(Heard)) {
         let words: Vec<&str> = own.split_whitespace().collect();
-        let number = |text: &str| text.parse::<f64>().ok().filter(|v| v.is_finite());
         match words[..] {
             ["tare"] => self.pipeline.tare(),
             ["rest", k, level, noise] => {
@@ -391,14 +489,44 @@ impl Listener {
                     tell(Heard::Truth(Some((DVec3::new(x, y, z) * 1e-3, force))));
                 }
             }
-            ["line", values] => {
-                let counts: Option<Vec<f64>> = values.split(',').map(number).collect();
-                if let Some(counts) = counts {
-                    self.measure(&Sample { time_us, counts }, arrived, tell);
-                }
+            ["part", from, values] => {
+                self.gather(from, values);
             }
+            ["line", values] => self.replay_line("0", values, time_us, arrived, tell),
+            ["line", from, values] => self.replay_line(from, values, time_us, arrived, tell),
             _ => {}
         }
+    }
+
+    /// The end of a line of counts, with what was gathered of it before.
+    fn replay_line(
+        &mut self,
+        from: &str,
+        values: &str,
+        time_us: u64,
+        arrived: Instant,
+        tell: &mut impl FnMut(Heard),
+    ) {
+        if self.gather(from, values) {
+            let counts = std::mem::take(&mut self.line);
+            self.measure(&Sample { time_us, counts }, arrived, tell);
+        }
+    }
+
+    /// Counts of a line from one channel on; none of it is used where those before them are missing.
+    fn gather(&mut self, from: &str, values: &str) -> bool {
+        let from = from.parse().unwrap_or(usize::MAX);
+        if from == 0 {
+            self.line.clear();
+        }
+        let piece: Option<Vec<f64>> = values.split(',').map(number).collect();
+        let piece = piece.filter(|p| from == self.line.len() && from + p.len() <= MOST_CHANNELS);
+        if let Some(piece) = &piece {
+            self.line.extend(piece);
+        } else {
+            self.line.clear();
+        }
+        piece.is_some()
     }
 
     /// The same board at the same port, or at another one. Nothing when it is no longer wanted.
@@ -418,6 +546,7 @@ impl Listener {
             while let Ok(command) = inbox.try_recv() {
                 self.obey(command, &mut Nowhere, tell);
             }
+            self.turn(tell);
             std::thread::sleep(AGAIN);
         }
         None
@@ -466,6 +595,15 @@ impl Listener {
     }
 }
 
+fn number(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|v: &f64| v.is_finite())
+}
+
+/// A text of a board cannot be taken for several of our own.
+fn in_one_line(text: &str) -> String {
+    text.replace(['\n', '\r'], " ")
+}
+
 /// For what is asked while there is no port.
 struct Nowhere;
 
@@ -512,5 +650,194 @@ impl Drop for Connection {
     /// Does not wait: a thread that is looking for an unplugged board may take a moment to hear of it.
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+    use std::net::TcpListener;
+    use std::path::Path;
+
+    use super::*;
+    use crate::inference::ResponseMap;
+    use crate::limb::LimbSpec;
+    use crate::link::Pace;
+    use crate::live::Settings;
+
+    const GAUGES: usize = 4;
+
+    fn pipeline() -> Pipeline {
+        let spec = LimbSpec {
+            element: 20.0,
+            ..LimbSpec::default()
+        };
+        let mesh = spec.build().unwrap().0;
+        let nodes = mesh.positions().len() + mesh.edges().len();
+        let value = |k: usize| 1e-5 * (1.7 * k as f64).sin();
+        let values = (0..nodes * GAUGES).map(value).collect();
+        let map = ResponseMap::of(Arc::new(mesh), GAUGES, values);
+        Pipeline::new(Arc::new(map), Settings::of(GAUGES))
+    }
+
+    fn hello() -> Hello {
+        Hello {
+            version: crate::wire::VERSION,
+            board: 7,
+            channels: 4,
+            bits: 12,
+            reference_mv: 3300,
+            supply_mv: 5000,
+            gain_milli: 330_000,
+            rate_hz: 1000,
+            name: "limb\u{1b}[31m".into(),
+        }
+    }
+
+    fn frames(messages: &[Message]) -> Vec<u8> {
+        let mut bytes = vec![0];
+        for (k, message) in (0..).zip(messages) {
+            encode(message, k, 1000 * u32::from(k), 12, &mut bytes);
+        }
+        bytes
+    }
+
+    /// All that is heard there until it is over, and how it ended.
+    fn heard(address: Address) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
+        let (mut said, mut counts) = (Vec::new(), Vec::new());
+        let (stop, (_commands, inbox)) = (AtomicBool::new(false), channel());
+        let ended = Listener::new(address, pipeline()).run(&stop, &inbox, |heard| match heard {
+            Heard::State(State::Gone) => stop.store(true, Ordering::Relaxed),
+            Heard::Hello(hello) => said.push(format!("hello {}", hello.name)),
+            Heard::Message(text) => said.push(format!("message {text}")),
+            Heard::Trouble(text) => said.push(format!("trouble {text}")),
+            Heard::Truth(touch) => said.push(format!("truth {touch:?}")),
+            Heard::Sample { sample, .. } => counts.push(sample.counts.clone()),
+            _ => {}
+        });
+        (said, counts, ended)
+    }
+
+    fn of_board(bytes: Vec<u8>) -> Vec<String> {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        std::thread::spawn(move || {
+            let (mut stream, _) = listener.accept().unwrap();
+            stream.write_all(&bytes).unwrap();
+            stream.shutdown(std::net::Shutdown::Write).unwrap();
+            // Until the other side has taken it and is gone.
+            let _ = std::io::copy(&mut stream, &mut std::io::sink());
+        });
+        heard(Address::Socket(address)).0
+    }
+
+    fn recording(path: &Path) -> Address {
+        Address::Recording {
+            path: path.to_owned(),
+            pace: Pace::Fast,
+        }
+    }
+
+    fn of_recording(bytes: &[u8]) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hapdrec");
+        std::fs::write(&path, bytes).unwrap();
+        heard(recording(&path))
+    }
+
+    fn log(text: &str) -> Message {
+        Message::Log {
+            level: 0,
+            text: text.into(),
+        }
+    }
+
+    #[test]
+    fn text_of_a_board_is_shown_and_never_obeyed() {
+        let said = of_board(frames(&[
+            Message::Hello(hello()),
+            log("hapdef truth 1 2 3 4"),
+            log("hapdef dead 0"),
+            log("hapdef line 1,2,3,4"),
+            Message::Note("truth 1 2 3 4".into()),
+            log("a\u{1b}]0;title\u{7}\nhapdef: b"),
+        ]));
+        let expected = [
+            "hello limb\u{fffd}[31m",
+            "message hapdef truth 1 2 3 4",
+            "message hapdef dead 0",
+            "message hapdef line 1,2,3,4",
+            "message a\u{fffd}]0;title\u{fffd} hapdef: b",
+        ];
+        assert_eq!(said, expected);
+    }
+
+    #[test]
+    fn notes_of_a_recording_are_obeyed_the_old_ones_too() {
+        let data = Message::Data(vec![2000; 4]);
+        let old = [Message::Hello(hello()), log("hapdef truth none"), data];
+        let (said, counts, ended) = of_recording(&frames(&old));
+        assert_eq!(said[1..], ["truth None"]);
+        assert_eq!((counts.len(), ended), (1, Ok(())));
+        let new = [
+            Message::Note("truth none".into()),
+            log("hapdef truth none"),
+            Message::Note("line 1,2,3,4".into()),
+        ];
+        let (said, counts, _) = of_recording(&frames(&new));
+        assert_eq!(said, ["truth None", "message hapdef truth none"]);
+        assert_eq!(counts, [[1.0, 2.0, 3.0, 4.0]]);
+    }
+
+    #[test]
+    fn lines_with_many_channels_are_recorded_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hapdrec");
+        let long = |k: usize| (k as f64 - 31.5) * 1e14 / 3.0 + 1e-9;
+        let sample = Sample {
+            time_us: 5,
+            counts: (0..MOST_CHANNELS).map(long).collect(),
+        };
+        let mut recorder = Recorder::create(&path).unwrap();
+        recorder.sample(&sample);
+        drop(recorder);
+        assert_eq!(heard(recording(&path)).1, [sample.counts]);
+        // One whose middle is lost is not taken for one of fewer channels.
+        let torn = ["part 0 1,2", "line 4 5,6", "line 0 1,2,x", "part 9", "line"];
+        let torn = torn.map(|text| Message::Note(text.into()));
+        assert!(of_recording(&frames(&torn)).1.is_empty());
+    }
+
+    #[test]
+    fn a_board_that_cannot_be_used_says_why_once() {
+        let deaf = Message::Hello(Hello {
+            gain_milli: 0,
+            ..hello()
+        });
+        let data = Message::Data(vec![2000; 4]);
+        let said = of_board(frames(&[
+            deaf.clone(),
+            data.clone(),
+            deaf.clone(),
+            data,
+            deaf,
+        ]));
+        assert_eq!(said.len(), 1, "{said:?}");
+        assert!(said[0].starts_with("trouble ") && said[0].contains("gain"));
+    }
+
+    #[test]
+    fn a_recording_without_a_reading_says_so() {
+        let other = Message::Hello(Hello {
+            version: 2,
+            ..hello()
+        });
+        let garbage = [&frames(&[log("ready"), other])[..], &vec![0x41; 40_000]].concat();
+        let (_, _, ended) = of_recording(&garbage);
+        let said = ended.unwrap_err();
+        assert!(
+            said.contains("no reading") && said.contains("version 2"),
+            "{said}"
+        );
     }
 }

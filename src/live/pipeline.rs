@@ -183,7 +183,7 @@ impl Pipeline {
     pub fn set_model(&mut self, map: Arc<ResponseMap>, settings: Settings) {
         if settings.channels != self.settings.channels {
             // Other channels have another rest.
-            self.rest = None;
+            (self.rest, self.taring) = (None, None);
         }
         let mut chain = settings.chain;
         if let Some(hello) = &self.hello {
@@ -243,7 +243,8 @@ impl Pipeline {
             }
         };
         if !self.hello.as_ref().is_some_and(same) {
-            self.rest = None;
+            // What was read before, of lines for instance, is none of it.
+            (self.rest, self.taring) = (None, None);
         }
         self.settings.chain = self.settings.chain.of_board(hello);
         self.hello = Some(hello.clone());

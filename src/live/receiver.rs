@@ -1,6 +1,6 @@
 //! Bytes in, samples out, whatever the board speaks.
 
-use crate::wire::{Decoder, Event, Hello, LineReader, Message, Reading, Timeline};
+use crate::wire::{Decoder, Event, Hello, LineReader, Message, Reading, Refusal, Timeline};
 
 /// What was understood.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,6 +9,11 @@ pub enum Input {
     Sample(Sample),
     Log {
         level: u8,
+        text: String,
+        time_us: u64,
+    },
+    /// Only a recording may say this: what was done while it was made.
+    Note {
         text: String,
         time_us: u64,
     },
@@ -45,36 +50,83 @@ enum Speech {
     Lines,
 }
 
+/// Why nothing that comes can be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doubt {
+    /// Frames that are refused.
+    Refused(Refusal),
+    /// Rows of numbers with commas that may be decimal ones.
+    Commas,
+    /// Bytes that are neither frames nor rows of numbers.
+    Neither,
+    /// Frames, but no data among them.
+    NoData,
+}
+
+impl Doubt {
+    /// Whether waiting will not help.
+    #[must_use]
+    pub fn is_lasting(self) -> bool {
+        match self {
+            Self::Refused(why) => why.is_lasting(),
+            Self::Commas => true,
+            Self::Neither | Self::NoData => false,
+        }
+    }
+
+    /// For people, with what to do.
+    #[must_use]
+    pub fn in_words(self) -> Option<String> {
+        let words = match self {
+            Self::Refused(why) => return why.in_words(),
+            Self::Commas => {
+                "the board prints lines such as “1,5;2,5”, with commas beside another sign between the numbers: whether they are decimal commas cannot be told. Print decimal points, or one sign alone between the numbers"
+            }
+            Self::Neither => {
+                "bytes come, but neither frames of the protocol nor lines of numbers: check the baud rate, and what the board prints"
+            }
+            Self::NoData => {
+                "the board answers, but sends no readings: check what its firmware does after START"
+            }
+        };
+        Some(words.to_owned())
+    }
+}
+
 /// Rows of numbers in a row that make a board one of plain lines.
 const ROWS: usize = 4;
+/// Frames in a row, with a right sum and no row of numbers between them, that make it one of frames after all.
+const FRAMES: usize = 3;
 
-/// Finds out by itself whether frames or plain lines come.
+/// Finds out by itself whether frames or plain lines come. A board may print numbers while it starts: frames are
+/// looked for even then.
 #[derive(Default)]
 pub struct Receiver {
     frames: Decoder,
+    events: Vec<Event>,
     lines: LineReader,
     speech: Speech,
     rows: usize,
+    /// Frames with a right sum since the last row of numbers.
+    sound: usize,
     time: Timeline,
+    /// Why what came since the last sample was not used.
+    doubt: Option<Doubt>,
     pub traffic: Traffic,
+    /// What had come when the line was cut last.
+    before: Traffic,
 }
 
 impl Receiver {
     /// Takes in bytes that arrived at `now_us` on the studio's clock.
     pub fn push(&mut self, bytes: &[u8], now_us: u64, mut tell: impl FnMut(Input)) {
         self.traffic.bytes += bytes.len() as u64;
-        if self.speech != Speech::Lines {
-            let Self {
-                frames,
-                time,
-                traffic,
-                speech,
-                ..
-            } = self;
-            frames.push(bytes, |event| {
-                take_event(event, time, traffic, speech, &mut tell);
-            });
+        let mut events = std::mem::take(&mut self.events);
+        self.frames.push(bytes, |event| events.push(event));
+        for event in events.drain(..) {
+            self.take_event(event, &mut tell);
         }
+        self.events = events;
         if self.speech != Speech::Frames {
             self.push_lines(bytes, now_us, tell);
         }
@@ -84,15 +136,17 @@ impl Receiver {
         let Self {
             lines,
             rows,
+            sound,
             speech,
             traffic,
+            doubt,
             ..
         } = self;
         lines.push(bytes, |reading| match reading {
             Reading::Values(counts) => {
-                *rows += 1;
+                (*rows, *sound) = (*rows + 1, 0);
                 if *rows >= ROWS {
-                    *speech = Speech::Lines;
+                    (*speech, *doubt) = (Speech::Lines, None);
                     traffic.samples += 1;
                     tell(Input::Sample(Sample {
                         time_us: now_us,
@@ -100,9 +154,82 @@ impl Receiver {
                     }));
                 }
             }
+            Reading::Unclear => {
+                (*rows, *doubt) = (0, Some(Doubt::Commas));
+                traffic.refused += 1;
+            }
             Reading::Other if *speech == Speech::Lines => traffic.refused += 1,
             Reading::Other => *rows = 0,
         });
+    }
+
+    fn take_event(&mut self, event: Event, tell: &mut impl FnMut(Input)) {
+        match event {
+            Event::Lost(count) => self.traffic.lost += u64::from(count),
+            Event::Refused(why) => self.refuse(why),
+            Event::Message {
+                time_us, message, ..
+            } => self.take_message(time_us, message, tell),
+        }
+    }
+
+    fn refuse(&mut self, why: Refusal) {
+        if why.in_words().is_some() {
+            self.believe_frames(matches!(why, Refusal::Version(_) | Refusal::Value { .. }));
+        }
+        // Before anything was understood it may well be lines.
+        if self.speech != Speech::Frames {
+            return;
+        }
+        self.traffic.refused += 1;
+        if why.is_lasting() || (why == Refusal::NoLayout && self.doubt.is_none()) {
+            self.doubt = Some(Doubt::Refused(why));
+        }
+    }
+
+    fn take_message(&mut self, time_us: u32, message: Message, tell: &mut impl FnMut(Input)) {
+        if message.is_of_studio() {
+            // An echo of our own, which lines may well have too.
+            return;
+        }
+        let first = self.speech == Speech::Unknown;
+        self.believe_frames(first || matches!(message, Message::Hello(_)));
+        if self.speech != Speech::Frames {
+            return;
+        }
+        match message {
+            Message::Hello(hello) => tell(Input::Hello(hello)),
+            Message::Data(counts) => {
+                self.traffic.samples += 1;
+                self.doubt = None;
+                let counts = counts.into_iter().map(f64::from).collect();
+                tell(Input::Sample(Sample {
+                    time_us: self.time.extend(time_us),
+                    counts,
+                }));
+            }
+            Message::Status { overruns, .. } => self.traffic.overruns = overruns,
+            Message::Log { level, text } => tell(Input::Log {
+                level,
+                text,
+                time_us: self.time.extend(time_us),
+            }),
+            Message::Note(text) => tell(Input::Note {
+                text,
+                time_us: self.time.extend(time_us),
+            }),
+            Message::Pong(token) => tell(Input::Pong(token)),
+            _ => {}
+        }
+    }
+
+    /// A frame had a right sum: after some of them, or at once after one that cannot be chance, the board is one
+    /// of frames.
+    fn believe_frames(&mut self, surely: bool) {
+        self.sound += 1;
+        if surely || self.sound >= FRAMES {
+            self.speech = Speech::Frames;
+        }
     }
 
     /// Whether plain lines come, which cannot be asked anything.
@@ -111,52 +238,27 @@ impl Receiver {
         self.speech == Speech::Lines
     }
 
+    /// Why nothing that came since the last sample can be used, as far as that is known.
+    #[must_use]
+    pub fn doubt(&self) -> Option<Doubt> {
+        let silent = self.traffic.samples == self.before.samples;
+        let guess = match self.speech {
+            Speech::Unknown if self.rows == 0 && self.traffic.bytes > self.before.bytes => {
+                Some(Doubt::Neither)
+            }
+            Speech::Frames => Some(Doubt::NoData),
+            _ => None,
+        };
+        self.doubt.or(guess.filter(|_| silent))
+    }
+
     /// The line was cut; the counters go on.
     pub fn reset(&mut self) {
         *self = Self {
             traffic: self.traffic,
+            before: self.traffic,
             ..Self::default()
         };
-    }
-}
-
-fn take_event(
-    event: Event,
-    time: &mut Timeline,
-    traffic: &mut Traffic,
-    speech: &mut Speech,
-    tell: &mut impl FnMut(Input),
-) {
-    match event {
-        Event::Lost(count) => traffic.lost += u64::from(count),
-        // Before anything was understood it may well be lines.
-        Event::Refused(_) if *speech == Speech::Unknown => {}
-        Event::Refused(_) => traffic.refused += 1,
-        Event::Message {
-            time_us, message, ..
-        } => {
-            *speech = Speech::Frames;
-            match message {
-                Message::Hello(hello) => tell(Input::Hello(hello)),
-                Message::Data(counts) => {
-                    traffic.samples += 1;
-                    let counts = counts.into_iter().map(f64::from).collect();
-                    tell(Input::Sample(Sample {
-                        time_us: time.extend(time_us),
-                        counts,
-                    }));
-                }
-                Message::Status { overruns, .. } => traffic.overruns = overruns,
-                Message::Log { level, text } => tell(Input::Log {
-                    level,
-                    text,
-                    time_us: time.extend(time_us),
-                }),
-                Message::Pong(token) => tell(Input::Pong(token)),
-                // What a studio says; an echo of our own.
-                _ => {}
-            }
-        }
     }
 }
 
@@ -185,6 +287,107 @@ mod tests {
             counts: vec![3.0, 6.0, 9.0],
         };
         assert_eq!(all[0], Input::Sample(first));
+    }
+
+    fn hello() -> Hello {
+        Hello {
+            version: 1,
+            board: 7,
+            channels: 2,
+            bits: 12,
+            reference_mv: 3300,
+            supply_mv: 5000,
+            gain_milli: 330_000,
+            rate_hz: 1000,
+            name: "limb".into(),
+        }
+    }
+
+    fn data(from: u16, to: u16) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        for k in from..to {
+            let counts = vec![100 + u32::from(k % 9), 200];
+            encode(
+                &Message::Data(counts),
+                k,
+                1000 * u32::from(k),
+                12,
+                &mut bytes,
+            );
+        }
+        bytes
+    }
+
+    /// A board that prints numbers while it starts is one of frames all the same.
+    #[test]
+    fn frames_are_heard_behind_numeric_lines() {
+        let boot = b"1,2,3\n2,3,4\n3,4,5\n4,5,6\n5,6,7\n6,7,8\n";
+        let mut greeting = Vec::new();
+        encode(&Message::Hello(hello()), 0, 0, 12, &mut greeting);
+        let (all, _) = inputs(&[&boot[..], &greeting, &data(1, 5000)].concat());
+        let pairs = |i: &&Input| matches!(i, Input::Sample(s) if s.counts.len() == 2);
+        assert_eq!(all.iter().filter(pairs).count(), 4999);
+        // Where its HELLO was said before anybody listened, it is soon known that one must be asked for.
+        let mut receiver = Receiver::default();
+        receiver.push(boot, 0, |_| {});
+        assert!(receiver.speaks_lines());
+        receiver.push(&data(1, 9), 0, |_| {});
+        assert!(!receiver.speaks_lines());
+        assert_eq!(receiver.doubt(), Some(Doubt::Refused(Refusal::NoLayout)));
+    }
+
+    #[test]
+    fn an_echo_of_the_studio_does_not_hide_lines() {
+        let mut bytes = vec![0];
+        encode(&Message::AskHello, 0, 0, 12, &mut bytes);
+        bytes.extend(b"\n1 2\n2 3\n3 4\n4 5\n5 6\n");
+        assert_eq!(inputs(&bytes).1.samples, 2);
+    }
+
+    #[test]
+    fn what_cannot_be_used_says_why() {
+        let doubt = |bytes: &[u8]| {
+            let mut receiver = Receiver::default();
+            receiver.push(bytes, 0, |_| {});
+            receiver.doubt()
+        };
+        let greeting = |hello: Hello| {
+            let mut bytes = vec![0];
+            encode(&Message::Hello(hello), 0, 0, 12, &mut bytes);
+            bytes
+        };
+        let refused = |doubt: Option<Doubt>| match doubt {
+            Some(Doubt::Refused(why)) => why.in_words().unwrap(),
+            other => panic!("{other:?}"),
+        };
+        let other = greeting(Hello {
+            version: 3,
+            ..hello()
+        });
+        // What comes behind it takes nothing from the reason.
+        let said = refused(doubt(&[&other[..], &data(1, 9)].concat()));
+        assert!(said.contains("version 3"), "{said}");
+        let deaf = greeting(Hello {
+            gain_milli: 0,
+            ..hello()
+        });
+        let said = refused(doubt(&[&deaf[..], &data(1, 9)].concat()));
+        assert!(said.contains("gain must be above zero"), "{said}");
+        let wide = greeting(Hello {
+            channels: 3,
+            ..hello()
+        });
+        let said = refused(doubt(&[&wide[..], &data(1, 9)].concat()));
+        assert!(
+            said.contains("3 bytes") && said.contains("take 5"),
+            "{said}"
+        );
+        assert_eq!(doubt(b"1,5;2,5\n1,6;2,4\n"), Some(Doubt::Commas));
+        assert_eq!(doubt(b"\x81\xf3\x17 ready\n"), Some(Doubt::Neither));
+        assert_eq!(doubt(&greeting(hello())), Some(Doubt::NoData));
+        assert_eq!(doubt(&[&greeting(hello())[..], &data(1, 9)].concat()), None);
+        assert_eq!(doubt(b"1,2\n"), None);
+        assert_eq!(doubt(b""), None);
     }
 
     #[test]

@@ -79,6 +79,35 @@ impl LiveKeys {
         (self.glued.len() == gauges && gauges > 0).then(|| self.glued.iter().map(values).collect())
     }
 
+    /// The first two gauges (from 0) that are on one channel, and that channel.
+    #[must_use]
+    pub fn shared_channel(&self) -> Option<(usize, usize, usize)> {
+        (self.channels.iter().enumerate()).find_map(|(second, channel)| {
+            let first = self.channels[..second].iter().position(|c| c == channel)?;
+            Some((first, second, *channel))
+        })
+    }
+
+    /// Whether channels and calibration are of so many gauges; where they are not, they hold for none.
+    ///
+    /// # Errors
+    /// [`BadValue`] naming the key.
+    pub fn check_gauges(&self, gauges: usize) -> Result<(), BadValue> {
+        for (key, count) in [
+            ("live.channels", self.channels.len()),
+            ("live.glued", self.glued.len()),
+        ] {
+            if count != 0 && count != gauges {
+                return Err(BadValue {
+                    key: key.to_owned(),
+                    rule: "one entry for each chosen gauge, or left out".into(),
+                    value: format!("{count} for {gauges} gauges"),
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// Settings of the pipeline for so many gauges.
     #[must_use]
     pub fn settings(&self, gauges: usize) -> Settings {
@@ -105,11 +134,21 @@ impl LiveKeys {
 impl Project {
     pub(super) fn check_live(&self) -> Result<(), BadValue> {
         let live = &self.live;
-        for (key, value) in [
-            ("live.gauge_factor", live.gauge_factor),
-            ("live.largest_force_n", live.largest_force_n),
+        for (key, rule, value, most) in [
+            (
+                "live.gauge_factor",
+                "above 0 and at most 10000",
+                live.gauge_factor,
+                1e4,
+            ),
+            (
+                "live.largest_force_n",
+                "above 0 and at most 1000000",
+                live.largest_force_n,
+                1e6,
+            ),
         ] {
-            check(key, "a number above zero", value, value > 0.0)?;
+            check(key, rule, value, value > 0.0 && value <= most)?;
         }
         let arms = f64::from(live.active_arms);
         check(
@@ -140,6 +179,13 @@ impl Project {
                 channel < most,
             )?;
         }
+        if let Some((first, second, channel)) = live.shared_channel() {
+            return Err(BadValue {
+                key: "live.channels".to_owned(),
+                rule: "another channel for each gauge".into(),
+                value: format!("{channel} for gauges {} and {}", first + 1, second + 1),
+            });
+        }
         for glued in &live.glued {
             let sound = [
                 glued.gain,
@@ -149,11 +195,38 @@ impl Project {
             ];
             check(
                 "live.glued.gain",
-                "a number above zero",
+                "a number above zero, and the other keys finite",
                 glued.gain,
                 glued.gain > 0.0 && sound.iter().all(|v| v.is_finite()),
             )?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_channel_belongs_to_one_gauge() {
+        let mut project = Project::around("limb.stl", None);
+        project.live.channels = vec![4, 2, 0, 2];
+        let said = project.check_live().unwrap_err().to_string();
+        let expected =
+            "live.channels must be another channel for each gauge, but is 2 for gauges 2 and 4";
+        assert_eq!(said, expected);
+        project.live.channels = vec![4, 2, 0, 1];
+        project.check_live().unwrap();
+        project.live.check_gauges(4).unwrap();
+        let said = project.live.check_gauges(5).unwrap_err().to_string();
+        assert!(
+            said.contains("live.channels") && said.contains("4 for 5 gauges"),
+            "{said}"
+        );
+        for bad in [0.0, -1.0, 1e300, f64::NAN, f64::INFINITY] {
+            project.live.gauge_factor = bad;
+            assert!(project.check_live().is_err(), "{bad}");
+        }
     }
 }

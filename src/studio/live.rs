@@ -97,7 +97,8 @@ pub(super) enum Brought {
     Board(Arc<Sensing>, Box<Mutex<Option<SimulatedBoard>>>),
     Trained(Vec<bool>, Pair),
     Calibrated(Calibration),
-    Table(PathBuf),
+    /// The files that a table takes.
+    Table(Vec<PathBuf>),
 }
 
 impl Live {
@@ -269,8 +270,9 @@ impl Studio {
 
     /// What a job of this stage has brought.
     pub(super) fn take_live(&mut self, ctx: &Context, brought: Brought, key: String) {
-        if let Brought::Table(path) = brought {
-            return self.tell(format!("The table is in {}", path.display()));
+        if let Brought::Table(paths) = brought {
+            let names: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
+            return self.tell(format!("The table is in {}", names.join(" and ")));
         }
         if key != self.sensing_key() {
             self.live.wish = None;
@@ -309,7 +311,7 @@ impl Studio {
                 feed.take_truth(&truth);
             }
         };
-        match host(board, &doorway(), told) {
+        match doorway().open().and_then(|door| host(board, door, told)) {
             Ok(hosted) => {
                 let address = Address::parse(&hosted.port, BAUD, Pace::Real);
                 self.live.hosted = Some(hosted);
@@ -463,10 +465,10 @@ impl Studio {
                 let settings = live.settings(sensing.gauges.len());
                 let pipeline = Pipeline::new(sensing.map_for(&live), settings);
                 let table = recording.with_extension("csv");
-                crate::cli::listen::write_table(&recording, &table, pipeline)
+                let tables = crate::cli::listen::write_table(&recording, &table, pipeline)
                     .map_err(|e| crate::job::Stop::Failed(format!("{e:#}")))?;
                 Ok(super::drive::Finished::Live(Box::new(Brought::Table(
-                    table,
+                    tables,
                 ))))
             });
     }

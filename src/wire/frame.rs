@@ -9,6 +9,9 @@ const HEAD: usize = 7;
 const TAIL: usize = 2;
 /// The longest frame before COBS: short enough that COBS adds one byte and no more.
 const LONGEST: usize = 253;
+/// The most bits of a count. As many channels as there may be then fit into a frame.
+const MOST_BITS: usize = 24;
+const _: () = assert!(MOST_CHANNELS * MOST_BITS <= 8 * (LONGEST - HEAD - TAIL));
 const MAGIC: [u8; 4] = *b"HAPD";
 const SUM: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 /// So many frames in a row that seem to come from the past are a board that has begun anew.
@@ -19,6 +22,7 @@ const DATA: u8 = 0x02;
 const STATUS: u8 = 0x03;
 const LOG: u8 = 0x04;
 const PONG: u8 = 0x05;
+const NOTE: u8 = 0x41;
 const ASK_HELLO: u8 = 0x81;
 const START: u8 = 0x82;
 const STOP: u8 = 0x83;
@@ -62,6 +66,9 @@ pub enum Message {
         text: String,
     },
     Pong(u32),
+    // In a recording only.
+    /// What the studio did while it recorded.
+    Note(String),
     // From the studio.
     AskHello,
     Start,
@@ -71,6 +78,14 @@ pub enum Message {
     Ping(u32),
 }
 
+impl Message {
+    /// Whether a studio says it, and never a board.
+    #[must_use]
+    pub fn is_of_studio(&self) -> bool {
+        kind(self) >= ASK_HELLO
+    }
+}
+
 /// Why bytes between two zeros were no message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
@@ -78,12 +93,55 @@ pub enum Refusal {
     Framing,
     /// The check sum does not fit.
     Damaged,
-    /// Sound, but of no type, version or length that is known.
+    /// Sound, but of no type or length that is known.
     Unknown,
+    /// A HELLO of another version of the protocol.
+    Version(u8),
+    /// A HELLO with a value that nothing can be computed with.
+    Value {
+        name: &'static str,
+        rule: &'static str,
+        found: u32,
+    },
+    /// Data of another size (bytes) than the HELLO before them announces.
+    Size { found: usize, announced: usize },
     /// Data before the board has said how many channels and bits they have.
     NoLayout,
     /// It was there already, or came after one that was sent later.
     Repeated,
+}
+
+impl Refusal {
+    /// Whether it is the board that is wrong, or unknown to us: it will say the same again. What a bad line does
+    /// passes, and so do data that came before their HELLO.
+    #[must_use]
+    pub fn is_lasting(self) -> bool {
+        matches!(
+            self,
+            Self::Version(_) | Self::Value { .. } | Self::Size { .. }
+        )
+    }
+
+    /// For people, with what to do; nothing for what any line brings now and then.
+    #[must_use]
+    pub fn in_words(self) -> Option<String> {
+        match self {
+            Self::Framing | Self::Damaged | Self::Unknown | Self::Repeated => None,
+            Self::Version(version) => Some(format!(
+                "the board speaks version {version} of the protocol, and this program version {VERSION}: bring the older of the two up to date"
+            )),
+            Self::Value { name, rule, found } => Some(format!(
+                "the board's HELLO cannot be used: {name} must be {rule}, but is {found}. Correct it in the firmware"
+            )),
+            Self::Size { found, announced } => Some(format!(
+                "the board's DATA have {found} bytes, but the channels and bits of its HELLO take {announced}. Correct the one or the other in the firmware"
+            )),
+            Self::NoLayout => Some(
+                "the board sends DATA, but no HELLO that says how many channels and bits they have. It must answer HELLO?"
+                    .to_owned(),
+            ),
+        }
+    }
 }
 
 /// What the decoder makes of bytes.
@@ -123,6 +181,7 @@ fn kind(message: &Message) -> u8 {
         Message::Status { .. } => STATUS,
         Message::Log { .. } => LOG,
         Message::Pong(_) => PONG,
+        Message::Note(_) => NOTE,
         Message::AskHello => ASK_HELLO,
         Message::Start => START,
         Message::Stop => STOP,
@@ -156,6 +215,7 @@ fn payload(message: &Message, bits: u8, out: &mut Vec<u8>) {
             out.push(*level);
             out.extend(text.bytes());
         }
+        Message::Note(text) => out.extend(text.bytes()),
         Message::Pong(token) | Message::Ping(token) => out.extend(token.to_le_bytes()),
         Message::Rate(hertz) => out.extend(hertz.to_le_bytes()),
         Message::AskHello | Message::Start | Message::Stop => {}
@@ -220,7 +280,9 @@ impl Decoder {
     pub fn push(&mut self, bytes: &[u8], mut tell: impl FnMut(Event)) {
         for &byte in bytes {
             if byte != 0 {
-                self.overlong |= self.frame.len() > LONGEST;
+                if !self.overlong && self.frame.len() > LONGEST {
+                    self.make_room();
+                }
                 if !self.overlong {
                     self.frame.push(byte);
                 }
@@ -241,8 +303,15 @@ impl Decoder {
         *self = Self::default();
     }
 
+    /// Longer than any frame, unless what was printed before it goes.
+    fn make_room(&mut self) {
+        let printed = printed(&self.frame);
+        self.frame.drain(..printed);
+        self.overlong = printed == 0;
+    }
+
     fn end_of_frame(&mut self, tell: &mut impl FnMut(Event)) {
-        match self.read() {
+        match self.read_behind_text() {
             Ok((sequence, time_us, message)) => {
                 if let Some(refused) = self.follow(sequence, &message, tell) {
                     return tell(Event::Refused(refused));
@@ -257,7 +326,26 @@ impl Decoder {
         }
     }
 
-    /// What lies between two zeros.
+    /// What lies between two zeros. A board that has just printed lines sends no zero before its first frame.
+    fn read_behind_text(&mut self) -> Result<(u16, u32, Message), Refusal> {
+        let printed = printed(&self.frame);
+        if printed == 0 {
+            return self.read();
+        }
+        let whole = self.frame.clone();
+        let mut found = self.read();
+        // The last line feed may be the first byte of the frame.
+        for start in [printed, printed - 1] {
+            if !matches!(found, Err(Refusal::Framing | Refusal::Damaged)) {
+                break;
+            }
+            self.frame.clear();
+            self.frame.extend_from_slice(&whole[start..]);
+            found = self.read();
+        }
+        found
+    }
+
     fn read(&mut self) -> Result<(u16, u32, Message), Refusal> {
         let length = cobs::decode_in_place(&mut self.frame).map_err(|_| Refusal::Framing)?;
         let frame = &self.frame[..length];
@@ -269,8 +357,12 @@ impl Decoder {
         }
         let sequence = u16::from_le_bytes([body[1], body[2]]);
         let time_us = u32::from_le_bytes([body[3], body[4], body[5], body[6]]);
-        let message = message(body[0], &body[HEAD..], self.layout)?;
-        Ok((sequence, time_us, message))
+        let message = message(body[0], &body[HEAD..], self.layout);
+        if matches!(message, Err(Refusal::Version(_) | Refusal::Value { .. })) {
+            // Nobody knows any more how its data are laid out.
+            self.layout = None;
+        }
+        Ok((sequence, time_us, message?))
     }
 
     /// Where a message stands among those before it; what must not be used is refused.
@@ -301,15 +393,26 @@ impl Decoder {
     }
 }
 
+/// Bytes at the beginning that are lines of text.
+fn printed(bytes: &[u8]) -> usize {
+    let text = bytes
+        .iter()
+        .take_while(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
+        .count();
+    let last = bytes[..text].iter().rposition(|&b| b == b'\n');
+    last.map_or(0, |at| at + 1)
+}
+
 fn message(kind: u8, payload: &[u8], layout: Option<(usize, u8)>) -> Result<Message, Refusal> {
     let unknown = Err(Refusal::Unknown);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     Ok(match (kind, payload) {
-        (HELLO, _) => Message::Hello(hello(payload).ok_or(Refusal::Unknown)?),
+        (HELLO, _) => Message::Hello(hello(payload)?),
         (DATA, _) => {
             let (channels, bits) = layout.ok_or(Refusal::NoLayout)?;
-            if payload.len() != packed(channels, bits) {
-                return unknown;
+            let (found, announced) = (payload.len(), packed(channels, bits));
+            if found != announced {
+                return Err(Refusal::Size { found, announced });
             }
             Message::Data(unpack(payload, channels, bits))
         }
@@ -321,6 +424,7 @@ fn message(kind: u8, payload: &[u8], layout: Option<(usize, u8)>) -> Result<Mess
             level: *level,
             text: text(rest),
         },
+        (NOTE, _) => Message::Note(text(payload)),
         (PONG, &[a, b, c, d]) => Message::Pong(u32::from_le_bytes([a, b, c, d])),
         (PING, &[a, b, c, d]) => Message::Ping(u32::from_le_bytes([a, b, c, d])),
         (RATE, &[a, b]) => Message::Rate(u16::from_le_bytes([a, b])),
@@ -331,24 +435,54 @@ fn message(kind: u8, payload: &[u8], layout: Option<(usize, u8)>) -> Result<Mess
     })
 }
 
-fn hello(payload: &[u8]) -> Option<Hello> {
-    let (head, name) = payload.split_at_checked(21)?;
+fn hello(payload: &[u8]) -> Result<Hello, Refusal> {
+    let rest = payload.strip_prefix(&MAGIC).ok_or(Refusal::Unknown)?;
+    // The version first: another one may have another length.
+    let (&version, rest) = rest.split_first().ok_or(Refusal::Unknown)?;
+    if version != VERSION {
+        return Err(Refusal::Version(version));
+    }
+    let (head, name) = rest.split_at_checked(16).ok_or(Refusal::Unknown)?;
     let pair = |k: usize| u16::from_le_bytes([head[k], head[k + 1]]);
     let four = |k: usize| u32::from_le_bytes([head[k], head[k + 1], head[k + 2], head[k + 3]]);
-    let (channels, bits) = (head[9], head[10]);
-    let fits = (1..=MOST_CHANNELS).contains(&usize::from(channels)) && (1..=24).contains(&bits);
-    let room = packed(usize::from(channels), bits) <= LONGEST - HEAD - TAIL;
-    (head[..4] == MAGIC && head[4] == VERSION && fits && room).then(|| Hello {
-        version: head[4],
-        board: four(5),
-        channels,
-        bits,
-        reference_mv: pair(11),
-        supply_mv: pair(13),
-        gain_milli: four(15),
-        rate_hz: pair(19),
+    let hello = Hello {
+        version,
+        board: four(0),
+        channels: head[4],
+        bits: head[5],
+        reference_mv: pair(6),
+        supply_mv: pair(8),
+        gain_milli: four(10),
+        rate_hz: pair(14),
         name: String::from_utf8_lossy(name).into_owned(),
-    })
+    };
+    usable(&hello).map(|()| hello)
+}
+
+/// Whether strains can be computed from what a board says of itself.
+fn usable(hello: &Hello) -> Result<(), Refusal> {
+    const ABOVE: &str = "above zero";
+    let channels = (1..=MOST_CHANNELS).contains(&usize::from(hello.channels));
+    let bits = (1..=MOST_BITS).contains(&usize::from(hello.bits));
+    let reference = u32::from(hello.reference_mv);
+    let supply = u32::from(hello.supply_mv);
+    let gain = hello.gain_milli;
+    let values = [
+        (
+            "channels",
+            "between 1 and 64",
+            u32::from(hello.channels),
+            channels,
+        ),
+        ("bits", "between 1 and 24", u32::from(hello.bits), bits),
+        ("V_ref", ABOVE, reference, reference > 0),
+        ("V_ex", ABOVE, supply, supply > 0),
+        ("gain", ABOVE, gain, gain > 0),
+    ];
+    match values.into_iter().find(|(.., fits)| !fits) {
+        Some((name, rule, found, _)) => Err(Refusal::Value { name, rule, found }),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -409,6 +543,7 @@ mod tests {
                 3,
                 3000,
             ),
+            (Message::Note("tare".into()), 4, 4000),
             (Message::Start, 0, 0),
             (Message::Rate(500), 1, 0),
         ] {
@@ -434,6 +569,7 @@ mod tests {
                 text: "bridge 3 open – µ".into(),
             },
             Message::Pong(0x0102_0304),
+            Message::Note("rest 0 2048.5 1.25".into()),
             Message::AskHello,
             Message::Start,
             Message::Stop,
@@ -506,6 +642,85 @@ mod tests {
         let mut told = Vec::new();
         decoder.push(&[0], |e| told.push(e));
         assert_eq!(told, [Event::Refused(Refusal::Framing)]);
+    }
+
+    /// A HELLO as its bytes on the wire, after something was done to its payload.
+    fn hello_with(change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
+        let mut frame = vec![HELLO, 0, 0, 0, 0, 0, 0];
+        let mut said = Vec::new();
+        payload(&Message::Hello(board()), 12, &mut said);
+        change(&mut said);
+        frame.extend(said);
+        frame.extend(SUM.checksum(&frame).to_le_bytes());
+        let mut out = vec![0; cobs::max_encoding_length(frame.len())];
+        let length = cobs::encode(&frame, &mut out);
+        out.truncate(length);
+        out.push(0);
+        out
+    }
+
+    #[test]
+    fn a_hello_that_cannot_be_used_says_why_and_its_data_are_not_believed() {
+        let none = |name| Refusal::Value {
+            name,
+            rule: "above zero",
+            found: 0,
+        };
+        let zero = |from: usize, to: usize| hello_with(|p| p[from..to].fill(0));
+        let shorter = hello_with(|p| {
+            p.truncate(4);
+            p.push(9);
+        });
+        let cases = [
+            (hello_with(|p| p[4] = 2), Refusal::Version(2)),
+            (shorter, Refusal::Version(9)),
+            (zero(11, 13), none("V_ref")),
+            (zero(13, 15), none("V_ex")),
+            (zero(15, 19), none("gain")),
+            (hello_with(|p| p.truncate(20)), Refusal::Unknown),
+        ];
+        let mut sound = Vec::new();
+        encode(&Message::Hello(board()), 0, 0, 12, &mut sound);
+        let mut data = Vec::new();
+        encode(&Message::Data(vec![5; 12]), 1, 0, 12, &mut data);
+        for (bytes, refusal) in cases {
+            let all = [&sound[..], &bytes, &data].concat();
+            let said = events(&all);
+            assert_eq!(said[1], Event::Refused(refusal));
+            let trusted = matches!(said[2], Event::Message { .. });
+            assert_eq!(trusted, refusal == Refusal::Unknown, "{:?}", said[2]);
+            assert_eq!(refusal.in_words().is_some(), refusal.is_lasting());
+        }
+        let Event::Refused(why) = events(&hello_with(|p| p[10] = 25))[0] else {
+            panic!("25 bits were believed");
+        };
+        let said = why.in_words().unwrap();
+        assert!(said.contains("bits must be between 1 and 24, but is 25"));
+    }
+
+    #[test]
+    fn a_frame_behind_printed_lines_is_found() {
+        let hello = Message::Hello(board());
+        for text in ["1,2,3\n", "ready\r\n\n", &"2000 2001 2002\r\n".repeat(100)] {
+            let mut bytes = text.as_bytes().to_vec();
+            encode(&hello, 0, 0, 12, &mut bytes);
+            let found = events(&bytes);
+            let is_hello =
+                |e: &Event| matches!(e, Event::Message { message, .. } if *message == hello);
+            assert!(found.len() == 1 && is_hello(&found[0]), "{text}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn data_of_another_size_say_so() {
+        let mut bytes = Vec::new();
+        encode(&Message::Hello(board()), 0, 0, 12, &mut bytes);
+        encode(&Message::Data(vec![5; 11]), 1, 0, 12, &mut bytes);
+        let refusal = Refusal::Size {
+            found: 17,
+            announced: 18,
+        };
+        assert_eq!(events(&bytes)[1], Event::Refused(refusal));
     }
 
     /// Bytes flipped, dropped, doubled: what comes through was sent, and sound frames come through.

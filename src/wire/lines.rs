@@ -8,6 +8,9 @@ const LONGEST: usize = 1024;
 pub enum Reading {
     /// One number a channel.
     Values(Vec<f64>),
+    /// Numbers with commas between some and another sign between others, as in “1,5;2,5”: two decimal commas or
+    /// four numbers, nobody knows.
+    Unclear,
     /// Not a row of numbers, or not as many as in the lines before.
     Other,
 }
@@ -48,9 +51,15 @@ impl LineReader {
     fn read(&mut self) -> Reading {
         /// So many lines of another length are the new length.
         const CHANGED: usize = 3;
-        let Some(values) = numbers(&self.line) else {
+        let Ok(text) = std::str::from_utf8(&self.line) else {
             return Reading::Other;
         };
+        let Some(values) = numbers(text) else {
+            return Reading::Other;
+        };
+        if is_unclear(text) {
+            return Reading::Unclear;
+        }
         match self.channels {
             Some(known) if known != values.len() && self.others + 1 < CHANGED => {
                 // Half a line, most likely: as when a port is opened in the middle of one.
@@ -65,15 +74,35 @@ impl LineReader {
     }
 }
 
-fn numbers(line: &[u8]) -> Option<Vec<f64>> {
-    let text = std::str::from_utf8(line).ok()?;
-    let divided = |c: char| matches!(c, ',' | ';' | '\t' | ' ');
+/// What stands between two numbers.
+fn divides(c: char) -> bool {
+    matches!(c, ',' | ';' | '\t' | ' ')
+}
+
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    /// No count, and no clock that is printed beside the counts, is larger; squares of it are still finite.
+    const LARGEST: f64 = 1e15;
     let values: Option<Vec<f64>> = text
-        .split(divided)
+        .split(divides)
         .filter(|word| !word.is_empty())
-        .map(|word| word.parse().ok().filter(|v: &f64| v.is_finite()))
+        .map(|word| word.parse().ok().filter(|v: &f64| v.abs() <= LARGEST))
         .collect();
     values.filter(|v| !v.is_empty() && v.len() <= super::MOST_CHANNELS)
+}
+
+/// Whether a bare comma stands between two numbers, and between others no comma at all. A comma with a space, as
+/// of columns that are padded, is no other sign.
+fn is_unclear(text: &str) -> bool {
+    let (mut bare, mut other) = (false, false);
+    let signs = text
+        .trim_matches(divides)
+        .split(|c: char| !divides(c))
+        .filter(|sign| !sign.is_empty());
+    for sign in signs {
+        bare |= sign == ",";
+        other |= !sign.contains(',');
+    }
+    bare && other
 }
 
 #[cfg(test)]
@@ -103,6 +132,23 @@ mod tests {
             Reading::Other,
         ];
         assert_eq!(said, expected);
+    }
+
+    #[test]
+    fn commas_that_may_be_decimal_are_not_guessed_at() {
+        let kinds =
+            readings(b"1,5;2,5\n1,5 2,5\n1,5\t2\n1000, 999,1000\n 7;8; 9\n1, 2, 3\n1e300,1,1\n");
+        let values = |v: &[f64]| Reading::Values(v.to_vec());
+        let expected = [
+            Reading::Unclear,
+            Reading::Unclear,
+            Reading::Unclear,
+            values(&[1000.0, 999.0, 1000.0]),
+            values(&[7.0, 8.0, 9.0]),
+            values(&[1.0, 2.0, 3.0]),
+            Reading::Other,
+        ];
+        assert_eq!(kinds, expected);
     }
 
     #[test]

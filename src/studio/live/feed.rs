@@ -18,6 +18,8 @@ pub const STRIPS_S: f64 = 8.0;
 /// Samples of a strip a second, and looks at the clockwork.
 const STRIP_HZ: f64 = 60.0;
 const LOOK: Duration = Duration::from_millis(400);
+/// The most messages that wait for the window to show them.
+const MESSAGES: usize = 50;
 /// Between two pictures.
 const FRAME: Duration = Duration::from_millis(16);
 
@@ -57,6 +59,8 @@ pub struct Feed {
     /// Where a simulated board is really touched (m, N).
     pub truth: Option<(DVec3, f64)>,
     pub messages: Vec<String>,
+    /// Why nothing that comes can be used.
+    pub trouble: Option<String>,
     /// How it ended.
     pub ended: Option<Result<(), String>>,
     /// Whose trail is drawn.
@@ -89,6 +93,9 @@ impl Feed {
         match heard {
             Heard::State(state) => {
                 self.state = Some((*state).clone());
+                if **state == State::Waiting {
+                    self.trouble = None;
+                }
                 if **state != State::Live {
                     self.update = None;
                     self.trail.clear();
@@ -115,8 +122,13 @@ impl Feed {
                 self.truth = *touch;
                 false
             }
-            Heard::Message(text) => {
-                self.messages.push((*text).to_owned());
+            Heard::Message(text) | Heard::Unrecorded(text) => {
+                self.say(text);
+                true
+            }
+            Heard::Trouble(text) => {
+                self.trouble = Some((*text).to_owned());
+                self.say(text);
                 true
             }
             Heard::Turn {
@@ -142,6 +154,13 @@ impl Feed {
                 });
                 false
             }
+        }
+    }
+
+    /// A board that talks without a pause does not fill the memory of a window that is not shown.
+    fn say(&mut self, text: &str) {
+        if self.messages.len() < MESSAGES {
+            self.messages.push(text.to_owned());
         }
     }
 
@@ -201,5 +220,29 @@ impl Feed {
     /// What really happens at a simulated board of our own.
     pub fn take_truth(&mut self, truth: &Truth) {
         self.truth = truth.touch.map(|t| (t.position, t.force));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn why_a_board_is_not_understood_stays_until_it_is_asked_anew() {
+        let mut feed = Feed::default();
+        assert!(feed.take(&Heard::Trouble("version 2")));
+        feed.take(&Heard::State(&State::Silent));
+        assert_eq!(feed.trouble.as_deref(), Some("version 2"));
+        feed.take(&Heard::State(&State::Waiting));
+        assert_eq!(feed.trouble, None);
+    }
+
+    #[test]
+    fn a_board_that_talks_without_a_pause_fills_no_memory() {
+        let mut feed = Feed::default();
+        for _ in 0..1000 {
+            feed.take(&Heard::Message("again"));
+        }
+        assert_eq!(feed.messages.len(), MESSAGES);
     }
 }

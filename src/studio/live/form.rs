@@ -126,10 +126,14 @@ impl Studio {
         if self.live.wish.is_some() {
             return ("Making the model of the gauges …".into(), None);
         }
-        let (state, taring, tared) = self
+        let (state, taring, tared, trouble) = self
             .live
-            .look(|f| (f.state.clone(), f.taring, f.tared))
+            .look(|f| (f.state.clone(), f.taring, f.tared, f.trouble.clone()))
             .unwrap_or_default();
+        if let Some(why) = trouble.filter(|_| matches!(state, Some(State::Waiting | State::Silent)))
+        {
+            return (format!("Not understood: {why}"), Some(theme::ERROR));
+        }
         match state {
             None => ("Not connected".into(), None),
             Some(State::Waiting) => ("Waiting for the board".into(), None),
@@ -412,5 +416,13 @@ fn channels(ui: &mut Ui, live: &mut LiveKeys, gauges: usize) {
     });
     if channels != before {
         live.channels = channels;
+    }
+    if let Some((first, second, channel)) = live.shared_channel() {
+        let text = format!(
+            "Gauges {} and {} are both on channel {channel}",
+            first + 1,
+            second + 1
+        );
+        ui.colored_label(theme::ERROR, text);
     }
 }
