@@ -262,8 +262,10 @@ fn mask(path: &Path) -> Outcome {
 fn export(bytes: &[u8], folder: &Path) -> Result<Outcome, String> {
     let exports = folder.join("exports");
     std::fs::create_dir_all(&exports).map_err(|e| e.to_string())?;
+    // Two touches: one alone has nothing to be told from.
     put(&exports, "1.txt", bytes)?;
-    let places = put(folder, "one.csv", b"x_mm,y_mm,z_mm\n0,0,1\n")?;
+    put(&exports, "2.txt", bytes)?;
+    let places = put(folder, "two.csv", b"x_mm,y_mm,z_mm\n0,0,1\n5,0,1\n")?;
     dataset(&exports, Some(&places))
 }
 

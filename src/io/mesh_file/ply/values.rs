@@ -145,11 +145,19 @@ impl<'b> Values<'b> {
 
     /// What is wrong with the element that is being read, with its place.
     pub fn wrong(&self, what: &str) -> String {
-        let said = format!("{} {} {what}", self.element, self.index);
+        let said = format!("{} {} {what}", plain_name(&self.element), self.index);
         match &self.source {
             Source::Text { line, .. } => at(*line, &said),
             Source::Binary { .. } => said,
         }
+    }
+}
+
+/// The name of an element: those of the format as they are, others are what the file says.
+fn plain_name(name: &str) -> String {
+    match name {
+        "vertex" | "face" => name.to_owned(),
+        _ => quote(name),
     }
 }
 
