@@ -17,6 +17,8 @@ mod walled;
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use crate::budget::Cancelled;
 use crate::elasticity::ElasticError;
 use crate::mesh::TriMesh;
@@ -84,6 +86,26 @@ pub enum DesignError {
         "the part is {size_mm:.3} mm across and its wall {thickness_mm:.3} mm thick: this is no shell. Check the unit of the mesh and part.thickness_mm"
     )]
     ThickerThanWide { size_mm: f64, thickness_mm: f64 },
+    #[error(
+        "one vertex of the part, at {place_mm:.3} mm, lies {distance_mm:.3} mm from all the others, which are {size_mm:.3} mm across: remove or move it in the program that wrote the mesh"
+    )]
+    FarVertex {
+        place_mm: DVec3,
+        distance_mm: f64,
+        size_mm: f64,
+    },
+    #[error(
+        "the part is too slender for elements: its longest edge has {longest_mm:.3} mm, and all of its surface {area_mm2:.3} mm². Remove the long thin triangles in the program that wrote the mesh, or check for vertices in a wrong place"
+    )]
+    Slender { longest_mm: f64, area_mm2: f64 },
+    #[error(
+        "unrolled about its axis the part is {round_mm:.0} mm round and {high_mm:.0} mm high, too much for sites every {spacing_mm} mm: choose sites.lattice = \"even\", another part.axis, or a wider sites.spacing_mm"
+    )]
+    WideLattice {
+        round_mm: f64,
+        high_mm: f64,
+        spacing_mm: f64,
+    },
     #[error(
         "no site fits on the part: {spacing_mm} mm (sites.spacing_mm) is too wide for a part of {size_mm:.3} mm across and {area_mm2:.3} mm². Lower it to less than {fits_mm:.3}, or check the unit of the mesh"
     )]

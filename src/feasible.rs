@@ -258,7 +258,8 @@ fn off_centre(sites: &[Site], neighbours: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The k nearest others of each position, by a search radius that grows until they are found.
+/// The k nearest others of each position, by a search radius that grows for those that have not found as many: what
+/// lies far from the rest costs the rest nothing.
 fn nearest(positions: &[DVec3], k: usize) -> Vec<Vec<usize>> {
     let (lower, upper) = positions
         .iter()
@@ -266,20 +267,39 @@ fn nearest(positions: &[DVec3], k: usize) -> Vec<Vec<usize>> {
             (l.min(p), u.max(p))
         });
     let size = (upper - lower).length().max(f64::MIN_POSITIVE);
-    let mut reach = size * (2.0 * k as f64 / positions.len() as f64).sqrt().min(1.0) / 2.0;
+    let mut found: Vec<Vec<usize>> = vec![Vec::new(); positions.len()];
+    let mut reach = usual_reach(positions, k).max(1e-6 * size);
     loop {
-        let near = sample::neighbours_within(positions, reach);
-        if reach > size || near.iter().all(|list| list.len() >= k) {
-            return near
-                .into_iter()
-                .map(|mut list| {
-                    list.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-                    list.into_iter().take(k).map(|(j, _)| j).collect()
-                })
-                .collect();
+        let near = sample::neighbours_of(positions, &|i| found[i].len() < k, reach);
+        for (found, mut near) in found.iter_mut().zip(near) {
+            if near.len() >= k {
+                near.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+                *found = near.into_iter().take(k).map(|(j, _)| j).collect();
+            }
+        }
+        if reach > size || found.iter().all(|list| list.len() >= k) {
+            return found;
         }
         reach *= 1.5;
     }
+}
+
+/// A little more than how far half of the positions have their k-th nearest other, as a few of them say.
+fn usual_reach(positions: &[DVec3], k: usize) -> f64 {
+    const ASKED: usize = 32;
+    const MORE: f64 = 1.2;
+    let step = positions.len().div_ceil(ASKED).max(1);
+    let kth = |p: &DVec3| {
+        let mut squares: Vec<f64> = positions.iter().map(|q| q.distance_squared(*p)).collect();
+        // The nearest is the position itself.
+        *squares.select_nth_unstable_by(k, f64::total_cmp).1
+    };
+    let mut squares: Vec<f64> = positions.iter().step_by(step).map(kth).collect();
+    let half = squares.len() / 2;
+    MORE * squares
+        .select_nth_unstable_by(half, f64::total_cmp)
+        .1
+        .sqrt()
 }
 
 struct Footprint {
@@ -319,4 +339,40 @@ fn footprint(
         result.height = result.height.max(height.abs());
     }
     result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same as by looking at all of them.
+    fn is_nearest(positions: &[DVec3], i: usize, list: &[usize]) -> bool {
+        let mut all: Vec<usize> = (0..positions.len()).filter(|&j| j != i).collect();
+        let distance = |j: usize| positions[j].distance(positions[i]);
+        all.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+        list == &all[..list.len()]
+    }
+
+    #[test]
+    fn what_lies_far_from_the_rest_costs_the_rest_nothing() {
+        // A radius at which the far ones find others spans the whole plate: 400 million pairs.
+        let plate = (0..20_000).map(|i| {
+            let (x, y) = (f64::from(i % 200), f64::from(i / 200));
+            DVec3::new(x, y, 0.0)
+        });
+        let line = (0..60).map(|i| DVec3::new(0.0, 0.0, 1e3 * f64::from(i + 1)));
+        let positions: Vec<DVec3> = plate.chain(line).collect();
+        let lists = nearest(&positions, 20);
+        assert!(lists.iter().all(|list| list.len() == 20));
+        for i in [0, 7, 10_101, 19_999, 20_000, 20_030, 20_059] {
+            assert!(is_nearest(&positions, i, &lists[i]), "{i}");
+        }
+    }
+
+    #[test]
+    fn places_may_be_equal() {
+        let positions = [DVec3::ONE; 5];
+        let lists = nearest(&positions, 4);
+        assert_eq!(lists[2], [0, 1, 3, 4]);
+    }
 }

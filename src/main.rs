@@ -1,9 +1,14 @@
 //! Maps arguments to commands and errors to exit codes: 0 done, 1 failed with a message, 2 wrong usage.
 
+mod allocation;
+
 use std::process::ExitCode;
 
 use clap::Parser;
 use hapdef::cli::{self, Cli, Command, out};
+
+#[global_allocator]
+static MEMORY: allocation::Spoken = allocation::Spoken;
 
 fn main() -> ExitCode {
     let outcome = match Cli::try_parse() {

@@ -585,6 +585,17 @@ fn weld(positions: &[DVec3], repair: &Repair, report: &mut RepairReport) -> (Vec
     (numbers, points)
 }
 
+/// Whether the height of a triangle is below 1e-10 of its longest side: relative, so that it does not depend on the
+/// unit.
+fn has_no_area(positions: &[DVec3], tri: [u32; 3]) -> bool {
+    let [a, b, c] = tri.map(|v| positions[v as usize]);
+    let longest = (b - a)
+        .length_squared()
+        .max((c - b).length_squared())
+        .max((a - c).length_squared());
+    (b - a).cross(c - a).length() <= 1e-10 * longest
+}
+
 fn drop_degenerate(
     positions: &[DVec3],
     triangles: impl ExactSizeIterator<Item = [u32; 3]>,
@@ -593,13 +604,7 @@ fn drop_degenerate(
     let mut seen: NumberSet<[u32; 3]> = NumberSet::default();
     let mut kept = Vec::with_capacity(triangles.len());
     for tri in triangles {
-        let [a, b, c] = tri.map(|v| positions[v as usize]);
-        let longest = (b - a)
-            .length_squared()
-            .max((c - b).length_squared())
-            .max((a - c).length_squared());
-        // Relative, so that the test does not depend on the unit: a height below 1e-10 of the side.
-        if (b - a).cross(c - a).length() <= 1e-10 * longest {
+        if has_no_area(positions, tri) {
             report.degenerate_triangles += 1;
             continue;
         }
@@ -756,17 +761,26 @@ fn fill_holes(
         return;
     }
     for rim in repair::holes(positions, triangles, repair.fill_holes) {
-        report.filled_holes += 1;
-        if let Some(filling) = repair::fill(positions, &rim) {
-            triangles.extend(filling);
+        let before = positions.len();
+        let filling = repair::fill(positions, &rim).unwrap_or_else(|| fan(positions, &rim));
+        // A seam of points in a line has no area to fill: it stays open, as what is said of open edges tells.
+        if filling.iter().any(|&tri| has_no_area(positions, tri)) {
+            positions.truncate(before);
             continue;
         }
-        // Too long for the best filling: a fan round the middle.
-        let middle = rim.iter().map(|&v| positions[v as usize]).sum::<DVec3>() / rim.len() as f64;
-        let centre = positions.len() as u32;
-        positions.push(middle);
-        triangles.extend((0..rim.len()).map(|i| [rim[i], rim[(i + 1) % rim.len()], centre]));
+        triangles.extend(filling);
+        report.filled_holes += 1;
     }
+}
+
+/// A filling for rims that are too long for the best one: a fan round a new vertex in the middle.
+fn fan(positions: &mut Vec<DVec3>, rim: &[u32]) -> Vec<[u32; 3]> {
+    let middle = rim.iter().map(|&v| positions[v as usize]).sum::<DVec3>() / rim.len() as f64;
+    let centre = positions.len() as u32;
+    positions.push(middle);
+    (0..rim.len())
+        .map(|i| [rim[i], rim[(i + 1) % rim.len()], centre])
+        .collect()
 }
 
 /// The representative of a vertex in a union-find forest, with its path halved.

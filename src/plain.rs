@@ -9,7 +9,14 @@ const MESSAGE: usize = 1600;
 /// One word of a file or a board, to stand in a message between quotation marks.
 #[must_use]
 pub fn quote(word: &str) -> String {
-    format!("“{}”", shown(word, WORD).replace('\n', "\u{fffd}"))
+    let plain = |c: char| match c {
+        '\n' => '\u{fffd}',
+        // The word's own would end the quotation.
+        '“' | '”' => '"',
+        c => c,
+    };
+    let inner: String = shown(word, WORD).chars().map(plain).collect();
+    format!("“{inner}”")
 }
 
 /// A whole message that may carry text from outside.
@@ -62,7 +69,7 @@ mod tests {
     #[test]
     fn nothing_that_a_terminal_obeys_is_left() {
         assert_eq!(quote("\u{1b}[31mred\u{7}"), "“\u{fffd}[31mred\u{fffd}”");
-        assert_eq!(quote("two\nlines"), "“two\u{fffd}lines”");
+        assert_eq!(quote("two\n”lines"), "“two\u{fffd}\"lines”");
         assert_eq!(message("two\nlines\tand é"), "two\nlines and é");
         assert_eq!(message("\u{9b}2J\u{202e}"), "\u{fffd}2J\u{fffd}");
     }

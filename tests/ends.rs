@@ -212,3 +212,78 @@ fn all_channels_dead() {
         assert!(update.guesses.iter().flatten().next().is_none());
     }
 }
+
+/// A box (mm) as the mesh of a project, its last vertex moved; what the program says to it.
+fn boxed(folder: &Path, sides: [f64; 3], last: [f64; 3], model: &str) -> String {
+    use std::fmt::Write as _;
+
+    let mut text = String::new();
+    for k in 0..8_u32 {
+        let corner: [f64; 3] = std::array::from_fn(|i| f64::from(k >> i & 1) * sides[i]);
+        let [x, y, z] = if k == 7 { last } else { corner };
+        let _ = writeln!(text, "v {x} {y} {z}");
+    }
+    for [a, b, c, d] in [
+        [1, 3, 4, 2],
+        [5, 6, 8, 7],
+        [1, 2, 6, 5],
+        [3, 7, 8, 4],
+        [1, 5, 7, 3],
+        [2, 4, 8, 6],
+    ] {
+        let _ = writeln!(text, "f {a} {b} {c}\nf {a} {c} {d}");
+    }
+    std::fs::write(folder.join("box.obj"), text).unwrap();
+    let project = folder.join("box.hapdef.toml");
+    let keys = format!(
+        "format = 1\n[part]\nmesh = \"box.obj\"\nunit = \"mm\"\nmodel = \"{model}\"\nthickness_mm = 1.5\n[[support]]\nkind = \"clamped\"\nbox_mm = [[-1, -1, -1], [1, 1e6, 1e6]]\n[budget]\nquality = \"draft\"\n"
+    );
+    std::fs::write(&project, keys).unwrap();
+    let out = folder.join("x.npz");
+    let begun = std::time::Instant::now();
+    let done = hapdef(&[
+        "simulate",
+        project.to_str().unwrap(),
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert_eq!(done.status.code(), Some(1), "{said}");
+    assert!(begun.elapsed().as_secs() < 10, "{said}");
+    assert!(!out.exists());
+    said
+}
+
+/// One vertex in a wrong place asks for more than any machine has: it is named before anything is begun.
+#[test]
+fn one_vertex_far_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let sides = [60.0, 30.0, 20.0];
+    for model in ["shell", "solid"] {
+        let said = boxed(folder.path(), sides, [1e7, 30.0, 20.0], model);
+        let words = [
+            "one vertex",
+            "10000000.000",
+            "9999940.000",
+            "remove or move it",
+        ];
+        for word in words {
+            assert!(said.contains(word), "{word} is not in: {said}");
+        }
+    }
+    // Too large as a whole, and nothing is far from the rest: as many sites as that are refused by their number.
+    let large = boxed(folder.path(), [6e4, 3e4, 2e4], [6e4, 3e4, 2e4], "shell");
+    assert!(large.contains("sites at a spacing"), "{large}");
+}
+
+/// A part that is next to nothing but long has no elements of its own scale.
+#[test]
+fn a_part_as_thin_as_a_thread() {
+    let folder = tempfile::tempdir().unwrap();
+    let sides = [1e7, 5e-3, 5e-3];
+    for model in ["shell", "solid"] {
+        let said = boxed(folder.path(), sides, sides, model);
+        assert!(said.contains("too slender"), "{said}");
+        assert!(said.contains("10000000.000 mm"), "{said}");
+    }
+}

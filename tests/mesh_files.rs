@@ -319,6 +319,23 @@ fn what_an_obj_has_beside_faces_is_said() {
 }
 
 #[test]
+fn a_seam_without_area_is_not_filled_with_triangles_of_none() {
+    // A square whose upper side has a vertex in the middle that the triangle above it knows nothing of.
+    let obj = b"v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 0 1 0\nv 1 2 0\nv 1 1 3\n\
+        f 1 2 4\nf 2 3 4\nf 1 4 5\nf 5 3 6\nf 1 7 2\nf 2 7 3\nf 3 7 6\nf 6 7 5\nf 5 7 1\n";
+    let repair = Repair {
+        fill_holes: 1.0,
+        ..Repair::default()
+    };
+    let loaded = parse_mesh(obj, "obj", None, 1e-3, 0, &repair).unwrap();
+    let mesh = &loaded.mesh;
+    for t in 0..mesh.triangles().len() as u32 {
+        assert!(mesh.facet_area(t) > 0.0, "{:?}", mesh.corners(t));
+    }
+    assert_eq!(mesh.boundary_edges().count(), 3, "the seam stays open");
+}
+
+#[test]
 fn all_solids_of_an_stl_are_read() {
     let (p, t) = (block(), block_triangles());
     let moved: Vec<DVec3> = p.iter().map(|p| *p + 9.0 * DVec3::X).collect();

@@ -3,12 +3,13 @@
 
 mod bench;
 
-use bench::solids::{Found, bent_tube, clamp, model, slotted, strip, tube};
+use bench::solids::{Found, bent_tube, block, clamp, model, shell_of, slotted, strip, tube};
 use glam::{DQuat, DVec3};
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::solid::SolidModel;
 use hapdef::elasticity::solid::immersed::Fineness;
-use hapdef::elasticity::{Material, Model as _, Touch};
+use hapdef::elasticity::support::Region;
+use hapdef::elasticity::{Freedoms, Material, Model as _, Support, Touch};
 
 #[test]
 fn cells_larger_than_the_wall_bend_as_a_beam() {
@@ -134,4 +135,97 @@ fn strain_inside_converges() {
     let rate = (errors[0] / errors[2]).ln() / (sizes[0] / sizes[2]).ln();
     println!("strain errors {errors:?}, rate {rate:.2}");
     assert!(rate > 1.2 && errors[2] < 0.01, "{errors:?} {rate}");
+}
+
+const RESIN: Material = Material {
+    youngs_modulus: 1.7e9,
+    poissons_ratio: 0.35,
+};
+
+/// The face of a part in a plane through the origin, kept from moving through it.
+fn mirror(axis: usize) -> Support {
+    let mut upper = DVec3::ONE;
+    let mut lower = DVec3::NEG_ONE;
+    upper[axis] = 1e-9;
+    lower[axis] = -1e-9;
+    Support {
+        region: Region::Box { lower, upper },
+        held: Freedoms::symmetry(axis),
+    }
+}
+
+#[test]
+fn a_block_under_uniform_load_shortens_as_hooke_says() {
+    // An eighth of a block between three mirrors; a tip that is much wider than it presses evenly.
+    let sides = DVec3::new(0.02, 0.015, 0.025);
+    let part = block(sides, |p| p);
+    let supports = [mirror(0), mirror(1), mirror(2)];
+    let touch = Touch {
+        position: DVec3::new(0.01, 0.0075, 0.025),
+        normal: DVec3::Z,
+        force: 300.0,
+        tip_radius: 1e3,
+    };
+    let stress = touch.force / (sides.x * sides.y);
+    let strain = stress / RESIN.youngs_modulus;
+    for size in [12e-3, 5e-3] {
+        let m = model(&part, RESIN, &supports, &Fineness::of(size, 0.015));
+        let u = m.system().solve_freedoms(&m.load(&touch));
+        let corner = [m.index().nearest(sides).0];
+        let moved = m.observer(&corner, Face::Outside).displacement_of(&m, &u)[0];
+        let exact = DVec3::new(
+            RESIN.poissons_ratio * strain * sides.x,
+            RESIN.poissons_ratio * strain * sides.y,
+            -strain * sides.z,
+        );
+        println!("{size}: {moved:?} of {exact:?}");
+        assert!(
+            moved.distance(exact) < 2e-3 * exact.length(),
+            "{moved} {exact}"
+        );
+    }
+}
+
+#[test]
+fn far_from_a_small_tip_a_thick_block_gives_way_as_a_half_space() {
+    // J. Boussinesq 1885: u(r) = (1 - ν²) F / (π E r). What holds the block from below adds to all of it alike.
+    let part = block(DVec3::new(0.06, 0.06, 0.04), |p| {
+        p - DVec3::new(0.03, 0.03, 0.04)
+    });
+    let support = clamp(DVec3::splat(-1.0), DVec3::new(1.0, 1.0, -0.038));
+    let m = model(&part, RESIN, &[support], &Fineness::of(4e-3, 0.04));
+    let touch = Touch {
+        position: DVec3::ZERO,
+        normal: DVec3::Z,
+        force: 10.0,
+        tip_radius: 2e-3,
+    };
+    let u = m.system().solve_freedoms(&m.load(&touch));
+    let sunk = |r: f64| {
+        let sum: f64 = (0..8)
+            .map(|k| {
+                let angle = std::f64::consts::FRAC_PI_4 * (f64::from(k) + 0.3);
+                let at = m
+                    .index()
+                    .nearest(DVec3::new(r * angle.cos(), r * angle.sin(), 0.0))
+                    .0;
+                -m.observer(&[at], Face::Outside).displacement_of(&m, &u)[0].z
+            })
+            .sum();
+        sum / 8.0
+    };
+    let (near, far) = (5e-3, 9e-3);
+    let plane = (1.0 - RESIN.poissons_ratio.powi(2)) / RESIN.youngs_modulus;
+    let exact = plane * touch.force / std::f64::consts::PI * (1.0 / near - 1.0 / far);
+    let found = sunk(near) - sunk(far);
+    println!("{:.4} of Boussinesq", found / exact);
+    assert!((found / exact - 1.0).abs() < 0.05, "{found} {exact}");
+}
+
+#[test]
+fn a_solid_and_a_shell_of_the_same_tube_agree() {
+    // What a shell leaves out of a wall of a tenth of the radius (RESULTS.md).
+    let found = shell_of(3.0);
+    println!("{found:?}");
+    assert!(found.displacement < 2.5 && found.strain < 2.0, "{found:?}");
 }

@@ -262,3 +262,271 @@ fn what_cannot_be_read_is_named() {
     let brick = inp((nodes, elements)).replace("C3D4", "C3D8");
     refused("inp", &brick, &["C3D8", "tetrahedra"]);
 }
+
+/// A block 20 × 20 × 10 mm of linear tetrahedra as a small file.
+fn block() -> (Vec<DVec3>, Vec<Vec<u32>>) {
+    let nodes = (0..18)
+        .map(|i: u32| 10.0 * DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)));
+    let mut elements = Vec::new();
+    for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+        let c: [u32; 8] = std::array::from_fn(|b| {
+            let b = b as u32;
+            i + (b & 1) + 3 * (j + (b >> 1 & 1)) + 9 * (b >> 2)
+        });
+        for t in [
+            [0, 1, 3, 7],
+            [0, 5, 1, 7],
+            [0, 3, 2, 7],
+            [0, 2, 6, 7],
+            [0, 4, 5, 7],
+            [0, 6, 4, 7],
+        ] {
+            elements.push(t.map(|n: usize| c[n]).to_vec());
+        }
+    }
+    (nodes.collect(), elements)
+}
+
+/// What was said of a file that is read.
+fn notes(ending: &str, text: &str) -> String {
+    read(ending, text).unwrap().repairs.notes.join("; ")
+}
+
+/// A file is refused with the line of what is wrong, and these words.
+fn refused(ending: &str, text: &str, line: usize, words: &[&str]) {
+    let said = read(ending, text).err().expect("the file is refused");
+    let place = format!("line {line}");
+    for word in words.iter().chain([&place.as_str()]) {
+        assert!(said.contains(word), "{word} is not in: {said}");
+    }
+    assert!(said.chars().count() < 600, "{said}");
+    assert!(said.chars().all(|c| !c.is_control()), "{said:?}");
+}
+
+/// The number of the first line that begins so.
+fn line_of(text: &str, start: &str) -> usize {
+    1 + text.lines().position(|l| l.starts_with(start)).unwrap()
+}
+
+/// The text with one line replaced, or with more than one in its place.
+fn with_line(text: &str, line: usize, new: &str) -> String {
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines[line - 1] = new;
+    lines.join("\n") + "\n"
+}
+
+#[test]
+fn counts_of_gmsh_that_do_not_fit_are_refused() {
+    let good = msh2(block());
+    assert_eq!(notes("msh", &good), "");
+    let count = line_of(&good, "$Elements") + 1;
+    refused(
+        "msh",
+        &with_line(&good, count, "20"),
+        count + 21,
+        &["20 elements", "goes on"],
+    );
+    refused(
+        "msh",
+        &with_line(&good, count, "30"),
+        count,
+        &["30 elements", "25"],
+    );
+    // Announced without end: nothing is taken before the lines are there.
+    let endless = with_line(&good, count, &u64::MAX.to_string());
+    refused("msh", &endless, count, &["announced"]);
+    let nodes = line_of(&good, "$Nodes") + 1;
+    refused(
+        "msh",
+        &with_line(&good, nodes, "17"),
+        nodes + 18,
+        &["17 nodes"],
+    );
+    let fourth = msh4(block());
+    assert_eq!(notes("msh", &fourth), "");
+    let head = line_of(&fourth, "$Elements") + 1;
+    refused(
+        "msh",
+        &with_line(&fourth, head, "1 25 1 25"),
+        head,
+        &["25", "24"],
+    );
+    let block = with_line(&fourth, head + 1, "3 1 4 18446744073709551615");
+    refused("msh", &block, head + 1, &["announced"]);
+    let fewer = with_line(&fourth, head + 1, "3 1 4 23");
+    refused("msh", &fewer, head, &["24", "23"]);
+}
+
+#[test]
+fn what_gmsh_cannot_mean_is_refused_with_its_line() {
+    let good = msh2(block());
+    let first = line_of(&good, "$Elements") + 3;
+    let bad = |line: &str, words: &[&str]| {
+        refused("msh", &with_line(&good, first, line), first, words);
+    };
+    bad(
+        "2 5 2 1 1 1001 1002 1005 1004 1010 1011 1014 1013",
+        &["hexahedron", "tetrahedra"],
+    );
+    bad("2 93 2 1 1 1001", &["kind 93"]);
+    bad("2 4 2 1 1 1001 1002", &["missing"]);
+    bad("2 4 2 1 1 1001 1002 1005 1014 1015", &["“1015”"]);
+    bad("2 4 2 1 1 1001 1002 1005 9014", &["9014", "not there"]);
+    bad("2 4 2 1 1 1001 1002 1003 1004", &["no volume"]);
+    bad("2 4 2 1 1 10\u{1b}[31m01 1002 1005 1014", &["damaged"]);
+    let twice = with_line(&good, first, "3 4 2 1 1 1001 1002 1005 1014");
+    refused("msh", &twice, first + 1, &["element 3", "second time"]);
+    // On the same side of the face 1001, 1002, 1014 as its neighbour in the next line.
+    let over = with_line(&good, first, "2 4 2 1 1 1001 1002 1014 1012");
+    refused("msh", &over, first + 1, &["overlaps"]);
+    refused(
+        "msh",
+        &with_line(&good, first - 5, "$Nodes"),
+        first - 5,
+        &["$Nodes"],
+    );
+    let twice = format!("{good}{}", &good[good.find("$Nodes").unwrap()..]);
+    refused(
+        "msh",
+        &twice,
+        good.lines().count() + 1,
+        &["$Nodes", "second time"],
+    );
+}
+
+#[test]
+fn what_gmsh_files_hold_besides_is_noted() {
+    let (nodes, mut elements) = block();
+    elements.push(elements[3].clone());
+    let said = notes("msh", &msh2((nodes, elements)));
+    assert!(
+        said.contains("1 tetrahedra are there a second time"),
+        "{said}"
+    );
+    let good = msh2(block());
+    let more = format!("{good}$NodeData\n1\n$EndNodeData\n");
+    let said = notes("msh", &more);
+    assert!(said.contains("“NodeData”"), "{said}");
+}
+
+#[test]
+fn elements_of_abaqus_are_whole_and_known() {
+    let good = inp(block());
+    assert_eq!(notes("inp", &good), "");
+    let set = line_of(&good, "*NSET");
+    // The last element lies in two lines.
+    let last = with_line(&good, set - 1, "");
+    refused("inp", &last, set - 2, &["cut off", "2 of its 4 nodes"]);
+    let first = line_of(&good, "*ELEMENT") + 1;
+    let again = with_line(&good, first + 2, "1, 1001, 1002,");
+    refused(
+        "inp",
+        &again,
+        first + 2,
+        &["element 1", "second time", &format!("line {first}")],
+    );
+    let long = with_line(&good, first + 1, "1005, 1014, 1015");
+    refused("inp", &long, first + 1, &["6 values"]);
+    let missing = with_line(&good, first + 1, "1005, 9999");
+    refused("inp", &missing, first, &["9999", "not there"]);
+    let shells = format!("{good}*ELEMENT, TYPE=S3, ELSET=skin\n900, 1001, 1002, 1005\n");
+    let said = notes("inp", &shells);
+    assert!(said.contains("“S3”") && said.contains("left out"), "{said}");
+    let bricks = with_line(&good, first - 1, "*ELEMENT, TYPE=C3D8R");
+    refused("inp", &bricks, first - 1, &["C3D8R", "tetrahedra"]);
+    let none = with_line(&good, first - 1, "*ELEMENT, TYPE=S4");
+    let said = read("inp", &none).err().unwrap();
+    assert!(
+        said.contains("no tetrahedra") && said.contains("“S4”"),
+        "{said}"
+    );
+}
+
+#[test]
+fn what_abaqus_places_elsewhere_is_refused() {
+    let good = inp(block());
+    let node = line_of(&good, "*Node");
+    let cases = [
+        ("*NODE, SYSTEM=C", "Cartesian"),
+        ("*NODE, INPUT=nodes.txt", "nodes.txt"),
+        ("*INCLUDE, INPUT=mesh.inp", "another file"),
+        ("*NGEN", "do not stand"),
+        ("*SYSTEM", "*SYSTEM"),
+    ];
+    for (keyword, word) in cases {
+        let said = read("inp", &with_line(&good, node, keyword)).err().unwrap();
+        assert!(said.contains(word) && said.contains("line "), "{said}");
+    }
+    refused(
+        "inp",
+        &with_line(&good, node + 1, "1.7, 0, 0, 0"),
+        node + 1,
+        &["“1.7”"],
+    );
+    refused(
+        "inp",
+        &with_line(&good, node + 1, "1001, 0, nan, 0"),
+        node + 1,
+        &["“nan”"],
+    );
+    let element = line_of(&good, "*ELEMENT");
+    let elsewhere = with_line(&good, element, "*ELEMENT, TYPE=C3D4, INPUT=e.txt");
+    refused("inp", &elsewhere, element, &["e.txt"]);
+    let damaged = with_line(&good, node + 3, "10\u{7}03, 20.0, 0, 0");
+    refused("inp", &damaged, node + 3, &["damaged"]);
+    refused(
+        "inp",
+        "1, 0, 0, 0\n*NODE\n",
+        1,
+        &["before the first keyword"],
+    );
+    let fortran = with_line(&good, node + 2, "1002, 1.0D+01, 0.D0, 0");
+    let (_, upper) = read("inp", &fortran).unwrap().mesh.bounds();
+    assert!((upper.x - 0.02).abs() < 1e-12, "{upper}");
+}
+
+#[test]
+fn sets_of_abaqus_are_read_in_all_their_ways() {
+    let good = inp(block());
+    let count = |text: &str, set: &str| -> usize {
+        let loaded = read("inp", text).unwrap();
+        loaded.groups[set].iter().filter(|&&m| m).count()
+    };
+    // Nine nodes of a face and the sixteen between them.
+    let range = format!("{good}*NSET, NSET=low, GENERATE\n1001, 1009\n");
+    assert_eq!(count(&range, "low"), 25);
+    // The face x = 0 has ten more, and the far corner comes with the middles of three edges.
+    let named = format!("{range}*NSET, NSET=both\nlow, ROOT, 1018\n");
+    assert_eq!(count(&named, "both"), 25 + 10 + 4);
+    let elements = format!("{good}*NSET, NSET=whole, ELSET=body\n");
+    assert_eq!(count(&elements, "whole"), count(&good, "all"));
+    let again = format!("{range}*NSET, NSET=LOW\n1018\n");
+    assert_eq!(count(&again, "low"), 25 + 4);
+    let line = good.lines().count() + 2;
+    refused(
+        "inp",
+        &format!("{good}*NSET, NSET=a\nnowhere\n"),
+        line,
+        &["“nowhere”"],
+    );
+    refused(
+        "inp",
+        &format!("{good}*NSET, NSET=a, GENERATE\n9, 1\n"),
+        line,
+        &["empty"],
+    );
+    let far = notes("inp", &format!("{good}*NSET, NSET=a\n1001, 77\n"));
+    assert!(far.contains("“a” names 1 "), "{far}");
+}
+
+#[test]
+fn ranges_without_end_cost_nothing() {
+    let mut bomb = inp(block()) + "*NSET, NSET=bomb, GENERATE\n";
+    for step in 0..5000 {
+        let _ = writeln!(bomb, "1, 18446744073709551614, {}", 1 + step % 7);
+    }
+    let loaded = read("inp", &bomb).unwrap();
+    assert!(loaded.groups["bomb"].iter().all(|&m| m));
+    let said = loaded.repairs.notes.join("; ");
+    assert!(said.contains("not there"), "{said}");
+}

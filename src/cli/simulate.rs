@@ -172,22 +172,31 @@ fn say(notes: &[String]) {
     }
 }
 
+/// What the summary says of the model's error; of linearity where that was looked at, which solids are not.
+fn estimated_error(summary: &serde_json::Value) -> String {
+    let number = |path: &str| summary.pointer(path).and_then(serde_json::Value::as_f64);
+    let under = number("/discretization/displacement_mm")
+        .zip(number("/discretization/displacement_percent"))
+        .map(|(mm, percent)| format!("{mm:.2e} mm ({percent:.1} %) under the touch"));
+    let strain = number("/discretization/strain_percent")
+        .map(|percent| format!("{percent:.1} % of a load's largest strain"));
+    let parts: Vec<String> = under.into_iter().chain(strain).collect();
+    let of_mesh = if parts.is_empty() {
+        "not known".to_owned()
+    } else {
+        parts.join(", ")
+    };
+    let of_linearity = number("/linearity/largest_percent")
+        .map(|percent| format!("; of linearity: up to {:.1} %", percent.abs()))
+        .unwrap_or_default();
+    format!("estimated error of the mesh: {of_mesh}{of_linearity}")
+}
+
 fn finish(args: &SimulateArgs, summary: &serde_json::Value) -> anyhow::Result<()> {
     if args.common.json {
         return out::line(&summary.to_string());
     }
-    let number = |path: &str| summary.pointer(path).and_then(serde_json::Value::as_f64);
-    if let (Some(mm), Some(percent), Some(strain), Some(linear)) = (
-        number("/discretization/displacement_mm"),
-        number("/discretization/displacement_percent"),
-        number("/discretization/strain_percent"),
-        number("/linearity/largest_percent"),
-    ) {
-        out::say(&format!(
-            "estimated error of the mesh: {mm:.2e} mm ({percent:.1} %) under the touch, {strain:.1} % of a load's largest strain; of linearity: up to {:.1} %",
-            linear.abs()
-        ));
-    }
+    out::say(&estimated_error(summary));
     for path in std::iter::once(&args.out).chain(&args.vtu) {
         out::say(&format!("wrote {}", path.display()));
     }

@@ -341,9 +341,10 @@ fn bent(radius: [f64; 2]) -> String {
 fn carried(part: &Arc<TriMesh>, solid: &SolidGround) -> Faces {
     let index = SurfaceIndex::new(&solid.whole);
     let (mut sides, mut thickness) = (Vec::new(), Vec::new());
+    let over = 0.1 * solid.wall();
     for (p, n) in part.positions().iter().zip(part.vertex_normals()) {
         // A little over the surface: thin walls have another face near.
-        let at = index.nearest(*p + *n * (0.1 * solid.wall())).0.triangle as usize;
+        let at = index.nearest(*p + *n * over).0.triangle as usize;
         sides.push(solid.walls.sides[at]);
         let t = solid.walls.thickness[at];
         thickness.push(if t.is_nan() { 0.0 } else { t });

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::layout::size_mm;
+use super::layout::{check_shape, size_mm};
 use super::{DesignError, Inputs, LAYOUT};
 use crate::budget::{Elements, Watch};
 use crate::elasticity::estimate::Discretization;
@@ -54,6 +54,7 @@ pub struct Built {
 pub fn ground(inputs: &Inputs, watch: Watch) -> Result<Ground, DesignError> {
     let project = &inputs.project;
     let supports = project.supports(&inputs.masks)?;
+    check_shape(&inputs.part)?;
     if project.part.model == PartModel::Solid {
         let told = told(inputs)?;
         let material = project.section().material;

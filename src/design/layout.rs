@@ -1,20 +1,104 @@
-//! Where sites and touches lie on the part, and whether all of it fits into memory.
+//! Where sites and touches lie on the part, and whether all of it fits into memory: what cannot is refused before
+//! anything is begun.
 
 use glam::DVec3;
 
-use super::{DesignError, Inputs, MOST_SITES};
+use super::{DesignError, Inputs, LAYOUT, MOST_SITES};
 use crate::budget::Budget;
 use crate::dataset::{self, TouchRegion};
 use crate::elasticity::load::Touch;
 use crate::memory;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::unroll::Unrolling;
-use crate::mesh::{SurfacePoint, TriMesh, sample};
-use crate::project::{Lattice, Project};
+use crate::mesh::{Edge, SurfacePoint, TriMesh, sample};
+use crate::project::{Lattice, PartModel, Project};
 
 pub(super) fn size_mm(mesh: &TriMesh) -> f64 {
     let (lower, upper) = mesh.bounds();
     (upper - lower).length() * 1000.0
+}
+
+/// Refuses a part that no elements can be laid on: one with a vertex far away from all the others, or so slender
+/// that elements of its own scale would never end along it.
+///
+/// # Errors
+/// [`DesignError::FarVertex`], [`DesignError::Slender`].
+pub(super) fn check_shape(part: &TriMesh) -> Result<(), DesignError> {
+    /// Elements along all edges of the part, each one counted for itself.
+    const MOST_ALONG: f64 = 5e6;
+    if let Some((place, distance, size)) = far_vertex(part) {
+        return Err(DesignError::FarVertex {
+            place_mm: place * 1e3,
+            distance_mm: distance * 1e3,
+            size_mm: size * 1e3,
+        });
+    }
+    let p = part.positions();
+    let length = |e: &Edge| p[e.a as usize].distance(p[e.b as usize]);
+    let rims: f64 = part.boundary_edges().map(length).sum();
+    let vertices = LAYOUT as f64;
+    let size = (part.area() / vertices).sqrt().max(rims / (2.0 * vertices));
+    let edges = part.edges();
+    let longest = edges.iter().map(length).fold(0.0, f64::max);
+    let along: f64 = edges.iter().map(length).sum::<f64>() / size;
+    if along - edges.len() as f64 > MOST_ALONG {
+        return Err(DesignError::Slender {
+            longest_mm: longest * 1e3,
+            area_mm2: part.area() * 1e6,
+        });
+    }
+    Ok(())
+}
+
+/// The one vertex that lies far away from all the others, how far, and the size of the rest (m).
+fn far_vertex(part: &TriMesh) -> Option<(DVec3, f64, f64)> {
+    /// In sizes of the rest: no point of a part is as sharp.
+    const FAR: f64 = 50.0;
+    let positions = part.positions();
+    let mean = positions.iter().sum::<DVec3>() / positions.len() as f64;
+    let from_mean = |v: &usize| positions[*v].distance_squared(mean);
+    let farthest = (0..positions.len()).max_by(|a, b| from_mean(a).total_cmp(&from_mean(b)))?;
+    let rest = positions.iter().enumerate().filter(|(v, _)| *v != farthest);
+    let (lower, upper) = rest.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), (_, &p)| {
+        (l.min(p), u.max(p))
+    });
+    let size = (upper - lower).length();
+    let place = positions[farthest];
+    let distance = place.distance(place.clamp(lower, upper));
+    (distance > FAR * size).then_some((place, distance, size))
+}
+
+/// Refuses sites and touches that the area of a shell says will be too many, before it is worked on. How much of a
+/// solid faces inward is only known later.
+///
+/// # Errors
+/// [`DesignError::TooManySites`], [`DesignError::TooLarge`].
+pub(super) fn check_foreseen(inputs: &Inputs, budget: &Budget) -> Result<(), DesignError> {
+    if inputs.project.part.model == PartModel::Solid {
+        return Ok(());
+    }
+    count_sites(&inputs.part, &inputs.project)?;
+    let (sites, touches, _) = expected_size(inputs, budget);
+    check_memory(sites, touches)
+}
+
+/// How many places for sites there are on a mesh, about.
+///
+/// # Errors
+/// [`DesignError::TooManySites`].
+fn count_sites(mesh: &TriMesh, project: &Project) -> Result<usize, DesignError> {
+    let spacing = project.sites.spacing_mm * 1e-3;
+    let places = mesh.area() / (spacing * spacing);
+    let sites = places * project.gauge.directions as f64;
+    if sites > MOST_SITES as f64 {
+        return Err(DesignError::TooManySites {
+            count: sites as usize,
+            limit: MOST_SITES,
+            spacing_mm: project.sites.spacing_mm,
+            size_mm: size_mm(mesh),
+        });
+    }
+    Ok(places.round() as usize)
 }
 
 /// The sites of a project on a mesh.
@@ -22,24 +106,10 @@ pub(super) fn size_mm(mesh: &TriMesh) -> f64 {
 /// # Errors
 /// [`DesignError`] where there would be none or far too many.
 pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoint>, DesignError> {
-    let spacing = project.sites.spacing_mm * 1e-3;
-    let estimate = mesh.area() / (spacing * spacing);
-    let directions = project.gauge.directions;
-    if estimate * directions as f64 > MOST_SITES as f64 {
-        return Err(DesignError::TooManySites {
-            count: estimate as usize * directions,
-            limit: MOST_SITES,
-            spacing_mm: project.sites.spacing_mm,
-            size_mm: size_mm(mesh),
-        });
-    }
+    let count = count_sites(mesh, project)?;
     let points = match project.sites.lattice {
-        Lattice::Even => sample::even(mesh, estimate.round() as usize, project.budget.seed, |_| {
-            true
-        }),
-        Lattice::Unrolled => {
-            Unrolling::of(mesh, project.part.axis).lattice(&SurfaceIndex::new(mesh), spacing)
-        }
+        Lattice::Even => sample::even(mesh, count, project.budget.seed, |_| true),
+        Lattice::Unrolled => unrolled_sites(mesh, project)?,
     };
     if points.is_empty() {
         let area_mm2 = mesh.area() * 1e6;
@@ -51,10 +121,29 @@ pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoi
         });
     }
     // A place with several directions is as many sites.
+    let directions = project.gauge.directions;
     Ok(points
         .into_iter()
         .flat_map(|at| std::iter::repeat_n(at, directions))
         .collect())
+}
+
+/// Sites in rows and columns about the axis.
+fn unrolled_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoint>, DesignError> {
+    /// Places of the lattice that are looked at, whether the part is there or not.
+    const MOST_PLACES: f64 = 5e6;
+    let spacing = project.sites.spacing_mm * 1e-3;
+    let unrolling = Unrolling::of(mesh, project.part.axis);
+    let round = unrolling.circumference();
+    let high = unrolling.height.1 - unrolling.height.0;
+    if (round / spacing) * (high / spacing) > MOST_PLACES {
+        return Err(DesignError::WideLattice {
+            round_mm: round * 1e3,
+            high_mm: high * 1e3,
+            spacing_mm: project.sites.spacing_mm,
+        });
+    }
+    Ok(unrolling.lattice(&SurfaceIndex::new(mesh), spacing))
 }
 
 pub(super) fn lay_out_touches(
@@ -174,12 +263,17 @@ pub(super) fn check_memory(sites: usize, touches: usize) -> Result<(), DesignErr
 }
 
 /// What a simulation will hold at its largest: about how many sites, how many touches, and the memory of
-/// its strains and signals (GB), known before anything is allocated.
+/// its strains and signals (GB), known before anything is allocated. Of a solid about half of the surface faces
+/// inward.
 #[must_use]
 pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
     let spacing = inputs.project.sites.spacing_mm * 1e-3;
-    let places = (inputs.part.area() / (spacing * spacing)).round() as usize;
-    let sites = places * inputs.project.gauge.directions;
+    let share = match inputs.project.part.model {
+        PartModel::Solid => 0.5,
+        PartModel::Shell => 1.0,
+    };
+    let places = (share * inputs.part.area() / (spacing * spacing)).round();
+    let sites = (places * inputs.project.gauge.directions as f64) as usize;
     let touches = inputs.project.touch.count.min(budget.touches);
     let bytes = 4.0 * sites as f64 * touches as f64 * size_of::<f64>() as f64;
     (sites, touches, bytes / 1e9)
@@ -200,4 +294,31 @@ pub fn check_room(rows: usize, columns: usize) -> Result<(), DesignError> {
         });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::project::Unit;
+
+    #[test]
+    fn a_hardly_bent_panel_is_not_unrolled_all_the_way_round() {
+        const RADIUS: f64 = 300.0;
+        let at = |column: i32, z: f64| {
+            let angle = f64::from(column) * 0.1 / RADIUS;
+            DVec3::new(RADIUS * angle.cos(), RADIUS * angle.sin(), z)
+        };
+        let positions: Vec<DVec3> = (-1..=1).flat_map(|k| [at(k, 0.0), at(k, 1.0)]).collect();
+        let triangles = [[0, 2, 1], [2, 3, 1], [2, 4, 3], [4, 5, 3]];
+        let (panel, _) = TriMesh::new(&positions, &triangles, 0).unwrap();
+        let mut project = Project::around("panel.obj", Some(Unit::Metre));
+        project.sites.spacing_mm = 4.0;
+        project.sites.lattice = Lattice::Unrolled;
+        let refused = lay_out_sites(&panel, &project).unwrap_err();
+        assert!(
+            matches!(refused, DesignError::WideLattice { .. }),
+            "{refused}"
+        );
+        assert!(check_shape(&panel).is_ok());
+    }
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::ground::{Built, Ground, Laid, ground, open_solid};
-use super::layout::{check_memory, lay_out_sites, lay_out_touches};
+use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches};
 use super::{DesignError, Inputs};
 use crate::budget::{Achieved, Budget, Quality, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset};
@@ -62,6 +62,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     Project::mask("feasible.keep_out", kept_out, &inputs.masks)?;
     let ground = ground(inputs, watch)?;
     ground.check(project)?;
+    check_foreseen(inputs, budget)?;
     let layout = ground.site_layout(&inputs.part);
     let sites = lay_out_sites(&layout, project)?;
     check_memory(sites.len(), project.touch.count.min(budget.touches))?;

@@ -10,6 +10,7 @@ mod msh;
 mod obj;
 mod ply;
 mod stl;
+mod tetrahedra;
 mod words;
 
 use std::collections::{BTreeSet, HashSet};
@@ -45,30 +46,13 @@ struct Soup {
     notes: Vec<String>,
     /// Tetrahedra on the positions: their surface is the mesh, whatever triangles there are.
     volume: Option<VolumeMesh>,
+    /// Line of the file that each of the tetrahedra stands in.
+    tetrahedron_lines: Vec<usize>,
     /// Names and positions.
     node_sets: Vec<(String, Vec<u32>)>,
 }
 
-/// Tetrahedra as they come out of a file.
-#[derive(Default)]
-struct Tets {
-    linear: Vec<[u32; 4]>,
-    quadratic: Vec<[u32; 10]>,
-}
-
 impl Soup {
-    /// Tetrahedra on the positions read so far.
-    fn take_tets(&mut self, tets: Tets) {
-        if tets.linear.is_empty() && tets.quadratic.is_empty() {
-            return;
-        }
-        let from_linear = !tets.linear.is_empty();
-        let mut volume = VolumeMesh::of_linear(self.positions.clone(), &tets.linear);
-        volume.tetrahedra.extend(tets.quadratic);
-        volume.from_linear = from_linear;
-        self.volume = Some(volume);
-    }
-
     /// Names the triangles from `first` on.
     fn group(&mut self, name: &str, first: usize) {
         if !name.is_empty() && first < self.triangles.len() {
@@ -207,7 +191,8 @@ fn tetrahedral(
     if let Some(node) = volume.nodes.iter().position(|p| !finite(p)) {
         return Err(format!("node {node} is not a finite point"));
     }
-    let whole = volume.checked().map_err(|e| e.to_string())?;
+    let whole = volume.checked();
+    let whole = whole.map_err(|e| tetrahedra::in_line(&e, &soup.tetrahedron_lines))?;
     let (piece, mesh, bodies) = whole.body(body).map_err(|e| e.to_string())?;
     let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
     let groups = (soup.node_sets.iter())

@@ -168,23 +168,37 @@ fn eliminate(positions: &[DVec3], count: usize, radius: f64) -> Vec<usize> {
 
 /// For each point the others within `reach`, with their distances, by a hash grid.
 pub(crate) fn neighbours_within(positions: &[DVec3], reach: f64) -> Vec<Vec<(usize, f64)>> {
-    let cell = |p: DVec3| (p / reach).floor().as_ivec3();
-    let mut grid: BTreeMap<[i32; 3], Vec<usize>> = BTreeMap::new();
+    neighbours_of(positions, &|_| true, reach)
+}
+
+/// As [`neighbours_within`] for some of the points; the lists of the others stay empty.
+pub(crate) fn neighbours_of(
+    positions: &[DVec3],
+    of: &dyn Fn(usize) -> bool,
+    reach: f64,
+) -> Vec<Vec<(usize, f64)>> {
+    // Wide numbers: a part far from the origin must not fall into one cell.
+    let cell = |p: DVec3| (p / reach).floor().to_array().map(|x| x as i64);
+    let mut grid: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
     for (i, &p) in positions.iter().enumerate() {
-        grid.entry(cell(p).to_array()).or_default().push(i);
+        grid.entry(cell(p)).or_default().push(i);
     }
     let mut near = vec![Vec::new(); positions.len()];
     for (&home, members) in &grid {
+        let asked: Vec<usize> = members.iter().copied().filter(|&i| of(i)).collect();
+        if asked.is_empty() {
+            continue;
+        }
         let around: Vec<usize> = (0..27)
             .filter_map(|k| {
                 let step = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
-                let key: [i32; 3] = std::array::from_fn(|a| home[a].wrapping_add(step[a]));
+                let key: [i64; 3] = std::array::from_fn(|a| home[a].wrapping_add(step[a]));
                 grid.get(&key)
             })
             .flatten()
             .copied()
             .collect();
-        for &i in members {
+        for i in asked {
             for &j in &around {
                 let d = positions[i].distance(positions[j]);
                 if j != i && d < reach {

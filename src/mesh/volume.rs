@@ -23,6 +23,14 @@ pub struct VolumeMesh {
     pub from_linear: bool,
 }
 
+/// A tetrahedron as a file has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tetrahedron {
+    pub corners: [u32; 4],
+    /// The nodes on [`EDGES`] of a quadratic one.
+    pub middles: Option<[u32; 6]>,
+}
+
 /// The tetrahedron behind a triangle of the surface, and where the triangle's corners are in it.
 pub type FacePlace = (u32, [DVec3; 3]);
 
@@ -30,22 +38,75 @@ pub type FacePlace = (u32, [DVec3; 3]);
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VolumeError {
     #[error(
-        "tetrahedron {element} has no volume (near {place:.2} mm): repair the mesh in the program that wrote it"
+        "the tetrahedron has no volume (near {place:.2} mm): repair the mesh in the program that wrote it"
     )]
     Flat { element: usize, place: DVec3 },
     #[error(
-        "tetrahedron {element} is turned inside out at one of its nodes (near {place:.2} mm): straighten its edges in the mesher"
+        "the tetrahedron is turned inside out at one of its nodes (near {place:.2} mm): straighten its edges in the mesher"
     )]
     Folded { element: usize, place: DVec3 },
+    #[error(
+        "the tetrahedron overlaps another one that it shares a face with (near {place:.2} mm): mesh the part anew"
+    )]
+    Overlapping { element: usize, place: DVec3 },
+    #[error(
+        "on one of its edges the tetrahedron has another middle node than its neighbour: join equal nodes in the program that wrote the mesh"
+    )]
+    Torn { element: usize },
     #[error(transparent)]
     Surface(#[from] MeshError),
 }
 
+impl VolumeError {
+    /// Which tetrahedron it is about.
+    #[must_use]
+    pub fn element(&self) -> Option<usize> {
+        match *self {
+            Self::Flat { element, .. }
+            | Self::Folded { element, .. }
+            | Self::Overlapping { element, .. }
+            | Self::Torn { element } => Some(element),
+            Self::Surface(_) => None,
+        }
+    }
+}
+
+/// Nodes at the middles of edges, by their ends, the smaller one first.
+type Middles = HashMap<(u32, u32), u32>;
+
 impl VolumeMesh {
+    /// Of linear and quadratic tetrahedra; a linear one shares the node on an edge with a quadratic neighbour.
+    ///
+    /// # Errors
+    /// [`VolumeError::Torn`] where quadratic ones have different nodes on the same edge: they would move apart.
+    pub fn of(nodes: Vec<DVec3>, tetrahedra: &[Tetrahedron]) -> Result<Self, VolumeError> {
+        let mut middles = Middles::new();
+        for (element, tet) in tetrahedra.iter().enumerate() {
+            let Some(own) = tet.middles else { continue };
+            for (ends, middle) in EDGES.iter().zip(own) {
+                let [a, b] = ends.map(|i| tet.corners[i]);
+                let known = middles.entry((a.min(b), a.max(b))).or_insert(middle);
+                if *known != middle {
+                    return Err(VolumeError::Torn { element });
+                }
+            }
+        }
+        let from_linear = tetrahedra.iter().any(|tet| tet.middles.is_none());
+        let corners: Vec<[u32; 4]> = tetrahedra.iter().map(|tet| tet.corners).collect();
+        Ok(Self {
+            from_linear,
+            ..Self::completed(nodes, &corners, middles)
+        })
+    }
+
     /// Of linear tetrahedra.
     #[must_use]
-    pub fn of_linear(mut nodes: Vec<DVec3>, corners: &[[u32; 4]]) -> Self {
-        let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
+    pub fn of_linear(nodes: Vec<DVec3>, corners: &[[u32; 4]]) -> Self {
+        Self::completed(nodes, corners, Middles::new())
+    }
+
+    /// With the nodes on all edges, those that are known already and new ones on the others.
+    fn completed(mut nodes: Vec<DVec3>, corners: &[[u32; 4]], mut middles: Middles) -> Self {
         let tetrahedra = corners
             .iter()
             .map(|tet| {
@@ -98,7 +159,23 @@ impl VolumeMesh {
                 }
             }
         }
-        Ok(self)
+        match self.overlapping() {
+            None => Ok(self),
+            Some(element) => Err(VolumeError::Overlapping {
+                element,
+                place: self.nodes[self.tetrahedra[element][0] as usize] * 1e3,
+            }),
+        }
+    }
+
+    /// The first tetrahedron of positive volume on that side of a face where another one lies already.
+    fn overlapping(&self) -> Option<usize> {
+        let mut taken = HashSet::with_capacity(2 * self.tetrahedra.len());
+        self.tetrahedra.iter().position(|tet| {
+            FACES
+                .iter()
+                .any(|face| !taken.insert(side_of(face.map(|i| tet[i]))))
+        })
     }
 
     /// Nodes, and where the tetrahedra were linear those on the edges between them.
@@ -269,6 +346,14 @@ const CHILDREN: [[usize; 4]; 8] = [
     [5, 6, 8, 9],
 ];
 
+/// A face by its nodes in rising order, and which of its two sides they are counter-clockwise from.
+fn side_of(face: [u32; 3]) -> ([u32; 3], bool) {
+    let mut nodes = face;
+    nodes.sort_unstable();
+    let least = face.iter().position(|&n| n == nodes[0]).unwrap_or(0);
+    (nodes, face[(least + 1) % 3] == nodes[1])
+}
+
 fn middle(a: usize, b: usize) -> usize {
     let on = |e: &[usize; 2]| e.contains(&a) && e.contains(&b);
     4 + EDGES.iter().position(on).unwrap_or(0)
@@ -382,5 +467,45 @@ mod tests {
         let mut folded = cube();
         folded.nodes[folded.tetrahedra[2][4] as usize] = DVec3::splat(5.0);
         assert!(matches!(folded.checked(), Err(VolumeError::Folded { .. })));
+    }
+
+    #[test]
+    fn what_lies_over_its_neighbour_is_named() {
+        let nodes = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::splat(0.4)];
+        // Both lie above the face 0, 1, 2.
+        let mesh = VolumeMesh::of_linear(nodes.to_vec(), &[[0, 1, 2, 3], [0, 1, 2, 4]]);
+        let found = mesh.checked().unwrap_err();
+        assert_eq!(found.element(), Some(1));
+        assert!(matches!(found, VolumeError::Overlapping { .. }));
+    }
+
+    #[test]
+    fn linear_and_quadratic_neighbours_share_the_nodes_between_them() {
+        let corners = [
+            DVec3::ZERO,
+            DVec3::X,
+            DVec3::Y,
+            DVec3::Z,
+            DVec3::new(1.0, 1.0, 1.0),
+        ];
+        let quadratic = VolumeMesh::of_linear(corners.to_vec(), &[[0, 1, 2, 3]]);
+        let own: [u32; 10] = quadratic.tetrahedra[0];
+        let mut mixed = [
+            Tetrahedron {
+                corners: [0, 1, 2, 3],
+                middles: Some(std::array::from_fn(|k| own[4 + k])),
+            },
+            Tetrahedron {
+                corners: [1, 2, 3, 4],
+                middles: None,
+            },
+        ];
+        // The nodes of the first, the far corner, and those on the three edges to it.
+        let mesh = VolumeMesh::of(quadratic.nodes.clone(), &mixed).unwrap();
+        assert_eq!(mesh.nodes.len(), 11 + 3);
+        // Another node on the edge 1, 2 would let them move apart.
+        mixed[1].middles = Some([own[4], own[8], own[9], own[6], own[6], own[7]]);
+        let torn = VolumeMesh::of(quadratic.nodes, &mixed).unwrap_err();
+        assert_eq!(torn, VolumeError::Torn { element: 1 });
     }
 }

@@ -74,7 +74,7 @@ impl Project {
             (
                 "gauge.range_microstrain",
                 gauge.range_microstrain,
-                1e-12..=1e15,
+                1e-12..=1e30,
             ),
             (
                 "gauge.least_signal_to_noise",

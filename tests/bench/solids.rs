@@ -3,16 +3,19 @@
 use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
-use hapdef::budget::unwatched;
+use hapdef::budget::{Elements, unwatched};
+use hapdef::elasticity::estimate::Discretization;
 use hapdef::elasticity::grade;
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::solid::SolidModel;
+use hapdef::elasticity::solid::ground::SolidGround;
 use hapdef::elasticity::solid::immersed::{Fineness, Immersed};
 use hapdef::elasticity::support::Region;
 use hapdef::elasticity::{Freedoms, Material, Model as _, Support, Touch};
 use hapdef::given::GivenSite;
 use hapdef::io::points::{read_sites, read_touches};
 use hapdef::mesh::TriMesh;
+use hapdef::mesh::walls::Side;
 
 /// A surface of quadrangles (each counter-clockwise from outside), cut in two.
 pub fn of_quads(positions: &[DVec3], quads: &[[u32; 4]]) -> Arc<TriMesh> {
@@ -236,12 +239,27 @@ fn slotted_solid(wall: f64, cells: f64, order: usize) -> Readings {
         ..Fineness::of(cells, wall)
     };
     let m = immersed.model(&part, &fineness, &unwatched).unwrap();
-    let radial = |p: DVec3| p.with_z(0.0).normalize() * wall / 2.0;
+    slotted_readings(&m, wall, &touches, &sites)
+}
+
+/// From the middle of the tube's wall to its outside.
+fn to_outside(p: DVec3, wall: f64) -> DVec3 {
+    p.with_z(0.0).normalize() * wall / 2.0
+}
+
+/// Touches of the slotted tube on its outside.
+fn on_outside(touches: &[Touch], wall: f64) -> Vec<Touch> {
     let outside = |t: &Touch| Touch {
-        position: t.position + radial(t.position),
+        position: t.position + to_outside(t.position, wall),
         ..*t
     };
-    let loads: Vec<_> = touches.iter().map(|t| m.load(&outside(t))).collect();
+    touches.iter().map(outside).collect()
+}
+
+fn slotted_readings(m: &SolidModel, wall: f64, touches: &[Touch], sites: &[GivenSite]) -> Readings {
+    let radial = |p: DVec3| to_outside(p, wall);
+    let pressed = on_outside(touches, wall);
+    let loads: Vec<_> = pressed.iter().map(|t| m.load(t)).collect();
     let face = |sign: f64| -> Vec<_> {
         let on = |p: DVec3| m.index().nearest(p + radial(p) * sign).0;
         sites.iter().map(|s| on(s.position)).collect()
@@ -254,11 +272,11 @@ fn slotted_solid(wall: f64, cells: f64, order: usize) -> Readings {
         unknowns: m.system().dimension(),
     };
     for u in m.system().solve_loads(&loads) {
-        let (below, above) = (inner.displacement_of(&m, &u), outer.displacement_of(&m, &u));
+        let (below, above) = (inner.displacement_of(m, &u), outer.displacement_of(m, &u));
         let middle = below.iter().zip(&above).map(|(b, a)| (*b + *a) / 2.0);
         readings.middle.push(middle.collect());
-        let read = inner.strain_of(&m, &u);
-        let each = read.iter().zip(inner.frames()).zip(&sites);
+        let read = inner.strain_of(m, &u);
+        let each = read.iter().zip(inner.frames()).zip(sites);
         let strains = each.map(|((&e, frame), s)| along_site(frame, s.direction, e));
         readings.strain.push(strains.collect());
     }
@@ -325,11 +343,36 @@ fn departure(found: &Readings, right: &Readings) -> Found {
 /// freedoms, quadratic wedges), as [`departure`].
 pub fn slotted(cells_mm: f64, order: usize) -> Found {
     let found = slotted_solid(3e-3, cells_mm * 1e-3, order);
+    departure(&found, &slotted_reference(&found))
+}
+
+/// The same as a design at a quality computes it, with what that says of its own error.
+pub fn slotted_graded(aim: &Elements) -> (Found, Discretization) {
+    let wall = 3e-3;
+    let inputs = super::slotted::inputs();
+    let (touches, sites) = slotted_places();
+    let part = Arc::new(inputs.part.thickened(wall));
+    let supports = inputs.project.supports(&inputs.masks).unwrap();
+    let material = inputs.project.section().material;
+    let ground =
+        SolidGround::new(&part, material, &supports, &|_| None::<Side>, &unwatched).unwrap();
+    let places: Vec<DVec3> = (sites.iter())
+        .map(|s| s.position - to_outside(s.position, wall))
+        .collect();
+    let pressed = on_outside(&touches, wall);
+    let graded = ground.grade(&pressed, &places, aim, &unwatched).unwrap();
+    let found = slotted_readings(&graded.model, wall, &touches, &sites);
+    let off = departure(&found, &slotted_reference(&found));
+    (off, graded.estimate)
+}
+
+/// What the independent solid says at the places of some readings.
+fn slotted_reference(found: &Readings) -> Readings {
     let reference = super::slotted::solid();
     let read = |t: usize, s: usize| reference.get(&(t, s)).copied().unwrap_or_default();
     let (touches, sites) = (found.middle.len(), found.middle[0].len());
     let row = |t: usize| (0..sites).map(move |s| read(t, s));
-    let right = Readings {
+    Readings {
         middle: (0..touches)
             .map(|t| row(t).map(|r| r.0 * 1e-3).collect())
             .collect(),
@@ -337,8 +380,7 @@ pub fn slotted(cells_mm: f64, order: usize) -> Found {
             .map(|t| row(t).map(|r| r.1).collect())
             .collect(),
         unknowns: 0,
-    };
-    departure(&found, &right)
+    }
 }
 
 /// The shell of the slotted tube against this program's own solid, both fine, over the thickness of the wall.

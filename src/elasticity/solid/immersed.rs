@@ -47,11 +47,14 @@ impl Fineness {
     /// Quadratic cells of a size (m) for walls of this thickness (m).
     #[must_use]
     pub fn of(size: f64, wall: f64) -> Self {
+        /// Boxes at an edge of the part lose about a box's section along it: they are small beside wall and cell.
+        const OF_WALL: f64 = 6.0;
+        const OF_CELL: f64 = 24.0;
         Self {
             size,
             order: 2,
             tolerance: 3e-3,
-            least: wall / 6.0,
+            least: (wall / OF_WALL).min(size / OF_CELL),
             halvings: 0,
         }
     }
