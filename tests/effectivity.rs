@@ -68,12 +68,9 @@ fn cube() -> Case {
             [20.0, 10.0, 5.0],
             [10.0, 0.0, 5.0],
         ]),
+        // Bricks of 1.6, 1.15 and 0.9 mm give 1.2482, 1.2604 and 1.2650 µm under the first touch: carried on to none.
         sides: DVec3::splat(0.9e-3),
-        truth: vec![
-            1.2649702601372016e-6,
-            1.6328393595875937e-6,
-            2.378219147454177e-6,
-        ],
+        truth: vec![1.2723e-6, 1.6406e-6, 2.3863e-6],
     }
 }
 
