@@ -135,12 +135,9 @@ fn tube() -> Case {
             [-12.0, 0.0, 40.0],
             [0.0, -12.0, 12.0],
         ]),
+        // Bricks of 1.4 times the size give 0.4 % less: carried on to none.
         sides: DVec3::new(0.0015, 0.34, 0.0016),
-        truth: vec![
-            3.502339780464514e-6,
-            2.1948376629647716e-6,
-            6.408542963228321e-6,
-        ],
+        truth: vec![3.517e-6, 2.204e-6, 6.435e-6],
     }
 }
 

@@ -116,10 +116,13 @@ fn a_change_costs_only_what_depends_on_it() {
     let back = until_it_stands(&mut w);
     assert!(back.factorizations <= 2, "back: {back:?}");
 
-    // The thickness: everything, once.
+    // The thickness: everything, once; elements may take another round (two more) to be fine enough.
     change(&mut w, |p| p.part.thickness_mm *= 1.1);
     let thickness = until_it_stands(&mut w);
-    assert_eq!(thickness.factorizations, 6, "the thickness: {thickness:?}");
+    assert!(
+        [6, 8].contains(&thickness.factorizations),
+        "the thickness: {thickness:?}"
+    );
 
     // A region that errors are quoted for: nothing but sums.
     change(&mut w, |p| {
