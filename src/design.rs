@@ -118,7 +118,7 @@ pub enum DesignError {
         fits_mm: f64,
     },
     #[error(
-        "{needed_gb:.1} GB would be needed for {sites} sites × {touches} touches, more than the {limit_gb:.0} GB this version allows: lower touch.count or widen sites.spacing_mm"
+        "{needed_gb:.1} GB would be needed for {sites} sites × {touches} touches, more than the {limit_gb:.1} GB that may be taken: lower touch.count, widen sites.spacing_mm, or allow more with --memory-gb"
     )]
     TooLarge {
         needed_gb: f64,

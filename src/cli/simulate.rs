@@ -12,6 +12,7 @@ use crate::given;
 use crate::io::artifacts::save_dataset;
 use crate::io::project_file::LoadedProject;
 use crate::io::{points, vtu};
+use crate::memory;
 
 #[derive(Args, Debug, Clone)]
 pub struct SimulateArgs {
@@ -76,9 +77,12 @@ fn check_output(path: &Path, endings: &[&str]) -> anyhow::Result<()> {
 fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()> {
     let budget = loaded.inputs.project.budget.budget();
     let (sites, touches, gigabytes) = design::expected_size(&loaded.inputs, &budget);
-    out::say(&format!(
-        "about {sites} sites × {touches} touches: {gigabytes:.2} GB while they are computed"
-    ));
+    // What cannot be had is refused with its cause; a figure before it would only be in the way.
+    if gigabytes <= memory::allowed_gb() {
+        out::say(&format!(
+            "about {sites} sites × {touches} touches: {gigabytes:.2} GB while they are computed"
+        ));
+    }
     let bar = Bar::default();
     let result = args
         .common

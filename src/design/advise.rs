@@ -166,7 +166,7 @@ impl Asked {
             unknowns: last,
             seconds: SOLID.seconds(sizes.iter().map(unknowns).sum(), last, self.touches),
             memory_gb: SOLID.memory_gb(last),
-            error_percent: SolidGround::error_percent(size, self.wall),
+            error_percent: SolidGround::error_percent(size, self.wall.min(self.tip)),
             theory_percent: 0.0,
         }
     }

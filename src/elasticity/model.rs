@@ -54,7 +54,7 @@ pub enum ElasticError {
     )]
     NoFace { face: &'static str },
     #[error(
-        "the factored model would take {needed_gb:.1} GB, more than the {limit_gb:.0} GB this version allows: choose a lower quality or larger cells"
+        "the factored model would take {needed_gb:.1} GB, more than the {limit_gb:.1} GB that may be taken: choose a lower quality or larger cells, or allow more with --memory-gb"
     )]
     TooLarge { needed_gb: f64, limit_gb: f64 },
     #[error("the model does not fit into memory: use a coarser mesh")]

@@ -190,7 +190,7 @@ impl SolidGround {
         (tip, away.get(nearest).copied().unwrap_or(f64::INFINITY))
     }
 
-    /// Error of the displacement under a touch (%) with cells of a size (m) for a wall (m): between the slotted
+    /// Error of the displacement under a touch (%) with cells of a size (m) for a wall, or a tip that is smaller (m): between the slotted
     /// tube (1 % of cells as large as the wall) and printed shins (3 %); it falls with the square of the size.
     #[must_use]
     pub fn error_percent(size: f64, wall: f64) -> f64 {
@@ -206,7 +206,8 @@ impl SolidGround {
         let mut sizes = vec![shape.first(tip, f64::INFINITY, least)];
         while let Some(&size) = sizes.last()
             && (sizes.len() < LEAST_GRIDS as usize
-                || Self::error_percent(size, shape.wall) > SAFETY * aim.displacement_percent)
+                || Self::error_percent(size, shape.wall.min(tip))
+                    > SAFETY * aim.displacement_percent)
             && let Some(next) = sizing::next(size, least)
         {
             sizes.push(next);
