@@ -152,7 +152,7 @@ pub fn dataset(data: &Data) -> Result<(), String> {
     if !fits(data.positions.len()) || !fits(data.costs.len()) {
         return Err("places or costs for another number of sites".into());
     }
-    let positions = data.positions.iter().flat_map(glam::DVec3::to_array);
+    let positions = data.positions.iter().flat_map(|&p| <[f64; 3]>::from(p));
     let all = (data.x.values().iter().copied())
         .chain(data.targets.iter().flatten().copied())
         .chain(positions)
