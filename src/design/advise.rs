@@ -130,7 +130,7 @@ impl Asked {
 
     fn shell(&self) -> Cost {
         /// Share of the tolerance that elements are graded to.
-        const AIM: f64 = 0.5;
+        const AIM: f64 = 0.6;
         let elements = &self.budget.elements;
         let wanted =
             self.vertices(self.tip * (AIM * elements.displacement_percent / OF_TIP).sqrt());
