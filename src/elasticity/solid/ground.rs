@@ -190,8 +190,9 @@ impl SolidGround {
         (tip, away.get(nearest).copied().unwrap_or(f64::INFINITY))
     }
 
-    /// Error of the displacement under a touch (%) with cells of a size (m) for a wall, or a tip that is smaller (m): between the slotted
-    /// tube (1 % of cells as large as the wall) and printed shins (3 %); it falls with the square of the size.
+    /// Error of the displacement under a touch (%) with cells of a size (m) for a wall, or a tip that is smaller (m):
+    /// between the slotted tube (1 % of cells as large as the wall) and printed shins (3 %); it falls with the square
+    /// of the size.
     #[must_use]
     pub fn error_percent(size: f64, wall: f64) -> f64 {
         const OF_ONE_WALL: f64 = 1.75;
