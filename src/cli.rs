@@ -108,7 +108,7 @@ macro_rules! named {
 }
 named!(QualityArg, Quality, Draft => Quality::Draft, Standard => Quality::Standard, Reference => Quality::Reference);
 named!(SignalArg, Signal, Displacement => Signal::Displacement, NormalDisplacement => Signal::NormalDisplacement, Strain => Signal::Strain);
-named!(SelectorArg, SelectorKind, GreedySvr => SelectorKind::GreedySvr, PcaQr => SelectorKind::PcaQr, Entropy => SelectorKind::Entropy, MutualInformation => SelectorKind::MutualInformation);
+named!(SelectorArg, SelectorKind, GreedySvr => SelectorKind::GreedySvr, PcaQr => SelectorKind::PcaQr, Entropy => SelectorKind::Entropy, MutualInformation => SelectorKind::MutualInformation, ExpectedError => SelectorKind::ExpectedError);
 named!(UnitArg, Unit, Mm => Unit::Millimetre, Cm => Unit::Centimetre, M => Unit::Metre, In => Unit::Inch);
 
 /// The bundled project and mesh, inside the program.

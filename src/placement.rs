@@ -2,6 +2,7 @@
 
 pub mod candidates;
 pub mod entropy;
+pub mod expected_error;
 pub mod greedy_svr;
 pub mod information;
 pub mod lead;
@@ -28,10 +29,12 @@ pub enum SelectorKind {
     PcaQr,
     Entropy,
     MutualInformation,
+    ExpectedError,
 }
 
 impl SelectorKind {
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 5] = [
+        Self::ExpectedError,
         Self::GreedySvr,
         Self::PcaQr,
         Self::Entropy,
@@ -46,6 +49,7 @@ impl SelectorKind {
             Self::PcaQr => "pca-qr",
             Self::Entropy => "entropy",
             Self::MutualInformation => "mutual-information",
+            Self::ExpectedError => "expected-error",
         }
     }
 
@@ -57,6 +61,7 @@ impl SelectorKind {
             Self::PcaQr => "PCA-QR",
             Self::Entropy => "Entropy",
             Self::MutualInformation => "Mutual information",
+            Self::ExpectedError => "Expected error",
         }
     }
 }

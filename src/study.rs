@@ -11,6 +11,7 @@ use crate::evaluation::add_noise;
 use crate::evaluation::failures::{FailureRow, FailureTrial, failures};
 use crate::gaussian_process::{self, Covariance, Distances, GpKernel};
 use crate::placement::entropy::Entropy;
+use crate::placement::expected_error::{Detail, ExpectedError, Knowledge, ROUNDS};
 use crate::placement::greedy_svr::{Audit, Comparison, GreedySvr};
 use crate::placement::information::{Geometry, GeometrySummary};
 use crate::placement::mutual_information::MutualInformation;
@@ -33,6 +34,8 @@ pub struct Data {
     pub positions: Vec<DVec3>,
     /// Cost of each site; empty where all cost the same.
     pub costs: Vec<f64>,
+    /// Force of each touch (N) that the signals grow with; empty where they are what they are.
+    pub forces: Vec<f64>,
 }
 
 /// How a choice is made.
@@ -47,6 +50,32 @@ pub struct Settings {
     pub kernel_noise: f64,
     /// Standard deviation of the noise added to the signals before choosing, in their unit.
     pub noise: f64,
+    /// How hard touches come (N), for signals whose force is known; a third to three times the middle force of the
+    /// data when absent.
+    pub forces: Option<[f64; 2]>,
+    /// How many touches a choice by expected error looks at.
+    pub detail: Detail,
+}
+
+impl Settings {
+    /// What a choice by expected error is told of the signals.
+    #[must_use]
+    pub fn knowledge<'a>(&self, data: &'a Data) -> Knowledge<'a> {
+        /// Forces that come, over the middle one of the data.
+        const COMING: [f64; 2] = [1.0 / 3.0, 3.0];
+        let coming = || {
+            let mut sorted = data.forces.clone();
+            sorted.sort_by(f64::total_cmp);
+            COMING.map(|share| share * sorted[sorted.len() / 2])
+        };
+        let known = !data.forces.is_empty();
+        Knowledge {
+            noise: self.noise,
+            variance: None,
+            forces: known.then(|| (&data.forces[..], self.forces.unwrap_or_else(coming))),
+            seed: self.svr.seed,
+        }
+    }
 }
 
 /// A choice with what it was made from.
@@ -88,7 +117,13 @@ pub fn select(
             least: 2 * settings.svr.folds,
         });
     }
-    let noisy = add_noise(&data.x, settings.noise, settings.svr.seed);
+    // Expected error knows the noise; the others hear it.
+    let heard = if settings.kind == SelectorKind::ExpectedError {
+        0.0
+    } else {
+        settings.noise
+    };
+    let noisy = add_noise(&data.x, heard, settings.svr.seed);
     let open: Vec<usize> = (0..noisy.rows())
         .filter(|s| !kept_out.contains(s))
         .collect();
@@ -148,6 +183,12 @@ pub fn select(
             MutualInformation { geometry }.select(&pool, &request)
         }
         (SelectorKind::PcaQr, _) => PcaQr.select(&pool, &request),
+        (SelectorKind::ExpectedError, _) => ExpectedError {
+            known: settings.knowledge(data),
+            detail: settings.detail,
+            rounds: ROUNDS,
+        }
+        .select(&pool, &request),
         _ => settings.svr.select(&pool, &request),
     }?;
     // The covariance is part of the choice.

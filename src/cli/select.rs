@@ -13,6 +13,7 @@ use crate::budget::Watch;
 use crate::gaussian_process::GpKernel;
 use crate::io::cpu_seconds;
 use crate::placement::greedy_svr::{Audit, Comparison};
+use crate::placement::expected_error::Detail;
 use crate::placement::{SelectorKind, SensorSet, Wishes};
 use crate::study::{self, Choice, Data, Settings};
 
@@ -75,6 +76,10 @@ pub struct SelectArgs {
     /// whether one of them would have been better (slow).
     #[arg(long, default_value_t = 0, value_parser = whole(0, 1_000_000))]
     pub audit: usize,
+    /// Lightest and hardest touch that will come (N, with a comma; expected error only, for data that say the force
+    /// of each touch): a third to three times the middle force when left out.
+    #[arg(long, value_delimiter = ',', num_args = 1, value_parser = between(1e-6, 1e9))]
+    pub forces_n: Vec<f64>,
     /// Length of the kernel of entropy and mutual information (mm); searched when left out with its power,
     /// else the paper's (33).
     #[arg(long, value_parser = between(1e-6, 1e9))]
@@ -196,6 +201,7 @@ impl SelectArgs {
     fn check(&self) -> anyhow::Result<()> {
         let kind = SelectorKind::from(self.selector);
         let svr = kind == SelectorKind::GreedySvr;
+        let expected = kind == SelectorKind::ExpectedError;
         let geometric = [SelectorKind::Entropy, SelectorKind::MutualInformation].contains(&kind);
         let flags = [
             ("--length-mm", self.length_mm.is_some(), geometric),
@@ -208,7 +214,8 @@ impl SelectArgs {
             ),
             ("--landmarks", self.landmarks.is_some(), svr),
             ("--audit", self.audit > 0, svr),
-            ("--no-criterion", self.no_criterion, !svr),
+            ("--forces-n", !self.forces_n.is_empty(), expected),
+            ("--no-criterion", self.no_criterion, !svr && !expected),
         ];
         if let Some((flag, ..)) = flags.iter().find(|(_, given, heeded)| *given && !heeded) {
             return Err(misuse(&format!(
@@ -249,7 +256,19 @@ impl SelectArgs {
             kernel,
             kernel_noise,
             noise: self.criterion.noise,
+            forces: self.forces()?,
+            detail: Detail::default(),
         })
+    }
+
+    fn forces(&self) -> anyhow::Result<Option<[f64; 2]>> {
+        match self.forces_n[..] {
+            [] => Ok(None),
+            [lightest, hardest] if lightest <= hardest => Ok(Some([lightest, hardest])),
+            _ => Err(misuse(
+                "--forces-n takes the lightest force and the hardest (N): LIGHTEST,HARDEST",
+            )),
+        }
     }
 
     fn wishes(&self, data: &Data) -> anyhow::Result<Wishes> {

@@ -358,6 +358,7 @@ fn select_all(
             SelectorKind::PcaQr => "select pca-qr",
             SelectorKind::Entropy => "select entropy",
             SelectorKind::MutualInformation => "select mutual-information",
+            SelectorKind::ExpectedError => "select expected-error",
         });
     }
     Ok(selections)

@@ -67,6 +67,8 @@ struct Found {
     /// Of the sites (m); empty where nobody knows them.
     positions: Vec<DVec3>,
     costs: Vec<f64>,
+    /// Of the touches (N); empty where nobody knows them.
+    forces: Vec<f64>,
     touches: Origin,
     sites: Origin,
     notes: Vec<String>,
@@ -78,6 +80,13 @@ impl Found {
         for (site, cost) in self.costs.iter().enumerate() {
             if !(cost.is_finite() && *cost > 0.0) {
                 let what = format!("the cost of site {site} is {cost:e}: it must be above zero");
+                return Err(FileError::broken(path, what));
+            }
+        }
+        for (touch, force) in self.forces.iter().enumerate() {
+            if !(force.is_finite() && *force > 0.0) {
+                let what =
+                    format!("the force of touch {touch} is {force:e} N: it must be above zero");
                 return Err(FileError::broken(path, what));
             }
         }
@@ -94,6 +103,7 @@ impl Found {
                 targets: self.targets,
                 positions: self.positions,
                 costs: self.costs,
+                forces: self.forces,
             },
             notes,
         })
@@ -167,11 +177,23 @@ fn read_npz(path: &Path) -> Result<Found, FileError> {
     if !costs.is_empty() && costs.len() != sites {
         return broken(format!("X has {sites} sites, but cost has {}", costs.len()));
     }
+    let forces = if arrays.holds("force_n") {
+        arrays.numbers("force_n")?.values
+    } else {
+        Vec::new()
+    };
+    if !forces.is_empty() && forces.len() != touches {
+        return broken(format!(
+            "X has {touches} touches, but force_n has {}",
+            forces.len()
+        ));
+    }
     Ok(Found {
         values: x.values,
         targets: pressed.iter().map(|&p| (p * 1e3).to_array()).collect(),
         positions: known,
         costs,
+        forces,
         touches: Origin::array(path, "touches", "p_m"),
         sites: Origin::array(path, "sites", "site_m"),
         notes: Vec::new(),
@@ -208,6 +230,8 @@ const PLACE: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
 /// Where the touches were, and the file of each where the table names one.
 struct Touches {
     mm: Vec<[f64; 3]>,
+    /// N; empty where the table has none.
+    forces: Vec<f64>,
     origin: Origin,
     files: Option<Vec<String>>,
 }
@@ -217,11 +241,16 @@ impl Touches {
         let table = Table::read(path)?;
         let columns = table.columns(&PLACE)?;
         let file = table.column("file")?;
+        let force = table.column("force_n")?;
         let (mut mm, mut lines, mut files) = (Vec::new(), Vec::new(), Vec::new());
+        let mut forces = Vec::new();
         for row in table.rows() {
             let row = row?;
             mm.push(row.numbers(&columns)?);
             lines.push(row.line());
+            if let Some(column) = force {
+                forces.push(row.number(column)?);
+            }
             files.extend(file.map(|column| row.text(column).to_owned()));
         }
         if mm.is_empty() {
@@ -229,6 +258,7 @@ impl Touches {
         }
         Ok(Self {
             mm,
+            forces,
             origin: Origin::lines(path, "touches", lines),
             files: file.map(|_| files),
         })
@@ -277,6 +307,7 @@ fn read_csv(path: &Path, touches: Touches) -> Result<Found, FileError> {
         targets: touches.mm,
         positions: metres(&mm),
         costs,
+        forces: touches.forces,
         touches: touches.origin,
         sites: Origin::lines(path, "sites", lines),
         notes: Vec::new(),

@@ -321,6 +321,7 @@ fn join(folder: &Path, exports: &[Export], touches: Touches) -> Result<Found, Fi
         targets: touches.mm,
         positions: kept.iter().map(|&k| first.positions[k]).collect(),
         costs: Vec::new(),
+        forces: touches.forces,
         touches: touches.origin,
         sites: Origin::nodes(folder, "sites", nodes),
         notes: (dropped > 0)

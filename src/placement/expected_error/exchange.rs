@@ -1,0 +1,51 @@
+//! Better sets by exchange: each gauge in turn is taken out, and the best of all sites put in.
+
+use super::Scenes;
+use crate::placement::wishes::Field;
+use crate::placement::{PlacementError, Pool, Request};
+
+/// An exchange must gain this share of the error: less is rounding.
+const LEAST: f64 = 1e-4;
+
+/// The set after at most so many rounds, with its expected error (mm); nothing where there is nothing to exchange.
+///
+/// # Errors
+/// [`PlacementError`] when the watch asks for a stop.
+pub(super) fn exchange(
+    scenes: &Scenes,
+    pool: &Pool,
+    request: &Request,
+    field: &Field,
+    rounds: usize,
+) -> Result<Option<(Vec<usize>, f64)>, PlacementError> {
+    let mut chosen = field.chosen.clone();
+    let kept = request.wishes.required.len();
+    if chosen.len() <= kept || rounds == 0 {
+        return Ok(None);
+    }
+    let mut error = scenes.banks(&chosen).fine.error();
+    // A gauge need not be looked at again while nothing else has changed.
+    let mut unchanged = 0;
+    for turn in 0..rounds * (chosen.len() - kept) {
+        let k = kept + turn % (chosen.len() - kept);
+        let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != chosen[k]).collect();
+        let mut open = Field::new(pool, request.wishes)?;
+        for &place in &others {
+            open.add(place);
+        }
+        let open = open.open();
+        let step = (chosen.len(), chosen.len());
+        let errors = scenes.banks(&others).scan(&open, request.watch, step)?;
+        let best = errors.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        unchanged += 1;
+        if let Some((place, with)) = best
+            && with < error * (1.0 - LEAST)
+        {
+            (chosen[k], error, unchanged) = (place, with, 1);
+        }
+        if unchanged >= chosen.len() - kept {
+            break;
+        }
+    }
+    Ok(Some((chosen, error)))
+}

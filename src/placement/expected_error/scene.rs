@@ -1,0 +1,506 @@
+//! The touches that gauges are chosen for: places all over the part as every site would report them, and presses of
+//! known place, force and noise that the choice is tried on.
+
+use glam::DVec3;
+use nalgebra::{Matrix3, SymmetricEigen};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use crate::budget::{Cancelled, Watch, report};
+use crate::dataset::SignalMatrix;
+use crate::evaluation::normal;
+use crate::regression::Grouping;
+
+/// How many places and presses a choice looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Detail {
+    /// Places that a reading is compared with.
+    pub places: usize,
+    /// Presses that it is tried on.
+    pub presses: usize,
+}
+
+impl Detail {
+    /// As much as tells promising sites from others.
+    #[must_use]
+    pub fn coarse(self) -> Self {
+        Self {
+            places: self.places.div_ceil(4),
+            presses: self.presses.div_ceil(3),
+        }
+    }
+}
+
+impl Default for Detail {
+    /// As a design at Standard.
+    fn default() -> Self {
+        Self {
+            places: 1024,
+            presses: 255,
+        }
+    }
+}
+
+/// Variance of each reading (sites × touches) that is not noise, in the square of the signal's unit, at the force of
+/// the touch: what gluing and model put on it.
+pub type Variance<'a> = &'a (dyn Fn(usize, usize) -> f64 + Sync);
+
+/// What is known of the signals beside their values.
+pub struct Knowledge<'a> {
+    /// Standard deviation of the noise, in the unit of the signals.
+    pub noise: f64,
+    /// Absent where nothing but noise is known to be off.
+    pub variance: Option<Variance<'a>>,
+    /// Force of each touch (N) that the signals grow with, and the lightest and the hardest that will come; absent
+    /// where the signals are what they are.
+    pub forces: Option<(&'a [f64], [f64; 2])>,
+    pub seed: u64,
+}
+
+/// What every site reports, per newton and in units of the noise, at some places: how much, how that changes over
+/// the surface (a millimetre along two directions), the variance of what else is off, and how far a plane leaves it
+/// at the border of what the place stands for (squared).
+#[derive(Default)]
+pub(super) struct Reports {
+    count: usize,
+    /// Site by site: values, slopes, slopes, variances, curvatures.
+    values: Vec<f32>,
+}
+
+/// Rows of [`Reports`] of one site.
+pub(super) struct Report<'a> {
+    pub value: &'a [f32],
+    pub slopes: [&'a [f32]; 2],
+    pub variance: &'a [f32],
+    pub curvature: &'a [f32],
+}
+
+impl Reports {
+    const ROWS: usize = 5;
+
+    pub fn of(&self, site: usize) -> Report<'_> {
+        let all = &self.values[site * Self::ROWS * self.count..][..Self::ROWS * self.count];
+        let row = |k: usize| &all[k * self.count..][..self.count];
+        Report {
+            value: row(0),
+            slopes: [row(1), row(2)],
+            variance: row(3),
+            curvature: row(4),
+        }
+    }
+}
+
+/// A place that a touch may come to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// mm.
+    pub position: DVec3,
+    /// Standard deviation along the surface (mm) of where a touch is that this place stands for.
+    pub reach: f64,
+    /// How likely it is that a touch comes here.
+    pub mass: f64,
+}
+
+/// Presses of one force.
+pub(super) struct Level {
+    /// N; 1 where forces do not matter.
+    pub force: f64,
+    /// Of the presses.
+    pub presses: std::ops::Range<usize>,
+}
+
+/// Everything that a choice needs to know of the touches; the readings of all sites are in it.
+pub struct Scene {
+    pub(super) places: Vec<Place>,
+    pub(super) at_places: Reports,
+    pub(super) presses: Vec<Place>,
+    pub(super) at_presses: Reports,
+    pub(super) levels: Vec<Level>,
+    /// Mean and deviation of the force before anything is known (N); nothing to find where it is absent.
+    pub(super) force_prior: Option<(f64, f64)>,
+    /// Sites × presses: noise of unit deviation.
+    pub(super) draws: Vec<f32>,
+    sites: usize,
+}
+
+/// Forces that presses have, evenly between the lightest and the hardest by their logarithm.
+const LEVELS: usize = 3;
+/// Neighbours that slopes are taken from.
+const NEIGHBOURS: usize = 9;
+/// What a place stands for reaches so far, over the distance of its neighbours.
+const REACH: f64 = 0.5;
+/// Noise is taken to be no less than this share of the signals' rms: no model is better than that.
+const LEAST_NOISE: f64 = 1e-3;
+
+impl Scene {
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn new(
+        x: &SignalMatrix,
+        targets: &[[f64; 3]],
+        known: &Knowledge,
+        detail: Detail,
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
+        report(watch, "Looking at touches", 0, 2)?;
+        let merged = Merged::new(targets, known.forces.map(|f| f.0));
+        let order = farthest_first(&merged.positions, detail.places + detail.presses);
+        let (mut places, presses) = shared(&order, detail);
+        in_neighbourhoods(&mut places, &merged.positions);
+        let around = Around::new(&merged.positions);
+        let unit = unit(x, known.noise).recip();
+        let reader = Reader {
+            x,
+            merged: &merged,
+            around: &around,
+            known,
+            unit,
+        };
+        let all: Vec<usize> = (0..merged.positions.len()).collect();
+        let stand = |of: &[usize]| standing(&merged.positions, &all, of);
+        let (places_at, presses_at) = (stand(&places), stand(&presses));
+        let at_places = reader.reports(&places, &places_at);
+        report(watch, "Looking at touches", 1, 2)?;
+        let at_presses = reader.reports(&presses, &presses_at);
+        let force_prior = known.forces.map(|(_, [_, hardest])| {
+            // As wide as any force up to the hardest, and some more.
+            (hardest / 2.0, hardest / 2.0)
+        });
+        Ok(Self {
+            levels: levels(presses.len(), known.forces.map(|f| f.1)),
+            draws: draws(x.rows(), presses.len(), known.seed),
+            sites: x.rows(),
+            places: places_at,
+            presses: presses_at,
+            at_places,
+            at_presses,
+            force_prior,
+        })
+    }
+
+    #[must_use]
+    pub fn sites(&self) -> usize {
+        self.sites
+    }
+}
+
+/// What readings are measured in: the noise, or where there is next to none, a small share of the signals.
+fn unit(x: &SignalMatrix, noise: f64) -> f64 {
+    let squares: f64 = x.values().iter().map(|v| v * v).sum();
+    let rms = (squares / x.values().len().max(1) as f64).sqrt();
+    noise.max(LEAST_NOISE * rms).max(f64::MIN_POSITIVE)
+}
+
+/// Presses with the same place in every third: each force comes everywhere.
+fn levels(presses: usize, range: Option<[f64; 2]>) -> Vec<Level> {
+    let Some([lightest, hardest]) = range else {
+        return vec![Level {
+            force: 1.0,
+            presses: 0..presses,
+        }];
+    };
+    (0..LEVELS)
+        .map(|k| {
+            let share = (k as f64 + 0.5) / LEVELS as f64;
+            Level {
+                force: lightest * (hardest / lightest).powf(share),
+                presses: k * presses / LEVELS..(k + 1) * presses / LEVELS,
+            }
+        })
+        .collect()
+}
+
+fn draws(sites: usize, presses: usize, seed: u64) -> Vec<f32> {
+    const SEED: u64 = 0xd4a3;
+    (0..sites)
+        .into_par_iter()
+        .flat_map_iter(|site| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(SEED));
+            rng.set_stream(site as u64);
+            (0..presses).map(move |_| normal(&mut rng) as f32)
+        })
+        .collect()
+}
+
+/// Touches by place: repeats of one are one, per newton where forces are known.
+struct Merged {
+    positions: Vec<DVec3>,
+    /// For each place the touches there, with what each weighs in a reading.
+    touches: Vec<Vec<(usize, f64)>>,
+}
+
+impl Merged {
+    fn new(targets: &[[f64; 3]], forces: Option<&[f64]>) -> Self {
+        let groups = Grouping::Place.of(targets);
+        let count = groups.iter().max().map_or(0, |g| g + 1);
+        let mut members = vec![Vec::new(); count];
+        for (touch, &group) in groups.iter().enumerate() {
+            members[group].push(touch);
+        }
+        let force = |t: usize| forces.map_or(1.0, |f| f[t]);
+        let weighed = |touches: &Vec<usize>| {
+            let squares: f64 = touches.iter().map(|&t| force(t).powi(2)).sum();
+            let weight = |&t: &usize| (t, force(t) / squares.max(f64::MIN_POSITIVE));
+            touches.iter().map(weight).collect()
+        };
+        Self {
+            positions: (members.iter())
+                .map(|m| DVec3::from_array(targets[m[0]]))
+                .collect(),
+            touches: members.iter().map(weighed).collect(),
+        }
+    }
+}
+
+/// At most `count` places, each as far as possible from those before it; the first is the one farthest from the
+/// middle.
+fn farthest_first(positions: &[DVec3], count: usize) -> Vec<usize> {
+    let middle = positions.iter().sum::<DVec3>() / positions.len().max(1) as f64;
+    let mut away: Vec<f64> = (positions.iter())
+        .map(|p| p.distance_squared(middle))
+        .collect();
+    let mut order = Vec::with_capacity(count.min(positions.len()));
+    while order.len() < count.min(positions.len()) {
+        let mut next = 0;
+        for k in 1..away.len() {
+            if away[k] > away[next] {
+                next = k;
+            }
+        }
+        let first = order.is_empty();
+        for (a, p) in away.iter_mut().zip(positions) {
+            let here = p.distance_squared(positions[next]);
+            *a = if first { here } else { a.min(here) };
+        }
+        away[next] = f64::NEG_INFINITY;
+        order.push(next);
+    }
+    order
+}
+
+/// Which of the places in order are compared with, and which are pressed: both lie all over the part, and none is
+/// both unless there are few.
+fn shared(order: &[usize], detail: Detail) -> (Vec<usize>, Vec<usize>) {
+    /// Fewer places than this are compared with and pressed.
+    const FEW: usize = 64;
+    if order.len() < FEW {
+        return (order.to_vec(), order.to_vec());
+    }
+    let every = (detail.places + detail.presses) / detail.presses.max(1);
+    let pressed = |k: usize| k % every == every - 1;
+    let (mut places, mut presses) = (Vec::new(), Vec::new());
+    for (k, &at) in order.iter().enumerate() {
+        if pressed(k) && presses.len() < detail.presses {
+            presses.push(at);
+        } else if places.len() < detail.places {
+            places.push(at);
+        }
+    }
+    (places, presses)
+}
+
+/// Puts places into an order in which those that follow each other lie together: halves along the longest extent,
+/// and each of them again.
+fn in_neighbourhoods(places: &mut [usize], positions: &[DVec3]) {
+    if places.len() <= 2 {
+        return;
+    }
+    let bounds = (places.iter()).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), &k| {
+        (l.min(positions[k]), u.max(positions[k]))
+    });
+    let extent = bounds.1 - bounds.0;
+    let axis = if extent.x >= extent.max_element() {
+        0
+    } else if extent.y >= extent.max_element() {
+        1
+    } else {
+        2
+    };
+    places.sort_by(|&a, &b| positions[a][axis].total_cmp(&positions[b][axis]).then(a.cmp(&b)));
+    let (low, high) = places.split_at_mut(places.len() / 2);
+    in_neighbourhoods(low, positions);
+    in_neighbourhoods(high, positions);
+}
+
+/// Some of the places with what each stands for: the places that are nearest to it.
+fn standing(positions: &[DVec3], all: &[usize], of: &[usize]) -> Vec<Place> {
+    let nearest = |&at: &usize| {
+        let away = |k: &usize| positions[of[*k]].distance_squared(positions[at]);
+        (0..of.len()).min_by(|a, b| away(a).total_cmp(&away(b)))
+    };
+    let owners: Vec<Option<usize>> = all.par_iter().map(nearest).collect();
+    let mut masses = vec![0.0; of.len()];
+    for owner in owners.into_iter().flatten() {
+        masses[owner] += 1.0 / all.len() as f64;
+    }
+    of.par_iter()
+        .zip(masses)
+        .map(|(&at, mass)| Place {
+            position: positions[at],
+            reach: REACH * spacing(positions, of, at),
+            mass,
+        })
+        .collect()
+}
+
+/// How far the nearest others are away (mm), of six the mean.
+fn spacing(positions: &[DVec3], of: &[usize], at: usize) -> f64 {
+    const OTHERS: usize = 6;
+    let mut away: Vec<f64> = (of.iter().filter(|&&o| o != at))
+        .map(|&o| positions[o].distance(positions[at]))
+        .collect();
+    away.sort_by(f64::total_cmp);
+    away.truncate(OTHERS);
+    away.iter().sum::<f64>() / away.len().max(1) as f64
+}
+
+/// How readings change around each place: what its neighbours weigh in the two slopes along the surface.
+struct Around<'a> {
+    positions: &'a [DVec3],
+}
+
+/// A neighbour, where it lies in the plane of the surface (mm), and what it weighs in both slopes (1/mm).
+struct Neighbour {
+    place: usize,
+    at: [f64; 2],
+    weights: [f64; 2],
+}
+
+impl<'a> Around<'a> {
+    fn new(positions: &'a [DVec3]) -> Self {
+        Self { positions }
+    }
+
+    fn neighbours(&self, at: usize) -> Vec<Neighbour> {
+        let centre = self.positions[at];
+        let mut near: Vec<(f64, usize)> = (0..self.positions.len())
+            .filter(|&k| k != at)
+            .map(|k| (self.positions[k].distance_squared(centre), k))
+            .collect();
+        let count = NEIGHBOURS.min(near.len());
+        if count == 0 {
+            return Vec::new();
+        }
+        near.select_nth_unstable_by(count - 1, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.truncate(count);
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let offsets: Vec<DVec3> = (near.iter())
+            .map(|(_, k)| self.positions[*k] - centre)
+            .collect();
+        let plane = plane(&offsets);
+        let flat: Vec<[f64; 2]> = (offsets.iter())
+            .map(|o| plane.map(|axis| o.dot(axis)))
+            .collect();
+        let weights = slope_weights(&flat);
+        (near.iter().zip(flat).zip(weights))
+            .map(|(((_, place), at), weights)| Neighbour {
+                place: *place,
+                at,
+                weights,
+            })
+            .collect()
+    }
+}
+
+/// The two directions in which neighbours lie most.
+fn plane(offsets: &[DVec3]) -> [DVec3; 2] {
+    let mut spread = Matrix3::zeros();
+    for o in offsets {
+        let o = nalgebra::Vector3::new(o.x, o.y, o.z);
+        spread += o * o.transpose();
+    }
+    let eigen = SymmetricEigen::new(spread);
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    [order[0], order[1]].map(|k| {
+        let v = eigen.eigenvectors.column(k);
+        DVec3::new(v[0], v[1], v[2])
+    })
+}
+
+/// What the differences to neighbours weigh in the slopes, by least squares; nothing in a direction that no
+/// neighbour lies in.
+fn slope_weights(flat: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    /// Over the larger spread.
+    const RIDGE: f64 = 1e-4;
+    let sum = |i: usize, j: usize| flat.iter().map(|p| p[i] * p[j]).sum::<f64>();
+    let ridge = RIDGE * (sum(0, 0) + sum(1, 1));
+    let (a, b, c) = (sum(0, 0) + ridge, sum(0, 1), sum(1, 1) + ridge);
+    let determinant = (a * c - b * b).max(f64::MIN_POSITIVE);
+    (flat.iter())
+        .map(|[x, y]| {
+            [
+                (c * x - b * y) / determinant,
+                (a * y - b * x) / determinant,
+            ]
+        })
+        .collect()
+}
+
+struct Reader<'a> {
+    x: &'a SignalMatrix,
+    merged: &'a Merged,
+    around: &'a Around<'a>,
+    known: &'a Knowledge<'a>,
+    /// One over the unit of readings.
+    unit: f64,
+}
+
+impl Reader<'_> {
+    fn reports(&self, at: &[usize], standing: &[Place]) -> Reports {
+        let neighbours: Vec<Vec<Neighbour>> =
+            at.par_iter().map(|&at| self.around.neighbours(at)).collect();
+        let rows = |site: usize| {
+            let mut rows = vec![0.0; Reports::ROWS * at.len()];
+            for (k, &place) in at.iter().enumerate() {
+                let of = self.report(site, place, &neighbours[k], standing[k].reach);
+                for (row, value) in of.into_iter().enumerate() {
+                    rows[row * at.len() + k] = value as f32;
+                }
+            }
+            rows
+        };
+        Reports {
+            count: at.len(),
+            values: (0..self.x.rows()).into_par_iter().flat_map_iter(rows).collect(),
+        }
+    }
+
+    fn report(&self, site: usize, place: usize, around: &[Neighbour], reach: f64) -> [f64; 5] {
+        let value = self.value(site, place);
+        let rises: Vec<f64> = (around.iter())
+            .map(|n| self.value(site, n.place) - value)
+            .collect();
+        let slope =
+            |k: usize| (around.iter().zip(&rises)).map(|(n, r)| n.weights[k] * r).sum::<f64>();
+        let slopes = [slope(0), slope(1)];
+        let curvature = (around.iter().zip(&rises)).map(|(n, rise)| {
+            let away = n.at[0].hypot(n.at[1]).max(f64::MIN_POSITIVE);
+            let off = rise - slopes[0] * n.at[0] - slopes[1] * n.at[1];
+            // What bends grows with the square of the way.
+            (off * (reach / away).powi(2).min(1.0)).powi(2)
+        });
+        let curvature = curvature.sum::<f64>() / around.len().max(1) as f64;
+        [value, slopes[0], slopes[1], self.variance(site, place), curvature]
+    }
+
+    fn value(&self, site: usize, place: usize) -> f64 {
+        let row = self.x.row(site);
+        let touches = self.merged.touches[place].iter();
+        touches.map(|&(t, weight)| weight * row[t]).sum::<f64>() * self.unit
+    }
+
+    /// Per newton squared.
+    fn variance(&self, site: usize, place: usize) -> f64 {
+        let Some(variance) = self.known.variance else {
+            return 0.0;
+        };
+        let touches = &self.merged.touches[place];
+        let of = |&(t, _): &(usize, f64)| {
+            let force = self.known.forces.map_or(1.0, |f| f.0[t]);
+            variance(site, t) / (force * force)
+        };
+        touches.iter().map(of).sum::<f64>() / touches.len() as f64 * self.unit * self.unit
+    }
+}
