@@ -15,7 +15,7 @@ use crate::inference::Chain;
 use crate::wire::{Decoder, Event, Hello, Message, VERSION, encode};
 
 pub use fault::{ChannelFault, Fault, Faults, Illness};
-pub use script::{Press, Script};
+pub use script::{GivenPress, PRESSES, Press, Script};
 
 /// How the board measures.
 #[derive(Clone, Debug, PartialEq)]

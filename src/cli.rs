@@ -26,6 +26,7 @@ use crate::dataset::Signal;
 use crate::design::Inputs;
 use crate::io::mesh_file::read_mesh;
 use crate::io::project_file::{self, LoadedProject};
+use crate::io::{FileError, atomic, source};
 use crate::mesh::repair::Repair;
 use crate::placement::SelectorKind;
 use crate::project::{Masks, PartModel, Project, Unit};
@@ -194,7 +195,7 @@ impl Cli {
     /// Says what memory this process may take: what was asked for, or what the machine has.
     pub fn bound_memory(&self) {
         let asked = self.memory_gb.map(|gb| (gb * 1e9) as u64);
-        crate::memory::allow(asked.unwrap_or_else(crate::io::source::machine_memory));
+        crate::memory::allow(asked.unwrap_or_else(source::machine_memory));
     }
 }
 
@@ -269,13 +270,14 @@ pub fn prepare_folder(loaded: &mut LoadedProject, folder: &Path) -> anyhow::Resu
 /// As [`prepare_folder`].
 pub fn write_bundled_mesh(folder: &Path) -> anyhow::Result<PathBuf> {
     let path = folder.join("limb.glb");
-    match std::fs::read(&path) {
+    match source::read(&path) {
         Ok(bytes) if bytes == BUNDLED_MESH => {}
-        Ok(_) => anyhow::bail!(
-            "{}: another mesh of this name is there already. Choose another folder",
+        Err(FileError::Missing { .. }) => atomic::write(&path, BUNDLED_MESH)?,
+        // Also what cannot be read, or is no file: it is not ours to write over.
+        _ => anyhow::bail!(
+            "{}: something else of this name is there already. Choose another folder",
             path.display()
         ),
-        Err(_) => crate::io::atomic::write(&path, BUNDLED_MESH)?,
     }
     Ok(path)
 }

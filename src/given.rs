@@ -174,6 +174,18 @@ fn facing_touches(
     inputs
 }
 
+/// Whether points can be meant for a part: none lies farther from it than it is large.
+///
+/// # Errors
+/// [`DesignError::OffThePart`] for the first that does; `what` it is.
+pub fn check_reach(
+    part: &TriMesh,
+    what: &'static str,
+    points: impl Iterator<Item = DVec3>,
+) -> Result<(), DesignError> {
+    Reach::of(part, &SurfaceIndex::new(part)).check(what, points)
+}
+
 /// How far from a part points can be meant for it: no farther than it is large.
 struct Reach<'a> {
     index: &'a SurfaceIndex,

@@ -478,7 +478,7 @@ fn what_is_wrong_is_said_before_the_model_is_computed() {
         ),
         (
             vec!["board", "--simulate", "--script", &far],
-            "away from the part",
+            "from the part",
         ),
         (
             vec!["board", "--simulate", "--truth", &nowhere],

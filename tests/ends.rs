@@ -287,3 +287,63 @@ fn a_part_as_thin_as_a_thread() {
         assert!(said.contains("10000000.000 mm"), "{said}");
     }
 }
+
+/// Where the machine has no memory left in the middle of the work, whatever may be taken: a message and no abort.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_that_ends_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("limb");
+    // Two million triangles in 200 MB of address space.
+    let done = Command::new("sh")
+        .args(["-c", "ulimit -v 200000 && exec \"$@\"", "sh"])
+        .arg(env!("CARGO_BIN_EXE_hapdef"))
+        .args(["limb", "--element", "0.15", "--no-sites"])
+        .args(["--memory-gb", "100", "--out", out.to_str().unwrap()])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), Some(1), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(said.starts_with("hapdef: the machine has no "), "{said}");
+    assert!(said.contains("MB of memory left. Lower"), "{said}");
+    assert!(!out.exists());
+}
+
+/// What lies where files are to be written may be anybody's, and may be no file at all: it stays, and nothing waits.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_no_file_is_neither_read_nor_written_over() {
+    use hapdef::cli::write_bundled_mesh;
+    use hapdef::io::trade_file;
+    use rustix::fs::{CWD, Mode, mkfifoat};
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (mesh, trade) = (at("limb.glb"), at("trade.json"));
+    let refused = |word: &str| {
+        let said = write_bundled_mesh(folder.path()).unwrap_err().to_string();
+        assert!(
+            said.contains("limb.glb") && said.contains("another folder"),
+            "{said}"
+        );
+        let said = trade_file::read(folder.path()).unwrap_err().to_string();
+        assert!(said.contains("trade.json") && said.contains(word), "{said}");
+    };
+    for path in [&mesh, &trade] {
+        std::fs::create_dir(path).unwrap();
+    }
+    refused("this is a folder");
+    for path in [&mesh, &trade] {
+        std::fs::remove_dir(path).unwrap();
+        mkfifoat(CWD, path, Mode::RUSR | Mode::WUSR).unwrap();
+    }
+    refused("this is a pipe");
+    for path in [&mesh, &trade] {
+        std::fs::remove_file(path).unwrap();
+    }
+    assert!(trade_file::read(folder.path()).unwrap().is_none());
+    for _ in 0..2 {
+        assert_eq!(write_bundled_mesh(folder.path()).unwrap(), mesh);
+    }
+}

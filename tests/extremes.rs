@@ -1,8 +1,11 @@
 //! The ends of every range: a right answer or a plain refusal, never a panic, never a number that is not
 //! one.
 
+mod coarse;
+
 use std::sync::Arc;
 
+use coarse::limb;
 use glam::DVec3;
 use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::dataset::Signal;
@@ -10,7 +13,6 @@ use hapdef::design::{self, Design, DesignError, Inputs};
 use hapdef::elasticity::Touch;
 use hapdef::feasible::Filter;
 use hapdef::given::{self, GivenSite};
-use hapdef::limb::LimbSpec;
 use hapdef::mesh::TriMesh;
 use hapdef::placement::SelectorKind;
 use hapdef::project::{Elements, Lattice, Masks, Project, SupportKeys, SupportKind};
@@ -26,20 +28,6 @@ fn budget() -> Budget {
         svr_steps: 20_000,
         ..Quality::Draft.budget()
     }
-}
-
-fn limb() -> Inputs {
-    let mut inputs = hapdef::cli::bundled().unwrap().inputs;
-    let coarse = LimbSpec {
-        element: 5.0,
-        ..LimbSpec::default()
-    };
-    inputs.part = Arc::new(coarse.build().unwrap().0);
-    // No multiple of it falls on a window's edge, where rounding would decide.
-    inputs.project.sites.spacing_mm = 4.1;
-    inputs.project.feasible.edge_radius_mm = 4.0;
-    inputs.project.selection.sensors = 2;
-    inputs
 }
 
 fn run(inputs: &Inputs) -> Result<Design, DesignError> {

@@ -1,7 +1,10 @@
 //! Meshes of tetrahedra that the user has, from the file to an answer.
 
+mod bench;
+
 use std::fmt::Write as _;
 
+use bench::hexes::TETRAHEDRA;
 use glam::DVec3;
 use hapdef::budget::{Quality, unwatched};
 use hapdef::design::Inputs;
@@ -13,43 +16,33 @@ use hapdef::mesh::unroll::Axis;
 use hapdef::mesh::volume::VolumeMesh;
 use hapdef::project::{PartModel, Project, SupportKeys, SupportKind, Unit};
 
-/// A strip 100 × 20 × 2 mm in blocks of six linear tetrahedra (mm).
-fn strip() -> (Vec<DVec3>, Vec<[u32; 4]>) {
-    let counts = [40u32, 8, 1];
-    let sides = DVec3::new(100.0, 20.0, 2.0);
-    let number = |i: u32, j: u32, k: u32| i + 41 * (j + 9 * k);
-    let mut nodes = Vec::new();
-    for k in 0..=counts[2] {
-        for j in 0..=counts[1] {
-            for i in 0..=counts[0] {
-                let at = [i, j, k].map(f64::from);
-                let whole = counts.map(f64::from);
-                nodes.push(DVec3::from_array(at) / DVec3::from_array(whole) * sides);
-            }
-        }
+/// A block of so many bricks along three axes, as large as `sides` (mm), of six linear tetrahedra a brick.
+fn bricks(counts: [u32; 3], sides: DVec3) -> (Vec<DVec3>, Vec<[u32; 4]>) {
+    let [nx, ny, nz] = counts;
+    let whole = DVec3::from_array(counts.map(f64::from));
+    let (mut nodes, mut tetrahedra) = (Vec::new(), Vec::new());
+    for [i, j, k] in places([nx + 1, ny + 1, nz + 1]) {
+        nodes.push(DVec3::from_array([i, j, k].map(f64::from)) / whole * sides);
     }
-    let mut tetrahedra = Vec::new();
-    for k in 0..counts[2] {
-        for j in 0..counts[1] {
-            for i in 0..counts[0] {
-                let c: [u32; 8] = std::array::from_fn(|b| {
-                    let b = b as u32;
-                    number(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2))
-                });
-                for t in [
-                    [0, 1, 3, 7],
-                    [0, 5, 1, 7],
-                    [0, 3, 2, 7],
-                    [0, 2, 6, 7],
-                    [0, 4, 5, 7],
-                    [0, 6, 4, 7],
-                ] {
-                    tetrahedra.push(t.map(|n| c[n]));
-                }
-            }
-        }
+    for [i, j, k] in places(counts) {
+        let brick: [u32; 8] = std::array::from_fn(|b| {
+            let b = b as u32;
+            let (i, j, k) = (i + (b & 1), j + (b >> 1 & 1), k + (b >> 2));
+            i + (nx + 1) * (j + (ny + 1) * k)
+        });
+        tetrahedra.extend(TETRAHEDRA.map(|t| t.map(|n| brick[n])));
     }
     (nodes, tetrahedra)
+}
+
+/// All places of a lattice, the first coordinate changing first.
+fn places([nx, ny, nz]: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
+    (0..nx * ny * nz).map(move |n| [n % nx, n / nx % ny, n / (nx * ny)])
+}
+
+/// A strip 100 × 20 × 2 mm.
+fn strip() -> (Vec<DVec3>, Vec<[u32; 4]>) {
+    bricks([40, 8, 1], DVec3::new(100.0, 20.0, 2.0))
 }
 
 /// Gmsh's and Abaqus' order of the ten nodes.
@@ -67,7 +60,11 @@ fn quadratic(order: [usize; 10]) -> (Vec<DVec3>, Vec<Vec<u32>>) {
 }
 
 fn linear() -> (Vec<DVec3>, Vec<Vec<u32>>) {
-    let (nodes, corners) = strip();
+    any_kind(strip())
+}
+
+/// Linear tetrahedra as elements of any number of nodes.
+fn any_kind((nodes, corners): (Vec<DVec3>, Vec<[u32; 4]>)) -> (Vec<DVec3>, Vec<Vec<u32>>) {
     (nodes, corners.iter().map(|t| t.to_vec()).collect())
 }
 
@@ -265,26 +262,7 @@ fn what_cannot_be_read_is_named() {
 
 /// A block 20 × 20 × 10 mm of linear tetrahedra as a small file.
 fn block() -> (Vec<DVec3>, Vec<Vec<u32>>) {
-    let nodes = (0..18)
-        .map(|i: u32| 10.0 * DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)));
-    let mut elements = Vec::new();
-    for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let c: [u32; 8] = std::array::from_fn(|b| {
-            let b = b as u32;
-            i + (b & 1) + 3 * (j + (b >> 1 & 1)) + 9 * (b >> 2)
-        });
-        for t in [
-            [0, 1, 3, 7],
-            [0, 5, 1, 7],
-            [0, 3, 2, 7],
-            [0, 2, 6, 7],
-            [0, 4, 5, 7],
-            [0, 6, 4, 7],
-        ] {
-            elements.push(t.map(|n: usize| c[n]).to_vec());
-        }
-    }
-    (nodes.collect(), elements)
+    any_kind(bricks([2, 2, 1], DVec3::new(20.0, 20.0, 10.0)))
 }
 
 /// What was said of a file that is read.

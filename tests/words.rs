@@ -1,14 +1,16 @@
 //! What a user is told: the cause that it really is, and which key to change to what.
 
+mod coarse;
+
 use std::path::Path;
 use std::process::Command;
 use std::sync::{Arc, OnceLock};
 
+use coarse::limb;
 use glam::DVec3;
 use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::design::{self, DesignError, Inputs, Simulated};
 use hapdef::feasible::Filter;
-use hapdef::limb::LimbSpec;
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::unroll::Axis;
 use hapdef::project::{Masks, Project, SupportKeys, SupportKind, Unit};
@@ -18,19 +20,6 @@ fn budget() -> Budget {
         touches: 60,
         ..Quality::Draft.budget()
     }
-}
-
-fn limb() -> Inputs {
-    let mut inputs = hapdef::cli::bundled().unwrap().inputs;
-    let coarse = LimbSpec {
-        element: 5.0,
-        ..LimbSpec::default()
-    };
-    inputs.part = Arc::new(coarse.build().unwrap().0);
-    inputs.project.sites.spacing_mm = 4.1;
-    inputs.project.feasible.edge_radius_mm = 4.0;
-    inputs.project.selection.sensors = 2;
-    inputs
 }
 
 /// The coarse limb under its touches: the filters need no other.

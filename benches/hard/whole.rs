@@ -29,8 +29,16 @@ const LOOK: Duration = Duration::from_millis(20);
 const SPOILED: u64 = 1000;
 /// Little to compute: what is tried is what comes in.
 const LIMITS: &str = "\n[budget.limits]\nvertices = 300\ntouches = 60\ncandidates = 20\nselection_touches = 60\nselection_candidates = 20\ntuning_touches = 60\n";
-const SCRIPT: &str =
-    "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n0.1,0.5,31.8,0,60,5\n0.9,0.3,0,31.8,40,2.5\n";
+
+/// What datasets are asked.
+const QUESTIONS: [&str; 6] = [
+    "select --selector greedy-svr --sensors 2 --folds 2 --json",
+    "select --selector pca-qr --sensors 2 --folds 2 --json",
+    "select --selector entropy --sensors 2 --folds 2 --json",
+    "select --selector mutual-information --sensors 2 --folds 2 --json",
+    "evaluate --sites 0,2 --folds 2 --json",
+    "evaluate --sites 1 --folds 2 --tune --baseline --json",
+];
 
 /// What is spoiled, and which command gets it. Those that compute long come rarely.
 #[derive(Clone, Copy, Debug)]
@@ -173,24 +181,20 @@ fn prepared(
         }
         Trial::Dataset(reader) => {
             dataset(reader, &spoiled(reader)?, folder)?;
-            let selector = ["greedy-svr", "pca-qr", "entropy", "mutual-information"];
-            let selector = selector[rng.random_range(0..selector.len())];
+            let question = QUESTIONS[rng.random_range(0..QUESTIONS.len())];
             let data = if reader == Reader::Csv {
                 "d.csv --touches t.csv"
             } else {
                 "d.npz"
             };
-            let line =
-                format!("select --data {data} --selector {selector} --sensors 2 --folds 2 --json");
-            return Ok(words(args, &line));
+            return Ok(words(args, &format!("{question} --data {data}")));
         }
         Trial::Recording => {
             put("r.hapdrec", &spoiled(Reader::Recording)?)?;
             "listen r.hapdrec --project p.hapdef.toml --fast --seconds 15"
         }
         Trial::Script => {
-            let files = [SCRIPT.as_bytes().to_vec()];
-            put("s.csv", &spoil::input(&files, args.seed, number + SPOILED))?;
+            put("s.csv", &spoiled(Reader::Presses)?)?;
             "board p.hapdef.toml --simulate --script s.csv --tcp 127.0.0.1:0 --seconds 0.3"
         }
     };

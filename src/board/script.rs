@@ -1,5 +1,8 @@
 //! Who presses a simulated board, when, where and how hard.
 
+use std::ops::RangeInclusive;
+
+use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -12,6 +15,20 @@ pub struct Press {
     pub duration_s: f64,
     /// With its largest force.
     pub touch: Touch,
+}
+
+/// How hard a press may be (N): what a finger hardly feels, and more than any robot bears.
+pub const PRESSES: RangeInclusive<f64> = 0.001..=1e4;
+
+/// A press as it was asked for: its place need not be on the part's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GivenPress {
+    pub start_s: f64,
+    pub duration_s: f64,
+    /// m.
+    pub position: DVec3,
+    /// The largest one (N).
+    pub force: f64,
 }
 
 /// Presses in the order of their time.

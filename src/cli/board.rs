@@ -8,21 +8,21 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::Args;
-use glam::DVec3;
-use serde::Deserialize;
 use serde_json::json;
 
 use super::ranges::{between, whole};
+use super::simulate::in_file;
 use super::{Common, out, progress::Bar};
 use crate::board::{
-    ChannelFault, Fault, Faults, Options, Press, Script, SimulatedBoard, Truth, fitting_gain,
-    script_seed,
+    ChannelFault, Fault, Faults, GivenPress, Options, PRESSES, Press, Script, SimulatedBoard,
+    Truth, fitting_gain, script_seed,
 };
 use crate::budget::Watch;
 use crate::design::{self, Inputs, Sensing, Workshop};
 use crate::elasticity::Touch;
+use crate::given;
 use crate::inference::Chain;
-use crate::io::source;
+use crate::io::points;
 use crate::link::{Doorway, host, ports};
 use crate::mesh::TriMesh;
 use crate::plain;
@@ -57,7 +57,7 @@ pub struct BoardArgs {
     #[arg(long, default_value = "all", value_parser = workshop)]
     pub workshop: Workshop,
     /// Smallest and largest force of random touches (N).
-    #[arg(long, num_args = 2, default_values_t = [2.0, 15.0], value_parser = between(0.001, MOST_NEWTONS))]
+    #[arg(long, num_args = 2, default_values_t = [2.0, 15.0], value_parser = between(*PRESSES.start(), *PRESSES.end()))]
     pub force: Vec<f64>,
     /// Touches instead of random ones (.csv): `start_s,duration_s,x_mm,y_mm,z_mm,force_n`.
     #[arg(long)]
@@ -85,9 +85,8 @@ pub struct BoardArgs {
     pub seconds: Option<f64>,
 }
 
-/// More than any gauge bears, and harder than any press.
+/// More than any gauge bears.
 const MOST_MICROSTRAIN: f64 = 1e5;
-const MOST_NEWTONS: f64 = 1e4;
 
 /// What the gauges are off by, as it is written.
 fn workshop(text: &str) -> Result<Workshop, String> {
@@ -190,7 +189,7 @@ struct Plan {
     channels: usize,
     faults: Faults,
     /// Instead of random touches.
-    rows: Option<Vec<Row>>,
+    presses: Option<Vec<GivenPress>>,
 }
 
 impl Plan {
@@ -212,7 +211,9 @@ impl Plan {
         Ok(Self {
             channels,
             faults: faults(args, channels)?,
-            rows: script.map(|path| rows(path, &inputs.part)).transpose()?,
+            presses: script
+                .map(|path| read_script(path, &inputs.part))
+                .transpose()?,
         })
     }
 }
@@ -245,8 +246,8 @@ fn build(
 ) -> anyhow::Result<SimulatedBoard> {
     let seed = inputs.project.budget.seed;
     let sensing = design::sense(inputs, &inputs.project.budget.budget(), watch)?;
-    let script = match &plan.rows {
-        Some(rows) => given(rows, inputs, &sensing),
+    let script = match &plan.presses {
+        Some(presses) => on_surface(presses, inputs, &sensing),
         None => Script::random(
             places(inputs, &sensing, seed)?,
             [args.force[0], args.force[1]],
@@ -337,93 +338,31 @@ fn strongest(script: &Script) -> Option<f64> {
     }
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Row {
-    start_s: f64,
-    duration_s: f64,
-    x_mm: f64,
-    y_mm: f64,
-    z_mm: f64,
-    force_n: f64,
+/// Presses from a file, all of them near the part.
+fn read_script(path: &Path, part: &TriMesh) -> anyhow::Result<Vec<GivenPress>> {
+    let presses = points::read_presses(path)?;
+    given::check_reach(part, "touch", presses.iter().map(|p| p.position))
+        .map_err(|error| in_file(error, path, path))?;
+    Ok(presses)
 }
 
-/// Touches from a file.
-fn rows(path: &Path, part: &TriMesh) -> anyhow::Result<Vec<Row>> {
-    let shown = path.display();
-    let bytes = source::read(path)?;
-    let mut reader = csv::Reader::from_reader(&bytes[..]);
-    let mut rows = Vec::new();
-    for (number, row) in (1..).zip(reader.deserialize()) {
-        let row: Row = row.map_err(|e| {
-            let why = plain::message(&e.to_string());
-            anyhow::anyhow!("{shown}, touch {number}: the columns are start_s,duration_s,x_mm,y_mm,z_mm,force_n ({why})")
-        })?;
-        if let Err(why) = row.check(part) {
-            anyhow::bail!("{shown}, touch {number}: {why}");
-        }
-        rows.push(row);
-    }
-    Ok(rows)
-}
-
-impl Row {
-    /// m.
-    fn place(&self) -> DVec3 {
-        DVec3::new(self.x_mm, self.y_mm, self.z_mm) * 1e-3
-    }
-
-    /// Whether somebody could press so.
-    fn check(&self, part: &TriMesh) -> Result<(), String> {
-        const LONGEST_S: f64 = 1e9;
-        let bounds = [
-            ("start_s", self.start_s, 0.0, LONGEST_S),
-            ("duration_s", self.duration_s, 0.001, LONGEST_S),
-            ("force_n", self.force_n, 0.001, MOST_NEWTONS),
-        ];
-        for (name, value, least, most) in bounds {
-            if !(least..=most).contains(&value) {
-                return Err(format!(
-                    "{name} must be from {least} to {most}, but is {value}"
-                ));
-            }
-        }
-        let place = self.place();
-        if !place.is_finite() {
-            return Err("x_mm, y_mm and z_mm must be finite numbers".to_owned());
-        }
-        let (lower, upper) = part.bounds();
-        let size = (upper - lower).length();
-        // By the axis that is worst: squares of what is far may be infinite.
-        let away = (place - place.clamp(lower, upper)).abs().max_element();
-        if away > size {
-            return Err(format!(
-                "x_mm, y_mm, z_mm lie {:.1e} mm away from the part, which is {:.1} mm large",
-                away * 1e3,
-                size * 1e3
-            ));
-        }
-        Ok(())
-    }
-}
-
-/// Touches put onto the part's surface.
-fn given(rows: &[Row], inputs: &Inputs, sensing: &Sensing) -> Script {
+/// Presses put onto the part's surface.
+fn on_surface(presses: &[GivenPress], inputs: &Inputs, sensing: &Sensing) -> Script {
     let map = &sensing.drawn.map;
-    let press = |row: &Row| {
-        let (at, _) = map.index.nearest(row.place());
+    let press = |asked: &GivenPress| {
+        let (at, _) = map.index.nearest(asked.position);
         Press {
-            start_s: row.start_s,
-            duration_s: row.duration_s,
+            start_s: asked.start_s,
+            duration_s: asked.duration_s,
             touch: Touch {
                 position: map.mesh.point(at),
                 normal: map.mesh.normal(at),
-                force: row.force_n,
+                force: asked.force,
                 tip_radius: inputs.project.tip().1,
             },
         }
     };
-    Script::Given(rows.iter().map(press).collect())
+    Script::Given(presses.iter().map(press).collect())
 }
 
 /// What really happens, as a table. What goes wrong with it is told to `failed`, once.
@@ -494,31 +433,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn touches_that_nobody_can_press_are_refused() {
-        let inputs = super::super::bundled().unwrap().inputs;
+    fn presses_far_from_the_part_are_refused_with_their_line() {
+        let part = super::super::bundled().unwrap().inputs.part;
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("touches.csv");
-        let read = |text: &str| {
-            let head = "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n";
-            std::fs::write(&path, format!("{head}{text}")).unwrap();
-            rows(&path, &inputs.part).map_err(|e| format!("{e:#}"))
-        };
-        assert_eq!(read("1,1,22.5,22.5,60,8\n2,1,0,0,0,1\n").unwrap().len(), 2);
-        for (text, why) in [
-            ("1,1,22.5,22.5,60,8\n1,1,1e160,0,0,8\n", "touch 2"),
-            ("1,1,nan,0,0,8\n", "finite"),
-            ("1,1,0,1e309,0,8\n", "finite"),
-            ("-1,1,22.5,22.5,60,8\n", "start_s"),
-            ("1,nan,22.5,22.5,60,8\n", "duration_s"),
-            ("1,1,22.5,22.5,60,1e300\n", "force_n"),
-            ("1,1,22.5\n", "touch 1: the columns are"),
-        ] {
-            let said = read(text).unwrap_err();
-            assert!(said.contains(why) && said.contains("touches.csv"), "{said}");
-        }
-        let long = format!("\u{1b}[31m{}\n1\n", "x".repeat(200_000));
-        std::fs::write(&path, long).unwrap();
-        let said = format!("{:#}", rows(&path, &inputs.part).err().unwrap());
-        assert!(said.len() < 4000 && !said.contains('\u{1b}'));
+        let head = "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n1,1,22.5,22.5,60,8\n";
+        std::fs::write(&path, format!("{head}2,1,0,0,0,1\n")).unwrap();
+        assert_eq!(read_script(&path, &part).unwrap().len(), 2);
+        std::fs::write(&path, format!("{head}1,1,1e160,0,0,8\n")).unwrap();
+        let said = format!("{:#}", read_script(&path, &part).unwrap_err());
+        assert!(
+            said.contains("touches.csv, line 3") && said.contains("from the part"),
+            "{said}"
+        );
+        assert!(said.len() < 500, "{said}");
     }
 }

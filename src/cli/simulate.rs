@@ -153,7 +153,7 @@ fn at_points(
 }
 
 /// An error of one of the given points, with its file and line before it.
-fn in_file(error: DesignError, touches: &Path, sites: &Path) -> anyhow::Error {
+pub(super) fn in_file(error: DesignError, touches: &Path, sites: &Path) -> anyhow::Error {
     let (path, number) = match error {
         DesignError::OffThePart {
             what: "touch",

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::fingerprint::Fingerprint;
 use super::npz::NpzFile;
 use super::together::Together;
-use super::{FileError, atomic, project_file, report};
+use super::{FileError, atomic, project_file, report, source};
 use crate::dataset::{Dataset, Signal, Site};
 use crate::design::{Design, Inputs};
 use crate::placement::information::Geometry;
@@ -96,10 +96,10 @@ fn write_project(
 
 /// Copies a file, where there is one.
 fn bring(from: &Path, to: &Path) -> Result<(), FileError> {
-    match std::fs::read(from) {
+    match source::read(from) {
         Ok(bytes) => atomic::write(to, &bytes),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        Err(e) => Err(FileError::of(from, &e)),
+        Err(FileError::Missing { .. }) => Ok(()),
+        Err(error) => Err(error),
     }
 }
 

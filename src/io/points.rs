@@ -1,4 +1,4 @@
-//! Given touches and sites, and the answers to them, as CSV with the units in the column names.
+//! Given touches, sites and presses, and answers, as CSV with the units in the column names.
 
 use std::io::Write as _;
 use std::ops::RangeInclusive;
@@ -9,6 +9,7 @@ use glam::DVec3;
 use super::npz::NpzFile;
 use super::table::{Row, Table};
 use super::{FileError, atomic};
+use crate::board::{GivenPress, PRESSES};
 use crate::elasticity::Touch;
 use crate::given::{Answer, GivenSite};
 
@@ -23,10 +24,14 @@ const TOUCHES: [&str; 8] = [
     "tip_radius_mm",
 ];
 const SITES: [&str; 6] = ["x_mm", "y_mm", "z_mm", "dx", "dy", "dz"];
+const SCRIPT: [&str; 6] = ["start_s", "duration_s", "x_mm", "y_mm", "z_mm", "force_n"];
 
 /// Forces (N) and tip radii (mm) that a robot may meet; beyond them the numbers of the model leave their range.
 const FORCES: RangeInclusive<f64> = 1e-9..=1e9;
 const TIPS: RangeInclusive<f64> = 1e-3..=1e6;
+/// When a press may begin, and how long it may last (s).
+const STARTS: RangeInclusive<f64> = 0.0..=1e9;
+const DURATIONS: RangeInclusive<f64> = 1e-3..=1e9;
 
 /// Reads touches: `x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm`, n being the outward normal. Further
 /// columns are ignored.
@@ -68,7 +73,24 @@ pub fn read_sites(path: &Path) -> Result<Vec<GivenSite>, FileError> {
     })
 }
 
-/// The line of a table of touches or gauges that one of them stands in, counted as they were read, from 0.
+/// Reads who presses a simulated board and when: `start_s,duration_s,x_mm,y_mm,z_mm,force_n`. Further columns are
+/// ignored. Without a row nobody presses.
+///
+/// # Errors
+/// [`FileError`] naming the file, the line and the column.
+pub fn read_presses(path: &Path) -> Result<Vec<GivenPress>, FileError> {
+    let table = Table::read(path)?;
+    taken(&table, &SCRIPT, |row, [start, duration, x, y, z, force]| {
+        Ok(GivenPress {
+            start_s: ranged(row, "start_s", start, &STARTS, "zero or more")?,
+            duration_s: ranged(row, "duration_s", duration, &DURATIONS, "above zero")?,
+            position: DVec3::new(x, y, z) * 1e-3,
+            force: ranged(row, "force_n", force, &PRESSES, "above zero")?,
+        })
+    })
+}
+
+/// The line of such a table that a touch, gauge or press stands in, counted as they were read, from 0.
 #[must_use]
 pub fn line(path: &Path, number: usize) -> Option<u64> {
     let table = Table::read(path).ok()?;
@@ -107,19 +129,27 @@ fn read<const N: usize, T>(
     take: impl Fn(&Row, [f64; N]) -> Result<T, FileError>,
 ) -> Result<Vec<T>, FileError> {
     let table = Table::read(path)?;
+    let rows = taken(&table, names, take)?;
+    if rows.is_empty() {
+        return Err(table.wrong("there is no row below the first line"));
+    }
+    Ok(rows)
+}
+
+/// As [`read`], of a table that may have no rows.
+fn taken<const N: usize, T>(
+    table: &Table,
+    names: &[&str; N],
+    take: impl Fn(&Row, [f64; N]) -> Result<T, FileError>,
+) -> Result<Vec<T>, FileError> {
     let columns = table.columns(names)?;
-    let rows: Result<Vec<T>, FileError> = table
+    table
         .rows()
         .map(|row| {
             let row = row?;
             take(&row, row.numbers(&columns)?)
         })
-        .collect();
-    let rows = rows?;
-    if rows.is_empty() {
-        return Err(table.wrong("there is no row below the first line"));
-    }
-    Ok(rows)
+        .collect()
 }
 
 /// Writes the answers: as CSV, one row a pair, touch by touch; or as NPZ, one array a column.
@@ -225,5 +255,38 @@ mod tests {
         let (_keep, path) = file("x_mm,y_mm\n1,2\n");
         let error = read_sites(&path).unwrap_err().to_string();
         assert!(error.contains("z_mm is missing"), "{error}");
+    }
+
+    #[test]
+    fn presses_that_nobody_can_mean_are_refused_with_their_line() {
+        let head = "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n";
+        let read = |rows: &str| {
+            let (_keep, path) = file(&format!("{head}{rows}"));
+            read_presses(&path).map_err(|e| e.to_string())
+        };
+        let presses = read("1,2,22.5,0,60,8\n# a remark\n4,1,0,0,0,1\n").unwrap();
+        let first = GivenPress {
+            start_s: 1.0,
+            duration_s: 2.0,
+            position: DVec3::new(22.5, 0.0, 60.0) * 1e-3,
+            force: 8.0,
+        };
+        assert_eq!((presses.len(), presses[0]), (2, first));
+        assert!(read("").unwrap().is_empty());
+        for (rows, part) in [
+            ("1,1,1,2,3,8\n1,1,nan,0,0,8\n", "line 3: “x_mm” is “nan”"),
+            ("1,1,0,1e309,0,8\n", "finite"),
+            ("-1,1,1,2,3,8\n", "start_s"),
+            ("1,nan,1,2,3,8\n", "duration_s"),
+            ("1,0,1,2,3,8\n", "duration_s"),
+            ("1,1,1,2,3,1e300\n", "force_n"),
+            ("1,1,1\n", "line 2: there are 3 values for the 6 columns"),
+        ] {
+            let said = read(rows).unwrap_err();
+            assert!(said.contains(part) && said.contains("t.csv"), "{said}");
+        }
+        let (_keep, path) = file(&format!("\u{1b}[31m{}\n1\n", "x".repeat(200_000)));
+        let said = read_presses(&path).unwrap_err().to_string();
+        assert!(said.len() < 500 && !said.contains('\u{1b}'), "{said}");
     }
 }

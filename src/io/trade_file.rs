@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::fingerprint::Fingerprint;
 use super::svg::escape;
 use super::together::Together;
-use super::{FileError, atomic};
+use super::{FileError, atomic, source};
 use crate::dataset::Signal;
 use crate::design::Inputs;
 use crate::placement::SelectorKind;
@@ -124,10 +124,10 @@ pub fn inputs_key(inputs: &Inputs) -> String {
 /// [`FileError`] for a file that is there and is no trade.
 pub fn read(folder: &Path) -> Result<Option<Record>, FileError> {
     let path = folder.join("trade.json");
-    let text = match std::fs::read_to_string(&path) {
+    let text = match source::read_text(&path) {
         Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(e) => return Err(FileError::of(&path, &e)),
+        Err(FileError::Missing { .. }) => return Ok(None),
+        Err(error) => return Err(error),
     };
     let broken = |m| {
         FileError::broken(

@@ -1,17 +1,25 @@
 //! The thread that listens: opens, asks, reads, understands, records, and finds the board again.
 
+mod connection;
+mod notes;
+mod reconnect;
+mod recording;
+mod timing;
+
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver as Inbox, Sender, channel};
+use std::sync::mpsc::Receiver as Inbox;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use super::{Address, Got, Port, Recorder, old_note, ports};
+use super::{Address, Got, Port, Recorder, old_note};
 use crate::live::{Doubt, Input, Pipeline, Receiver, Rest, Sample, Traffic, Update};
 use crate::plain;
-use crate::wire::{Hello, MOST_CHANNELS, Message, encode};
+use crate::wire::{Hello, Message, encode};
+
+pub use connection::Connection;
+pub use timing::Timing;
 
 /// How the connection stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,46 +73,13 @@ pub enum Command {
     Do(Box<dyn FnOnce(&mut Pipeline) + Send>),
 }
 
-/// Between bytes that arrive and the touch that was computed from them.
-#[derive(Clone, Debug, Default)]
-pub struct Timing {
-    /// The last ones (µs), in a ring.
-    ring: Vec<f32>,
-    next: usize,
-}
-
-impl Timing {
-    const KEPT: usize = 4096;
-
-    fn push(&mut self, micros: f32) {
-        if self.ring.len() < Self::KEPT {
-            self.ring.push(micros);
-        } else {
-            self.ring[self.next] = micros;
-        }
-        self.next = (self.next + 1) % Self::KEPT;
-    }
-
-    /// The value (µs) that a share of the last samples stayed below.
-    #[must_use]
-    pub fn quantile(&self, share: f64) -> Option<f32> {
-        let mut sorted = self.ring.clone();
-        sorted.sort_by(f32::total_cmp);
-        let last = sorted.len().checked_sub(1)?;
-        Some(sorted[(share * last as f64).round() as usize])
-    }
-}
-
-/// Asked again so often while nothing is understood; silence that is told; tries to find a board again.
+/// Asked again so often while nothing is understood; silence that is told.
 const ASK: Duration = Duration::from_millis(400);
 const SILENCE: Duration = Duration::from_millis(700);
-const AGAIN: Duration = Duration::from_millis(150);
 /// How long a board may take to be understood before it is said why it is not.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// The most reasons that are told of one connection.
 const REASONS: usize = 8;
-/// How long another port has to say which board it is.
-const WHO: Duration = Duration::from_millis(400);
 
 /// One who listens, on whatever thread it is run on.
 pub struct Listener {
@@ -294,21 +269,6 @@ impl Listener {
         });
     }
 
-    /// A recording that can be written no more has ended, and that is said.
-    fn check_recording(&mut self, tell: &mut impl FnMut(Heard)) {
-        if let Some(why) = self.recorder.as_mut().and_then(|r| r.failed.take()) {
-            self.recorder = None;
-            tell(Heard::Unrecorded(&why));
-        }
-    }
-
-    fn flush_recording(&mut self, tell: &mut impl FnMut(Heard)) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.flush();
-        }
-        self.check_recording(tell);
-    }
-
     fn say(&mut self, port: &mut dyn Port, message: &Message) {
         let mut bytes = Vec::new();
         encode(
@@ -346,36 +306,6 @@ impl Listener {
             Command::Truth(touch) => self.record(|r| r.truth(touch)),
             Command::Do(work) => work(&mut self.pipeline),
         }
-    }
-
-    fn record(&mut self, write: impl FnOnce(&mut Recorder)) {
-        if let Some(recorder) = &mut self.recorder {
-            write(recorder);
-        }
-    }
-
-    /// A recording can be replayed on its own: it begins with the board and its rest.
-    fn begin_recording(&mut self) {
-        self.pipeline.begin_anew();
-        let taring = self.pipeline.is_taring();
-        if taring {
-            self.pipeline.tare();
-        }
-        if let (Some(recorder), Some(hello)) = (&mut self.recorder, &self.hello) {
-            recorder.hello(hello);
-        }
-        if let (Some(recorder), Some(rest)) = (&mut self.recorder, &self.pipeline.rest) {
-            recorder.rest(rest);
-        }
-        let dead: Vec<usize> = self.pipeline.dead().collect();
-        self.record(|r| {
-            if taring {
-                r.own("tare");
-            }
-            for k in dead {
-                r.own(&format!("dead {k}"));
-            }
-        });
     }
 
     fn take(
@@ -460,143 +390,6 @@ impl Listener {
         // Not when it arrived: one that is slow to compute is not silent.
         self.heard = Instant::now();
     }
-
-    /// What the studio did when this was recorded.
-    fn replay(&mut self, own: &str, time_us: u64, arrived: Instant, tell: &mut impl FnMut(Heard)) {
-        let words: Vec<&str> = own.split_whitespace().collect();
-        match words[..] {
-            ["tare"] => self.pipeline.tare(),
-            ["rest", k, level, noise] => {
-                if let (Ok(k), Some(level), Some(noise)) =
-                    (k.parse::<usize>(), number(level), number(noise))
-                    && k == self.rest.level.len()
-                {
-                    self.rest.level.push(level);
-                    self.rest.noise.push(noise);
-                }
-                if self.rest.level.len() == self.pipeline.settings.channels.len() {
-                    self.pipeline.set_rest(std::mem::take(&mut self.rest));
-                }
-            }
-            ["dead", k] => {
-                if let Ok(k) = k.parse() {
-                    self.pipeline.mark_dead(&[k]);
-                }
-            }
-            ["truth", "none"] => tell(Heard::Truth(None)),
-            ["truth", x, y, z, force] => {
-                if let [Some(x), Some(y), Some(z), Some(force)] = [x, y, z, force].map(number) {
-                    tell(Heard::Truth(Some((DVec3::new(x, y, z) * 1e-3, force))));
-                }
-            }
-            ["part", from, values] => {
-                self.gather(from, values);
-            }
-            ["line", values] => self.replay_line("0", values, time_us, arrived, tell),
-            ["line", from, values] => self.replay_line(from, values, time_us, arrived, tell),
-            _ => {}
-        }
-    }
-
-    /// The end of a line of counts, with what was gathered of it before.
-    fn replay_line(
-        &mut self,
-        from: &str,
-        values: &str,
-        time_us: u64,
-        arrived: Instant,
-        tell: &mut impl FnMut(Heard),
-    ) {
-        if self.gather(from, values) {
-            let counts = std::mem::take(&mut self.line);
-            self.measure(&Sample { time_us, counts }, arrived, tell);
-        }
-    }
-
-    /// Counts of a line from one channel on; none of it is used where those before them are missing.
-    fn gather(&mut self, from: &str, values: &str) -> bool {
-        let from = from.parse().unwrap_or(usize::MAX);
-        if from == 0 {
-            self.line.clear();
-        }
-        let piece: Option<Vec<f64>> = values.split(',').map(number).collect();
-        let piece = piece.filter(|p| from == self.line.len() && from + p.len() <= MOST_CHANNELS);
-        if let Some(piece) = &piece {
-            self.line.extend(piece);
-        } else {
-            self.line.clear();
-        }
-        piece.is_some()
-    }
-
-    /// The same board at the same port, or at another one. Nothing when it is no longer wanted.
-    fn find_again(
-        &mut self,
-        stop: &AtomicBool,
-        inbox: &Inbox<Command>,
-        tell: &mut impl FnMut(Heard),
-    ) -> Option<Box<dyn Port>> {
-        while !stop.load(Ordering::Relaxed) {
-            if let Ok(port) = self.address.open() {
-                return Some(port);
-            }
-            if let Some(port) = self.at_another_port() {
-                return Some(port);
-            }
-            while let Ok(command) = inbox.try_recv() {
-                self.obey(command, &mut Nowhere, tell);
-            }
-            self.turn(tell);
-            std::thread::sleep(AGAIN);
-        }
-        None
-    }
-
-    fn at_another_port(&mut self) -> Option<Box<dyn Port>> {
-        let (Address::Serial { path, baud }, Some(board)) =
-            (&self.address, self.hello.as_ref().map(|h| h.board))
-        else {
-            return None;
-        };
-        let (path, baud) = (path.clone(), *baud);
-        for other in ports().into_iter().filter(|p| p.likely && p.path != path) {
-            let address = Address::Serial {
-                path: other.path,
-                baud,
-            };
-            let Ok(mut port) = address.open() else {
-                continue;
-            };
-            if self.asks(&mut *port) == Some(board) {
-                self.address = address;
-                return Some(port);
-            }
-        }
-        None
-    }
-
-    /// Which board it is.
-    fn asks(&mut self, port: &mut dyn Port) -> Option<u32> {
-        self.say(port, &Message::AskHello);
-        let (begun, mut receiver, mut buffer) = (Instant::now(), Receiver::default(), [0; 4096]);
-        let mut found = None;
-        while found.is_none() && begun.elapsed() < WHO {
-            match port.read(&mut buffer) {
-                Got::Gone => return None,
-                Got::Nothing => {}
-                Got::Bytes(count) => receiver.push(&buffer[..count], 0, |input| {
-                    if let Input::Hello(hello) = input {
-                        found = Some(hello.board);
-                    }
-                }),
-            }
-        }
-        found
-    }
-}
-
-fn number(text: &str) -> Option<f64> {
-    text.parse().ok().filter(|v: &f64| v.is_finite())
 }
 
 /// A text of a board cannot be taken for several of our own.
@@ -604,240 +397,5 @@ fn in_one_line(text: &str) -> String {
     text.replace(['\n', '\r'], " ")
 }
 
-/// For what is asked while there is no port.
-struct Nowhere;
-
-impl Port for Nowhere {
-    fn read(&mut self, _: &mut [u8]) -> Got {
-        Got::Gone
-    }
-    fn write(&mut self, _: &[u8]) {}
-}
-
-/// A listener on a thread of its own; it ends when this is dropped.
-pub struct Connection {
-    commands: Sender<Command>,
-    stop: Arc<AtomicBool>,
-}
-
-impl Connection {
-    /// Starts to listen. `tell` is called on the listening thread; `ended` at the end, with why it could not begin.
-    ///
-    /// # Errors
-    /// When no thread can be had.
-    pub fn start(
-        listener: Listener,
-        tell: impl FnMut(Heard) + Send + 'static,
-        ended: impl FnOnce(Result<(), String>) + Send + 'static,
-    ) -> Result<Self, String> {
-        let (commands, inbox) = channel();
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopping = Arc::clone(&stop);
-        std::thread::Builder::new()
-            .name("board".into())
-            .spawn(move || ended(listener.run(&stopping, &inbox, tell)))
-            .map_err(|e| format!("the port cannot be listened to ({e})"))?;
-        Ok(Self { commands, stop })
-    }
-
-    pub fn send(&self, command: Command) {
-        // A listener that has ended hears nothing any more, and has said so.
-        let _ = self.commands.send(command);
-    }
-}
-
-impl Drop for Connection {
-    /// Does not wait: a thread that is looking for an unplugged board may take a moment to hear of it.
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use std::io::Write;
-    use std::net::TcpListener;
-    use std::path::Path;
-
-    use super::*;
-    use crate::inference::ResponseMap;
-    use crate::limb::LimbSpec;
-    use crate::link::Pace;
-    use crate::live::Settings;
-
-    const GAUGES: usize = 4;
-
-    fn pipeline() -> Pipeline {
-        let spec = LimbSpec {
-            element: 20.0,
-            ..LimbSpec::default()
-        };
-        let mesh = spec.build().unwrap().0;
-        let nodes = mesh.positions().len() + mesh.edges().len();
-        let value = |k: usize| 1e-5 * (1.7 * k as f64).sin();
-        let values = (0..nodes * GAUGES).map(value).collect();
-        let map = ResponseMap::of(Arc::new(mesh), GAUGES, values);
-        Pipeline::new(Arc::new(map), Settings::of(GAUGES))
-    }
-
-    fn hello() -> Hello {
-        Hello {
-            version: crate::wire::VERSION,
-            board: 7,
-            channels: 4,
-            bits: 12,
-            reference_mv: 3300,
-            supply_mv: 5000,
-            gain_milli: 330_000,
-            rate_hz: 1000,
-            name: "limb\u{1b}[31m".into(),
-        }
-    }
-
-    fn frames(messages: &[Message]) -> Vec<u8> {
-        let mut bytes = vec![0];
-        for (k, message) in (0..).zip(messages) {
-            encode(message, k, 1000 * u32::from(k), 12, &mut bytes);
-        }
-        bytes
-    }
-
-    /// All that is heard there until it is over, and how it ended.
-    fn heard(address: Address) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
-        let (mut said, mut counts) = (Vec::new(), Vec::new());
-        let (stop, (_commands, inbox)) = (AtomicBool::new(false), channel());
-        let ended = Listener::new(address, pipeline()).run(&stop, &inbox, |heard| match heard {
-            Heard::State(State::Gone) => stop.store(true, Ordering::Relaxed),
-            Heard::Hello(hello) => said.push(format!("hello {}", hello.name)),
-            Heard::Message(text) => said.push(format!("message {text}")),
-            Heard::Trouble(text) => said.push(format!("trouble {text}")),
-            Heard::Truth(touch) => said.push(format!("truth {touch:?}")),
-            Heard::Sample { sample, .. } => counts.push(sample.counts.clone()),
-            _ => {}
-        });
-        (said, counts, ended)
-    }
-
-    fn of_board(bytes: Vec<u8>) -> Vec<String> {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = listener.local_addr().unwrap().to_string();
-        std::thread::spawn(move || {
-            let (mut stream, _) = listener.accept().unwrap();
-            stream.write_all(&bytes).unwrap();
-            stream.shutdown(std::net::Shutdown::Write).unwrap();
-            // Until the other side has taken it and is gone.
-            let _ = std::io::copy(&mut stream, &mut std::io::sink());
-        });
-        heard(Address::Socket(address)).0
-    }
-
-    fn recording(path: &Path) -> Address {
-        Address::Recording {
-            path: path.to_owned(),
-            pace: Pace::Fast,
-        }
-    }
-
-    fn of_recording(bytes: &[u8]) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.hapdrec");
-        std::fs::write(&path, bytes).unwrap();
-        heard(recording(&path))
-    }
-
-    fn log(text: &str) -> Message {
-        Message::Log {
-            level: 0,
-            text: text.into(),
-        }
-    }
-
-    #[test]
-    fn text_of_a_board_is_shown_and_never_obeyed() {
-        let said = of_board(frames(&[
-            Message::Hello(hello()),
-            log("hapdef truth 1 2 3 4"),
-            log("hapdef dead 0"),
-            log("hapdef line 1,2,3,4"),
-            Message::Note("truth 1 2 3 4".into()),
-            log("a\u{1b}]0;title\u{7}\nhapdef: b"),
-        ]));
-        let expected = [
-            "hello limb\u{fffd}[31m",
-            "message hapdef truth 1 2 3 4",
-            "message hapdef dead 0",
-            "message hapdef line 1,2,3,4",
-            "message a\u{fffd}]0;title\u{fffd} hapdef: b",
-        ];
-        assert_eq!(said, expected);
-    }
-
-    #[test]
-    fn notes_of_a_recording_are_obeyed_the_old_ones_too() {
-        let data = Message::Data(vec![2000; 4]);
-        let old = [Message::Hello(hello()), log("hapdef truth none"), data];
-        let (said, counts, ended) = of_recording(&frames(&old));
-        assert_eq!(said[1..], ["truth None"]);
-        assert_eq!((counts.len(), ended), (1, Ok(())));
-        let new = [
-            Message::Note("truth none".into()),
-            log("hapdef truth none"),
-            Message::Note("line 1,2,3,4".into()),
-        ];
-        let (said, counts, _) = of_recording(&frames(&new));
-        assert_eq!(said, ["truth None", "message hapdef truth none"]);
-        assert_eq!(counts, [[1.0, 2.0, 3.0, 4.0]]);
-    }
-
-    #[test]
-    fn lines_with_many_channels_are_recorded_whole() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.hapdrec");
-        let long = |k: usize| (k as f64 - 31.5) * 1e14 / 3.0 + 1e-9;
-        let sample = Sample {
-            time_us: 5,
-            counts: (0..MOST_CHANNELS).map(long).collect(),
-        };
-        let mut recorder = Recorder::create(&path).unwrap();
-        recorder.sample(&sample);
-        drop(recorder);
-        assert_eq!(heard(recording(&path)).1, [sample.counts]);
-        // One whose middle is lost is not taken for one of fewer channels.
-        let torn = ["part 0 1,2", "line 4 5,6", "line 0 1,2,x", "part 9", "line"];
-        let torn = torn.map(|text| Message::Note(text.into()));
-        assert!(of_recording(&frames(&torn)).1.is_empty());
-    }
-
-    #[test]
-    fn a_board_that_cannot_be_used_says_why_once() {
-        let deaf = Message::Hello(Hello {
-            gain_milli: 0,
-            ..hello()
-        });
-        let data = Message::Data(vec![2000; 4]);
-        let said = of_board(frames(&[
-            deaf.clone(),
-            data.clone(),
-            deaf.clone(),
-            data,
-            deaf,
-        ]));
-        assert_eq!(said.len(), 1, "{said:?}");
-        assert!(said[0].starts_with("trouble ") && said[0].contains("gain"));
-    }
-
-    #[test]
-    fn a_recording_without_a_reading_says_so() {
-        let other = Message::Hello(Hello {
-            version: 2,
-            ..hello()
-        });
-        let garbage = [&frames(&[log("ready"), other])[..], &vec![0x41; 40_000]].concat();
-        let (_, _, ended) = of_recording(&garbage);
-        let said = ended.unwrap_err();
-        assert!(
-            said.contains("no reading") && said.contains("version 2"),
-            "{said}"
-        );
-    }
-}
+mod tests;

@@ -303,6 +303,12 @@ mod tests {
         }
     }
 
+    fn greeting(hello: Hello) -> Vec<u8> {
+        let mut bytes = vec![0];
+        encode(&Message::Hello(hello), 0, 0, 12, &mut bytes);
+        bytes
+    }
+
     fn data(from: u16, to: u16) -> Vec<u8> {
         let mut bytes = Vec::new();
         for k in from..to {
@@ -322,9 +328,9 @@ mod tests {
     #[test]
     fn frames_are_heard_behind_numeric_lines() {
         let boot = b"1,2,3\n2,3,4\n3,4,5\n4,5,6\n5,6,7\n6,7,8\n";
-        let mut greeting = Vec::new();
-        encode(&Message::Hello(hello()), 0, 0, 12, &mut greeting);
-        let (all, _) = inputs(&[&boot[..], &greeting, &data(1, 5000)].concat());
+        // It sends no zero before its first frame.
+        let greeted = &greeting(hello())[1..];
+        let (all, _) = inputs(&[&boot[..], greeted, &data(1, 5000)].concat());
         let pairs = |i: &&Input| matches!(i, Input::Sample(s) if s.counts.len() == 2);
         assert_eq!(all.iter().filter(pairs).count(), 4999);
         // Where its HELLO was said before anybody listened, it is soon known that one must be asked for.
@@ -350,11 +356,6 @@ mod tests {
             let mut receiver = Receiver::default();
             receiver.push(bytes, 0, |_| {});
             receiver.doubt()
-        };
-        let greeting = |hello: Hello| {
-            let mut bytes = vec![0];
-            encode(&Message::Hello(hello), 0, 0, 12, &mut bytes);
-            bytes
         };
         let refused = |doubt: Option<Doubt>| match doubt {
             Some(Doubt::Refused(why)) => why.in_words().unwrap(),
@@ -392,30 +393,12 @@ mod tests {
 
     #[test]
     fn frames_are_found_behind_anything_and_lines_in_them_are_none() {
-        let hello = Hello {
-            version: 1,
-            board: 7,
-            channels: 2,
-            bits: 12,
-            reference_mv: 3300,
-            supply_mv: 5000,
-            gain_milli: 330_000,
-            rate_hz: 1000,
+        let named = Hello {
             name: "1,2\n1,2\n1,2\n1,2\n1,2\n".into(),
+            ..hello()
         };
-        let mut bytes = b"garbage\n\0".to_vec();
-        encode(&Message::Hello(hello), 0, 0, 12, &mut bytes);
-        for k in 0..5_u32 {
-            let counts = vec![100 + k, 200];
-            encode(
-                &Message::Data(counts),
-                k as u16 + 1,
-                1000 * k,
-                12,
-                &mut bytes,
-            );
-        }
-        // The fourth is damaged.
+        let mut bytes = [&b"garbage\n"[..], &greeting(named), &data(1, 6)].concat();
+        // The last one is damaged.
         let at = bytes.len() - 12;
         bytes[at] ^= 0x10;
         let (all, traffic) = inputs(&bytes);

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::{DVec3, I64Vec3};
 
 use super::numbers::NumberMap;
+use super::report::RepairReport;
 
 /// Repairs that are asked for; without them only what must be is done.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -102,10 +103,54 @@ fn open_sides(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
         .collect()
 }
 
+/// Whether the height of a triangle is below 1e-10 of its longest side: relative, so that it does not depend on the
+/// unit.
+pub(super) fn has_no_area(positions: &[DVec3], tri: [u32; 3]) -> bool {
+    let [a, b, c] = tri.map(|v| positions[v as usize]);
+    let longest = (b - a)
+        .length_squared()
+        .max((c - b).length_squared())
+        .max((a - c).length_squared());
+    (b - a).cross(c - a).length() <= 1e-10 * longest
+}
+
+/// Fills the holes that are asked for.
+pub(super) fn fill_holes(
+    positions: &mut Vec<DVec3>,
+    triangles: &mut Vec<[u32; 3]>,
+    repair: &Repair,
+    report: &mut RepairReport,
+) {
+    if repair.fill_holes <= 0.0 {
+        return;
+    }
+    for rim in holes(positions, triangles, repair.fill_holes) {
+        let before = positions.len();
+        let filling = fill(positions, &rim).unwrap_or_else(|| fan(positions, &rim));
+        // A seam of points in a line has no area to fill: it stays open, as what is said of open edges tells.
+        if filling.iter().any(|&tri| has_no_area(positions, tri)) {
+            positions.truncate(before);
+            continue;
+        }
+        triangles.extend(filling);
+        report.filled_holes += 1;
+    }
+}
+
+/// A filling for rims that are too long for the best one: a fan round a new vertex in the middle.
+fn fan(positions: &mut Vec<DVec3>, rim: &[u32]) -> Vec<[u32; 3]> {
+    let middle = rim.iter().map(|&v| positions[v as usize]).sum::<DVec3>() / rim.len() as f64;
+    let centre = positions.len() as u32;
+    positions.push(middle);
+    (0..rim.len())
+        .map(|i| [rim[i], rim[(i + 1) % rim.len()], centre])
+        .collect()
+}
+
 /// Rims of holes no further across than `across` (m): closed lines of edges with a triangle on one side
 /// only, in the winding of the triangles that would fill them. The longest rim of an open surface is
 /// its border and never counts as a hole, however small it is.
-pub(super) fn holes(positions: &[DVec3], triangles: &[[u32; 3]], across: f64) -> Vec<Vec<u32>> {
+fn holes(positions: &[DVec3], triangles: &[[u32; 3]], across: f64) -> Vec<Vec<u32>> {
     let mut rims = rims(triangles);
     let size = |rim: &Vec<u32>| {
         let (low, high) = rim
@@ -169,7 +214,7 @@ const LONGEST: usize = 120;
 
 /// The triangulation of a closed line with the least area (G. Barequet and M. Sharir, "Filling gaps in
 /// the boundary of a polyhedron", Computer Aided Geometric Design 12 (1995)).
-pub(super) fn fill(positions: &[DVec3], rim: &[u32]) -> Option<Vec<[u32; 3]>> {
+fn fill(positions: &[DVec3], rim: &[u32]) -> Option<Vec<[u32; 3]>> {
     let n = rim.len();
     if n > LONGEST {
         return None;

@@ -66,9 +66,14 @@ impl Ranges {
         self.0.get(&field).copied()
     }
 
+    /// Fixes a range, or lets it go. Bounds that are no numbers, endless or equal can be typed, but nothing can be
+    /// coloured by them: they leave the range before.
     pub fn set(&mut self, field: Field, range: Option<(f64, f64)>) {
         match range {
-            Some(range) => drop(self.0.insert(field, range)),
+            Some((low, high)) if (high - low).is_finite() && low != high => {
+                self.0.insert(field, (low, high));
+            }
+            Some(_) => {}
             None => drop(self.0.remove(&field)),
         }
     }
@@ -409,5 +414,28 @@ impl Studio {
         touched
             .exaggeration
             .filter(|_| self.view.tool == Tool::Touch)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_that_nothing_can_be_coloured_by_leave_the_range_before() {
+        let field = Field::Strain;
+        let mut ranges = Ranges::default();
+        ranges.set(field, Some((f64::NAN, 1.0)));
+        assert_eq!(ranges.of(field), None);
+        ranges.set(field, Some((-2.0, 3.0)));
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            ranges.set(field, Some((bad, 3.0)));
+            ranges.set(field, Some((-2.0, bad)));
+        }
+        ranges.set(field, Some((f64::MIN, f64::MAX)));
+        ranges.set(field, Some((3.0, 3.0)));
+        assert_eq!(ranges.of(field), Some((-2.0, 3.0)));
+        ranges.set(field, None);
+        assert_eq!(ranges.of(field), None);
     }
 }

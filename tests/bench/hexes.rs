@@ -13,6 +13,17 @@ use hapdef::elasticity::{Material, Support};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::volume::VolumeMesh;
 
+/// A brick as six tetrahedra around the diagonal from its first corner to its last; corners are counted in binary,
+/// x in the lowest bit.
+pub const TETRAHEDRA: [[usize; 4]; 6] = [
+    [0, 1, 3, 7],
+    [0, 5, 1, 7],
+    [0, 3, 2, 7],
+    [0, 2, 6, 7],
+    [0, 4, 5, 7],
+    [0, 6, 4, 7],
+];
+
 /// Bricks between coordinates along three axes, of which some are kept, placed by a map that is linear in each.
 pub struct Bricks {
     pub axes: [Vec<f64>; 3],
@@ -85,16 +96,7 @@ impl Bricks {
                             })
                         })
                     });
-                    for t in [
-                        [0, 1, 3, 7],
-                        [0, 5, 1, 7],
-                        [0, 3, 2, 7],
-                        [0, 2, 6, 7],
-                        [0, 4, 5, 7],
-                        [0, 6, 4, 7],
-                    ] {
-                        corners.push(t.map(|n| brick[n]));
-                    }
+                    corners.extend(TETRAHEDRA.map(|t| t.map(|n| brick[n])));
                 }
             }
         }

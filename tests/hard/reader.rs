@@ -50,6 +50,8 @@ pub enum Reader {
     /// Touches and gauges to answer for.
     Touches,
     Sites,
+    /// Who presses a simulated board, and when.
+    Presses,
     /// A trade that was measured.
     Trade,
     /// What a board sends.
@@ -78,7 +80,7 @@ pub const TABLE: &str =
 pub const PLACES: &str = "x_mm,y_mm,z_mm\n0,0,1\n10,0,1\n20.5,-3,1e1\n";
 
 impl Reader {
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::Stl,
         Self::Obj,
         Self::Ply,
@@ -95,6 +97,7 @@ impl Reader {
         Self::Export,
         Self::Touches,
         Self::Sites,
+        Self::Presses,
         Self::Trade,
         Self::Wire,
         Self::Frames,
@@ -119,6 +122,7 @@ impl Reader {
             Self::Export => "export",
             Self::Touches => "touches",
             Self::Sites => "sites",
+            Self::Presses => "presses",
             Self::Trade => "trade",
             Self::Wire => "wire",
             Self::Frames => "frames",
@@ -131,7 +135,7 @@ impl Reader {
         match self {
             Self::Project => "toml",
             Self::Arrays | Self::Mask => "npy",
-            Self::Places | Self::Touches | Self::Sites => "csv",
+            Self::Places | Self::Touches | Self::Sites | Self::Presses => "csv",
             Self::Export => "txt",
             Self::Trade => "json",
             Self::Wire | Self::Frames => "bin",
@@ -180,6 +184,7 @@ impl Reader {
             Self::Export => export(bytes, folder),
             Self::Touches => touches(&put(folder, "touches.csv", bytes)?),
             Self::Sites => sites(&put(folder, "sites.csv", bytes)?),
+            Self::Presses => presses(&put(folder, "presses.csv", bytes)?),
             Self::Trade => trade(bytes),
             Self::Wire => wire(bytes),
             Self::Frames => wire(&framed(bytes)),
@@ -293,6 +298,22 @@ fn sites(path: &Path) -> Result<Outcome, String> {
         property::finite(site.position.to_array())?;
         if !site.direction.is_normalized() {
             return Err(format!("a gauge along {}", site.direction));
+        }
+    }
+    Ok(Outcome::Taken)
+}
+
+fn presses(path: &Path) -> Result<Outcome, String> {
+    let presses = match points::read_presses(path) {
+        Ok(presses) => presses,
+        Err(error) => return Ok(refused(error)),
+    };
+    for p in &presses {
+        let end = p.start_s + p.duration_s;
+        let place = p.position.to_array().into_iter();
+        property::finite(place.chain([p.start_s, end, p.force]))?;
+        if p.start_s < 0.0 || end <= p.start_s || p.force <= 0.0 {
+            return Err(format!("the press {p:?}"));
         }
     }
     Ok(Outcome::Taken)

@@ -43,6 +43,7 @@ pub fn of(reader: Reader) -> Vec<Vec<u8>> {
         Reader::Export => vec![EXPORT.into(), EXPORT.replace('.', ",").into(), wide(EXPORT)],
         Reader::Touches => vec![TOUCHES.into()],
         Reader::Sites => vec![SITES.into()],
+        Reader::Presses => vec![PRESSES.into()],
         Reader::Trade => vec![trade()],
         Reader::Wire => vec![frames(true), lines()],
         Reader::Frames => vec![contents(&frames(false))],
@@ -270,6 +271,8 @@ channels = [2, 0, 1]
 const EXPORT: &str = "Node Number\tX Location (mm)\tY Location (mm)\tZ Location (mm)\tTotal Deformation (mm)\n1\t0.5\t1.5\t2.5\t0.001\n2\t3.5\t4.5\t5.5\t2.5e-3\n";
 const TOUCHES: &str =
     "x_mm,y_mm,z_mm,nx,ny,nz,force_n,tip_radius_mm\n31.8,0,60,1,0,0,10,5\n0,31.8,40,0,1,0,2.5,3\n";
+const PRESSES: &str =
+    "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n0.1,0.5,31.8,0,60,5\n0.9,0.3,0,31.8,40,2.5\n";
 const SITES: &str = "x_mm,y_mm,z_mm,dx,dy,dz\n30.3,0,50,0,0,1\n0,30.3,70,1,0,1\n";
 
 /// Text as Windows likes to write it.

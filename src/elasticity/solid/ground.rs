@@ -244,20 +244,21 @@ impl SolidGround {
         let (tip, away) = self.nearest(&touches);
         let mut grids = Grids::default();
         let mut size = shape.first(tip, away, least);
-        loop {
-            let solved = Solved::new(self, size, &touches, &places, watch)?;
-            grids.push(solved);
+        let estimate = loop {
+            grids.push(Solved::new(self, size, &touches, &places, watch)?);
             let next = sizing::next(size, least);
-            let enough = grids.samples.len() >= LEAST_GRIDS as usize;
-            match next {
-                Some(finer) if !enough => size = finer,
-                Some(finer) if self.left(&grids, &touches, &places).excess(aim) > SAFETY => {
-                    size = finer;
-                }
-                _ => break,
+            if let Some(finer) = next
+                && grids.sizes.len() < LEAST_GRIDS as usize
+            {
+                size = finer;
+                continue;
             }
-        }
-        let estimate = self.left(&grids, &touches, &places);
+            let left = self.left(&grids, &touches, &places);
+            match next {
+                Some(finer) if left.excess(aim) > SAFETY => size = finer,
+                _ => break left,
+            }
+        };
         let (models, solves) = (grids.sizes.len() as u64, touches.len() as u64);
         let Some(last) = grids.last else {
             unreachable!("there is a first grid");

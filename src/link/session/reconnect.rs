@@ -1,0 +1,92 @@
+//! A board that was unplugged is looked for again, at its port and at the others.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver as Inbox;
+use std::time::{Duration, Instant};
+
+use super::{Command, Heard, Listener};
+use crate::link::{Address, Got, Port, ports};
+use crate::live::{Input, Receiver};
+use crate::wire::Message;
+
+/// Between two tries.
+const AGAIN: Duration = Duration::from_millis(150);
+/// How long another port has to say which board it is.
+const WHO: Duration = Duration::from_millis(400);
+
+impl Listener {
+    /// The same board at the same port, or at another one. Nothing when it is no longer wanted.
+    pub(super) fn find_again(
+        &mut self,
+        stop: &AtomicBool,
+        inbox: &Inbox<Command>,
+        tell: &mut impl FnMut(Heard),
+    ) -> Option<Box<dyn Port>> {
+        while !stop.load(Ordering::Relaxed) {
+            if let Ok(port) = self.address.open() {
+                return Some(port);
+            }
+            if let Some(port) = self.at_another_port() {
+                return Some(port);
+            }
+            while let Ok(command) = inbox.try_recv() {
+                self.obey(command, &mut Nowhere, tell);
+            }
+            self.turn(tell);
+            std::thread::sleep(AGAIN);
+        }
+        None
+    }
+
+    fn at_another_port(&mut self) -> Option<Box<dyn Port>> {
+        let (Address::Serial { path, baud }, Some(board)) =
+            (&self.address, self.hello.as_ref().map(|h| h.board))
+        else {
+            return None;
+        };
+        let (path, baud) = (path.clone(), *baud);
+        for other in ports().into_iter().filter(|p| p.likely && p.path != path) {
+            let address = Address::Serial {
+                path: other.path,
+                baud,
+            };
+            let Ok(mut port) = address.open() else {
+                continue;
+            };
+            if self.asks(&mut *port) == Some(board) {
+                self.address = address;
+                return Some(port);
+            }
+        }
+        None
+    }
+
+    /// Which board it is.
+    fn asks(&mut self, port: &mut dyn Port) -> Option<u32> {
+        self.say(port, &Message::AskHello);
+        let (begun, mut receiver, mut buffer) = (Instant::now(), Receiver::default(), [0; 4096]);
+        let mut found = None;
+        while found.is_none() && begun.elapsed() < WHO {
+            match port.read(&mut buffer) {
+                Got::Gone => return None,
+                Got::Nothing => {}
+                Got::Bytes(count) => receiver.push(&buffer[..count], 0, |input| {
+                    if let Input::Hello(hello) = input {
+                        found = Some(hello.board);
+                    }
+                }),
+            }
+        }
+        found
+    }
+}
+
+/// For what is asked while there is no port.
+struct Nowhere;
+
+impl Port for Nowhere {
+    fn read(&mut self, _: &mut [u8]) -> Got {
+        Got::Gone
+    }
+    fn write(&mut self, _: &[u8]) {}
+}

@@ -1,0 +1,51 @@
+//! What is heard, written down while it is heard.
+
+use super::{Heard, Listener};
+use crate::link::Recorder;
+
+impl Listener {
+    pub(super) fn record(&mut self, write: impl FnOnce(&mut Recorder)) {
+        if let Some(recorder) = &mut self.recorder {
+            write(recorder);
+        }
+    }
+
+    /// A recording can be replayed on its own: it begins with the board and its rest.
+    pub(super) fn begin_recording(&mut self) {
+        self.pipeline.begin_anew();
+        let taring = self.pipeline.is_taring();
+        if taring {
+            self.pipeline.tare();
+        }
+        if let (Some(recorder), Some(hello)) = (&mut self.recorder, &self.hello) {
+            recorder.hello(hello);
+        }
+        if let (Some(recorder), Some(rest)) = (&mut self.recorder, &self.pipeline.rest) {
+            recorder.rest(rest);
+        }
+        let dead: Vec<usize> = self.pipeline.dead().collect();
+        self.record(|r| {
+            if taring {
+                r.own("tare");
+            }
+            for k in dead {
+                r.own(&format!("dead {k}"));
+            }
+        });
+    }
+
+    /// A recording that can be written no more has ended, and that is said.
+    pub(super) fn check_recording(&mut self, tell: &mut impl FnMut(Heard)) {
+        if let Some(why) = self.recorder.as_mut().and_then(|r| r.failed.take()) {
+            self.recorder = None;
+            tell(Heard::Unrecorded(&why));
+        }
+    }
+
+    pub(super) fn flush_recording(&mut self, tell: &mut impl FnMut(Heard)) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.flush();
+        }
+        self.check_recording(tell);
+    }
+}

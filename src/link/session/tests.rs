@@ -1,0 +1,190 @@
+//! What is said on the line, and what comes of it.
+
+use std::io::Write;
+use std::net::TcpListener;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::channel;
+
+use super::*;
+use crate::inference::ResponseMap;
+use crate::limb::LimbSpec;
+use crate::link::Pace;
+use crate::live::Settings;
+use crate::wire::MOST_CHANNELS;
+
+const GAUGES: usize = 4;
+
+fn pipeline() -> Pipeline {
+    let spec = LimbSpec {
+        element: 20.0,
+        ..LimbSpec::default()
+    };
+    let mesh = spec.build().unwrap().0;
+    let nodes = mesh.positions().len() + mesh.edges().len();
+    let value = |k: usize| 1e-5 * (1.7 * k as f64).sin();
+    let values = (0..nodes * GAUGES).map(value).collect();
+    let map = ResponseMap::of(Arc::new(mesh), GAUGES, values);
+    Pipeline::new(Arc::new(map), Settings::of(GAUGES))
+}
+
+fn hello() -> Hello {
+    Hello {
+        version: crate::wire::VERSION,
+        board: 7,
+        channels: 4,
+        bits: 12,
+        reference_mv: 3300,
+        supply_mv: 5000,
+        gain_milli: 330_000,
+        rate_hz: 1000,
+        name: "limb\u{1b}[31m".into(),
+    }
+}
+
+fn frames(messages: &[Message]) -> Vec<u8> {
+    let mut bytes = vec![0];
+    for (k, message) in (0..).zip(messages) {
+        encode(message, k, 1000 * u32::from(k), 12, &mut bytes);
+    }
+    bytes
+}
+
+/// All that is heard there until it is over, and how it ended.
+fn heard(address: Address) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
+    let (mut said, mut counts) = (Vec::new(), Vec::new());
+    let (stop, (_commands, inbox)) = (AtomicBool::new(false), channel());
+    let ended = Listener::new(address, pipeline()).run(&stop, &inbox, |heard| match heard {
+        Heard::State(State::Gone) => stop.store(true, Ordering::Relaxed),
+        Heard::Hello(hello) => said.push(format!("hello {}", hello.name)),
+        Heard::Message(text) => said.push(format!("message {text}")),
+        Heard::Trouble(text) => said.push(format!("trouble {text}")),
+        Heard::Truth(touch) => said.push(format!("truth {touch:?}")),
+        Heard::Sample { sample, .. } => counts.push(sample.counts.clone()),
+        _ => {}
+    });
+    (said, counts, ended)
+}
+
+fn of_board(bytes: Vec<u8>) -> Vec<String> {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        stream.write_all(&bytes).unwrap();
+        stream.shutdown(std::net::Shutdown::Write).unwrap();
+        // Until the other side has taken it and is gone.
+        let _ = std::io::copy(&mut stream, &mut std::io::sink());
+    });
+    heard(Address::Socket(address)).0
+}
+
+fn recording(path: &Path) -> Address {
+    Address::Recording {
+        path: path.to_owned(),
+        pace: Pace::Fast,
+    }
+}
+
+fn of_recording(bytes: &[u8]) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.hapdrec");
+    std::fs::write(&path, bytes).unwrap();
+    heard(recording(&path))
+}
+
+fn log(text: &str) -> Message {
+    Message::Log {
+        level: 0,
+        text: text.into(),
+    }
+}
+
+#[test]
+fn text_of_a_board_is_shown_and_never_obeyed() {
+    let said = of_board(frames(&[
+        Message::Hello(hello()),
+        log("hapdef truth 1 2 3 4"),
+        log("hapdef dead 0"),
+        log("hapdef line 1,2,3,4"),
+        Message::Note("truth 1 2 3 4".into()),
+        log("a\u{1b}]0;title\u{7}\nhapdef: b"),
+    ]));
+    let expected = [
+        "hello limb\u{fffd}[31m",
+        "message hapdef truth 1 2 3 4",
+        "message hapdef dead 0",
+        "message hapdef line 1,2,3,4",
+        "message a\u{fffd}]0;title\u{fffd} hapdef: b",
+    ];
+    assert_eq!(said, expected);
+}
+
+#[test]
+fn notes_of_a_recording_are_obeyed_the_old_ones_too() {
+    let data = Message::Data(vec![2000; 4]);
+    let old = [Message::Hello(hello()), log("hapdef truth none"), data];
+    let (said, counts, ended) = of_recording(&frames(&old));
+    assert_eq!(said[1..], ["truth None"]);
+    assert_eq!((counts.len(), ended), (1, Ok(())));
+    let new = [
+        Message::Note("truth none".into()),
+        log("hapdef truth none"),
+        Message::Note("line 1,2,3,4".into()),
+    ];
+    let (said, counts, _) = of_recording(&frames(&new));
+    assert_eq!(said, ["truth None", "message hapdef truth none"]);
+    assert_eq!(counts, [[1.0, 2.0, 3.0, 4.0]]);
+}
+
+#[test]
+fn lines_with_many_channels_are_recorded_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.hapdrec");
+    let long = |k: usize| (k as f64 - 31.5) * 1e14 / 3.0 + 1e-9;
+    let sample = Sample {
+        time_us: 5,
+        counts: (0..MOST_CHANNELS).map(long).collect(),
+    };
+    let mut recorder = Recorder::create(&path).unwrap();
+    recorder.sample(&sample);
+    drop(recorder);
+    assert_eq!(heard(recording(&path)).1, [sample.counts]);
+    // One whose middle is lost is not taken for one of fewer channels.
+    let torn = ["part 0 1,2", "line 4 5,6", "line 0 1,2,x", "part 9", "line"];
+    let torn = torn.map(|text| Message::Note(text.into()));
+    assert!(of_recording(&frames(&torn)).1.is_empty());
+}
+
+#[test]
+fn a_board_that_cannot_be_used_says_why_once() {
+    let deaf = Message::Hello(Hello {
+        gain_milli: 0,
+        ..hello()
+    });
+    let data = Message::Data(vec![2000; 4]);
+    let said = of_board(frames(&[
+        deaf.clone(),
+        data.clone(),
+        deaf.clone(),
+        data,
+        deaf,
+    ]));
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(said[0].starts_with("trouble ") && said[0].contains("gain"));
+}
+
+#[test]
+fn a_recording_without_a_reading_says_so() {
+    let other = Message::Hello(Hello {
+        version: 2,
+        ..hello()
+    });
+    let garbage = [&frames(&[log("ready"), other])[..], &vec![0x41; 40_000]].concat();
+    let (_, _, ended) = of_recording(&garbage);
+    let said = ended.unwrap_err();
+    assert!(
+        said.contains("no reading") && said.contains("version 2"),
+        "{said}"
+    );
+}

@@ -1,0 +1,163 @@
+//! The part: its mesh and what is made of it, what it is made of, and how it is held.
+
+use serde::{Deserialize, Serialize};
+
+use super::MM;
+use crate::limb::BoxMm;
+use crate::mesh::repair::Repair;
+use crate::mesh::unroll::Axis;
+
+/// Unit of a mesh file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Unit {
+    #[serde(rename = "mm")]
+    Millimetre,
+    #[serde(rename = "cm")]
+    Centimetre,
+    #[serde(rename = "m")]
+    Metre,
+    #[serde(rename = "in")]
+    Inch,
+}
+
+impl Unit {
+    pub const ALL: [Self; 4] = [Self::Millimetre, Self::Centimetre, Self::Metre, Self::Inch];
+
+    #[must_use]
+    pub fn metres(self) -> f64 {
+        match self {
+            Self::Millimetre => 1e-3,
+            Self::Centimetre => 1e-2,
+            Self::Metre => 1.0,
+            Self::Inch => 0.0254,
+        }
+    }
+
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Millimetre => "mm",
+            Self::Centimetre => "cm",
+            Self::Metre => "m",
+            Self::Inch => "in",
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// Path of the mesh, relative to the project file.
+    pub mesh: String,
+    /// Unit of the mesh; glTF is in metres by its specification and needs none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Unit>,
+    #[serde(default)]
+    pub body: usize,
+    /// Vertices nearer to each other than this are joined; zero joins equal ones only.
+    #[serde(default)]
+    pub weld_mm: f64,
+    /// Holes up to this far across are filled.
+    #[serde(default)]
+    pub fill_holes_mm: f64,
+    /// What the elastic model is computed on.
+    #[serde(default)]
+    pub elements: Elements,
+    #[serde(default)]
+    pub model: PartModel,
+    #[serde(default = "defaults::thickness")]
+    pub thickness_mm: f64,
+    /// Of a solid: masks of the part's vertices that say where gauges can go and where touches land, where
+    /// what is found by itself is wrong.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inside: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outside: Option<String>,
+    /// The axis the part is unrolled about.
+    #[serde(default)]
+    pub axis: Axis,
+}
+
+impl Part {
+    /// The repairs asked for when the mesh is read.
+    #[must_use]
+    pub fn repair(&self) -> Repair {
+        Repair {
+            weld: self.weld_mm * MM,
+            fill_holes: self.fill_holes_mm * MM,
+        }
+    }
+}
+
+/// What the elastic model is computed on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Elements {
+    /// A mesh of its own on the part's surface, finer where the strain changes.
+    #[default]
+    Graded,
+    /// The triangles of the mesh file.
+    AsGiven,
+}
+
+/// How the mesh is meant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PartModel {
+    /// The mesh is the mid-surface of a shell.
+    #[default]
+    Shell,
+    /// The mesh encloses a solid with walls.
+    Solid,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MaterialKeys {
+    pub youngs_modulus_gpa: f64,
+    pub poissons_ratio: f64,
+}
+
+impl Default for MaterialKeys {
+    fn default() -> Self {
+        Self {
+            youngs_modulus_gpa: 1.7,
+            poissons_ratio: 0.35,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SupportKind {
+    /// No displacement, no rotation.
+    #[default]
+    Clamped,
+    /// No displacement.
+    Pinned,
+    /// A mirror plane, normal to `normal`.
+    Symmetry,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupportKeys {
+    #[serde(default)]
+    pub kind: SupportKind,
+    /// Every point of the part inside it is held.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_mm: Option<BoxMm>,
+    /// Instead of a box: a mask of the part's vertices, by its name in the arrays beside the project
+    /// file, or a group of the mesh file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertices: Option<String>,
+    #[serde(default)]
+    pub normal: Axis,
+}
+
+/// What stands in place of a key that is left out.
+pub(super) mod defaults {
+    pub fn thickness() -> f64 {
+        1.5
+    }
+}

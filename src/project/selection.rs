@@ -1,0 +1,126 @@
+//! Which selector chooses how many gauges, what it may spend, and what it chose.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use super::MM;
+use crate::gaussian_process::GpKernel;
+use crate::limb::BoxMm;
+use crate::placement::SelectorKind;
+use crate::regression::Hyper;
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SelectionKeys {
+    pub selector: SelectorKind,
+    pub sensors: usize,
+    /// Settings of greedy SVR's regression (targets in mm, features standardized).
+    pub c_mm: f64,
+    pub epsilon_mm: f64,
+    pub gamma: f64,
+    /// Least distance between two gauges.
+    pub spacing_mm: f64,
+    /// Places of gauges that must be there; the nearest site is taken.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub required_mm: Vec<[f64; 3]>,
+    /// Error at which greedy SVR adds no more gauges.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_mm: Option<f64>,
+    /// What all gauges together may cost.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cost_budget: Option<f64>,
+    /// Whether the gauge's noise is added to the signals that sites are chosen from.
+    pub with_noise: bool,
+    /// Probability that one gauge has failed.
+    pub failure: f64,
+    /// Whether the other selectors choose too, to be compared.
+    pub compare: bool,
+    pub gaussian_process: GaussianProcessKeys,
+    /// What a gauge costs inside a box, the last box counting; 1 elsewhere.
+    #[serde(rename = "cost", skip_serializing_if = "Vec::is_empty")]
+    pub costs: Vec<CostKeys>,
+    /// The chosen sites, written by a design.
+    #[serde(rename = "site", skip_serializing_if = "Vec::is_empty")]
+    pub sites: Vec<ChosenSite>,
+}
+
+impl Default for SelectionKeys {
+    fn default() -> Self {
+        let hyper = Hyper::default();
+        Self {
+            selector: SelectorKind::GreedySvr,
+            sensors: 10,
+            c_mm: hyper.c,
+            epsilon_mm: hyper.epsilon,
+            gamma: hyper.gamma,
+            spacing_mm: 0.0,
+            required_mm: Vec::new(),
+            target_mm: None,
+            cost_budget: None,
+            with_noise: false,
+            failure: 0.0,
+            compare: true,
+            gaussian_process: GaussianProcessKeys::default(),
+            costs: Vec::new(),
+            sites: Vec::new(),
+        }
+    }
+}
+
+/// The kernel of entropy and mutual information.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GaussianProcessKeys {
+    /// Length and power of the kernel; searched by cross-validation when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub power: Option<f64>,
+    pub noise: f64,
+}
+
+impl Default for GaussianProcessKeys {
+    fn default() -> Self {
+        Self {
+            length_mm: None,
+            power: None,
+            noise: GpKernel::default().noise,
+        }
+    }
+}
+
+impl GaussianProcessKeys {
+    /// Length (m) and power, where either is given; the other is then the paper's.
+    #[must_use]
+    pub fn given(&self) -> Option<(f64, f64)> {
+        let paper = GpKernel::default();
+        (self.length_mm.is_some() || self.power.is_some()).then(|| {
+            (
+                self.length_mm.map_or(paper.length_m, |l| l * MM),
+                self.power.unwrap_or(paper.power),
+            )
+        })
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CostKeys {
+    pub box_mm: BoxMm,
+    pub cost: f64,
+}
+
+impl CostKeys {
+    #[must_use]
+    pub fn contains(&self, at_mm: DVec3) -> bool {
+        let [a, b] = self.box_mm.map(DVec3::from_array);
+        at_mm.cmpge(a.min(b)).all() && at_mm.cmple(a.max(b)).all()
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChosenSite {
+    pub position_mm: [f64; 3],
+    pub direction: [f64; 3],
+}

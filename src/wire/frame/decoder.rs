@@ -1,0 +1,355 @@
+//! Frames found in bytes, in whatever pieces these come.
+
+use super::message::Message;
+use super::refusal::Refusal;
+use super::{HEAD, LONGEST, SUM, TAIL, payload};
+
+/// So many frames in a row that seem to come from the past are a board that has begun anew.
+const BEGUN_ANEW: u32 = 16;
+
+/// What the decoder makes of bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Event {
+    Message {
+        sequence: u16,
+        /// The board's clock; see [`crate::wire::Timeline`].
+        time_us: u32,
+        message: Message,
+    },
+    /// So many frames are missing before the next one.
+    Lost(u16),
+    Refused(Refusal),
+}
+
+/// Takes bytes in as they come, in whatever pieces.
+#[derive(Clone, Debug, Default)]
+pub struct Decoder {
+    frame: Vec<u8>,
+    /// What comes until the next zero is too long for any frame.
+    overlong: bool,
+    /// Channels and bits of a sample, once the board has said them.
+    layout: Option<(usize, u8)>,
+    last: Option<u16>,
+    late: u32,
+}
+
+impl Decoder {
+    /// Takes in bytes and tells what they are. Whatever they are, no more than one frame is held.
+    pub fn push(&mut self, bytes: &[u8], mut tell: impl FnMut(Event)) {
+        for &byte in bytes {
+            if byte != 0 {
+                if !self.overlong && self.frame.len() > LONGEST {
+                    self.make_room();
+                }
+                if !self.overlong {
+                    self.frame.push(byte);
+                }
+                continue;
+            }
+            if self.overlong {
+                tell(Event::Refused(Refusal::Framing));
+            } else if !self.frame.is_empty() {
+                self.end_of_frame(&mut tell);
+            }
+            self.frame.clear();
+            self.overlong = false;
+        }
+    }
+
+    /// The line was cut: what follows has nothing to do with what was before.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Longer than any frame, unless what was printed before it goes.
+    fn make_room(&mut self) {
+        let printed = printed(&self.frame);
+        self.frame.drain(..printed);
+        self.overlong = printed == 0;
+    }
+
+    fn end_of_frame(&mut self, tell: &mut impl FnMut(Event)) {
+        match self.read_behind_text() {
+            Ok((sequence, time_us, message)) => {
+                if let Some(refused) = self.follow(sequence, &message, tell) {
+                    return tell(Event::Refused(refused));
+                }
+                tell(Event::Message {
+                    sequence,
+                    time_us,
+                    message,
+                });
+            }
+            Err(refusal) => tell(Event::Refused(refusal)),
+        }
+    }
+
+    /// What lies between two zeros. A board that has just printed lines sends no zero before its first frame.
+    fn read_behind_text(&mut self) -> Result<(u16, u32, Message), Refusal> {
+        let printed = printed(&self.frame);
+        if printed == 0 {
+            return self.read();
+        }
+        let whole = self.frame.clone();
+        let mut found = self.read();
+        // The last line feed may be the first byte of the frame.
+        for start in [printed, printed - 1] {
+            if !matches!(found, Err(Refusal::Framing | Refusal::Damaged)) {
+                break;
+            }
+            self.frame.clear();
+            self.frame.extend_from_slice(&whole[start..]);
+            found = self.read();
+        }
+        found
+    }
+
+    fn read(&mut self) -> Result<(u16, u32, Message), Refusal> {
+        let length = cobs::decode_in_place(&mut self.frame).map_err(|_| Refusal::Framing)?;
+        let frame = &self.frame[..length];
+        let body = length.checked_sub(TAIL).filter(|&b| b >= HEAD);
+        let body = body.ok_or(Refusal::Framing)?;
+        let (body, sum) = frame.split_at(body);
+        if SUM.checksum(body).to_le_bytes() != sum {
+            return Err(Refusal::Damaged);
+        }
+        let sequence = u16::from_le_bytes([body[1], body[2]]);
+        let time_us = u32::from_le_bytes([body[3], body[4], body[5], body[6]]);
+        let message = payload::read(body[0], &body[HEAD..], self.layout);
+        if matches!(message, Err(Refusal::Version(_) | Refusal::Value { .. })) {
+            // Nobody knows any more how its data are laid out.
+            self.layout = None;
+        }
+        Ok((sequence, time_us, message?))
+    }
+
+    /// Where a message stands among those before it; what must not be used is refused.
+    fn follow(
+        &mut self,
+        sequence: u16,
+        message: &Message,
+        tell: &mut impl FnMut(Event),
+    ) -> Option<Refusal> {
+        if let Message::Hello(hello) = message {
+            self.layout = Some((usize::from(hello.channels), hello.bits));
+            // A board that has begun anew counts from where it likes.
+            (self.last, self.late) = (Some(sequence), 0);
+            return None;
+        }
+        let gap = self
+            .last
+            .map_or(0, |last| sequence.wrapping_sub(last).wrapping_sub(1));
+        if gap >= 0x8000 && self.late < BEGUN_ANEW {
+            self.late += 1;
+            return Some(Refusal::Repeated);
+        }
+        if gap > 0 && gap < 0x8000 {
+            tell(Event::Lost(gap));
+        }
+        (self.last, self.late) = (Some(sequence), 0);
+        None
+    }
+}
+
+/// Bytes at the beginning that are lines of text.
+fn printed(bytes: &[u8]) -> usize {
+    let text = bytes
+        .iter()
+        .take_while(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
+        .count();
+    let last = bytes[..text].iter().rposition(|&b| b == b'\n');
+    last.map_or(0, |at| at + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::super::payload::HELLO;
+    use super::super::tests::board;
+    use super::*;
+    use crate::wire::encode;
+
+    fn events(bytes: &[u8]) -> Vec<Event> {
+        let mut decoder = Decoder::default();
+        let mut all = Vec::new();
+        decoder.push(bytes, |e| all.push(e));
+        all
+    }
+
+    #[test]
+    fn gaps_repeats_and_new_beginnings_are_told_apart() {
+        let hello = Message::Hello(board());
+        let data = Message::Data(vec![5; 12]);
+        let mut bytes = Vec::new();
+        encode(&hello, 65_530, 0, 12, &mut bytes);
+        for sequence in [65_531, 65_535, 0, 0, 65_531, 1] {
+            encode(&data, sequence, 0, 12, &mut bytes);
+        }
+        let told: Vec<String> = (events(&bytes).iter())
+            .map(|event| match event {
+                Event::Message { sequence, .. } => sequence.to_string(),
+                Event::Lost(n) => format!("lost {n}"),
+                Event::Refused(why) => format!("{why:?}"),
+            })
+            .collect();
+        let expected = [
+            "65530", "65531", "lost 3", "65535", "0", "Repeated", "Repeated", "1",
+        ];
+        assert_eq!(told, expected);
+        // A board that begins anew and whose hello was lost is heard again soon.
+        for sequence in 0..40 {
+            encode(&data, 40_000 + sequence, 0, 12, &mut bytes);
+        }
+        let heard = events(&bytes)
+            .into_iter()
+            .filter(|e| matches!(e, Event::Message { .. }));
+        assert!(heard.count() > 25);
+    }
+
+    #[test]
+    fn data_without_a_layout_are_refused_and_floods_are_not_kept() {
+        let mut bytes = Vec::new();
+        encode(&Message::Data(vec![5; 12]), 0, 0, 12, &mut bytes);
+        assert_eq!(events(&bytes), [Event::Refused(Refusal::NoLayout)]);
+        let mut decoder = Decoder::default();
+        decoder.push(&vec![0x41; 1_000_000], |e| panic!("{e:?}"));
+        assert!(decoder.frame.capacity() < 1024);
+        let mut told = Vec::new();
+        decoder.push(&[0], |e| told.push(e));
+        assert_eq!(told, [Event::Refused(Refusal::Framing)]);
+    }
+
+    /// A HELLO as its bytes on the wire, after something was done to its payload.
+    fn hello_with(change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
+        let mut frame = vec![HELLO, 0, 0, 0, 0, 0, 0];
+        let mut said = Vec::new();
+        payload::append(&Message::Hello(board()), 12, &mut said);
+        change(&mut said);
+        frame.extend(said);
+        frame.extend(SUM.checksum(&frame).to_le_bytes());
+        let mut out = vec![0; cobs::max_encoding_length(frame.len())];
+        let length = cobs::encode(&frame, &mut out);
+        out.truncate(length);
+        out.push(0);
+        out
+    }
+
+    #[test]
+    fn a_hello_that_cannot_be_used_says_why_and_its_data_are_not_believed() {
+        let none = |name| Refusal::Value {
+            name,
+            rule: "above zero",
+            found: 0,
+        };
+        let zero = |from: usize, to: usize| hello_with(|p| p[from..to].fill(0));
+        let shorter = hello_with(|p| {
+            p.truncate(4);
+            p.push(9);
+        });
+        let cases = [
+            (hello_with(|p| p[4] = 2), Refusal::Version(2)),
+            (shorter, Refusal::Version(9)),
+            (zero(11, 13), none("V_ref")),
+            (zero(13, 15), none("V_ex")),
+            (zero(15, 19), none("gain")),
+            (hello_with(|p| p.truncate(20)), Refusal::Unknown),
+        ];
+        let mut sound = Vec::new();
+        encode(&Message::Hello(board()), 0, 0, 12, &mut sound);
+        let mut data = Vec::new();
+        encode(&Message::Data(vec![5; 12]), 1, 0, 12, &mut data);
+        for (bytes, refusal) in cases {
+            let all = [&sound[..], &bytes, &data].concat();
+            let said = events(&all);
+            assert_eq!(said[1], Event::Refused(refusal));
+            let trusted = matches!(said[2], Event::Message { .. });
+            assert_eq!(trusted, refusal == Refusal::Unknown, "{:?}", said[2]);
+            assert_eq!(refusal.in_words().is_some(), refusal.is_lasting());
+        }
+        let Event::Refused(why) = events(&hello_with(|p| p[10] = 25))[0] else {
+            panic!("25 bits were believed");
+        };
+        let said = why.in_words().unwrap();
+        assert!(said.contains("bits must be between 1 and 24, but is 25"));
+    }
+
+    #[test]
+    fn a_frame_behind_printed_lines_is_found() {
+        let hello = Message::Hello(board());
+        for text in ["1,2,3\n", "ready\r\n\n", &"2000 2001 2002\r\n".repeat(100)] {
+            let mut bytes = text.as_bytes().to_vec();
+            encode(&hello, 0, 0, 12, &mut bytes);
+            let found = events(&bytes);
+            let is_hello =
+                |e: &Event| matches!(e, Event::Message { message, .. } if *message == hello);
+            assert!(found.len() == 1 && is_hello(&found[0]), "{text}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn data_of_another_size_say_so() {
+        let mut bytes = Vec::new();
+        encode(&Message::Hello(board()), 0, 0, 12, &mut bytes);
+        encode(&Message::Data(vec![5; 11]), 1, 0, 12, &mut bytes);
+        let refusal = Refusal::Size {
+            found: 17,
+            announced: 18,
+        };
+        assert_eq!(events(&bytes)[1], Event::Refused(refusal));
+    }
+
+    /// Bytes flipped, dropped, doubled: what comes through was sent, and sound frames come through.
+    #[test]
+    fn a_bad_line_loses_frames_and_never_shows_a_wrong_one() {
+        const FRAMES: u32 = 60_000;
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let counts = |k: u32| -> Vec<u32> { (0..12).map(|c| (k * 31 + c * 517) % 4096).collect() };
+        let mut decoder = Decoder::default();
+        let mut hello = Vec::new();
+        encode(&Message::Hello(board()), u16::MAX, 0, 12, &mut hello);
+        let (mut good, mut refused, mut lost) = (0_u32, 0_u32, 0_u32);
+        let mut tell = |event: Event| match event {
+            Event::Message {
+                time_us,
+                message: Message::Data(found),
+                ..
+            } => {
+                good += 1;
+                assert_eq!(found, counts(time_us), "frame {time_us}");
+            }
+            Event::Message { .. } => {}
+            Event::Lost(n) => lost += u32::from(n),
+            Event::Refused(_) => refused += 1,
+        };
+        decoder.push(&hello, &mut tell);
+        for k in 0..FRAMES {
+            let mut bytes = Vec::new();
+            encode(&Message::Data(counts(k)), k as u16, k, 12, &mut bytes);
+            let mut sent = Vec::new();
+            for mut byte in bytes {
+                let fate: f64 = rng.random();
+                if fate < 1e-4 {
+                    continue;
+                }
+                if fate < 2e-4 {
+                    byte ^= 1 << rng.random_range(0..8);
+                }
+                sent.push(byte);
+                if (2e-4..3e-4).contains(&fate) {
+                    sent.push(byte);
+                }
+            }
+            decoder.push(&sent, &mut tell);
+        }
+        // About one frame in a hundred is hit.
+        assert!(good > FRAMES * 97 / 100 && good < FRAMES, "{good}");
+        assert!(refused > 100, "{refused}");
+        assert!(
+            lost.abs_diff(FRAMES - good) < 20,
+            "{lost} of {}",
+            FRAMES - good
+        );
+    }
+}
