@@ -3,6 +3,7 @@
 //! Positions are in metres. Everything after this layer may index without checking again.
 
 mod bodies;
+pub mod canonical;
 pub mod cut;
 pub mod flatten;
 pub mod geodesic;

@@ -154,6 +154,25 @@ fn halving_finds_the_curved_surface_and_not_the_chords() {
 }
 
 #[test]
+fn halving_gives_back_the_corners_of_openings() {
+    // Windows with corners of 3 mm, and elements of twice that: what they cut off is material too much.
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/slotted/shell.obj");
+    let loaded = read_mesh(&file, Some(Unit::Millimetre), 0, Repair::default()).unwrap();
+    let part = Arc::new(loaded.mesh);
+    let surface = plain(&part);
+    let coarse = remesh(&surface, &|_: DVec3| 6.5e-3);
+    let fine = quarter(&surface, &coarse);
+    let excess = [&coarse, &fine].map(|laid| laid.mesh.area() - part.area());
+    println!(
+        "area too much: {:.0} and {:.0} mm²",
+        excess[0] * 1e6,
+        excess[1] * 1e6
+    );
+    // Without it nothing comes back at all.
+    assert!(excess[1] < 0.6 * excess[0], "{excess:?}");
+}
+
+#[test]
 fn creases_and_lines_that_are_marked_stay() {
     // An L of two plates, and a line across one of them.
     let p: Vec<DVec3> = (0..=4)

@@ -8,9 +8,7 @@ use hapdef::budget::Quality;
 #[test]
 fn a_slotted_limb_agrees_with_a_solid_model() {
     for (quality, most) in [
-        // Its first elements are 7 to 8.5 % off by the order of the vertices, and say 3 %: whether a second round is laid
-        // hangs on a hair (3.4 % then).
-        (Quality::Draft, [9.0, 14.0, 5.0]),
+        (Quality::Draft, [4.0, 7.0, 3.5]),
         (Quality::Standard, [2.0, 6.0, 2.0]),
         (Quality::Reference, [1.0, 4.0, 1.0]),
     ] {
@@ -30,6 +28,11 @@ fn a_slotted_limb_agrees_with_a_solid_model() {
             .zip(most)
         {
             assert!(found < most, "{}: {found:.2} of {most}", quality.name());
+        }
+        if quality == Quality::Draft {
+            // Finer ones are as near to the solid as a shell can be, whatever their elements leave.
+            let effectivity = estimate.displacement_percent / a.under_rms;
+            assert!((0.5..2.0).contains(&effectivity), "{effectivity:.2}");
         }
         // The wall is a tenth of its radius thick: that is said.
         assert!(

@@ -12,8 +12,8 @@ use super::{SelectorArg, out, progress::Bar};
 use crate::budget::Watch;
 use crate::gaussian_process::GpKernel;
 use crate::io::cpu_seconds;
-use crate::placement::greedy_svr::{Audit, Comparison};
 use crate::placement::expected_error::Detail;
+use crate::placement::greedy_svr::{Audit, Comparison};
 use crate::placement::{SelectorKind, SensorSet, Wishes};
 use crate::study::{self, Choice, Data, Settings};
 

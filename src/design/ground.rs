@@ -11,7 +11,7 @@ use crate::elasticity::estimate::Discretization;
 use crate::elasticity::grade::{self, Graded};
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::model::LoadCheck;
-use crate::elasticity::shell::{check_held, check_section};
+use crate::elasticity::shell::check_section;
 use crate::elasticity::solid::ground::SolidGround;
 use crate::elasticity::solid::immersed::Fineness;
 use crate::elasticity::{Freedoms, Model, Touch};
@@ -116,7 +116,7 @@ impl Ground {
     pub fn check(&self, project: &Project) -> Result<(), DesignError> {
         check_section(&project.section())?;
         if let Self::Shell(shell) = self {
-            check_held(&shell.held.mesh, &shell.held.held)?;
+            shell.check_held()?;
         }
         Ok(())
     }
@@ -328,7 +328,7 @@ fn even_enough(part: &Arc<TriMesh>, ground: &grade::Ground) -> Arc<TriMesh> {
         .map(|t| part.facet_area(t))
         .sum();
     if unfit < SHARE * part.area() {
-        Arc::clone(part)
+        ground.in_order(part)
     } else {
         ground.even(LAYOUT).mesh
     }

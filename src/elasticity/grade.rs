@@ -9,20 +9,24 @@ use super::linearity::{Linearity, linearity};
 use super::load::Touch;
 use super::model::LoadCheck;
 use super::recover::facet_errors;
+use super::shell::check_held;
 use super::support::{Freedoms, HeldPart, Support};
 use super::{ElasticError, Model as _, Section, ShellModel, scope};
 use crate::budget::{Elements, Watch, report};
 use crate::mesh::TriMesh;
+use crate::mesh::canonical::Canonical;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::remesh::{Remeshed, as_given, quarter, remesh};
 use crate::mesh::surface::Surface;
 
-/// A part ready to have elements laid on it.
+/// A part ready to have elements laid on it. They are laid on its canonical form, and then carried to where the part
+/// lies.
 pub struct Ground {
-    pub held: HeldPart,
+    held: HeldPart,
     surface: Surface,
     section: Section,
-    as_given: bool,
+    /// The canonical form; nothing where the part's own triangles are the elements.
+    own: Option<Canonical>,
 }
 
 /// The elements, with the model built on them.
@@ -71,18 +75,32 @@ impl Ground {
         supports: &[Support],
         as_given: bool,
     ) -> Self {
-        let held = if as_given {
-            HeldPart::uncut(part, supports)
-        } else {
-            HeldPart::new(part, supports)
+        let own = (!as_given).then(|| Canonical::of(part));
+        let held = match &own {
+            None => HeldPart::uncut(part, supports),
+            Some(own) => {
+                let supports: Vec<Support> = supports.iter().map(|s| s.canonical(own)).collect();
+                HeldPart::new(&own.mesh, &supports)
+            }
         };
         let surface = Surface::new(&held.mesh, |e| held.is_border(e), |v| held.is_spot(v));
         Self {
             held,
             surface,
             section,
-            as_given,
+            own,
         }
+    }
+
+    /// Whether every piece of the part is held against all rigid motions.
+    ///
+    /// # Errors
+    /// [`ElasticError`] saying what is loose.
+    pub fn check_held(&self) -> Result<(), ElasticError> {
+        check_held(&self.held.mesh, &self.held.held).map_err(|error| match &self.own {
+            Some(own) => as_in_the_file(error, own),
+            None => error,
+        })
     }
 
     /// Where thin-shell theory itself is off for this part and a tip of this radius (m).
@@ -94,7 +112,7 @@ impl Ground {
     /// Elements of one size, about as many vertices as asked for.
     #[must_use]
     pub fn even(&self, vertices: usize) -> Remeshed {
-        if self.as_given {
+        if self.own.is_none() {
             return as_given(&self.surface);
         }
         let rim: f64 = self
@@ -104,14 +122,38 @@ impl Ground {
             .map(|e| self.length(e))
             .sum();
         let size = even_size(self.held.mesh.area(), rim, vertices);
-        let size = size.max(LEAST_IN_THICKNESS * self.section.thickness);
-        remesh(&self.surface, &|_| size)
+        self.of_size(size.max(LEAST_IN_THICKNESS * self.section.thickness))
     }
 
     /// A mesh of about one edge length (m) on the part's surface, whatever its elements are.
     #[must_use]
     pub fn of_size(&self, size: f64) -> Remeshed {
-        remesh(&self.surface, &|_| size)
+        self.lay(&|_| size)
+    }
+
+    /// A mesh of a size (m, at a place in the frame) where the part lies.
+    fn lay(&self, size: &dyn Fn(DVec3) -> f64) -> Remeshed {
+        self.outward(remesh(&self.surface, size))
+    }
+
+    /// What was laid on the canonical form, where the part lies.
+    fn outward(&self, laid: Remeshed) -> Remeshed {
+        match &self.own {
+            Some(own) => laid.moved(|p| own.frame.outward(p)),
+            None => laid,
+        }
+    }
+
+    /// The part in its canonical order, where it lies: what is drawn on it at random does not depend on its file.
+    #[must_use]
+    pub fn in_order(&self, part: &Arc<TriMesh>) -> Arc<TriMesh> {
+        let Some(own) = &self.own else {
+            return Arc::clone(part);
+        };
+        let given = |&v: &u32| part.positions()[v as usize];
+        let positions = own.numbers.iter().map(given).collect();
+        let triangles = own.mesh.triangles().to_vec();
+        Arc::new(TriMesh::from_checked(positions, triangles))
     }
 
     /// Area of the surface (m²).
@@ -128,7 +170,13 @@ impl Ground {
     /// The same elements, halved.
     #[must_use]
     pub fn halved(&self, laid: &Remeshed) -> Remeshed {
-        quarter(&self.surface, laid)
+        match &self.own {
+            Some(own) => {
+                let inward = laid.moved(|p| own.frame.inward(p));
+                self.outward(quarter(&self.surface, &inward))
+            }
+            None => quarter(&self.surface, laid),
+        }
     }
 
     /// What is held at the vertices of a mesh on this ground.
@@ -160,6 +208,7 @@ impl Ground {
         aim: &Elements,
         watch: Watch,
     ) -> Result<Graded, ElasticError> {
+        let as_given = self.own.is_none();
         let most = aim.most_for(touches.len());
         let touches = sample(touches);
         let places: Vec<DVec3> = spread(places, PLACES);
@@ -171,7 +220,7 @@ impl Ground {
         let (mut models, mut solves) = (1, touches.len() as u64);
         let mut last = 0;
         loop {
-            for pass in 0..if self.as_given { 0 } else { aim.passes } {
+            for pass in 0..if as_given { 0 } else { aim.passes } {
                 report(watch, "Laying elements", pass, aim.passes)?;
                 let laid = self.regraded(&coarse, vertices / 4);
                 coarse = Solved::new(self, laid, &touches, watch)?;
@@ -184,7 +233,7 @@ impl Ground {
             solves += touches.len() as u64;
             let sample = |s: &Solved| Sample::of(&s.model, &touches, &s.solutions, &places);
             let estimate = estimate::between(&sample(&coarse), &sample(&fine), &touches, &places);
-            if self.as_given {
+            if as_given {
                 // The part's own triangles are the model; the halved ones only say how good they are.
                 let estimate = estimate.of_the_coarser();
                 return Ok(coarse.graded(self, &touches, estimate, models, solves));
@@ -213,10 +262,26 @@ impl Ground {
         let errors = facet_errors(&solved.model, &spread(&solved.solutions, loads));
         let least = LEAST_IN_THICKNESS * self.section.thickness;
         let sizes = sizes(mesh, &errors, vertices, least);
-        let index = SurfaceIndex::new(mesh);
-        remesh(&self.surface, &|p| {
-            mesh.interpolate(&sizes, index.nearest(p).0)
-        })
+        let inward = |&p: &DVec3| self.own.as_ref().map_or(p, |own| own.frame.inward(p));
+        let positions = mesh.positions().iter().map(inward).collect();
+        let index = SurfaceIndex::of(positions, mesh.triangles());
+        self.lay(&|p| mesh.interpolate(&sizes, index.nearest(p).0))
+    }
+}
+
+/// An error of the canonical form, with places and numbers of vertices as the file has them.
+fn as_in_the_file(error: ElasticError, own: &Canonical) -> ElasticError {
+    let outward = |mm: DVec3| own.frame.outward(mm / 1000.0) * 1000.0;
+    match error {
+        ElasticError::NothingHeld { lower, upper } => ElasticError::NothingHeld {
+            lower: outward(lower),
+            upper: outward(upper),
+        },
+        ElasticError::NotHeld { vertex, place } => ElasticError::NotHeld {
+            vertex: (own.numbers.get(vertex)).map_or(vertex, |&v| v as usize),
+            place: outward(place),
+        },
+        other => other,
     }
 }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use crate::mesh::canonical::Canonical;
 use crate::mesh::cut::{ON_PLANE, cut_by_boxes};
 use crate::mesh::{Edge, SurfacePoint, TriMesh};
 
@@ -49,6 +50,24 @@ pub enum Region {
 pub struct Support {
     pub region: Region,
     pub held: Freedoms,
+}
+
+impl Support {
+    /// The same support of the part in its canonical form.
+    #[must_use]
+    pub fn canonical(&self, part: &Canonical) -> Self {
+        let region = match &self.region {
+            Region::Box { lower, upper } => Region::Box {
+                lower: part.frame.snapped(*lower),
+                upper: part.frame.snapped(*upper),
+            },
+            Region::Vertices(mask) => Region::Vertices(Arc::new(part.in_order(mask))),
+        };
+        Self {
+            region,
+            held: self.held,
+        }
+    }
 }
 
 /// Supports that a vertex belongs to, one bit each.

@@ -22,6 +22,10 @@ const SHORT: f64 = 4.0 / 5.0;
 /// An edge may leave a feature line, and the surface, by this share of its length: about seven edges
 /// round a circle, at least.
 const SAGITTA: f64 = 0.11;
+/// Steps of the queues of edges: lengths over what is wanted that differ by less are the same but for rounding.
+const STEP: f64 = 1e-5;
+/// Opposite angles within this (rad) of half a turn are half a turn but for rounding: the edge stays.
+const LEVEL: f64 = 1e-5;
 /// Details smaller than this share of the wanted size are given up, feature lines among them.
 const TINY: f64 = 0.2;
 
@@ -33,6 +37,20 @@ pub struct Remeshed {
     pub places: Vec<SurfacePoint>,
     /// Edges on feature lines, smaller vertex first.
     pub lines: HashSet<(u32, u32)>,
+}
+
+impl Remeshed {
+    /// The same mesh with its vertices elsewhere, such as in another frame.
+    #[must_use]
+    pub fn moved(&self, to: impl Fn(DVec3) -> DVec3) -> Self {
+        let positions = self.mesh.positions().iter().map(|&p| to(p)).collect();
+        let triangles = self.mesh.triangles().to_vec();
+        Self {
+            mesh: Arc::new(TriMesh::from_checked(positions, triangles)),
+            places: self.places.clone(),
+            lines: self.lines.clone(),
+        }
+    }
 }
 
 /// Lays a mesh of the given size (m, at a position) on the surface.
@@ -145,6 +163,11 @@ fn settle_middles(mesh: &TriMesh, positions: &mut [DVec3]) {
 
 /// The middle of an edge, moved onto the smooth surface or the feature line where that is near.
 fn middle_on(surface: &Surface, a: DVec3, b: DVec3, line: bool) -> (DVec3, SurfacePoint) {
+    /// How far that may be, as a share of the edge. Large elements cut off rounded corners of openings: over a quarter
+    /// of a circle a chord is 0.207 from its arc. Were that not given back, coarse and fine elements would share the
+    /// fault, and what changes between them would say nothing of it.
+    const NEAR_SURFACE: f64 = 0.2;
+    const NEAR_LINE: f64 = 0.4;
     let middle = a.midpoint(b);
     let at = if line {
         surface.project_to_line(middle)
@@ -153,7 +176,8 @@ fn middle_on(surface: &Surface, a: DVec3, b: DVec3, line: bool) -> (DVec3, Surfa
     }
     .unwrap_or_else(|| surface.project(middle));
     let placed = surface.place(at);
-    if placed.distance(middle) < 0.2 * a.distance(b) {
+    let near = if line { NEAR_LINE } else { NEAR_SURFACE };
+    if placed.distance(middle) < near * a.distance(b) {
         (placed, at)
     } else {
         (middle, at)
@@ -233,7 +257,7 @@ fn split_long(work: &mut Working, size: &dyn Fn(DVec3) -> f64) {
             .into_iter()
             .filter_map(|(a, b)| {
                 let excess = work.length(a, b) / work.wanted(a, b);
-                (excess > LONG).then_some((excess, a, b))
+                (excess > LONG).then_some((stepped(excess), a, b))
             })
             .collect();
         if long.is_empty() {
@@ -246,13 +270,18 @@ fn split_long(work: &mut Working, size: &dyn Fn(DVec3) -> f64) {
     }
 }
 
+/// The step that an edge's length over what is wanted stands on: edges of one step come by their vertices.
+fn stepped(excess: f64) -> f64 {
+    (excess / STEP).round()
+}
+
 fn collapse_short(work: &mut Working) {
     let mut short: Vec<(f64, u32, u32)> = work
         .edges()
         .into_iter()
         .filter_map(|(a, b)| {
             let excess = work.length(a, b) / work.wanted(a, b);
-            (excess < SHORT).then_some((excess, a, b))
+            (excess < SHORT).then_some((stepped(excess), a, b))
         })
         .collect();
     short.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
@@ -362,7 +391,7 @@ fn flip_edge(work: &mut Working, a: u32, b: u32, s: u32, t: u32) -> bool {
     let [pa, pb, pc, pd] = [a, b, c, d].map(|v| work.position(v));
     let angle = |at: DVec3, u: DVec3, v: DVec3| (u - at).angle_between(v - at);
     // Delaunay on the surface: opposite angles of more than half a turn.
-    if angle(pc, pa, pb) + angle(pd, pa, pb) <= std::f64::consts::PI + 1e-9 {
+    if angle(pc, pa, pb) + angle(pd, pa, pb) <= std::f64::consts::PI + LEVEL {
         return false;
     }
     let (n, m) = (work.normal(s), work.normal(t));

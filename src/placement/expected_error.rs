@@ -95,7 +95,11 @@ impl Selector for ExpectedError<'_> {
                 error_estimate: sets.last().and_then(|s| s.criterion),
                 unit: "mm expected error",
                 effort: Work::default(),
-                stop_reason: if short { StopReason::NoRoom } else { StopReason::Converged },
+                stop_reason: if short {
+                    StopReason::NoRoom
+                } else {
+                    StopReason::Converged
+                },
                 notes,
             },
             sets,

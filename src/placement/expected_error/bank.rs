@@ -115,11 +115,7 @@ impl<'a> Bank<'a> {
             };
             let nearest = nearest(&scene.places, press.position);
             Press {
-                estimates: [
-                    vec![0.0; count],
-                    vec![0.0; count],
-                    vec![mean as f32; count],
-                ],
+                estimates: [vec![0.0; count], vec![0.0; count], vec![mean as f32; count]],
                 costs: padded(&cost, NEVER),
                 blocks: (0..(count / LANES) as u32).collect(),
                 covariance: Matrix3::from_diagonal(&Vector3::new(
@@ -176,7 +172,10 @@ impl<'a> Bank<'a> {
         let mut errors = Vec::with_capacity(self.presses.len());
         for (filters, level) in self.filters.iter().zip(&self.scene.levels) {
             let nothing = Rows {
-                sharpness: filters.covariances[5].iter().map(|&v| sharpness(v)).collect(),
+                sharpness: filters.covariances[5]
+                    .iter()
+                    .map(|&v| sharpness(v))
+                    .collect(),
                 ..self.rows()
             };
             errors.extend(level.presses.clone().map(|k| {
@@ -334,7 +333,11 @@ fn predict(filters: &Filters, report: &Report, force: f32, rows: &mut Rows) {
 /// One over the deviation; nothing where there is none to know.
 #[inline(always)]
 fn sharpness(variance: f32) -> f32 {
-    if variance > 0.0 { variance.sqrt().recip() } else { 0.0 }
+    if variance > 0.0 {
+        variance.sqrt().recip()
+    } else {
+        0.0
+    }
 }
 
 /// By how much the filters at all places correct along, across and force.
@@ -371,8 +374,9 @@ fn correct(
 ) {
     let [along, across, force] = estimates;
     for k in 0..costs.len() {
-        let predicted =
-            rows.slopes[0][k] * along[k] + rows.slopes[1][k] * across[k] + rows.slopes[2][k] * force[k];
+        let predicted = rows.slopes[0][k] * along[k]
+            + rows.slopes[1][k] * across[k]
+            + rows.slopes[2][k] * force[k];
         let off = reading * rows.scale[k] - predicted;
         costs[k] += off * off * rows.half[k] + rows.log[k];
         along[k] += gains[0][k] * off;
@@ -392,7 +396,12 @@ fn masses_with(
     let [along, across, force] = &press.estimates;
     sum_masses_with(
         [along, across, force, &press.costs],
-        [&rows.slopes[0], &rows.slopes[1], &rows.slopes[2], &rows.scale],
+        [
+            &rows.slopes[0],
+            &rows.slopes[1],
+            &rows.slopes[2],
+            &rows.scale,
+        ],
         [&rows.half, &rows.log, &rows.gain, &rows.sharpness],
         [&positions[0], &positions[1], &positions[2]],
         &press.blocks,
@@ -508,7 +517,10 @@ mod tests {
         for k in -400..=400 {
             let x = k as f32 * 0.15;
             let true_value = f64::from(x).exp();
-            assert!((f64::from(exponential(x)) / true_value - 1.0).abs() < 2e-5, "{x}");
+            assert!(
+                (f64::from(exponential(x)) / true_value - 1.0).abs() < 2e-5,
+                "{x}"
+            );
             let y = (k as f32 * 0.15).exp();
             assert!((logarithm(y) - x).abs() < 1e-5 * (1.0 + x.abs()), "{x}");
         }

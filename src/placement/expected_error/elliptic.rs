@@ -38,8 +38,14 @@ mod tests {
     #[test]
     fn lengths_are_those_of_the_normal_distribution() {
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} {b}");
-        near(mean_length(4.0, 0.0, 4.0), 2.0 * (std::f64::consts::PI / 2.0).sqrt());
-        near(mean_length(9.0, 0.0, 0.0), 3.0 * (2.0 / std::f64::consts::PI).sqrt());
+        near(
+            mean_length(4.0, 0.0, 4.0),
+            2.0 * (std::f64::consts::PI / 2.0).sqrt(),
+        );
+        near(
+            mean_length(9.0, 0.0, 0.0),
+            3.0 * (2.0 / std::f64::consts::PI).sqrt(),
+        );
         // E(3/4) = 1.211056027568459 (Abramowitz and Stegun, table 17.1).
         near(second_kind(0.75), 1.211_056_027_568_459);
         // Turned by any angle the same.

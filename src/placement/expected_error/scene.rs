@@ -317,7 +317,11 @@ fn in_neighbourhoods(places: &mut [usize], positions: &[DVec3]) {
     } else {
         2
     };
-    places.sort_by(|&a, &b| positions[a][axis].total_cmp(&positions[b][axis]).then(a.cmp(&b)));
+    places.sort_by(|&a, &b| {
+        positions[a][axis]
+            .total_cmp(&positions[b][axis])
+            .then(a.cmp(&b))
+    });
     let (low, high) = places.split_at_mut(places.len() / 2);
     in_neighbourhoods(low, positions);
     in_neighbourhoods(high, positions);
@@ -429,12 +433,7 @@ fn slope_weights(flat: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let (a, b, c) = (sum(0, 0) + ridge, sum(0, 1), sum(1, 1) + ridge);
     let determinant = (a * c - b * b).max(f64::MIN_POSITIVE);
     (flat.iter())
-        .map(|[x, y]| {
-            [
-                (c * x - b * y) / determinant,
-                (a * y - b * x) / determinant,
-            ]
-        })
+        .map(|[x, y]| [(c * x - b * y) / determinant, (a * y - b * x) / determinant])
         .collect()
 }
 
@@ -449,8 +448,10 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn reports(&self, at: &[usize], standing: &[Place]) -> Reports {
-        let neighbours: Vec<Vec<Neighbour>> =
-            at.par_iter().map(|&at| self.around.neighbours(at)).collect();
+        let neighbours: Vec<Vec<Neighbour>> = at
+            .par_iter()
+            .map(|&at| self.around.neighbours(at))
+            .collect();
         let rows = |site: usize| {
             let mut rows = vec![0.0; Reports::ROWS * at.len()];
             for (k, &place) in at.iter().enumerate() {
@@ -463,7 +464,10 @@ impl Reader<'_> {
         };
         Reports {
             count: at.len(),
-            values: (0..self.x.rows()).into_par_iter().flat_map_iter(rows).collect(),
+            values: (0..self.x.rows())
+                .into_par_iter()
+                .flat_map_iter(rows)
+                .collect(),
         }
     }
 
@@ -472,8 +476,11 @@ impl Reader<'_> {
         let rises: Vec<f64> = (around.iter())
             .map(|n| self.value(site, n.place) - value)
             .collect();
-        let slope =
-            |k: usize| (around.iter().zip(&rises)).map(|(n, r)| n.weights[k] * r).sum::<f64>();
+        let slope = |k: usize| {
+            (around.iter().zip(&rises))
+                .map(|(n, r)| n.weights[k] * r)
+                .sum::<f64>()
+        };
         let slopes = [slope(0), slope(1)];
         let curvature = (around.iter().zip(&rises)).map(|(n, rise)| {
             let away = n.at[0].hypot(n.at[1]).max(f64::MIN_POSITIVE);
@@ -482,7 +489,13 @@ impl Reader<'_> {
             (off * (reach / away).powi(2).min(1.0)).powi(2)
         });
         let curvature = curvature.sum::<f64>() / around.len().max(1) as f64;
-        [value, slopes[0], slopes[1], self.variance(site, place), curvature]
+        [
+            value,
+            slopes[0],
+            slopes[1],
+            self.variance(site, place),
+            curvature,
+        ]
     }
 
     fn value(&self, site: usize, place: usize) -> f64 {
