@@ -239,8 +239,10 @@ fn trade(text: &mut String) {
         let model = graded.expect("grades").model;
         let points: Vec<_> = places.iter().map(|&p| model.index.nearest(p).0).collect();
         let solve = |signal| {
-            on_one_core(|| dataset::simulate(&model, many.clone(), &points, signal, 1, &unwatched))
-                .1
+            on_one_core(|| {
+                dataset::simulate(&model, many.clone(), &points, signal, 1, &[], &unwatched)
+            })
+            .1
         };
         let seconds = [solve(Signal::Displacement), solve(Signal::Strain)];
         for (name, radius) in [("5 mm", tip), ("point force", 1e-7)] {

@@ -24,6 +24,7 @@ use hapdef::inference::{
 use hapdef::link::{Address, BAUD, Doorway, Heard, Listener, Pace, State, host};
 use hapdef::live::{Input, Pipeline, Receiver};
 use hapdef::regression::Hyper;
+use hapdef::uncertainty::Gluing;
 use hapdef::wire::{Hello, Message, VERSION, encode};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -227,11 +228,11 @@ impl Lab {
     fn accuracy(&self, text: &mut String) {
         let (finer, _) = self
             .sensing
-            .truth(Workshop::Exact, SEED, &unwatched)
+            .truth(&Gluing::EXACT, SEED, &unwatched)
             .expect("the truth");
         let (built, gains) = self
             .sensing
-            .truth(Workshop::All, SEED, &unwatched)
+            .truth(&Gluing::default(), SEED, &unwatched)
             .expect("the truth");
         let _ = writeln!(
             text,

@@ -140,6 +140,8 @@ impl Quality {
                 locations: 600,
                 selection_touches: 400,
                 selection_candidates: 40,
+                expected_places: 320,
+                expected_presses: 96,
                 folds: 3,
                 tuning_touches: 300,
                 failure_subsets: 4,
@@ -164,6 +166,8 @@ impl Quality {
                 locations: 4000,
                 selection_touches: 4000,
                 selection_candidates: 407,
+                expected_places: 1024,
+                expected_presses: 255,
                 folds: 5,
                 tuning_touches: 1000,
                 failure_subsets: 12,
@@ -188,6 +192,8 @@ impl Quality {
                 locations: 6000,
                 selection_touches: 8000,
                 selection_candidates: 1000,
+                expected_places: 1600,
+                expected_presses: 510,
                 folds: 5,
                 tuning_touches: 1600,
                 failure_subsets: 252,
@@ -244,6 +250,9 @@ pub struct Budget {
     pub selection_touches: usize,
     /// Most candidates that greedy SVR scores.
     pub selection_candidates: usize,
+    /// Places that a choice by expected error compares readings with, and presses that it is tried on.
+    pub expected_places: usize,
+    pub expected_presses: usize,
     /// Folds of every cross-validation.
     pub folds: usize,
     /// Most touches that hyper-parameters are searched on.

@@ -1,5 +1,7 @@
 //! What every site reports under every touch, and where the touches were.
 
+mod slopes;
+
 use std::f64::consts::PI;
 
 use glam::DVec3;
@@ -7,10 +9,12 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::budget::{Cancelled, Watch, Work};
-use crate::elasticity::observe::{Face, SiteFrame, along};
+use crate::elasticity::observe::{Face, Observer, SiteFrame, along};
 use crate::elasticity::respond::{Reading, respond};
 use crate::elasticity::{Model, Touch};
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
+
+pub use slopes::GluingSlopes;
 
 /// What a site reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -131,6 +135,8 @@ pub struct Dataset {
     pub touches: Vec<Touch>,
     /// Sites × touches; m or strain.
     pub x: SignalMatrix,
+    /// What readings change by as gauges are glued a little off, where that was asked for.
+    pub slopes: Option<GluingSlopes>,
     pub work: Work,
 }
 
@@ -196,7 +202,8 @@ pub fn spread_touches(
 
 /// Simulates all touches and reads the signal at all sites. Gauge directions follow the strain over
 /// these very touches: of `directions` sites one after the other at the same point, the first lies along
-/// the largest and the others are evenly turned from it.
+/// the largest and the others are evenly turned from it. Of strain, what gluing changes is found for the touches
+/// numbered in `slope_touches`.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
@@ -206,6 +213,7 @@ pub fn simulate(
     points: &[SurfacePoint],
     signal: Signal,
     directions: usize,
+    slope_touches: &[usize],
     watch: Watch,
 ) -> Result<Dataset, Cancelled> {
     let observer = model.observer(points, Face::Inside);
@@ -216,7 +224,7 @@ pub fn simulate(
     let responses = respond(model, &touches, &observer, reading, watch)?;
     let count = touches.len();
     let mut values = vec![0.0; points.len() * count];
-    let sites = values
+    let read: Vec<(Site, Vec<f32>)> = values
         .par_chunks_mut(count)
         .enumerate()
         .map_init(
@@ -229,28 +237,43 @@ pub fn simulate(
                 let turned = (i % directions) as f64 * PI / directions as f64;
                 let angle = (moments.dominant_angle() + turned) % PI;
                 let frame = observer.frames()[i];
+                let mut by_angle = Vec::new();
                 if signal == Signal::Strain {
                     let w = along(angle);
                     for (t, x) in into.iter_mut().enumerate() {
                         *x = w[0] * rows[0][t] + w[1] * rows[1][t] + w[2] * rows[2][t];
                     }
+                    by_angle = slopes::turned(rows, angle, slope_touches);
                 } else {
                     for (k, row) in rows.iter_mut().enumerate() {
                         responses.row_into(3 * (points.len() + i) + k, row);
                     }
                     read_displacement(signal, frame.z_axis, rows, into);
                 }
-                moments.site(model.mesh().point(points[i]), frame, angle, count)
+                let position = model.mesh().point(points[i]);
+                (moments.site(position, frame, angle, count), by_angle)
             },
         )
         .collect();
+    let (sites, by_angle): (Vec<Site>, Vec<Vec<f32>>) = read.into_iter().unzip();
     let mut work = model.system().work();
     work.solves += responses.solves as u64;
+    // The strains go before moved gauges are read.
+    drop(responses);
+    let mut slopes = None;
+    if signal == Signal::Strain && !slope_touches.is_empty() {
+        let turned = by_angle.into_iter().flatten().collect();
+        let (found, solves) =
+            GluingSlopes::of(model, &sites, &touches, slope_touches, turned, watch)?;
+        work.solves += solves as u64;
+        slopes = Some(found);
+    }
     Ok(Dataset {
         signal,
         sites,
         touches,
         x: SignalMatrix::new(count, values),
+        slopes,
         work,
     })
 }
@@ -267,16 +290,7 @@ pub fn measure(
     signal: Signal,
     watch: Watch,
 ) -> Result<(SignalMatrix, usize), Cancelled> {
-    let points: Vec<SurfacePoint> = sites
-        .iter()
-        .map(|s| model.index().nearest(s.position).0)
-        .collect();
-    let observer = model.observer(&points, Face::Inside);
-    let angles: Vec<f64> = sites
-        .iter()
-        .zip(observer.frames())
-        .map(|(s, f)| s.direction.dot(f.y_axis).atan2(s.direction.dot(f.x_axis)))
-        .collect();
+    let (observer, angles) = gauges_on(model, sites);
     let reading = match signal {
         Signal::Strain => Reading::Gauge(&angles),
         Signal::Displacement | Signal::NormalDisplacement => Reading::Displacement,
@@ -295,6 +309,21 @@ pub fn measure(
         read_displacement(signal, observer.frames()[i].z_axis, &rows, into);
     }
     Ok((SignalMatrix::new(touches.len(), values), responses.solves))
+}
+
+/// What reads the places of gauges on a model's surface, and their angles in its frames.
+fn gauges_on(model: &dyn Model, sites: &[Site]) -> (Observer, Vec<f64>) {
+    let points: Vec<SurfacePoint> = sites
+        .iter()
+        .map(|s| model.index().nearest(s.position).0)
+        .collect();
+    let observer = model.observer(&points, Face::Inside);
+    let angles = sites
+        .iter()
+        .zip(observer.frames())
+        .map(|(s, f)| s.direction.dot(f.y_axis).atan2(s.direction.dot(f.x_axis)))
+        .collect();
+    (observer, angles)
 }
 
 /// The displacement signal from its three components by rows.

@@ -8,6 +8,7 @@ mod doubt;
 mod finest;
 mod ground;
 mod judge;
+mod known;
 mod layout;
 mod road;
 mod sense;

@@ -13,7 +13,10 @@ use crate::mesh::geodesic::{March, Scratch};
 use crate::mesh::repair::Repair;
 use crate::mesh::{RepairReport, TriMesh};
 use crate::placement::SelectorKind;
-use crate::project::{ChosenSite, Masks, PartModel, Project, SelectionKeys, SupportKeys};
+use crate::project::{
+    ChosenSite, GaugeKeys, Masks, PartModel, Project, SelectionKeys, SupportKeys, ToleranceKeys,
+    TouchKeys,
+};
 
 pub use paint::{Brush, Layer};
 
@@ -224,10 +227,14 @@ impl Document {
     #[must_use]
     pub fn elements_key_at(&self, quality: Quality) -> String {
         let p = &self.state.project;
+        // How hard touches come is for whoever chooses and judges: signals grow with the force.
+        let touch = TouchKeys {
+            forces_n: TouchKeys::default().forces_n,
+            ..p.touch.clone()
+        };
         format!(
-            "{} {:?} {:?} {:?} {:?} {:?}",
+            "{} {touch:?} {:?} {:?} {:?} {:?}",
             self.model_key(),
-            p.touch,
             p.touch.region.as_ref().map(|name| self.mask_key(name)),
             p.sites,
             (quality, p.budget.seed, p.budget.limits_at(quality)),
@@ -301,10 +308,14 @@ impl Document {
     pub fn feasible_key_at(&self, quality: Quality) -> String {
         let p = &self.state.project;
         let painted = self.state.painted.as_ref().map(|m| self.fingerprints.of(m));
+        // How far off gauges are glued decides nothing of where they can go.
+        let gauge = GaugeKeys {
+            tolerance: ToleranceKeys::default(),
+            ..p.gauge.clone()
+        };
         format!(
-            "{} {:?} {:?} {painted:?} {:?}",
+            "{} {gauge:?} {:?} {painted:?} {:?}",
             self.simulation_key_at(quality),
-            p.gauge,
             p.feasible,
             p.feasible.keep_out.as_ref().map(|name| self.mask_key(name)),
         )
@@ -342,7 +353,11 @@ impl Document {
             },
             ..keys.clone()
         };
-        format!("{} {asked:?}", self.candidates_key_at(quality))
+        // One selector knows how hard touches come, and how far off gauges are glued.
+        let (p, knowing) = (&self.state.project, SelectorKind::ExpectedError);
+        let knows = p.selectors().contains(&knowing);
+        let known = knows.then_some((p.touch.forces_n, p.gauge.tolerance));
+        format!("{} {asked:?} {known:?}", self.candidates_key_at(quality))
     }
 
     /// What a whole design depends on.
@@ -354,8 +369,9 @@ impl Document {
     /// As [`Self::design_key`], of a quality that need not be the project's.
     #[must_use]
     pub fn design_key_at(&self, quality: Quality) -> String {
-        let evaluation = &self.state.project.evaluation;
-        format!("{} {evaluation:?}", self.selection_key_at(quality))
+        let (evaluation, gauge) = (&self.state.project.evaluation, &self.state.project.gauge);
+        let judged = (evaluation, gauge.tolerance);
+        format!("{} {judged:?}", self.selection_key_at(quality))
     }
 }
 
@@ -482,5 +498,35 @@ mod tests {
         assert_ne!(now[2], before[2]);
         d.state.project.part.thickness_mm = 2.0;
         assert_ne!(keys(&d)[0], before[0]);
+    }
+
+    /// Which of candidates, selections and design go stale when a project with one selector is changed.
+    fn stale(selector: SelectorKind, change: impl Fn(&mut Project)) -> [bool; 3] {
+        let mut d = document();
+        d.state.project.selection.selector = selector;
+        d.state.project.selection.compare = false;
+        let keys = |d: &Document| {
+            let quality = d.state.project.budget.quality;
+            [
+                d.candidates_key_at(quality),
+                d.selection_key_at(quality),
+                d.design_key(),
+            ]
+        };
+        let before = keys(&d);
+        change(&mut d.state.project);
+        let now = keys(&d);
+        std::array::from_fn(|k| now[k] != before[k])
+    }
+
+    #[test]
+    fn another_workshop_is_another_judge_and_another_choice_for_who_knows_it() {
+        let glued = |p: &mut Project| p.gauge.tolerance.place_mm = 0.5;
+        let pressed = |p: &mut Project| p.touch.forces_n = [1.0, 10.0];
+        let [knows, other] = [SelectorKind::ExpectedError, SelectorKind::PcaQr];
+        assert_eq!(stale(other, glued), [false, false, true]);
+        assert_eq!(stale(other, pressed), [false; 3]);
+        assert_eq!(stale(knows, glued), [false, true, true]);
+        assert_eq!(stale(knows, pressed), [false, true, true]);
     }
 }

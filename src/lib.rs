@@ -36,4 +36,5 @@ pub mod studio;
 pub mod study;
 pub mod tally;
 pub mod trade;
+pub mod uncertainty;
 pub mod wire;

@@ -8,6 +8,7 @@ mod ranges;
 mod selection;
 
 use std::borrow::Cow;
+use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +21,7 @@ use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
 use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
+use crate::uncertainty::Gluing;
 
 use ranges::check;
 
@@ -27,7 +29,9 @@ pub use kept::{Kept, KeptError, KeptFailure};
 pub use live::{GluedKeys, LiveKeys};
 pub use masks::Masks;
 pub use part::{Elements, MaterialKeys, Part, PartModel, SupportKeys, SupportKind, Unit};
-pub use ranges::{EDGE_NEIGHBOURS, FARTHEST, GAUGES, TOUCHES};
+pub use ranges::{
+    ANGLE_OFF, EDGE_NEIGHBOURS, FARTHEST, FORCES, GAIN_OFF, GAUGES, PLACE_OFF, TOUCHES,
+};
 pub use selection::{ChosenSite, CostKeys, GaussianProcessKeys, SelectionKeys};
 
 /// Version of the file format this program writes and the newest it reads.
@@ -82,12 +86,23 @@ pub struct Project {
 #[serde(default, deny_unknown_fields)]
 pub struct TouchKeys {
     pub force_n: f64,
+    // What is usual is not serialized: the fingerprints of trades that were measured before this key still hold.
+    /// How hard touches come, the lightest and the hardest: evenly over the logarithm between.
+    #[serde(skip_serializing_if = "are_usual_forces")]
+    pub forces_n: [f64; 2],
     pub tip_radius_mm: f64,
     pub count: usize,
     pub edge_margin_mm: f64,
     /// Name of a mask (one value a vertex of the part): touches come only where it is set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region: Option<String>,
+}
+
+/// The lightest and the hardest touch (N), where nothing else is said.
+const FORCES_N: [f64; 2] = [2.0, 30.0];
+
+fn are_usual_forces(forces_n: &[f64; 2]) -> bool {
+    *forces_n == FORCES_N
 }
 
 /// How sites are laid out on the inside.
@@ -121,6 +136,25 @@ pub struct GaugeKeys {
     pub grid_length_mm: f64,
     pub grid_width_mm: f64,
     pub flatness_mm: f64,
+    // As `touch.forces_n`.
+    #[serde(skip_serializing_if = "ToleranceKeys::is_usual")]
+    pub tolerance: ToleranceKeys,
+}
+
+/// How far off gauges are glued (standard deviations).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ToleranceKeys {
+    /// Rms distance, in any direction along the surface.
+    pub place_mm: f64,
+    pub angle_deg: f64,
+    pub gain_percent: f64,
+}
+
+impl ToleranceKeys {
+    fn is_usual(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -198,6 +232,7 @@ impl Default for TouchKeys {
     fn default() -> Self {
         Self {
             force_n: 10.0,
+            forces_n: FORCES_N,
             tip_radius_mm: 5.0,
             count: 4000,
             edge_margin_mm: 2.4,
@@ -224,6 +259,16 @@ impl Default for GaugeKeys {
             grid_length_mm: 5.0,
             grid_width_mm: 2.0,
             flatness_mm: 0.3,
+            tolerance: ToleranceKeys::default(),
+        }
+    }
+}
+impl Default for ToleranceKeys {
+    fn default() -> Self {
+        Self {
+            place_mm: 1.0,
+            angle_deg: 3.0,
+            gain_percent: 3.0,
         }
     }
 }
@@ -331,6 +376,17 @@ impl Project {
             c: self.selection.c_mm,
             epsilon: self.selection.epsilon_mm,
             gamma: self.selection.gamma,
+        }
+    }
+
+    /// How far off a workshop glues the gauges.
+    #[must_use]
+    pub fn gluing(&self) -> Gluing {
+        let tolerance = &self.gauge.tolerance;
+        Gluing {
+            place: tolerance.place_mm * MM,
+            angle: tolerance.angle_deg * PI / 180.0,
+            gain: tolerance.gain_percent / 100.0,
         }
     }
 

@@ -72,6 +72,7 @@ impl Settings {
         Knowledge {
             noise: self.noise,
             variance: None,
+            among: None,
             forces: known.then(|| (&data.forces[..], self.forces.unwrap_or_else(coming))),
             seed: self.svr.seed,
         }

@@ -205,7 +205,10 @@ fn grading_is_worth_its_elements() {
         [0, 1].map(|k| errors.iter().map(|e| e[k].ln()).sum::<f64>() / counts.len() as f64)
     };
     let (even, graded) = (mean(0), mean(2));
-    assert!(graded[0] < even[0] && graded[1] < even[1], "{graded:?} {even:?}");
+    assert!(
+        graded[0] < even[0] && graded[1] < even[1],
+        "{graded:?} {even:?}"
+    );
 }
 
 /// A clamped disc pressed in its middle stiffens: w/t + 0.443 (w/t)³ = linear w/t (Timoshenko and

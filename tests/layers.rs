@@ -5,7 +5,15 @@ use std::path::Path;
 /// From the bottom up; a module may use those above it in this list, itself included.
 const ORDER: [&[&str]; 14] = [
     &[
-        "budget", "colormap", "eigen", "lanes", "memory", "plain", "tally", "wire",
+        "budget",
+        "colormap",
+        "eigen",
+        "lanes",
+        "memory",
+        "plain",
+        "tally",
+        "uncertainty",
+        "wire",
     ],
     &["mesh"],
     &["limb", "elasticity"],

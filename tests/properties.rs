@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use hapdef::budget::{Quality, unwatched};
-use hapdef::dataset::{Signal, SignalMatrix};
+use hapdef::dataset::{self, Signal, SignalMatrix, Site};
 use hapdef::design::{self, Inputs};
 use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::{Face, Observer};
@@ -297,6 +297,61 @@ fn small(signal: Signal) -> (Inputs, hapdef::budget::Budget) {
     (inputs, budget)
 }
 
+/// A gauge half a millimetre along, back, across, back, and turned by a degree either way.
+fn moved(site: &Site) -> [Site; 6] {
+    let across = site.normal.cross(site.direction);
+    let at = |along: f64, aside: f64, degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Site {
+            position: site.position + site.direction * along + across * aside,
+            direction: site.direction * cos + across * sin,
+            ..*site
+        }
+    };
+    let half = 0.5e-3;
+    [
+        at(half, 0.0, 0.0),
+        at(-half, 0.0, 0.0),
+        at(0.0, half, 0.0),
+        at(0.0, -half, 0.0),
+        at(0.0, 0.0, 1.0),
+        at(0.0, 0.0, -1.0),
+    ]
+}
+
+#[test]
+fn slopes_of_gluing_are_what_moved_gauges_read() {
+    let (inputs, budget) = small(Signal::Strain);
+    let simulated = design::simulate(&inputs, &budget, &unwatched).unwrap();
+    let all = &simulated.dataset;
+    let slopes = all.slopes.as_ref().unwrap();
+    let touches: Vec<Touch> = slopes.touches().iter().map(|&t| all.touches[t]).collect();
+    let sites: Vec<usize> = (0..all.sites.len()).step_by(61).collect();
+    let gauges: Vec<Site> = sites.iter().flat_map(|&s| moved(&all.sites[s])).collect();
+    let model = simulated.model().unwrap();
+    let read = dataset::measure(&*model, &touches, &gauges, Signal::Strain, &unwatched);
+    let (read, _) = read.unwrap();
+    // Metres twice, and a radian.
+    let steps = [1e-3, 1e-3, 2_f64.to_radians()];
+    for (kind, (step, limit)) in steps.into_iter().zip([0.15, 0.15, 0.02]).enumerate() {
+        let (mut apart, mut whole) = (0.0, 0.0);
+        for (i, &site) in sites.iter().enumerate() {
+            let [forth, back] = [0, 1].map(|side| read.row(6 * i + 2 * kind + side));
+            let differences = forth.iter().zip(back).map(|(f, b)| (f - b) / step);
+            for (difference, &slope) in differences.zip(slopes.row(site)[kind]) {
+                apart += (difference - f64::from(slope)).powi(2);
+                whole += difference * difference;
+            }
+        }
+        let share = (apart / whole).sqrt();
+        assert!(share < limit, "{kind}: {share}");
+    }
+    assert_eq!(slopes.touches(), (0..200_usize).collect::<Vec<_>>());
+    let (other, budget) = small(Signal::NormalDisplacement);
+    let simulated = design::simulate(&other, &budget, &unwatched).unwrap();
+    assert!(simulated.dataset.slopes.is_none());
+}
+
 #[test]
 fn one_thread_or_many_give_the_same_bytes() {
     let (inputs, budget) = small(Signal::Strain);
@@ -331,6 +386,7 @@ fn one_thread_or_many_give_the_same_bytes() {
                 .collect::<Vec<_>>(),
             errors,
             design.work(),
+            design.simulated.dataset.slopes.clone(),
         )
     };
     let one = run(1);
@@ -340,6 +396,7 @@ fn one_thread_or_many_give_the_same_bytes() {
         assert_eq!(one.1, many.1);
         assert_eq!(one.2, many.2);
         assert_eq!(one.3, many.3);
+        assert!(one.4 == many.4, "slopes on {threads} threads");
     }
 }
 

@@ -53,7 +53,7 @@ pub struct BoardArgs {
     /// What readings drift by in a second (microstrain).
     #[arg(long, default_value_t = 0.1, value_parser = between(0.0, MOST_MICROSTRAIN))]
     pub drift: f64,
-    /// What the gauges are off by: exact, gains (3 %), or all (gains, 1 mm, 3°).
+    /// What the gauges are off by: exact, gains, or all (gains, places, directions); as far as gauge.tolerance says.
     #[arg(long, default_value = "all", value_parser = workshop)]
     pub workshop: Workshop,
     /// Smallest and largest force of random touches (N).
@@ -322,7 +322,7 @@ pub fn simulated(
     watch: Watch,
 ) -> Result<SimulatedBoard, design::DesignError> {
     let seed = inputs.project.budget.seed;
-    let (truth, gains) = sensing.truth(workshop, seed, watch)?;
+    let (truth, gains) = sensing.truth(&workshop.of(inputs.project.gluing()), seed, watch)?;
     let typical: Vec<Touch> = places(inputs, sensing, seed)?
         .into_iter()
         .take(300)

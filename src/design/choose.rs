@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
+use super::known::Known;
 use super::{DesignError, HEARD_SEED, Inputs, LEAST_TOUCHES, Shortage, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::{Dataset, Signal, SignalMatrix, Site};
@@ -17,6 +18,7 @@ use crate::mesh::{SurfacePoint, TriMesh, geodesic};
 use crate::pca::Pca;
 use crate::placement::candidates::{Candidates, reduce};
 use crate::placement::entropy::Entropy;
+use crate::placement::expected_error::{self, Detail, ExpectedError};
 use crate::placement::greedy_svr::{self, GreedySvr};
 use crate::placement::information::Geometry;
 use crate::placement::mutual_information::MutualInformation;
@@ -391,6 +393,9 @@ fn choose(
     if kind == SelectorKind::GreedySvr {
         return select_by_svr(inputs, simulated, reduced, budget, watch, &found);
     }
+    if kind == SelectorKind::ExpectedError {
+        return select_by_expected_error(inputs, simulated, reduced, budget, watch, &found);
+    }
     let places = positions(&reduced.feasible);
     let x = heard(inputs, reduced);
     let pool = Pool {
@@ -445,6 +450,43 @@ fn choose(
         ));
     }
     Ok(selection)
+}
+
+fn select_by_expected_error(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    budget: &Budget,
+    watch: Watch,
+    found: &(dyn Fn(&SensorSet) + Sync),
+) -> Result<Selection, DesignError> {
+    let known = Known::new(inputs, simulated, &inputs.project.gluing());
+    let positions: Vec<DVec3> = (reduced.feasible.iter())
+        .map(|&s| simulated.dataset.sites[s].position)
+        .collect();
+    let variance = |row: usize, touch: usize| known.variance(reduced.feasible[row], touch);
+    let targets = simulated.dataset.targets_mm();
+    let pool = Pool {
+        x: &reduced.x,
+        targets: &targets,
+        sites: &reduced.feasible,
+        positions: &positions,
+    };
+    let wishes = wishes(inputs, &positions)?;
+    let request = Request {
+        wishes: &wishes,
+        watch,
+        found,
+    };
+    let selector = ExpectedError {
+        known: known.knowledge(&variance),
+        detail: Detail {
+            places: budget.expected_places,
+            presses: budget.expected_presses,
+        },
+        rounds: expected_error::ROUNDS,
+    };
+    Ok(selector.select(&pool, &request)?)
 }
 
 /// The feasible sites nearest to the places where gauges must be: rows of the reduced signals.

@@ -16,6 +16,7 @@ use crate::evaluation::{self, Candidate, Evaluation, Region, Trial};
 use crate::placement::Selection;
 use crate::project::Project;
 use crate::regression::folds::evenly;
+use crate::uncertainty::Gluing;
 
 /// The judge: a model of finer elements, with touches of its own.
 #[derive(Clone)]
@@ -28,18 +29,19 @@ pub struct Truth {
     /// Dataset sites that were measured, rising, and their signals.
     pub sites: Vec<usize>,
     pub x: SignalMatrix,
-    /// The same sites as a workshop would build them.
+    /// The same sites as a workshop would build them, and how far off that is.
     pub workshop: SignalMatrix,
+    pub gluing: Gluing,
 }
 
 impl Truth {
-    /// Whether it measures exactly these sites, in any order.
+    /// Whether it measures exactly these sites, in any order, and built by this workshop.
     #[must_use]
-    pub fn measures(&self, sites: &[usize]) -> bool {
+    pub fn measures(&self, sites: &[usize], gluing: &Gluing) -> bool {
         let mut rows = sites.to_vec();
         rows.sort_unstable();
         rows.dedup();
-        rows == self.sites
+        rows == self.sites && *gluing == self.gluing
     }
 
     /// The same, judged in the regions that a project asks for.
@@ -90,15 +92,16 @@ pub(super) fn measured_by(
     rows.dedup();
     // Both kinds of gauges in one measurement: the loads are solved for once.
     let drawn = rows.iter().map(|&s| simulated.dataset.sites[s]);
+    let (gluing, seed) = (project.gluing(), project.budget.seed);
     let built =
-        (rows.iter().zip(drawn.clone())).map(|(&s, site)| as_built(&site, project.budget.seed, s));
+        (rows.iter().zip(drawn.clone())).map(|(&s, site)| as_built(&site, &gluing, seed, s));
     let gauges: Vec<Site> = drawn.clone().chain(built).collect();
     let (signals, solves) =
         dataset::measure(model, &touches, &gauges, project.gauge.signal, watch)?;
     let half =
         |k: usize| signals.select_rows(&(k * rows.len()..(k + 1) * rows.len()).collect::<Vec<_>>());
     let (x, workshop) = (half(0), half(1));
-    let gains = (rows.iter()).map(|&s| workshop_draw(project.budget.seed, s).gain);
+    let gains = (rows.iter()).map(|&s| workshop_draw(&gluing, seed, s).gain);
     let workshop = workshop.scaled_rows(gains);
     Ok(Truth {
         regions: regions(project, &touches),
@@ -111,6 +114,7 @@ pub(super) fn measured_by(
         sites: rows,
         x,
         workshop,
+        gluing,
     })
 }
 
@@ -122,15 +126,13 @@ pub(super) struct WorkshopDraw {
     pub gain: f64,
 }
 
-/// Off by 1 mm in any direction, by 3° either way, and by 3 % either way: the same for a site in whatever
+/// Off by as much as is usual for the workshop, in any direction and either way: the same for a site in whatever
 /// set it is.
-pub(super) fn workshop_draw(seed: u64, site: usize) -> WorkshopDraw {
-    const TURN: f64 = 3.0 * std::f64::consts::PI / 180.0;
-    const GAIN: f64 = 0.03;
+pub(super) fn workshop_draw(gluing: &Gluing, seed: u64, site: usize) -> WorkshopDraw {
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(WORKSHOP_SEED));
     rng.set_stream(site as u64);
     let mut sign = || if rng.random::<bool>() { 1.0 } else { -1.0 };
-    let (turned, gain) = (TURN * sign(), 1.0 + GAIN * sign());
+    let (turned, gain) = (gluing.angle * sign(), 1.0 + gluing.gain * sign());
     WorkshopDraw {
         toward: std::f64::consts::TAU * rng.random::<f64>(),
         turned,
@@ -138,13 +140,12 @@ pub(super) fn workshop_draw(seed: u64, site: usize) -> WorkshopDraw {
     }
 }
 
-pub(super) fn as_built(site: &Site, seed: u64, number: usize) -> Site {
-    const OFF: f64 = 1e-3;
-    let draw = workshop_draw(seed, number);
+pub(super) fn as_built(site: &Site, gluing: &Gluing, seed: u64, number: usize) -> Site {
+    let draw = workshop_draw(gluing, seed, number);
     let across = site.normal.cross(site.direction);
     let along = |angle: f64| site.direction * angle.cos() + across * angle.sin();
     Site {
-        position: site.position + along(draw.toward) * OFF,
+        position: site.position + along(draw.toward) * gluing.place,
         direction: along(draw.turned),
         ..*site
     }
@@ -320,4 +321,57 @@ pub fn sites_to_judge(reduced: &Reduced, selections: &[Selection]) -> Vec<usize>
         .flat_map(|s| &s.sets)
         .flat_map(|s| &s.sites);
     reduced.sites.iter().chain(chosen).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn site() -> Site {
+        Site {
+            position: DVec3::new(0.01, 0.02, 0.03),
+            normal: DVec3::Z,
+            direction: DVec3::X,
+            rms_strain: 0.0,
+            peak_strain: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_gauge_is_off_by_what_the_project_says() {
+        let gluing = Gluing {
+            place: 2e-3,
+            angle: 0.1,
+            gain: 0.05,
+        };
+        for number in 0..20 {
+            let built = as_built(&site(), &gluing, 7, number);
+            assert!((built.position.distance(site().position) - 2e-3).abs() < 1e-12);
+            assert!((built.direction.angle_between(DVec3::X) - 0.1).abs() < 1e-9);
+            let gain = workshop_draw(&gluing, 7, number).gain;
+            assert!(((gain - 1.0).abs() - 0.05).abs() < 1e-12);
+            // Another workshop is off the same way, by another amount.
+            let usual = as_built(&site(), &Gluing::default(), 7, number);
+            let [a, b] = [built, usual].map(|s| (s.position - site().position).normalize());
+            assert!(a.distance(b) < 1e-9);
+            assert_eq!(as_built(&site(), &Gluing::EXACT, 7, number), site());
+        }
+    }
+
+    #[test]
+    fn what_another_workshop_built_was_not_measured() {
+        let truth = Truth {
+            touches: Vec::new(),
+            regions: Vec::new(),
+            element_mm: 1.0,
+            work: Work::default(),
+            sites: vec![2, 5],
+            x: SignalMatrix::default(),
+            workshop: SignalMatrix::default(),
+            gluing: Gluing::default(),
+        };
+        assert!(truth.measures(&[5, 2, 5], &Gluing::default()));
+        assert!(!truth.measures(&[5, 3], &Gluing::default()));
+        assert!(!truth.measures(&[5, 2], &Gluing::EXACT));
+    }
 }

@@ -5,13 +5,16 @@ use glam::DVec3;
 
 use super::{DesignError, Inputs, LAYOUT, MOST_SITES};
 use crate::budget::Budget;
-use crate::dataset::{self, TouchRegion};
+use crate::dataset::{self, GluingSlopes, Signal, TouchRegion};
 use crate::elasticity::load::Touch;
 use crate::memory;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::unroll::Unrolling;
 use crate::mesh::{Edge, SurfacePoint, TriMesh, sample};
 use crate::project::{Lattice, PartModel, Project};
+
+/// Most touches that the slopes of gluing are found for, evenly chosen: a variance needs no more.
+pub const SLOPE_TOUCHES: usize = 1300;
 
 pub(super) fn size_mm(mesh: &TriMesh) -> f64 {
     let (lower, upper) = mesh.bounds();
@@ -79,7 +82,7 @@ pub(super) fn check_foreseen(inputs: &Inputs, budget: &Budget) -> Result<(), Des
     }
     count_sites(&inputs.part, &inputs.project)?;
     let (sites, touches, _) = expected_size(inputs, budget);
-    check_memory(sites, touches)
+    check_memory(sites, touches, inputs.project.gauge.signal)
 }
 
 /// How many places for sites there are on a mesh, about.
@@ -241,25 +244,31 @@ fn near_mask(mesh: &TriMesh, part: &TriMesh, index: &SurfaceIndex, mask: &[bool]
         .collect()
 }
 
-pub(super) fn check_memory(sites: usize, touches: usize) -> Result<(), DesignError> {
-    // The signal itself beside three strain components a site and touch; then the kernel of the
-    // evaluation and its distances, on every thread.
-    let kernels = 2 * touches * touches * rayon::current_num_threads();
-    check_room(4 * sites, touches)?;
-    check_room(kernels.div_ceil(touches.max(1)), touches).map_err(|error| match error {
-        DesignError::TooLarge {
-            needed_gb,
-            limit_gb,
-            touches,
-            ..
-        } => DesignError::TooLarge {
-            needed_gb,
-            limit_gb,
-            sites,
-            touches,
-        },
-        other => other,
-    })
+pub(super) fn check_memory(
+    sites: usize,
+    touches: usize,
+    signal: Signal,
+) -> Result<(), DesignError> {
+    // Then the kernel of the evaluation and its distances, on every thread.
+    let kernels = 2.0 * (touches as f64).powi(2) * rayon::current_num_threads() as f64;
+    let most = simulation_numbers(sites, touches, signal).max(kernels);
+    check_numbers(most, sites, touches)
+}
+
+/// Numbers in double precision that a simulation holds at its largest.
+fn simulation_numbers(sites: usize, touches: usize, signal: Signal) -> f64 {
+    // The signal itself beside what it is read from: the components of the strain, and of the displacement.
+    let components = match signal {
+        Signal::Strain => 3.0,
+        Signal::Displacement | Signal::NormalDisplacement => 6.0,
+    };
+    // The strains are let go before gauges are read as they are glued.
+    let glued = match signal {
+        Signal::Strain => GluingSlopes::HELD * touches.min(SLOPE_TOUCHES) as f64,
+        Signal::Displacement | Signal::NormalDisplacement => 0.0,
+    };
+    let (sites, touches) = (sites as f64, touches as f64);
+    sites * (touches + glued.max(components * touches))
 }
 
 /// What a simulation will hold at its largest: about how many sites, how many touches, and the memory of
@@ -275,31 +284,60 @@ pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
     let places = (share * inputs.part.area() / (spacing * spacing)).round();
     let sites = (places * inputs.project.gauge.directions as f64) as usize;
     let touches = inputs.project.touch.count.min(budget.touches);
-    let bytes = 4.0 * sites as f64 * touches as f64 * size_of::<f64>() as f64;
-    (sites, touches, bytes / 1e9)
+    let numbers = simulation_numbers(sites, touches, inputs.project.gauge.signal);
+    (sites, touches, gigabytes(numbers))
 }
 
-/// Refuses a dense result of `rows` × `columns` that cannot be held, before it is allocated.
+/// Refuses a result of `each` numbers for every site and touch that cannot be held, before it is allocated.
 ///
 /// # Errors
 /// [`DesignError::TooLarge`].
-pub fn check_room(rows: usize, columns: usize) -> Result<(), DesignError> {
-    let needed_gb = rows as f64 * columns as f64 * size_of::<f64>() as f64 / 1e9;
-    if needed_gb > memory::allowed_gb() {
+pub fn check_room(sites: usize, touches: usize, each: usize) -> Result<(), DesignError> {
+    check_numbers(sites as f64 * touches as f64 * each as f64, sites, touches)
+}
+
+fn check_numbers(numbers: f64, sites: usize, touches: usize) -> Result<(), DesignError> {
+    let (needed_gb, limit_gb) = (gigabytes(numbers), memory::allowed_gb());
+    if needed_gb > limit_gb {
         return Err(DesignError::TooLarge {
             needed_gb,
-            limit_gb: memory::allowed_gb(),
-            sites: rows / 4,
-            touches: columns,
+            limit_gb,
+            sites,
+            touches,
         });
     }
     Ok(())
+}
+
+fn gigabytes(numbers: f64) -> f64 {
+    numbers * size_of::<f64>() as f64 / 1e9
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::project::Unit;
+
+    #[test]
+    fn what_is_held_is_the_larger_of_strains_and_glued_gauges() {
+        let each = |touches: usize, signal| {
+            let numbers = simulation_numbers(100, touches, signal);
+            numbers / (100.0 * touches as f64)
+        };
+        assert_eq!(each(10_000, Signal::Strain), 4.0);
+        assert_eq!(each(800, Signal::Strain), 1.0 + GluingSlopes::HELD);
+        assert_eq!(each(800, Signal::Displacement), 7.0);
+    }
+
+    #[test]
+    fn a_refusal_names_the_sites_that_were_given() {
+        let refused = check_room(10_000_000, 4000, 24).unwrap_err();
+        let DesignError::TooLarge { sites, touches, .. } = refused else {
+            panic!("{refused}");
+        };
+        assert_eq!((sites, touches), (10_000_000, 4000));
+        assert!(check_room(10, 10, 24).is_ok());
+    }
 
     #[test]
     fn a_hardly_bent_panel_is_not_unrolled_all_the_way_round() {

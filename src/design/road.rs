@@ -304,7 +304,8 @@ pub fn run_step_by_step(
     };
     (hooks.entered)(Step::Evaluate);
     let judged = sites_to_judge(&reduced, &selections);
-    let measured = known.truth.filter(|t| t.measures(&judged));
+    let gluing = inputs.project.gluing();
+    let measured = known.truth.filter(|t| t.measures(&judged, &gluing));
     let known = known.evaluation.filter(|_| measured.is_some());
     let truth = match measured {
         Some(known) => Arc::new(known.in_regions_of(&inputs.project)),

@@ -15,6 +15,7 @@ use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::elasticity::{Model, Touch};
 use crate::inference::{AsDrawn, ResponseMap};
 use crate::project::{LiveKeys, Project};
+use crate::uncertainty::Gluing;
 
 /// A model of the chosen gauges, without the stiffness it came from.
 pub struct Sensing {
@@ -47,11 +48,26 @@ pub struct Lesson {
 pub enum Workshop {
     /// Glued exactly as drawn.
     Exact,
-    /// Gains off by 3 %.
+    /// Gains off by the project's tolerance.
     Gains,
-    /// Gains off by 3 %, places by 1 mm, directions by 3°.
+    /// Gains, places and directions off by it.
     #[default]
     All,
+}
+
+impl Workshop {
+    /// What it leaves of a project's tolerance.
+    #[must_use]
+    pub fn of(self, gluing: Gluing) -> Gluing {
+        match self {
+            Self::Exact => Gluing::EXACT,
+            Self::Gains => Gluing {
+                gain: gluing.gain,
+                ..Gluing::EXACT
+            },
+            Self::All => gluing,
+        }
+    }
 }
 
 /// The model of a project's chosen gauges, on the same elements as a design of the same quality.
@@ -179,24 +195,15 @@ impl Sensing {
     /// [`DesignError`] as for a simulation.
     pub fn truth(
         &self,
-        workshop: Workshop,
+        gluing: &Gluing,
         seed: u64,
         watch: Watch,
     ) -> Result<(Sensitivity, Vec<f64>), DesignError> {
         let (_, model) = self.ground.truth(&self.laid, watch)?;
         let gauges: Vec<Gauge> = (self.gauges.iter().enumerate())
-            .map(|(k, gauge)| {
-                if workshop == Workshop::All {
-                    glued(gauge, seed, k)
-                } else {
-                    *gauge
-                }
-            })
+            .map(|(k, gauge)| glued(gauge, gluing, seed, k))
             .collect();
-        let gain = |k: usize| match workshop {
-            Workshop::Exact => 1.0,
-            Workshop::Gains | Workshop::All => workshop_draw(seed, k).gain,
-        };
+        let gain = |k: usize| workshop_draw(gluing, seed, k).gain;
         let gains = (0..gauges.len()).map(gain).collect();
         Ok((Sensitivity::new(&*model, &gauges, watch)?, gains))
     }
@@ -253,7 +260,7 @@ impl Sensing {
     }
 }
 
-fn glued(gauge: &Gauge, seed: u64, number: usize) -> Gauge {
+fn glued(gauge: &Gauge, gluing: &Gluing, seed: u64, number: usize) -> Gauge {
     let drawn = Site {
         position: gauge.position,
         normal: gauge.normal,
@@ -261,7 +268,7 @@ fn glued(gauge: &Gauge, seed: u64, number: usize) -> Gauge {
         rms_strain: 0.0,
         peak_strain: 0.0,
     };
-    let built = as_built(&drawn, seed, number);
+    let built = as_built(&drawn, gluing, seed, number);
     Gauge {
         position: built.position,
         direction: built.direction,

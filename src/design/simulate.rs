@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::ground::{Built, Ground, Laid, ground, open_solid};
 use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches};
-use super::{DesignError, Inputs};
+use super::{DesignError, Inputs, SLOPE_TOUCHES};
 use crate::budget::{Achieved, Budget, Quality, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset};
 use crate::elasticity::estimate::Discretization;
@@ -17,6 +17,7 @@ use crate::elasticity::{Freedoms, Model, Support, Touch};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::Project;
+use crate::regression::folds::evenly;
 
 /// The elastic stage: the mesh that was computed on, the sites on it and the dataset.
 pub struct Simulated {
@@ -65,7 +66,8 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     check_foreseen(inputs, budget)?;
     let layout = ground.site_layout(&inputs.part);
     let sites = lay_out_sites(&layout, project)?;
-    check_memory(sites.len(), project.touch.count.min(budget.touches))?;
+    let count = project.touch.count.min(budget.touches);
+    check_memory(sites.len(), count, project.gauge.signal)?;
     let touches = lay_out_touches(&ground.touch_layout(&inputs.part), inputs, budget)?;
     let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
     let built = ground.build(&touches, &places, &budget.elements, watch)?;
@@ -113,7 +115,11 @@ pub fn simulate_again(
     project.check()?;
     let layout = last.ground.site_layout(&inputs.part);
     let sites = lay_out_sites(&layout, project)?;
-    check_memory(sites.len(), last.dataset.touches.len())?;
+    check_memory(
+        sites.len(),
+        last.dataset.touches.len(),
+        project.gauge.signal,
+    )?;
     let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
     let known = Elements {
         ground: Arc::clone(&last.ground),
@@ -166,7 +172,9 @@ fn read(
     let unknowns = model.system().dimension();
     let gauge = &project.gauge;
     let (signal, directions) = (gauge.signal, gauge.directions);
-    let mut dataset = dataset::simulate(model, touches, &points, signal, directions, watch)?;
+    let slopes = evenly(touches.len(), SLOPE_TOUCHES);
+    let mut dataset =
+        dataset::simulate(model, touches, &points, signal, directions, &slopes, watch)?;
     dataset.work += before;
     let mut notes = if dataset.touches.len() < project.touch.count {
         vec![format!(

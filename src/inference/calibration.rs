@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::map::{ResponseMap, Slope};
 use super::matching::{Errors, Measured, equations};
 use crate::mesh::SurfacePoint;
+use crate::uncertainty::Gluing;
 
 /// What gauges read as drawn, and how that changes with the way they are glued.
 pub struct AsDrawn {
@@ -32,6 +33,26 @@ impl AsDrawn {
     #[must_use]
     pub fn glued(&self, glued: &[[f64; 4]]) -> ResponseMap {
         self.map.combined(&self.changes, glued)
+    }
+
+    /// How far off readings per newton are by gluing (standard deviations), at every node of the map and for every
+    /// channel.
+    #[must_use]
+    pub fn spread(&self, gluing: &Gluing) -> ResponseMap {
+        let mesh = &self.map.mesh;
+        let nodes = mesh.positions().len() + mesh.edges().len();
+        let mut values = Vec::with_capacity(nodes * self.map.channels());
+        for node in 0..nodes {
+            let [along, across, turned] = self.changes.each_ref().map(|m| m.node(node));
+            let deviation = |(c, &reading): (usize, &f64)| {
+                // From a millimetre and a degree to a metre and a radian.
+                let (along, across) = (along[c] * 1e3, across[c] * 1e3);
+                let variance = gluing.variance(reading, along, across, turned[c].to_degrees());
+                variance.sqrt()
+            };
+            values.extend(self.map.node(node).iter().enumerate().map(deviation));
+        }
+        ResponseMap::of(Arc::clone(mesh), self.map.channels(), values)
     }
 
     /// Readings and slopes at one place for gauges that are glued like that.
@@ -246,4 +267,58 @@ fn still_off(known: &[Known], bases: &[Vec<Vector4<f64>>], fits: &[Fit], noise: 
         sum - count
     };
     zero_of(excess)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::mesh::TriMesh;
+
+    /// Two channels on one triangle, with the same readings per newton at all its six nodes.
+    fn map(mesh: &Arc<TriMesh>, readings: [f64; 2]) -> ResponseMap {
+        ResponseMap::of(Arc::clone(mesh), 2, readings.repeat(6))
+    }
+
+    #[test]
+    fn the_spread_is_that_of_gauges_glued_so() {
+        const DIRECTIONS: u32 = 8;
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let (mesh, _) = TriMesh::new(&corners, &[[0, 1, 2]], 0).unwrap();
+        let mesh = Arc::new(mesh);
+        let drawn = AsDrawn {
+            map: Arc::new(map(&mesh, [2e-6, -1e-6])),
+            changes: [[3e-7, 0.0], [-4e-7, 1e-7], [1e-7, 2e-7]].map(|c| map(&mesh, c)),
+        };
+        let gluing = Gluing::default();
+        // Every way of being off as far as a workshop is, each as likely as its opposite.
+        let mut squares = [0.0; 2];
+        let at = SurfacePoint {
+            triangle: 0,
+            barycentric: [0.2, 0.3, 0.5],
+        };
+        for k in 0..4 * DIRECTIONS {
+            let (s, c) = (TAU * f64::from(k / 4) / f64::from(DIRECTIONS)).sin_cos();
+            let [turn, gain] = [k % 2, k / 2 % 2].map(|bit| 2.0 * f64::from(bit) - 1.0);
+            let off = [
+                1.0 + gluing.gain * gain,
+                gluing.place * 1e3 * c,
+                gluing.place * 1e3 * s,
+                gluing.angle.to_degrees() * turn,
+            ];
+            let built = drawn.glued(&[off, off]).at(at);
+            for ((square, built), drawn) in squares.iter_mut().zip(built).zip(drawn.map.at(at)) {
+                *square += (built - drawn).powi(2) / f64::from(4 * DIRECTIONS);
+            }
+        }
+        let spread = drawn.spread(&gluing).at(at);
+        for (spread, square) in spread.into_iter().zip(squares) {
+            assert!((spread - square.sqrt()).abs() < 1e-9 * spread, "{spread}");
+        }
+        let exact = drawn.spread(&Gluing::EXACT).at(at);
+        assert!(exact.iter().all(|&v| v == 0.0));
+    }
 }

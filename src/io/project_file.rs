@@ -297,6 +297,12 @@ mod tests {
         p.feasible.painted = Some("painted".into());
         p.feasible.keep_out = Some("connector".into());
         p.touch.region = Some("grip".into());
+        p.touch.forces_n = [0.5, 12.0];
+        p.gauge.tolerance = crate::project::ToleranceKeys {
+            place_mm: 0.4,
+            angle_deg: 1.0 / 3.0,
+            gain_percent: 0.0,
+        };
         p.selection.sites.push(ChosenSite {
             position_mm: [0.1, 1.0 / 3.0, -7e-17],
             direction: [0.0, 0.0, 1.0],
@@ -348,6 +354,26 @@ mod tests {
             let text = to_text(&project);
             assert_eq!(parse(&text).as_ref(), Ok(&project), "{text}");
         }
+    }
+
+    #[test]
+    fn a_file_from_before_a_key_means_what_is_usual() {
+        let project = Project::around("limb.glb", None);
+        let old: String = to_text(&project)
+            .split_inclusive('\n')
+            .filter(|line| {
+                let new = [
+                    "forces_n",
+                    "[gauge.tolerance]",
+                    "place_mm",
+                    "angle_deg",
+                    "gain_percent",
+                ];
+                !new.iter().any(|key| line.starts_with(key))
+            })
+            .collect();
+        assert!(!old.contains("tolerance") && !old.contains("forces_n"));
+        assert_eq!(parse(&old), Ok(project));
     }
 
     #[test]

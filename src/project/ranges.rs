@@ -14,6 +14,11 @@ use crate::elasticity::support::MOST;
 pub const GAUGES: RangeInclusive<usize> = 1..=10_000;
 pub const TOUCHES: RangeInclusive<usize> = 3..=1_000_000;
 pub const EDGE_NEIGHBOURS: RangeInclusive<usize> = 0..=1000;
+/// How hard touches may come (N), and how far off gauges may be glued (mm, degrees, percent): likewise.
+pub const FORCES: RangeInclusive<f64> = 1e-3..=1e5;
+pub const PLACE_OFF: RangeInclusive<f64> = 0.0..=50.0;
+pub const ANGLE_OFF: RangeInclusive<f64> = 0.0..=45.0;
+pub const GAIN_OFF: RangeInclusive<f64> = 0.0..=50.0;
 
 /// Of anything that is made (mm): from a nanometre to a kilometre.
 const LENGTH: RangeInclusive<f64> = 1e-6..=1e6;
@@ -29,6 +34,7 @@ impl Project {
     /// [`BadValue`] for the first that cannot be used.
     pub fn check(&self) -> Result<(), BadValue> {
         self.check_model()?;
+        self.check_forces()?;
         self.check_room()?;
         self.check_counts()?;
         self.check_selection()?;
@@ -61,8 +67,24 @@ impl Project {
         )
     }
 
+    fn check_forces(&self) -> Result<(), BadValue> {
+        let [lightest, hardest] = self.touch.forces_n;
+        for force in [lightest, hardest] {
+            bounded("touch.forces_n", force, &FORCES)?;
+        }
+        if lightest <= hardest {
+            return Ok(());
+        }
+        Err(BadValue {
+            key: "touch.forces_n".to_owned(),
+            rule: "the lightest force and then the hardest".into(),
+            value: format!("[{}, {}]", number(lightest), number(hardest)),
+        })
+    }
+
     fn check_room(&self) -> Result<(), BadValue> {
         let (gauge, room) = (&self.gauge, &self.feasible);
+        let tolerance = &gauge.tolerance;
         all_bounded([
             ("touch.edge_margin_mm", self.touch.edge_margin_mm, ROOM),
             ("sites.spacing_mm", self.sites.spacing_mm, LENGTH),
@@ -84,6 +106,13 @@ impl Project {
             ("gauge.grid_length_mm", gauge.grid_length_mm, LENGTH),
             ("gauge.grid_width_mm", gauge.grid_width_mm, LENGTH),
             ("gauge.flatness_mm", gauge.flatness_mm, ROOM),
+            ("gauge.tolerance.place_mm", tolerance.place_mm, PLACE_OFF),
+            ("gauge.tolerance.angle_deg", tolerance.angle_deg, ANGLE_OFF),
+            (
+                "gauge.tolerance.gain_percent",
+                tolerance.gain_percent,
+                GAIN_OFF,
+            ),
             (
                 "feasible.support_clearance_mm",
                 room.support_clearance_mm,
@@ -322,6 +351,7 @@ fn number(value: f64) -> String {
 mod tests {
     use super::*;
     use crate::project::{CostKeys, RegionKeys};
+    use crate::uncertainty::Gluing;
 
     fn project() -> Project {
         let mut project = Project::around("part.stl", None);
@@ -343,7 +373,7 @@ mod tests {
     type Place = fn(&mut Project) -> &mut f64;
 
     /// Every number of a project that may not be just any.
-    const NUMBERS: [(&str, Place); 25] = [
+    const NUMBERS: [(&str, Place); 30] = [
         ("part.thickness_mm", |p| &mut p.part.thickness_mm),
         ("part.weld_mm", |p| &mut p.part.weld_mm),
         ("part.fill_holes_mm", |p| &mut p.part.fill_holes_mm),
@@ -365,6 +395,17 @@ mod tests {
         }),
         ("gauge.grid_length_mm", |p| &mut p.gauge.grid_length_mm),
         ("gauge.flatness_mm", |p| &mut p.gauge.flatness_mm),
+        ("gauge.tolerance.place_mm", |p| {
+            &mut p.gauge.tolerance.place_mm
+        }),
+        ("gauge.tolerance.angle_deg", |p| {
+            &mut p.gauge.tolerance.angle_deg
+        }),
+        ("gauge.tolerance.gain_percent", |p| {
+            &mut p.gauge.tolerance.gain_percent
+        }),
+        ("touch.forces_n", |p| &mut p.touch.forces_n[0]),
+        ("touch.forces_n", |p| &mut p.touch.forces_n[1]),
         ("feasible.support_clearance_mm", |p| {
             &mut p.feasible.support_clearance_mm
         }),
@@ -423,6 +464,33 @@ mod tests {
             let said = project.check().unwrap_err().to_string();
             assert!(said.contains("between 1e-6 and 1000000"), "{said}");
         }
+    }
+
+    #[test]
+    fn the_lightest_touch_comes_first() {
+        let mut project = project();
+        project.touch.forces_n = [5.0, 5.0];
+        assert_eq!(project.check(), Ok(()));
+        project.touch.forces_n = [30.0, 2.0];
+        let said = project.check().unwrap_err().to_string();
+        let expected =
+            "touch.forces_n must be the lightest force and then the hardest, but is [30, 2]";
+        assert_eq!(said, expected);
+    }
+
+    #[test]
+    fn gluing_is_exact_to_much_too_far_and_usually_that_of_the_paper() {
+        let mut project = project();
+        assert_eq!(project.gluing(), Gluing::default());
+        let tolerance = &mut project.gauge.tolerance;
+        (tolerance.place_mm, tolerance.angle_deg) = (0.0, 0.0);
+        tolerance.gain_percent = 0.0;
+        assert_eq!(project.check(), Ok(()));
+        assert_eq!(project.gluing(), Gluing::EXACT);
+        project.gauge.tolerance.angle_deg = 45.1;
+        let said = project.check().unwrap_err().to_string();
+        let expected = "gauge.tolerance.angle_deg must be between 0 and 45, but is 45.1";
+        assert_eq!(said, expected);
     }
 
     #[test]

@@ -11,8 +11,8 @@ use crate::limb::BoxMm;
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
 use crate::project::{
-    EDGE_NEIGHBOURS, FARTHEST, GAUGES, Lattice, PartModel, Project, RegionKeys, SupportKeys,
-    SupportKind, TOUCHES,
+    ANGLE_OFF, EDGE_NEIGHBOURS, FARTHEST, FORCES, GAIN_OFF, GAUGES, Lattice, PLACE_OFF, PartModel,
+    Project, RegionKeys, SupportKeys, SupportKind, TOUCHES, ToleranceKeys,
 };
 
 impl Studio {
@@ -390,6 +390,26 @@ fn touch(ui: &mut Ui, project: &mut Project) {
         " N",
         "Pressed along the inward normal",
     );
+    let [lightest, hardest] = &mut touch.forces_n;
+    let (least, most) = (*lightest, *hardest);
+    number(
+        ui,
+        "Lightest touch",
+        lightest,
+        *FORCES.start()..=most,
+        0.1,
+        " N",
+        "How hard touches come: from here to the hardest, evenly over the logarithm",
+    );
+    number(
+        ui,
+        "Hardest touch",
+        hardest,
+        least..=*FORCES.end(),
+        0.1,
+        " N",
+        "How hard touches come: from the lightest to here, evenly over the logarithm",
+    );
     number(
         ui,
         "Tip radius",
@@ -528,6 +548,38 @@ fn gauge(ui: &mut Ui, project: &mut Project) {
         0.01,
         " mm",
         "Largest height of the surface over the gauge's plane",
+    );
+    gluing(ui, &mut gauge.tolerance);
+}
+
+/// How far off gauges are glued.
+fn gluing(ui: &mut Ui, tolerance: &mut ToleranceKeys) {
+    number(
+        ui,
+        "Place off",
+        &mut tolerance.place_mm,
+        PLACE_OFF,
+        0.01,
+        " mm",
+        "How far from its place a gauge is glued, in any direction (standard deviation)",
+    );
+    number(
+        ui,
+        "Angle off",
+        &mut tolerance.angle_deg,
+        ANGLE_OFF,
+        0.05,
+        "°",
+        "How far from its direction a gauge is glued (standard deviation)",
+    );
+    number(
+        ui,
+        "Gain off",
+        &mut tolerance.gain_percent,
+        GAIN_OFF,
+        0.05,
+        " %",
+        "How far off the gain of a glued gauge is (standard deviation)",
     );
 }
 

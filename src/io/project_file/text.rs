@@ -125,6 +125,11 @@ fn touch(t: &mut Text, project: &Project) {
         "pressed along the inward normal",
     );
     t.key(
+        "forces_n",
+        numbers(&project.touch.forces_n),
+        "how hard touches come, the lightest and the hardest: evenly over the logarithm between",
+    );
+    t.key(
         "tip_radius_mm",
         float(project.touch.tip_radius_mm),
         "the tip spreads the force as (1 - r²/a²)²",
@@ -300,6 +305,22 @@ fn gauge(t: &mut Text, project: &Project) {
         float(gauge.flatness_mm),
         "largest height of the surface over the gauge's plane",
     );
+    t.table("gauge.tolerance");
+    t.key(
+        "place_mm",
+        float(gauge.tolerance.place_mm),
+        "how far off gauges are glued, in any direction (standard deviations)",
+    );
+    t.key(
+        "angle_deg",
+        float(gauge.tolerance.angle_deg),
+        "from their direction",
+    );
+    t.key(
+        "gain_percent",
+        float(gauge.tolerance.gain_percent),
+        "of the reading",
+    );
 }
 
 fn selection(t: &mut Text, project: &Project) {
@@ -323,7 +344,7 @@ fn selection(t: &mut Text, project: &Project) {
         float(selection.spacing_mm),
         "least distance between two gauges",
     );
-    let required: Vec<String> = selection.required_mm.iter().map(triple).collect();
+    let required: Vec<String> = selection.required_mm.iter().map(numbers).collect();
     t.maybe(
         "required_mm",
         (!required.is_empty()).then(|| format!("[{}]", required.join(", "))),
@@ -378,8 +399,8 @@ fn selection(t: &mut Text, project: &Project) {
     }
     for site in &selection.sites {
         t.list("selection.site");
-        t.key("position_mm", triple(&site.position_mm), "");
-        t.key("direction", triple(&site.direction), "");
+        t.key("position_mm", numbers(&site.position_mm), "");
+        t.key("direction", numbers(&site.direction), "");
     }
 }
 
@@ -442,8 +463,8 @@ fn kept(t: &mut Text, kept: &Kept) {
     t.key("seconds", float(kept.seconds), "that choosing it took");
     for site in &kept.sites {
         t.list("kept.site");
-        t.key("position_mm", triple(&site.position_mm), "");
-        t.key("direction", triple(&site.direction), "");
+        t.key("position_mm", numbers(&site.position_mm), "");
+        t.key("direction", numbers(&site.direction), "");
     }
     for error in &kept.errors {
         t.list("kept.error");
@@ -499,12 +520,12 @@ fn float(value: f64) -> String {
     format!("{value:?}")
 }
 
-fn triple(values: &[f64; 3]) -> String {
+fn numbers<const N: usize>(values: &[f64; N]) -> String {
     format!("[{}]", values.map(float).join(", "))
 }
 
 fn corners(values: &[[f64; 3]; 2]) -> String {
-    format!("[{}]", values.each_ref().map(triple).join(", "))
+    format!("[{}]", values.each_ref().map(numbers).join(", "))
 }
 
 /// An enum as its file name.

@@ -52,6 +52,8 @@ pub struct Knowledge<'a> {
     pub noise: f64,
     /// Absent where nothing but noise is known to be off.
     pub variance: Option<Variance<'a>>,
+    /// Touches that places are taken from, rising: those whose variance is known. All where absent.
+    pub among: Option<&'a [usize]>,
     /// Force of each touch (N) that the signals grow with, and the lightest and the hardest that will come; absent
     /// where the signals are what they are.
     pub forces: Option<(&'a [f64], [f64; 2])>,
@@ -145,7 +147,10 @@ impl Scene {
     ) -> Result<Self, Cancelled> {
         report(watch, "Looking at touches", 0, 2)?;
         let merged = Merged::new(targets, known.forces.map(|f| f.0));
-        let order = farthest_first(&merged.positions, detail.places + detail.presses);
+        let all: Vec<usize> = (0..merged.positions.len())
+            .filter(|&k| merged.is_among(k, known.among))
+            .collect();
+        let order = farthest_first(&merged.positions, &all, detail.places + detail.presses);
         let (mut places, presses) = shared(&order, detail);
         in_neighbourhoods(&mut places, &merged.positions);
         let around = Around::new(&merged.positions);
@@ -157,8 +162,7 @@ impl Scene {
             known,
             unit,
         };
-        let all: Vec<usize> = (0..merged.positions.len()).collect();
-        let stand = |of: &[usize]| standing(&merged.positions, &all, of);
+        let stand = |of: &[usize]| standing(&merged.positions, of);
         let (places_at, presses_at) = (stand(&places), stand(&presses));
         let at_places = reader.reports(&places, &places_at);
         report(watch, "Looking at touches", 1, 2)?;
@@ -251,17 +255,25 @@ impl Merged {
             touches: members.iter().map(weighed).collect(),
         }
     }
+
+    /// Whether all touches at a place are among some, which rise.
+    fn is_among(&self, place: usize, some: Option<&[usize]>) -> bool {
+        some.is_none_or(|some| {
+            (self.touches[place].iter()).all(|(t, _)| some.binary_search(t).is_ok())
+        })
+    }
 }
 
-/// At most `count` places, each as far as possible from those before it; the first is the one farthest from the
-/// middle.
-fn farthest_first(positions: &[DVec3], count: usize) -> Vec<usize> {
+/// At most `count` of some places, each as far as possible from those before it; the first is the one farthest from
+/// the middle.
+fn farthest_first(positions: &[DVec3], among: &[usize], count: usize) -> Vec<usize> {
     let middle = positions.iter().sum::<DVec3>() / positions.len().max(1) as f64;
-    let mut away: Vec<f64> = (positions.iter())
-        .map(|p| p.distance_squared(middle))
+    let mut away: Vec<f64> = (among.iter())
+        .map(|&k| positions[k].distance_squared(middle))
         .collect();
-    let mut order = Vec::with_capacity(count.min(positions.len()));
-    while order.len() < count.min(positions.len()) {
+    let count = count.min(among.len());
+    let mut order = Vec::with_capacity(count);
+    while order.len() < count {
         let mut next = 0;
         for k in 1..away.len() {
             if away[k] > away[next] {
@@ -269,12 +281,13 @@ fn farthest_first(positions: &[DVec3], count: usize) -> Vec<usize> {
             }
         }
         let first = order.is_empty();
-        for (a, p) in away.iter_mut().zip(positions) {
-            let here = p.distance_squared(positions[next]);
+        let centre = positions[among[next]];
+        for (a, &k) in away.iter_mut().zip(among) {
+            let here = positions[k].distance_squared(centre);
             *a = if first { here } else { a.min(here) };
         }
         away[next] = f64::NEG_INFINITY;
-        order.push(next);
+        order.push(among[next]);
     }
     order
 }
@@ -328,15 +341,15 @@ fn in_neighbourhoods(places: &mut [usize], positions: &[DVec3]) {
 }
 
 /// Some of the places with what each stands for: the places that are nearest to it.
-fn standing(positions: &[DVec3], all: &[usize], of: &[usize]) -> Vec<Place> {
-    let nearest = |&at: &usize| {
-        let away = |k: &usize| positions[of[*k]].distance_squared(positions[at]);
+fn standing(positions: &[DVec3], of: &[usize]) -> Vec<Place> {
+    let nearest = |at: &DVec3| {
+        let away = |k: &usize| positions[of[*k]].distance_squared(*at);
         (0..of.len()).min_by(|a, b| away(a).total_cmp(&away(b)))
     };
-    let owners: Vec<Option<usize>> = all.par_iter().map(nearest).collect();
+    let owners: Vec<Option<usize>> = positions.par_iter().map(nearest).collect();
     let mut masses = vec![0.0; of.len()];
     for owner in owners.into_iter().flatten() {
-        masses[owner] += 1.0 / all.len() as f64;
+        masses[owner] += 1.0 / positions.len() as f64;
     }
     of.par_iter()
         .zip(masses)

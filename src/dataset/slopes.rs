@@ -1,0 +1,174 @@
+//! How readings change with the way gauges are glued.
+//!
+//! With the angle exactly, from the three components of the strain. With the place by central differences of what
+//! the model itself says of gauges that are moved, under some of the touches: sites lie too far from each other for
+//! differences between them, which are off by a quarter to a half.
+
+use rayon::prelude::*;
+
+use super::{Site, gauges_on};
+use crate::budget::{Cancelled, Watch};
+use crate::elasticity::respond::{Reading, respond};
+use crate::elasticity::{Model, Touch};
+use crate::uncertainty::Gluing;
+
+/// How far a gauge is moved either way (m): about as far as a workshop is off.
+const STEP: f64 = 0.75e-3;
+/// A gauge is moved along itself and across itself, forth and back.
+const MOVES: usize = 4;
+
+/// What the reading of every site changes by as its gauge is moved or turned, under some of the touches of a dataset
+/// at their force. In single precision: they make up variances.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GluingSlopes {
+    touches: Vec<usize>,
+    /// Sites × touches: strain a metre along the gauge, a metre across it, and strain a radian.
+    along: Vec<f32>,
+    across: Vec<f32>,
+    turned: Vec<f32>,
+}
+
+impl GluingSlopes {
+    /// Numbers in double precision that are held for a site and a touch while they are computed: moved readings,
+    /// and three slopes in single precision.
+    pub const HELD: f64 = MOVES as f64 + 1.5;
+
+    /// Solves for the touches in `columns` (at least one) once more, for gauges that are moved; `turned` are the
+    /// slopes by the angle, sites × these touches. Also how many right-hand sides that took.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub(super) fn of(
+        model: &dyn Model,
+        sites: &[Site],
+        touches: &[Touch],
+        columns: &[usize],
+        turned: Vec<f32>,
+        watch: Watch,
+    ) -> Result<(Self, usize), Cancelled> {
+        let pressed: Vec<Touch> = columns.iter().map(|&t| touches[t]).collect();
+        let moved: Vec<Site> = sites.iter().flat_map(shifted).collect();
+        let (observer, angles) = gauges_on(model, &moved);
+        let responses = respond(model, &pressed, &observer, Reading::Gauge(&angles), watch)?;
+        let count = columns.len();
+        let mut along = vec![0.0_f32; sites.len() * count];
+        let mut across = vec![0.0_f32; sites.len() * count];
+        let rows = along
+            .par_chunks_mut(count)
+            .zip(across.par_chunks_mut(count));
+        rows.enumerate().for_each_init(
+            || [vec![0.0; count], vec![0.0; count]],
+            |[forth, back], (site, (along, across))| {
+                for (k, into) in [along, across].into_iter().enumerate() {
+                    responses.row_into(MOVES * site + 2 * k, forth);
+                    responses.row_into(MOVES * site + 2 * k + 1, back);
+                    for (slope, (f, b)) in into.iter_mut().zip(forth.iter().zip(back.iter())) {
+                        *slope = ((f - b) / (2.0 * STEP)) as f32;
+                    }
+                }
+            },
+        );
+        let slopes = Self {
+            touches: columns.to_vec(),
+            along,
+            across,
+            turned,
+        };
+        Ok((slopes, responses.solves))
+    }
+
+    /// The touches of the dataset that slopes are known for, column by column.
+    #[must_use]
+    pub fn touches(&self) -> &[usize] {
+        &self.touches
+    }
+
+    /// Of one site, column by column: strain a metre along the gauge, strain a metre across it (normal × direction),
+    /// and strain a radian from the one to the other.
+    #[must_use]
+    pub fn row(&self, site: usize) -> [&[f32]; 3] {
+        let count = self.touches.len();
+        [&self.along, &self.across, &self.turned].map(|values| &values[site * count..][..count])
+    }
+
+    /// Variance that gluing puts on a site's reading of the touch of a column; `reading` is what it reads as drawn.
+    #[must_use]
+    pub fn variance(&self, site: usize, column: usize, reading: f64, gluing: &Gluing) -> f64 {
+        let [along, across, turned] = self.row(site).map(|values| f64::from(values[column]));
+        gluing.variance(reading, along, across, turned)
+    }
+
+    /// Those of some sites, in the order given.
+    #[must_use]
+    pub fn select_rows(&self, sites: &[usize]) -> Self {
+        let chosen = |which: usize| -> Vec<f32> {
+            let rows = sites.iter().flat_map(|&site| self.row(site)[which]);
+            rows.copied().collect()
+        };
+        Self {
+            touches: self.touches.clone(),
+            along: chosen(0),
+            across: chosen(1),
+            turned: chosen(2),
+        }
+    }
+}
+
+/// What strain along an angle changes by a radian under some of the touches, from its components (xx, yy, 2xy) under
+/// all of them.
+pub(super) fn turned(components: &[Vec<f64>], angle: f64, columns: &[usize]) -> Vec<f32> {
+    let (s, c) = (2.0 * angle).sin_cos();
+    let change = |&t: &usize| s * (components[1][t] - components[0][t]) + c * components[2][t];
+    columns.iter().map(|t| change(t) as f32).collect()
+}
+
+/// A gauge moved along itself and across itself, forth and back.
+fn shifted(site: &Site) -> [Site; MOVES] {
+    let across = site.normal.cross(site.direction);
+    [site.direction, -site.direction, across, -across].map(|toward| Site {
+        position: site.position + toward * STEP,
+        ..*site
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elasticity::observe::along;
+
+    #[test]
+    fn turning_is_the_derivative_of_reading() {
+        let components = [vec![0.0, 3.0], vec![0.0, -1.0], vec![0.0, 0.5]];
+        let read = |angle: f64| -> f64 {
+            let weights = along(angle);
+            (0..3).map(|k| weights[k] * components[k][1]).sum()
+        };
+        for angle in [0.0, 0.4, 1.3, 2.9] {
+            let step = 1e-5;
+            let difference = (read(angle + step) - read(angle - step)) / (2.0 * step);
+            let slope = f64::from(turned(&components, angle, &[1])[0]);
+            assert!((slope - difference).abs() < 1e-5, "{slope} {difference}");
+        }
+    }
+
+    #[test]
+    fn rows_are_of_their_sites() {
+        let slopes = GluingSlopes {
+            touches: vec![3, 8],
+            along: vec![0.0, 1.0, 2.0, 3.0],
+            across: vec![0.0, 10.0, 20.0, 30.0],
+            turned: vec![0.0, 100.0, 200.0, 300.0],
+        };
+        let second: [&[f32]; 3] = [&[2.0, 3.0], &[20.0, 30.0], &[200.0, 300.0]];
+        assert_eq!(slopes.row(1), second);
+        let gluing = Gluing {
+            place: 2.0_f64.sqrt(),
+            angle: 1.0,
+            gain: 0.5,
+        };
+        let expected = 9.0 + 900.0 + 9e4 + 4.0;
+        assert!((slopes.variance(1, 1, 4.0, &gluing) - expected).abs() < 1e-6);
+        assert_eq!(slopes.select_rows(&[1]).row(0), slopes.row(1));
+        assert_eq!(slopes.select_rows(&[1, 0]).touches(), [3, 8]);
+    }
+}
