@@ -33,6 +33,7 @@ pub use self::doubt::*;
 pub use self::finest::*;
 pub use self::ground::*;
 pub use self::judge::*;
+pub use self::known::expected_errors;
 pub use self::layout::*;
 pub use self::road::*;
 pub use self::sense::*;

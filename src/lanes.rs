@@ -26,3 +26,49 @@ macro_rules! wide {
 }
 
 pub(crate) use wide;
+
+/// e to the power of x, for x up to 60: 2 to a whole number by its bits, and a polynomial between (to 3e-6).
+#[inline(always)]
+pub(crate) fn exponential(x: f32) -> f32 {
+    /// Added to a number, it leaves the nearest whole one in the lowest bits.
+    const WHOLE: f32 = 12_582_912.0;
+    let t = (x * std::f32::consts::LOG2_E).max(-126.0);
+    let whole = t + WHOLE;
+    let y = (t - (whole - WHOLE)) * std::f32::consts::LN_2;
+    let p = 1.0 + y * (1.0 + y * (0.5 + y * (0.166_666_6 + y * (0.041_666_2 + y * 0.008_4))));
+    f32::from_bits(p.to_bits().wrapping_add(whole.to_bits() << 23))
+}
+
+/// The natural logarithm of a number above zero (to 3e-7), by that of its mantissa: 2 artanh((m - 1) / (m + 1)).
+#[inline(always)]
+pub(crate) fn logarithm(x: f32) -> f32 {
+    /// Bits of the square root of a half: mantissas lie around one.
+    const ROOT: u32 = 0x3f35_04f3;
+    let from_root = x.to_bits().wrapping_sub(ROOT);
+    let power = (from_root as i32 >> 23) as f32;
+    let mantissa = f32::from_bits((from_root & 0x007f_ffff) + ROOT);
+    let s = (mantissa - 1.0) / (mantissa + 1.0);
+    let q = s * s;
+    let series = 1.0 + q * (0.333_333_3 + q * (0.2 + q * (0.142_857 + q * 0.111_111)));
+    power * std::f32::consts::LN_2 + 2.0 * s * series
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quick_functions_are_near_enough() {
+        for k in -400..=400 {
+            let x = k as f32 * 0.15;
+            let true_value = f64::from(x).exp();
+            assert!(
+                (f64::from(exponential(x)) / true_value - 1.0).abs() < 2e-5,
+                "{x}"
+            );
+            let y = (k as f32 * 0.15).exp();
+            assert!((logarithm(y) - x).abs() < 1e-5 * (1.0 + x.abs()), "{x}");
+        }
+        assert!(exponential(-1e30) < 1e-37);
+    }
+}

@@ -11,7 +11,7 @@ use crate::evaluation::add_noise;
 use crate::evaluation::failures::{FailureRow, FailureTrial, failures};
 use crate::gaussian_process::{self, Covariance, Distances, GpKernel};
 use crate::placement::entropy::Entropy;
-use crate::placement::expected_error::{Detail, ExpectedError, Knowledge, ROUNDS};
+use crate::placement::expected_error::{Detail, ExpectedError, Forces, Knowledge, ROUNDS};
 use crate::placement::greedy_svr::{Audit, Comparison, GreedySvr};
 use crate::placement::information::{Geometry, GeometrySummary};
 use crate::placement::mutual_information::MutualInformation;
@@ -63,6 +63,8 @@ impl Settings {
     pub fn knowledge<'a>(&self, data: &'a Data) -> Knowledge<'a> {
         /// Forces that come, over the middle one of the data.
         const COMING: [f64; 2] = [1.0 / 3.0, 3.0];
+        /// The hardest that is thought possible, over the hardest that comes.
+        const POSSIBLE: f64 = 2.0;
         let coming = || {
             let mut sorted = data.forces.clone();
             sorted.sort_by(f64::total_cmp);
@@ -73,7 +75,14 @@ impl Settings {
             noise: self.noise,
             variance: None,
             among: None,
-            forces: known.then(|| (&data.forces[..], self.forces.unwrap_or_else(coming))),
+            forces: known.then(|| {
+                let coming = self.forces.unwrap_or_else(coming);
+                Forces {
+                    touches: &data.forces,
+                    coming,
+                    possible: POSSIBLE * coming[1],
+                }
+            }),
             seed: self.svr.seed,
         }
     }

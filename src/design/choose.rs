@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::known::Known;
+use super::known::{Known, detail};
 use super::{DesignError, HEARD_SEED, Inputs, LEAST_TOUCHES, Shortage, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::{Dataset, Signal, SignalMatrix, Site};
@@ -18,7 +18,7 @@ use crate::mesh::{SurfacePoint, TriMesh, geodesic};
 use crate::pca::Pca;
 use crate::placement::candidates::{Candidates, reduce};
 use crate::placement::entropy::Entropy;
-use crate::placement::expected_error::{self, Detail, ExpectedError};
+use crate::placement::expected_error::{self, ExpectedError};
 use crate::placement::greedy_svr::{self, GreedySvr};
 use crate::placement::information::Geometry;
 use crate::placement::mutual_information::MutualInformation;
@@ -480,10 +480,7 @@ fn select_by_expected_error(
     };
     let selector = ExpectedError {
         known: known.knowledge(&variance),
-        detail: Detail {
-            places: budget.expected_places,
-            presses: budget.expected_presses,
-        },
+        detail: detail(budget),
         rounds: expected_error::ROUNDS,
     };
     Ok(selector.select(&pool, &request)?)

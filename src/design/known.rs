@@ -1,8 +1,9 @@
 //! What is known of the signals of a simulation beside their values: noise, gluing, and what its elements leave.
 
 use super::{HEARD_SEED, Inputs, Simulated};
+use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::Signal;
-use crate::placement::expected_error::{Knowledge, Variance};
+use crate::placement::expected_error::{Detail, Forces, Knowledge, Scene, Variance, expected};
 use crate::uncertainty::Gluing;
 
 /// What a choice by expected error is told of a simulation.
@@ -11,10 +12,12 @@ pub(super) struct Known<'a> {
     gluing: Gluing,
     /// Force of each touch (N).
     forces: Vec<f64>,
-    /// Variance of every signal that the elements leave, touch by touch.
-    elements: Vec<f64>,
+    /// What the elements leave, as a share of readings, and the mean square of these, touch by touch.
+    share: f64,
+    squares: Vec<f64>,
     noise: f64,
     range: [f64; 2],
+    possible: f64,
     seed: u64,
 }
 
@@ -23,26 +26,28 @@ impl<'a> Known<'a> {
         let project = &inputs.project;
         let dataset = &simulated.dataset;
         let estimate = &simulated.discretization;
-        let share = match (dataset.signal, estimate.strain_percent.is_nan()) {
+        let share = if std::env::var("EL").is_ok() {0.0} else {match (dataset.signal, estimate.strain_percent.is_nan()) {
             (Signal::Strain, false) => estimate.strain_percent / 100.0,
             _ => 0.0,
-        };
-        let mut largest = vec![0.0_f64; dataset.touches.len()];
+        }};
+        let mut squares = vec![0.0_f64; dataset.touches.len()];
         for site in 0..dataset.x.rows() {
-            for (most, x) in largest.iter_mut().zip(dataset.x.row(site)) {
-                *most = most.max(x.abs());
+            for (square, x) in squares.iter_mut().zip(dataset.x.row(site)) {
+                *square += x * x / dataset.x.rows() as f64;
             }
         }
         Self {
             simulated,
             gluing: *gluing,
             forces: dataset.touches.iter().map(|t| t.force).collect(),
-            elements: largest.iter().map(|x| (share * x).powi(2)).collect(),
+            share,
+            squares,
             noise: match dataset.signal {
                 Signal::Strain => project.gauge.noise_microstrain * 1e-6,
                 Signal::Displacement | Signal::NormalDisplacement => 0.0,
             },
             range: project.touch.forces_n,
+            possible: project.live.largest_force_n.max(project.touch.forces_n[1]),
             seed: project.budget.seed.wrapping_add(HEARD_SEED),
         }
     }
@@ -56,7 +61,8 @@ impl<'a> Known<'a> {
             (Some(slopes), Some(column)) => slopes.variance(site, column, reading, &self.gluing),
             _ => 0.0,
         };
-        glued + self.elements[touch]
+        // As `inference::Errors::relative`: half by the reading itself, half by all.
+        glued + self.share.powi(2) * f64::midpoint(reading * reading, self.squares[touch])
     }
 
     /// For a pool with this variance of its rows.
@@ -65,8 +71,54 @@ impl<'a> Known<'a> {
             noise: self.noise,
             variance: Some(variance),
             among: (self.simulated.dataset.slopes.as_ref()).map(|s| s.touches()),
-            forces: Some((&self.forces, self.range)),
+            forces: Some(Forces {
+                touches: &self.forces,
+                coming: self.range,
+                possible: self.possible,
+            }),
             seed: self.seed,
         }
     }
+}
+
+/// How much a choice by expected error looks at.
+pub(super) fn detail(budget: &Budget) -> Detail {
+    Detail {
+        places: budget.expected_places,
+        presses: budget.expected_presses,
+    }
+}
+
+/// The error (mm) that matching is expected to make with each of some sets of sites (as numbered in the dataset), over
+/// where touches come, how hard they are and what is off.
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn expected_errors(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    sets: &[Vec<usize>],
+    watch: Watch,
+) -> Result<Vec<f64>, Cancelled> {
+    /// A few sites are looked at in more detail than a choice among thousands can.
+    const FINE: Detail = Detail {
+        places: 1000,
+        presses: 300,
+    };
+    let known = Known::new(inputs, simulated, &inputs.project.gluing());
+    let mut sites: Vec<usize> = sets.concat();
+    sites.sort_unstable();
+    sites.dedup();
+    let variance = |row: usize, touch: usize| known.variance(sites[row], touch);
+    let scene = Scene::new(
+        &simulated.dataset.x.select_rows(&sites),
+        &simulated.dataset.targets_mm(),
+        &known.knowledge(&variance),
+        FINE,
+        watch,
+    )?;
+    let rows = |set: &Vec<usize>| -> Vec<usize> {
+        set.iter().filter_map(|s| sites.binary_search(s).ok()).collect()
+    };
+    Ok(sets.iter().map(|set| expected(&scene, &rows(set)).0).collect())
 }

@@ -14,6 +14,7 @@ use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::elasticity::{Model, Touch};
 use crate::inference::{AsDrawn, ResponseMap};
+use crate::live::GaugeModel;
 use crate::project::{LiveKeys, Project};
 use crate::uncertainty::Gluing;
 
@@ -23,6 +24,8 @@ pub struct Sensing {
     pub sensitivity: Arc<Sensitivity>,
     /// Readings everywhere, as drawn and as they change with the way gauges are glued.
     pub drawn: Arc<AsDrawn>,
+    /// What the project's tolerance of gluing puts on the readings, while nothing is known of it.
+    pub spread: Arc<ResponseMap>,
     /// Where known touches are best pressed: evenly over the part.
     pub proposed: Vec<Touch>,
     /// Mean edge of the elements (mm).
@@ -101,6 +104,7 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
     Ok(Sensing {
         gauges,
         sensitivity: Arc::new(sensitivity),
+        spread: Arc::new(drawn.spread(&project.gluing())),
         drawn: Arc::new(drawn),
         proposed,
         element_mm: Ground::element_mm(&graded.laid),
@@ -252,10 +256,13 @@ impl Sensing {
 impl Sensing {
     /// What gauges read as the project knows them to be glued.
     #[must_use]
-    pub fn map_for(&self, live: &LiveKeys) -> Arc<ResponseMap> {
+    pub fn map_for(&self, live: &LiveKeys) -> GaugeModel {
         match live.glued(self.gauges.len()) {
-            Some(glued) => Arc::new(self.drawn.glued(&glued)),
-            None => Arc::clone(&self.drawn.map),
+            Some(glued) => Arc::new(self.drawn.glued(&glued)).into(),
+            None => GaugeModel {
+                map: Arc::clone(&self.drawn.map),
+                spread: Some(Arc::clone(&self.spread)),
+            },
         }
     }
 }

@@ -120,16 +120,16 @@ pub fn calibrate(drawn: &AsDrawn, known: &[Known], noise: &[f64]) -> Calibration
     // Weights need the size of the errors, and that the fits: both settle in a few turns.
     for _ in 0..8 {
         let errors = Errors {
-            noise: noise.to_vec(),
             relative,
+            ..Errors::of_noises(noise)
         };
         fits = fit(known, &bases, &errors);
         relative = still_off(known, &bases, &fits, noise);
     }
     // From few touches the size of the errors is itself uncertain, as is the fit: a prediction is wider.
     let weighed = Errors {
-        noise: noise.to_vec(),
         relative,
+        ..Errors::of_noises(noise)
     };
     Calibration {
         glued: fits.iter().map(|f| f.glued.into()).collect(),
@@ -170,8 +170,8 @@ fn misplaced(
     let used = vec![true; errors.noise.len()];
     let excess = |relative: f64| {
         let errors = Errors {
-            noise: errors.noise.clone(),
             relative,
+            ..Errors::of_noises(&errors.noise)
         };
         let mut squares = Vec::new();
         for (k, slope) in known.iter().zip(&slopes) {
@@ -252,8 +252,8 @@ fn still_off(known: &[Known], bases: &[Vec<Vector4<f64>>], fits: &[Fit], noise: 
     let count = (known.len() * fits.len()) as f64;
     let excess = |relative: f64| {
         let errors = Errors {
-            noise: noise.to_vec(),
             relative,
+            ..Errors::of_noises(noise)
         };
         let mut sum = 0.0;
         for (k, basis) in known.iter().zip(bases) {

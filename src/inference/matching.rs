@@ -5,6 +5,9 @@
 //! searched: all templates at once, then Gauss–Newton on the quadratic pieces of g from the best few. Where
 //! the readings hardly tell places apart, the mean over the posterior of the templates is taken instead, with
 //! flat priors on area and on force. It needs no training.
+//!
+//! Where it is known how gauges may be glued, a reading's variance is the template's own: it grows with the force and
+//! with what a gauge that is a little off would read there, and its determinant counts.
 
 use std::sync::Arc;
 
@@ -13,7 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::map::{LANES, ResponseMap};
 use super::region::{DEVIATIONS, Region};
-use crate::lanes::wide;
+use crate::lanes::{logarithm, wide};
 use crate::mesh::SurfacePoint;
 
 /// A touch as it was inferred.
@@ -36,21 +39,31 @@ pub struct Contact {
 }
 
 /// What is known of the readings' errors.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone)]
 pub struct Errors {
     /// Standard deviation of each channel's noise (strain).
     pub noise: Vec<f64>,
     /// Standard deviation of what gains, places and model are off by, over the reading: half of it from the
     /// channel's own reading, half from the mean square of all.
     pub relative: f64,
+    /// Standard deviation a newton that gluing puts on each channel's reading, on the mesh of the readings; absent
+    /// where gauges are known to be glued as the readings say.
+    pub spread: Option<Arc<ResponseMap>>,
 }
 
 impl Errors {
     #[must_use]
     pub fn of_noise(noise: f64, channels: usize) -> Self {
+        Self::of_noises(&vec![noise; channels])
+    }
+
+    /// Noise of each channel, and nothing else.
+    #[must_use]
+    pub fn of_noises(noise: &[f64]) -> Self {
         Self {
-            noise: vec![noise; channels],
+            noise: noise.to_vec(),
             relative: 0.0,
+            spread: None,
         }
     }
 
@@ -99,6 +112,8 @@ const STEPS: usize = 8;
 const NOTHING: f64 = 14.0;
 /// Beyond this deviation, in templates, their posterior takes the place of Gauss–Newton's normal one.
 const BROAD: f64 = 1.0;
+/// Turns in which a force and the weights that depend on it settle.
+const TURNS: usize = 2;
 /// One place with this share of the probability is the answer; below it, the mean is.
 const CLEAR: f64 = 0.9;
 
@@ -122,6 +137,33 @@ pub(super) struct Measured<'a> {
     pub x: &'a [f64],
     pub w: &'a [f64],
     pub squares: f64,
+}
+
+/// A reading, and what is known of its errors wherever the touch was.
+struct Heard<'a> {
+    x: &'a [f64],
+    /// One over the variance of every channel, without gluing.
+    w: Vec<f64>,
+    /// Weighted squares of a reading without a touch.
+    squares: f64,
+}
+
+/// The weights of a reading for a touch at one place, of one force.
+struct Weighed {
+    w: Vec<f64>,
+    squares: f64,
+    /// Half the logarithm of the variances' determinant, over that without gluing.
+    log: f64,
+}
+
+impl Weighed {
+    fn measured<'a>(&'a self, x: &'a [f64]) -> Measured<'a> {
+        Measured {
+            x,
+            w: &self.w,
+            squares: self.squares,
+        }
+    }
 }
 
 impl Measured<'_> {
@@ -156,13 +198,7 @@ impl Matching {
 
     /// The touch that explains a reading (strain, a channel each) best.
     pub fn find(&mut self, reading: &[f64]) -> Contact {
-        let weights = self.errors.weights(reading, &self.used);
-        let squares = reading.iter().zip(&weights).map(|(x, w)| w * x * x).sum();
-        let measured = Measured {
-            x: reading,
-            w: &weights,
-            squares,
-        };
+        let measured = self.heard(reading);
         self.score(&measured);
         let mut modes = self.modes(&measured);
         modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
@@ -178,18 +214,12 @@ impl Matching {
     /// Nothing where that does not explain the reading any more, or no longer clearly.
     #[must_use]
     pub fn track(&self, reading: &[f64], last: &Contact) -> Option<Contact> {
-        let weights = self.errors.weights(reading, &self.used);
-        let squares = reading.iter().zip(&weights).map(|(x, w)| w * x * x).sum();
-        let measured = Measured {
-            x: reading,
-            w: &weights,
-            squares,
-        };
+        let measured = self.heard(reading);
         // Noise alone makes them differ by a few deviations of χ².
         let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
         let explained = |cost: f64| 2.0 * cost <= last.unexplained + differs;
         let start = self.map.index.nearest(last.position).0;
-        let mode = self.follow(&measured, start);
+        let mode = self.follow(&measured, start, Some(last.force));
         let broad = BROAD * self.map.spacing();
         (explained(mode.cost) && widest(mode.covariance) <= broad * broad)
             .then(|| self.contact_at(&measured, &mode, true))
@@ -227,12 +257,25 @@ impl Matching {
     }
 
     /// How much better than nothing a touch at each template explains the reading.
-    fn score(&mut self, measured: &Measured) {
-        let scaled: Vec<f32> = (measured.x.iter().zip(measured.w))
+    fn score(&mut self, measured: &Heard) {
+        let scaled: Vec<f32> = (measured.x.iter().zip(&measured.w))
             .map(|(x, w)| (w * x * 1e-6) as f32)
             .collect();
         let weights: Vec<f32> = measured.w.iter().map(|w| (w * 1e-12) as f32).collect();
         let most = self.most_force as f32;
+        if let Some(spread) = &self.errors.spread {
+            let reading: Vec<f32> = measured.x.iter().map(|x| (x * 1e6) as f32).collect();
+            score_with_gluing(
+                &self.map.templates,
+                &spread.templates,
+                &reading,
+                &weights,
+                most,
+                &mut self.scores,
+                &mut self.highest,
+            );
+            return;
+        }
         score_templates(
             &self.map.templates,
             &scaled,
@@ -244,7 +287,7 @@ impl Matching {
     }
 
     /// The best templates, apart from each other, each followed to the best place near it.
-    fn modes(&self, measured: &Measured) -> Vec<Mode> {
+    fn modes(&self, measured: &Heard) -> Vec<Mode> {
         let reach = APART * self.map.spacing();
         let mut starts: Vec<usize> = Vec::with_capacity(STARTS);
         for _ in 0..STARTS {
@@ -256,7 +299,8 @@ impl Matching {
         }
         let mut modes: Vec<Mode> = Vec::with_capacity(STARTS);
         for start in starts {
-            let mode = self.follow(measured, self.map.index.nearest(self.map.places[start]).0);
+            let at = self.map.index.nearest(self.map.places[start]).0;
+            let mode = self.follow(measured, at, None);
             // Two starts may end at the same place.
             let same = |m: &Mode| m.position.distance(mode.position) < 0.5 * self.map.spacing();
             if !modes.iter().any(same) {
@@ -283,8 +327,72 @@ impl Matching {
         best
     }
 
+    /// A reading with its weights where gluing does not count.
+    fn heard<'a>(&self, reading: &'a [f64]) -> Heard<'a> {
+        let w = self.errors.weights(reading, &self.used);
+        Heard {
+            squares: reading.iter().zip(&w).map(|(x, w)| w * x * x).sum(),
+            x: reading,
+            w,
+        }
+    }
+
+    /// The weights for a touch of a force, where gauges glued otherwise would read so much else (a newton).
+    fn weighed(&self, heard: &Heard, spread: Option<&[f64]>, force: f64) -> Weighed {
+        let Some(spread) = spread else {
+            return Weighed {
+                w: heard.w.clone(),
+                squares: heard.squares,
+                log: 0.0,
+            };
+        };
+        let mut log = 0.0;
+        let weight = |(w, s): (&f64, &f64)| {
+            let wider = 1.0 + w * (force * s).powi(2);
+            log += 0.5 * wider.ln();
+            w / wider
+        };
+        let w: Vec<f64> = heard.w.iter().zip(spread).map(weight).collect();
+        Weighed {
+            squares: heard.x.iter().zip(&w).map(|(x, w)| w * x * x).sum(),
+            w,
+            log,
+        }
+    }
+
+    /// The weights for a touch at a place: of the force that is given, or else of the one that fits best.
+    fn weighed_at(&self, heard: &Heard, at: SurfacePoint, force: Option<f64>) -> Weighed {
+        let spread = self.errors.spread.as_ref().map(|s| s.at(at));
+        let spread = spread.as_deref();
+        let fitting = || self.fitting_force(heard, &self.map.at(at), spread);
+        self.weighed(heard, spread, force.unwrap_or_else(fitting))
+    }
+
+    /// The force that fits best at a place with these readings a newton: its weights depend on it, and two turns
+    /// settle them.
+    fn fitting_force(&self, heard: &Heard, g: &[f64], spread: Option<&[f64]>) -> f64 {
+        let mut force = first_force(heard, g).clamp(0.0, self.most_force);
+        for _ in 0..TURNS {
+            let weighed = self.weighed(heard, spread, force);
+            force = weighed.measured(heard.x).fit(g, self.most_force).0;
+        }
+        force
+    }
+
+    /// The most likely place near a start. Weights that depend on where and how hard the touch was are taken there
+    /// once more.
+    fn follow(&self, heard: &Heard, start: SurfacePoint, force: Option<f64>) -> Mode {
+        let weighed = self.weighed_at(heard, start, force);
+        let mode = self.descend(&weighed.measured(heard.x), weighed.log, start);
+        if self.errors.spread.is_none() {
+            return mode;
+        }
+        let weighed = self.weighed_at(heard, mode.at, Some(mode.force));
+        self.descend(&weighed.measured(heard.x), weighed.log, mode.at)
+    }
+
     /// Gauss–Newton on place and force, with Levenberg's damping.
-    fn follow(&self, measured: &Measured, start: SurfacePoint) -> Mode {
+    fn descend(&self, measured: &Measured, log: f64, start: SurfacePoint) -> Mode {
         let map = &self.map;
         let mut at = start;
         let mut slope = map.slope(at);
@@ -321,7 +429,7 @@ impl Matching {
                 damping = (damping * 20.0).max(1e-3);
             }
         }
-        self.mode(measured, at, &slope, force, cost)
+        self.mode(measured, at, &slope, force, cost + log)
     }
 
     fn mode(
@@ -358,14 +466,14 @@ impl Matching {
     }
 
     /// A mode alone, with its normal distribution.
-    fn contact_at(&self, measured: &Measured, mode: &Mode, narrow: bool) -> Contact {
+    fn contact_at(&self, measured: &Heard, mode: &Mode, narrow: bool) -> Contact {
         let region = Region::of_normal(mode.covariance, mode.plane);
         let force = (mode.force, mode.force_variance);
         self.contact(measured, mode.at, force, region, mode.cost, narrow)
     }
 
     /// Where one narrow place is far likelier than all others, that one; otherwise their mean.
-    fn mean_of_modes(&self, measured: &Measured, modes: &[Mode]) -> Contact {
+    fn mean_of_modes(&self, measured: &Heard, modes: &[Mode]) -> Contact {
         let best = modes[0];
         let weight = |m: &Mode| (m.log_evidence - best.log_evidence).exp();
         let total: f64 = modes.iter().map(weight).sum();
@@ -385,7 +493,7 @@ impl Matching {
     }
 
     /// Mean, spread and region over all templates, each with the area it stands for.
-    fn mean_of_templates(&self, measured: &Measured, best: &Mode) -> Contact {
+    fn mean_of_templates(&self, measured: &Heard, best: &Mode) -> Contact {
         let map = &self.map;
         let highest = self.highest.iter().fold(0.0_f32, |m, s| m.max(*s));
         let highest = f64::from(highest).max(0.5 * measured.squares - best.cost);
@@ -397,7 +505,7 @@ impl Matching {
             .enumerate()
             .filter(|(_, s)| **s >= floor)
         {
-            let (mean, variance, log_likelihood) = self.force_at(measured, map.node(node));
+            let (mean, variance, log_likelihood) = self.force_at(measured, node);
             let weight = map.areas[node] * (log_likelihood - highest).exp();
             places.push((map.places[node], weight));
             total += weight;
@@ -416,21 +524,25 @@ impl Matching {
     }
 
     /// Mean and variance of the force at a place, and the log-likelihood with the force integrated out.
-    fn force_at(&self, measured: &Measured, g: &[f64]) -> (f64, f64, f64) {
-        let d: f64 = g.iter().zip(measured.w).map(|(g, w)| w * g * g).sum();
-        let (force, cost) = measured.fit(g, self.most_force);
+    fn force_at(&self, heard: &Heard, node: usize) -> (f64, f64, f64) {
+        let g = self.map.node(node);
+        let spread = self.errors.spread.as_ref().map(|s| s.node(node));
+        let force = spread.map_or(0.0, |_| self.fitting_force(heard, g, spread));
+        let weighed = self.weighed(heard, spread, force);
+        let d: f64 = g.iter().zip(&weighed.w).map(|(g, w)| w * g * g).sum();
+        let (force, cost) = weighed.measured(heard.x).fit(g, self.most_force);
         // A force is never known worse than that it lies between nothing and the most.
         let variance = d.max(12.0 * self.most_force.powi(-2)).recip();
         (
             force,
             variance,
-            0.5 * measured.squares - cost + 0.5 * variance.ln(),
+            0.5 * heard.squares - cost - weighed.log + 0.5 * variance.ln(),
         )
     }
 
     fn contact(
         &self,
-        measured: &Measured,
+        measured: &Heard,
         at: SurfacePoint,
         force: (f64, f64),
         region: Region,
@@ -448,6 +560,14 @@ impl Matching {
             unexplained: 2.0 * cost,
         }
     }
+}
+
+/// The force that fits best where all channels are off alike: where each has variances of its own, one begins here.
+fn first_force(heard: &Heard, g: &[f64]) -> f64 {
+    let trusted = || heard.x.iter().zip(g).zip(&heard.w).filter(|(_, w)| **w > 0.0);
+    let s: f64 = trusted().map(|((x, g), _)| x * g).sum();
+    let d: f64 = trusted().map(|((_, g), _)| g * g).sum();
+    if d > 0.0 { s / d } else { 0.0 }
 }
 
 /// Normal equations of place (two directions) and force, and their right side.
@@ -510,6 +630,69 @@ wide! {
                 out[k] = force * (s[k] - 0.5 * force * d[k]);
             }
             *highest = 0.0;
+            for k in 0..LANES {
+                *highest = highest.max(out[k]);
+            }
+        }
+    }
+}
+
+wide! {
+    /// As [`score_templates`], with variances that grow with the force by what gluing spreads: `reading` in
+    /// microstrain, `weights` without gluing.
+    fn score_with_gluing<'a>(
+        templates: &'a [f32],
+        spreads: &'a [f32],
+        reading: &'a [f32],
+        weights: &'a [f32],
+        most: f32,
+        scores: &'a mut [f32],
+        highest: &'a mut [f32],
+    ) {
+        let channels = reading.len();
+        let nothing: f32 = reading.iter().zip(weights).map(|(x, w)| w * x * x).sum();
+        let block = LANES * channels;
+        let blocks = templates.chunks_exact(block).zip(spreads.chunks_exact(block));
+        for (((block, spread), out), highest) in
+            blocks.zip(scores.chunks_exact_mut(LANES)).zip(highest)
+        {
+            let (mut s, mut d) = ([0.0_f32; LANES], [f32::MIN_POSITIVE; LANES]);
+            for (row, (&x, &w)) in block.chunks_exact(LANES).zip(reading.iter().zip(weights)) {
+                let trusted = if w > 0.0 { 1.0 } else { 0.0 };
+                for k in 0..LANES {
+                    s[k] += trusted * x * row[k];
+                    d[k] += trusted * row[k] * row[k];
+                }
+            }
+            let mut force = [0.0_f32; LANES];
+            for k in 0..LANES {
+                force[k] = (s[k] / d[k]).max(0.0).min(most);
+            }
+            for turn in 0..=TURNS {
+                let (mut a, mut log) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+                (s, d) = ([0.0_f32; LANES], [f32::MIN_POSITIVE; LANES]);
+                let rows = block.chunks_exact(LANES).zip(spread.chunks_exact(LANES));
+                for ((row, spread), (&x, &w)) in rows.zip(reading.iter().zip(weights)) {
+                    for k in 0..LANES {
+                        let off = force[k] * spread[k];
+                        let wider = 1.0 + w * off * off;
+                        let w = w / wider;
+                        s[k] += w * x * row[k];
+                        d[k] += w * row[k] * row[k];
+                        a[k] += w * x * x;
+                        log[k] += logarithm(wider);
+                    }
+                }
+                for k in 0..LANES {
+                    if turn == TURNS {
+                        let left = a[k] - force[k] * (2.0 * s[k] - force[k] * d[k]);
+                        out[k] = 0.5 * (nothing - left - log[k]);
+                    } else {
+                        force[k] = (s[k] / d[k]).max(0.0).min(most);
+                    }
+                }
+            }
+            *highest = f32::NEG_INFINITY;
             for k in 0..LANES {
                 *highest = highest.max(out[k]);
             }

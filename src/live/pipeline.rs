@@ -112,6 +112,20 @@ impl Update {
     }
 }
 
+/// What gauges read of a newton anywhere, and how far off that may be.
+#[derive(Clone)]
+pub struct GaugeModel {
+    pub map: Arc<ResponseMap>,
+    /// See [`Errors::spread`].
+    pub spread: Option<Arc<ResponseMap>>,
+}
+
+impl From<Arc<ResponseMap>> for GaugeModel {
+    fn from(map: Arc<ResponseMap>) -> Self {
+        Self { map, spread: None }
+    }
+}
+
 /// Samples in a row that make or end a touch.
 const BEGINS: u32 = 3;
 const ENDS: u32 = 6;
@@ -150,14 +164,16 @@ pub struct Pipeline {
 
 impl Pipeline {
     #[must_use]
-    pub fn new(map: Arc<ResponseMap>, settings: Settings) -> Self {
-        let gauges = map.channels();
+    pub fn new(model: impl Into<GaugeModel>, settings: Settings) -> Self {
+        let model = model.into();
+        let gauges = model.map.channels();
         let errors = Errors {
-            noise: vec![settings.least_noise.max(1e-9); gauges],
             relative: settings.relative,
+            spread: model.spread,
+            ..Errors::of_noise(settings.least_noise.max(1e-9), gauges)
         };
         Self {
-            matching: Matching::new(map, errors, settings.most_force),
+            matching: Matching::new(model.map, errors, settings.most_force),
             settings,
             trained: [None, None],
             trained_for: Vec::new(),
@@ -180,7 +196,8 @@ impl Pipeline {
 
     /// Another model of the same gauges, or other settings: after a calibration. What the board has said of
     /// itself stays.
-    pub fn set_model(&mut self, map: Arc<ResponseMap>, settings: Settings) {
+    pub fn set_model(&mut self, model: impl Into<GaugeModel>, settings: Settings) {
+        let GaugeModel { map, spread } = model.into();
         if settings.channels != self.settings.channels {
             // Other channels have another rest.
             (self.rest, self.taring) = (None, None);
@@ -193,6 +210,7 @@ impl Pipeline {
         let errors = Errors {
             noise,
             relative: settings.relative,
+            spread,
         };
         self.settings = Settings { chain, ..settings };
         let used = self.matching.used.clone();

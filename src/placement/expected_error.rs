@@ -15,7 +15,7 @@ mod scene;
 use rayon::prelude::*;
 
 pub use self::elliptic::mean_length;
-pub use self::scene::{Detail, Knowledge, Scene, Variance};
+pub use self::scene::{Detail, Forces, Knowledge, Scene, Variance};
 
 use self::bank::{Bank, Rows};
 use super::lead::{self, Best};

@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::elliptic::mean_length;
 use super::scene::{Place, Report, Scene};
-use crate::lanes::wide;
+use crate::lanes::{exponential, logarithm, wide};
 
 /// Places whose probability is summed side by side.
 const LANES: usize = 16;
@@ -48,6 +48,8 @@ pub(super) struct Bank<'a> {
     filters: Vec<Filters>,
     presses: Vec<Press>,
     mass: f64,
+    /// How many there are.
+    gauges: usize,
 }
 
 /// What a site's reading does to the filters at all places, for one force.
@@ -82,8 +84,8 @@ impl Rows {
 impl<'a> Bank<'a> {
     /// No gauge yet.
     pub fn new(scene: &'a Scene) -> Self {
-        let force = scene.force_prior;
-        let (mean, deviation) = force.unwrap_or((1.0, 0.0));
+        // Any force up to the hardest; or the one there is.
+        let (mean, deviation) = scene.hardest.map_or((1.0, 0.0), |hardest| (0.0, hardest));
         let count = scene.places.len().next_multiple_of(LANES);
         let padded = |value: &dyn Fn(&Place) -> f64, rest: f32| -> Vec<f32> {
             let mut values: Vec<f32> = scene.places.iter().map(|p| value(p) as f32).collect();
@@ -136,6 +138,7 @@ impl<'a> Bank<'a> {
             filters: scene.levels.iter().map(|_| filters()).collect(),
             presses: presses.collect(),
             mass: scene.presses.iter().map(|p| p.mass).sum(),
+            gauges: 0,
             scene,
         }
     }
@@ -227,6 +230,7 @@ impl<'a> Bank<'a> {
             }
             shrink(&mut self.filters[level], &rows, &gains);
         }
+        self.gauges += 1;
     }
 
     /// A site's reading of a press, as the filter at the true place takes it.
@@ -235,7 +239,8 @@ impl<'a> Bank<'a> {
         let variance = 1.0 + force * force * f64::from(report.variance[press]);
         let deviation = variance.sqrt();
         let value = f64::from(report.value[press]);
-        let draw = self.scene.draws[site * self.scene.presses.len() + press];
+        // Of the gauge's turn and not of its site: else the sites with the luckiest noise would be chosen.
+        let draw = self.scene.draw(self.gauges, press);
         let reading = force * value + deviation * f64::from(draw);
         let slope = |k: usize| force * f64::from(report.slopes[k][press]);
         let own = Own {
@@ -314,7 +319,6 @@ fn predict(filters: &Filters, report: &Report, force: f32, rows: &mut Rows) {
             report.slopes[0],
             report.slopes[1],
             report.variance,
-            report.curvature,
         ],
         [
             r0,
@@ -410,32 +414,6 @@ fn masses_with(
     )
 }
 
-/// e to the power of x, for x up to 60: 2 to a whole number by its bits, and a polynomial between (to 3e-6).
-#[inline(always)]
-fn exponential(x: f32) -> f32 {
-    /// Added to a number, it leaves the nearest whole one in the lowest bits.
-    const WHOLE: f32 = 12_582_912.0;
-    let t = (x * std::f32::consts::LOG2_E).max(-126.0);
-    let whole = t + WHOLE;
-    let y = (t - (whole - WHOLE)) * std::f32::consts::LN_2;
-    let p = 1.0 + y * (1.0 + y * (0.5 + y * (0.166_666_6 + y * (0.041_666_2 + y * 0.008_4))));
-    f32::from_bits(p.to_bits().wrapping_add(whole.to_bits() << 23))
-}
-
-/// The natural logarithm of a number above zero (to 3e-7), by that of its mantissa: 2 artanh((m - 1) / (m + 1)).
-#[inline(always)]
-fn logarithm(x: f32) -> f32 {
-    /// Bits of the square root of a half: mantissas lie around one.
-    const ROOT: u32 = 0x3f35_04f3;
-    let from_root = x.to_bits().wrapping_sub(ROOT);
-    let power = (from_root as i32 >> 23) as f32;
-    let mantissa = f32::from_bits((from_root & 0x007f_ffff) + ROOT);
-    let s = (mantissa - 1.0) / (mantissa + 1.0);
-    let q = s * s;
-    let series = 1.0 + q * (0.333_333_3 + q * (0.2 + q * (0.142_857 + q * 0.111_111)));
-    power * std::f32::consts::LN_2 + 2.0 * s * series
-}
-
 fn folded(lanes: [[f32; LANES]; 4]) -> [f64; 4] {
     lanes.map(|lane| lane.iter().map(|v| f64::from(*v)).sum())
 }
@@ -479,16 +457,16 @@ wide! {
 wide! {
     fn fill<'a>(
         covariances: [&'a [f32]; 6],
-        report: [&'a [f32]; 5],
+        report: [&'a [f32]; 4],
         into: [&'a mut [f32]; 8],
         force: f32,
     ) {
         let count = report[0].len();
         let [xx, xy, xf, yy, yf, ff] = covariances.map(|c| &c[..count]);
-        let [value, along, across, variance, curvature] = report.map(|r| &r[..count]);
+        let [value, along, across, variance] = report.map(|r| &r[..count]);
         let [r0, r1, r2, scales, halves, logs, gains, sharp] = into.map(|i| &mut i[..count]);
         for k in 0..count {
-            let variance = 1.0 + force * force * (variance[k] + curvature[k]);
+            let variance = 1.0 + force * force * variance[k];
             let scale = variance.sqrt().recip();
             let r = [force * along[k] * scale, force * across[k] * scale, value[k] * scale];
             let spread = [
@@ -505,25 +483,5 @@ wide! {
             gains[k] = spread[2] * share;
             sharp[k] = sharpness(ff[k] - spread[2] * spread[2] * share);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn quick_functions_are_near_enough() {
-        for k in -400..=400 {
-            let x = k as f32 * 0.15;
-            let true_value = f64::from(x).exp();
-            assert!(
-                (f64::from(exponential(x)) / true_value - 1.0).abs() < 2e-5,
-                "{x}"
-            );
-            let y = (k as f32 * 0.15).exp();
-            assert!((logarithm(y) - x).abs() < 1e-5 * (1.0 + x.abs()), "{x}");
-        }
-        assert!(exponential(-1e30) < 1e-37);
     }
 }

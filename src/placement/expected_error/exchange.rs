@@ -23,7 +23,6 @@ pub(super) fn exchange(
     if chosen.len() <= kept || rounds == 0 {
         return Ok(None);
     }
-    let mut error = scenes.banks(&chosen).fine.error();
     // A gauge need not be looked at again while nothing else has changed.
     let mut unchanged = 0;
     for turn in 0..rounds * (chosen.len() - kept) {
@@ -35,17 +34,21 @@ pub(super) fn exchange(
         }
         let open = open.open();
         let step = (chosen.len(), chosen.len());
-        let errors = scenes.banks(&others).scan(&open, request.watch, step)?;
+        let banks = scenes.banks(&others);
+        let errors = banks.scan(&open, request.watch, step)?;
         let best = errors.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        // The gauge that is there takes the same turn: all hear the same noise.
+        let now = banks.fine.with(chosen[k], &mut banks.fine.rows());
         unchanged += 1;
         if let Some((place, with)) = best
-            && with < error * (1.0 - LEAST)
+            && with < now * (1.0 - LEAST)
         {
-            (chosen[k], error, unchanged) = (place, with, 1);
+            (chosen[k], unchanged) = (place, 1);
         }
         if unchanged >= chosen.len() - kept {
             break;
         }
     }
+    let error = scenes.banks(&chosen).fine.error();
     Ok(Some((chosen, error)))
 }

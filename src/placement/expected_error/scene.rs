@@ -46,6 +46,17 @@ impl Default for Detail {
 /// the touch: what gluing and model put on it.
 pub type Variance<'a> = &'a (dyn Fn(usize, usize) -> f64 + Sync);
 
+/// How hard touches are.
+#[derive(Clone, Copy)]
+pub struct Forces<'a> {
+    /// Of each touch of the data (N); the signals grow with it.
+    pub touches: &'a [f64],
+    /// The lightest and the hardest that will come (N).
+    pub coming: [f64; 2],
+    /// The hardest that the estimator thinks possible (N).
+    pub possible: f64,
+}
+
 /// What is known of the signals beside their values.
 pub struct Knowledge<'a> {
     /// Standard deviation of the noise, in the unit of the signals.
@@ -54,19 +65,17 @@ pub struct Knowledge<'a> {
     pub variance: Option<Variance<'a>>,
     /// Touches that places are taken from, rising: those whose variance is known. All where absent.
     pub among: Option<&'a [usize]>,
-    /// Force of each touch (N) that the signals grow with, and the lightest and the hardest that will come; absent
-    /// where the signals are what they are.
-    pub forces: Option<(&'a [f64], [f64; 2])>,
+    /// Absent where the signals are what they are.
+    pub forces: Option<Forces<'a>>,
     pub seed: u64,
 }
 
 /// What every site reports, per newton and in units of the noise, at some places: how much, how that changes over
-/// the surface (a millimetre along two directions), the variance of what else is off, and how far a plane leaves it
-/// at the border of what the place stands for (squared).
+/// the surface (a millimetre along two directions), and the variance of what else is off.
 #[derive(Default)]
 pub(super) struct Reports {
     count: usize,
-    /// Site by site: values, slopes, slopes, variances, curvatures.
+    /// Site by site: values, slopes along, slopes across, variances.
     values: Vec<f32>,
 }
 
@@ -75,11 +84,10 @@ pub(super) struct Report<'a> {
     pub value: &'a [f32],
     pub slopes: [&'a [f32]; 2],
     pub variance: &'a [f32],
-    pub curvature: &'a [f32],
 }
 
 impl Reports {
-    const ROWS: usize = 5;
+    const ROWS: usize = 4;
 
     pub fn of(&self, site: usize) -> Report<'_> {
         let all = &self.values[site * Self::ROWS * self.count..][..Self::ROWS * self.count];
@@ -88,7 +96,6 @@ impl Reports {
             value: row(0),
             slopes: [row(1), row(2)],
             variance: row(3),
-            curvature: row(4),
         }
     }
 }
@@ -119,15 +126,16 @@ pub struct Scene {
     pub(super) presses: Vec<Place>,
     pub(super) at_presses: Reports,
     pub(super) levels: Vec<Level>,
-    /// Mean and deviation of the force before anything is known (N); nothing to find where it is absent.
-    pub(super) force_prior: Option<(f64, f64)>,
-    /// Sites × presses: noise of unit deviation.
-    pub(super) draws: Vec<f32>,
+    /// The hardest force that is thought possible (N); nothing to find where it is absent.
+    pub(super) hardest: Option<f64>,
+    draws: Vec<f32>,
     sites: usize,
 }
 
 /// Forces that presses have, evenly between the lightest and the hardest by their logarithm.
 const LEVELS: usize = 3;
+/// Gauges with noise of their own; many more are never chosen.
+const TURNS: usize = 64;
 /// Neighbours that slopes are taken from.
 const NEIGHBOURS: usize = 9;
 /// What a place stands for reaches so far, over the distance of its neighbours.
@@ -146,7 +154,7 @@ impl Scene {
         watch: Watch,
     ) -> Result<Self, Cancelled> {
         report(watch, "Looking at touches", 0, 2)?;
-        let merged = Merged::new(targets, known.forces.map(|f| f.0));
+        let merged = Merged::new(targets, known.forces.map(|f| f.touches));
         let all: Vec<usize> = (0..merged.positions.len())
             .filter(|&k| merged.is_among(k, known.among))
             .collect();
@@ -164,23 +172,24 @@ impl Scene {
         };
         let stand = |of: &[usize]| standing(&merged.positions, of);
         let (places_at, presses_at) = (stand(&places), stand(&presses));
-        let at_places = reader.reports(&places, &places_at);
+        let at_places = reader.reports(&places);
         report(watch, "Looking at touches", 1, 2)?;
-        let at_presses = reader.reports(&presses, &presses_at);
-        let force_prior = known.forces.map(|(_, [_, hardest])| {
-            // As wide as any force up to the hardest, and some more.
-            (hardest / 2.0, hardest / 2.0)
-        });
+        let at_presses = reader.reports(&presses);
         Ok(Self {
-            levels: levels(presses.len(), known.forces.map(|f| f.1)),
-            draws: draws(x.rows(), presses.len(), known.seed),
+            levels: levels(presses.len(), known.forces.map(|f| f.coming)),
+            draws: draws(TURNS, presses.len(), known.seed),
             sites: x.rows(),
             places: places_at,
             presses: presses_at,
             at_places,
             at_presses,
-            force_prior,
+            hardest: known.forces.map(|f| f.possible),
         })
+    }
+
+    /// Noise of unit deviation in what the gauge of a turn reads of a press.
+    pub(super) fn draw(&self, turn: usize, press: usize) -> f32 {
+        self.draws[turn % TURNS * self.presses.len() + press]
     }
 
     #[must_use]
@@ -215,14 +224,16 @@ fn levels(presses: usize, range: Option<[f64; 2]>) -> Vec<Level> {
         .collect()
 }
 
-fn draws(sites: usize, presses: usize, seed: u64) -> Vec<f32> {
+/// Noise of unit deviation: turns of gauges × presses.
+fn draws(turns: usize, presses: usize, seed: u64) -> Vec<f32> {
     const SEED: u64 = 0xd4a3;
-    (0..sites)
-        .into_par_iter()
-        .flat_map_iter(|site| {
+    (0..turns)
+        .flat_map(|turn| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(SEED));
-            rng.set_stream(site as u64);
-            (0..presses).map(move |_| normal(&mut rng) as f32)
+            rng.set_stream(turn as u64);
+            (0..presses)
+                .map(move |_| normal(&mut rng) as f32)
+                .collect::<Vec<_>>()
         })
         .collect()
 }
@@ -377,10 +388,9 @@ struct Around<'a> {
     positions: &'a [DVec3],
 }
 
-/// A neighbour, where it lies in the plane of the surface (mm), and what it weighs in both slopes (1/mm).
+/// A neighbour, and what it weighs in both slopes (1/mm).
 struct Neighbour {
     place: usize,
-    at: [f64; 2],
     weights: [f64; 2],
 }
 
@@ -410,10 +420,9 @@ impl<'a> Around<'a> {
             .map(|o| plane.map(|axis| o.dot(axis)))
             .collect();
         let weights = slope_weights(&flat);
-        (near.iter().zip(flat).zip(weights))
-            .map(|(((_, place), at), weights)| Neighbour {
+        (near.iter().zip(weights))
+            .map(|((_, place), weights)| Neighbour {
                 place: *place,
-                at,
                 weights,
             })
             .collect()
@@ -460,7 +469,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn reports(&self, at: &[usize], standing: &[Place]) -> Reports {
+    fn reports(&self, at: &[usize]) -> Reports {
         let neighbours: Vec<Vec<Neighbour>> = at
             .par_iter()
             .map(|&at| self.around.neighbours(at))
@@ -468,7 +477,7 @@ impl Reader<'_> {
         let rows = |site: usize| {
             let mut rows = vec![0.0; Reports::ROWS * at.len()];
             for (k, &place) in at.iter().enumerate() {
-                let of = self.report(site, place, &neighbours[k], standing[k].reach);
+                let of = self.report(site, place, &neighbours[k]);
                 for (row, value) in of.into_iter().enumerate() {
                     rows[row * at.len() + k] = value as f32;
                 }
@@ -484,7 +493,7 @@ impl Reader<'_> {
         }
     }
 
-    fn report(&self, site: usize, place: usize, around: &[Neighbour], reach: f64) -> [f64; 5] {
+    fn report(&self, site: usize, place: usize, around: &[Neighbour]) -> [f64; 4] {
         let value = self.value(site, place);
         let rises: Vec<f64> = (around.iter())
             .map(|n| self.value(site, n.place) - value)
@@ -495,20 +504,7 @@ impl Reader<'_> {
                 .sum::<f64>()
         };
         let slopes = [slope(0), slope(1)];
-        let curvature = (around.iter().zip(&rises)).map(|(n, rise)| {
-            let away = n.at[0].hypot(n.at[1]).max(f64::MIN_POSITIVE);
-            let off = rise - slopes[0] * n.at[0] - slopes[1] * n.at[1];
-            // What bends grows with the square of the way.
-            (off * (reach / away).powi(2).min(1.0)).powi(2)
-        });
-        let curvature = curvature.sum::<f64>() / around.len().max(1) as f64;
-        [
-            value,
-            slopes[0],
-            slopes[1],
-            self.variance(site, place),
-            curvature,
-        ]
+        [value, slopes[0], slopes[1], self.variance(site, place)]
     }
 
     fn value(&self, site: usize, place: usize) -> f64 {
@@ -524,7 +520,7 @@ impl Reader<'_> {
         };
         let touches = &self.merged.touches[place];
         let of = |&(t, _): &(usize, f64)| {
-            let force = self.known.forces.map_or(1.0, |f| f.0[t]);
+            let force = self.known.forces.map_or(1.0, |f| f.touches[t]);
             variance(site, t) / (force * force)
         };
         touches.iter().map(of).sum::<f64>() / touches.len() as f64 * self.unit * self.unit
