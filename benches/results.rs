@@ -114,7 +114,7 @@ fn inputs(signal: Signal) -> Inputs {
 fn run(quality: Quality, signal: Signal) -> Design {
     design::run(
         &inputs(signal),
-        &SelectorKind::ALL,
+        &SelectorKind::PAPER,
         &quality.budget(),
         &cpu_seconds,
         &unwatched,
@@ -292,7 +292,7 @@ fn errors(text: &mut String, designs: &[(Quality, Signal, Design)]) {
                 find(false)
             );
         };
-        for selector in SelectorKind::ALL.map(SelectorKind::name) {
+        for selector in SelectorKind::PAPER.map(SelectorKind::name) {
             line(selector, 5);
             line(selector, 10);
         }
@@ -303,7 +303,7 @@ fn errors(text: &mut String, designs: &[(Quality, Signal, Design)]) {
 
 /// Error against number of gauges, for all selectors: the paper's first figure.
 fn curves(text: &mut String, designs: &[(Quality, Signal, Design)]) {
-    let kinds = SelectorKind::ALL;
+    let kinds = SelectorKind::PAPER;
     for (quality, signal, design) in designs {
         let names: Vec<&str> = kinds.iter().map(|k| k.title()).collect();
         let _ = writeln!(

@@ -8,9 +8,9 @@ mod script;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::draw::normal;
 use crate::elasticity::Touch;
 use crate::elasticity::sensitivity::Sensitivity;
-use crate::evaluation::normal;
 use crate::inference::Chain;
 use crate::wire::{Decoder, Event, Hello, Message, VERSION, encode};
 

@@ -5,7 +5,7 @@ pub mod failures;
 
 use std::borrow::Cow;
 
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -13,6 +13,7 @@ use serde::Serialize;
 use self::failures::{FailureRow, FailureTrial, failures};
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Signal, SignalMatrix};
+use crate::draw::normal;
 use crate::regression::folds::evenly;
 use crate::regression::tune::{self, CrossValidation, Effort, Grid, distances};
 use crate::regression::{Grouping, Hyper, PositionModel, scale};
@@ -241,12 +242,6 @@ pub(crate) fn add_noise_by<'a>(
         })
         .collect();
     Cow::Owned(SignalMatrix::new(x.columns(), values))
-}
-
-/// Standard normal, by Box and Muller.
-pub(crate) fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }
 
 fn tune_sets(

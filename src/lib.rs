@@ -10,6 +10,7 @@ pub mod colormap;
 pub mod dataset;
 pub mod design;
 pub mod document;
+mod draw;
 mod eigen;
 pub mod elasticity;
 pub mod evaluation;

@@ -34,7 +34,14 @@ pub enum SelectorKind {
 
 impl SelectorKind {
     pub const ALL: [Self; 5] = [
+        Self::GreedySvr,
+        Self::PcaQr,
+        Self::Entropy,
+        Self::MutualInformation,
         Self::ExpectedError,
+    ];
+    /// Those that the paper compares.
+    pub const PAPER: [Self; 4] = [
         Self::GreedySvr,
         Self::PcaQr,
         Self::Entropy,

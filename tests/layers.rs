@@ -13,6 +13,7 @@ const ORDER: [&[&str]; 14] = [
         "plain",
         "tally",
         "uncertainty",
+        "draw",
         "wire",
     ],
     &["mesh"],

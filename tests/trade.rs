@@ -281,9 +281,10 @@ fn the_dial_turns_in_the_window() {
     });
     let promise = w.harness.state().promise().unwrap().clone();
     assert!(promise.achieved_s > 0.0 && promise.predicted_s > 0.0);
-    // The same setting, on the same elements: the same error.
+    // The same setting: the same error, but for what elements, sites and touches that were laid otherwise change (the
+    // bundled trade was measured before a part's own frame decided how they lie).
     assert!(
-        (promise.achieved_mm / promise.predicted_mm - 1.0).abs() < 0.02,
+        (promise.achieved_mm / promise.predicted_mm - 1.0).abs() < 0.05,
         "{promise:?}"
     );
     w.click_label("Trade");

@@ -12,9 +12,8 @@ pub(super) struct Known<'a> {
     gluing: Gluing,
     /// Force of each touch (N).
     forces: Vec<f64>,
-    /// What the elements leave, as a share of readings, and the mean square of these, touch by touch.
+    /// What the elements leave, as a share of a reading.
     share: f64,
-    squares: Vec<f64>,
     noise: f64,
     range: [f64; 2],
     possible: f64,
@@ -26,22 +25,15 @@ impl<'a> Known<'a> {
         let project = &inputs.project;
         let dataset = &simulated.dataset;
         let estimate = &simulated.discretization;
-        let share = if std::env::var("EL").is_ok() {0.0} else {match (dataset.signal, estimate.strain_percent.is_nan()) {
+        let share = match (dataset.signal, estimate.strain_percent.is_nan()) {
             (Signal::Strain, false) => estimate.strain_percent / 100.0,
             _ => 0.0,
-        }};
-        let mut squares = vec![0.0_f64; dataset.touches.len()];
-        for site in 0..dataset.x.rows() {
-            for (square, x) in squares.iter_mut().zip(dataset.x.row(site)) {
-                *square += x * x / dataset.x.rows() as f64;
-            }
-        }
+        };
         Self {
             simulated,
             gluing: *gluing,
             forces: dataset.touches.iter().map(|t| t.force).collect(),
             share,
-            squares,
             noise: match dataset.signal {
                 Signal::Strain => project.gauge.noise_microstrain * 1e-6,
                 Signal::Displacement | Signal::NormalDisplacement => 0.0,
@@ -61,8 +53,7 @@ impl<'a> Known<'a> {
             (Some(slopes), Some(column)) => slopes.variance(site, column, reading, &self.gluing),
             _ => 0.0,
         };
-        // As `inference::Errors::relative`: half by the reading itself, half by all.
-        glued + self.share.powi(2) * f64::midpoint(reading * reading, self.squares[touch])
+        glued + (self.share * reading).powi(2)
     }
 
     /// For a pool with this variance of its rows.
@@ -103,7 +94,7 @@ pub fn expected_errors(
     /// A few sites are looked at in more detail than a choice among thousands can.
     const FINE: Detail = Detail {
         places: 1000,
-        presses: 300,
+        presses: 800,
     };
     let known = Known::new(inputs, simulated, &inputs.project.gluing());
     let mut sites: Vec<usize> = sets.concat();
@@ -118,7 +109,12 @@ pub fn expected_errors(
         watch,
     )?;
     let rows = |set: &Vec<usize>| -> Vec<usize> {
-        set.iter().filter_map(|s| sites.binary_search(s).ok()).collect()
+        set.iter()
+            .filter_map(|s| sites.binary_search(s).ok())
+            .collect()
     };
-    Ok(sets.iter().map(|set| expected(&scene, &rows(set)).0).collect())
+    Ok(sets
+        .iter()
+        .map(|set| expected(&scene, &rows(set)).0)
+        .collect())
 }

@@ -564,7 +564,14 @@ impl Matching {
 
 /// The force that fits best where all channels are off alike: where each has variances of its own, one begins here.
 fn first_force(heard: &Heard, g: &[f64]) -> f64 {
-    let trusted = || heard.x.iter().zip(g).zip(&heard.w).filter(|(_, w)| **w > 0.0);
+    let trusted = || {
+        heard
+            .x
+            .iter()
+            .zip(g)
+            .zip(&heard.w)
+            .filter(|(_, w)| **w > 0.0)
+    };
     let s: f64 = trusted().map(|((x, g), _)| x * g).sum();
     let d: f64 = trusted().map(|((_, g), _)| g * g).sum();
     if d > 0.0 { s / d } else { 0.0 }

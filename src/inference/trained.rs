@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::dataset::SignalMatrix;
-use crate::evaluation::normal;
+use crate::draw::normal;
 use crate::regression::predictor::Predictor;
 use crate::regression::{Hyper, SvrParams};
 

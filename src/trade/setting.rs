@@ -342,7 +342,7 @@ impl Setting {
                 unexplained,
                 ..*self
             }),
-            Knob::Selector => others(&SelectorKind::ALL, self.selector, |selector| Self {
+            Knob::Selector => others(&SelectorKind::PAPER, self.selector, |selector| Self {
                 selector,
                 ..*self
             }),

@@ -18,8 +18,9 @@ use crate::lanes::{exponential, logarithm, wide};
 const LANES: usize = 16;
 /// Added to the cost of a place that a press already stands for.
 const NEVER: f32 = 1e30;
-/// A place nearer to a press than so many of its own reach is the press's own.
-const OWN: f64 = 1.5;
+/// Places nearer to a press than so many of their reaches are the press's own: around those beyond, the normal
+/// distribution does not come as far as the press, which they would explain as well as its own place does.
+const OWN: f64 = 2.5;
 
 /// The filters at all places, for one force.
 struct Filters {
@@ -115,14 +116,15 @@ impl<'a> Bank<'a> {
                     -p.mass.max(1e-12).ln()
                 }
             };
-            let nearest = nearest(&scene.places, press.position);
+            // As a disc of that radius.
+            let reach = nearest(&scene.places, press.position).reach * OWN / 2.0;
             Press {
                 estimates: [vec![0.0; count], vec![0.0; count], vec![mean as f32; count]],
                 costs: padded(&cost, NEVER),
                 blocks: (0..(count / LANES) as u32).collect(),
                 covariance: Matrix3::from_diagonal(&Vector3::new(
-                    nearest.reach.powi(2),
-                    nearest.reach.powi(2),
+                    reach * reach,
+                    reach * reach,
                     deviation * deviation,
                 )),
                 estimate: Vector3::new(0.0, 0.0, mean),

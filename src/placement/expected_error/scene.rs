@@ -9,8 +9,9 @@ use rayon::prelude::*;
 
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
-use crate::evaluation::normal;
+use crate::draw::normal;
 use crate::regression::Grouping;
+use crate::regression::folds::evenly;
 
 /// How many places and presses a choice looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,8 +139,9 @@ const LEVELS: usize = 3;
 const TURNS: usize = 64;
 /// Neighbours that slopes are taken from.
 const NEIGHBOURS: usize = 9;
-/// What a place stands for reaches so far, over the distance of its neighbours.
-const REACH: f64 = 0.5;
+/// What a place stands for reaches so far, over the distance of its neighbours: normal distributions around a lattice
+/// of places then add up to an even one, to a few thousandths.
+const REACH: f64 = 0.65;
 /// Noise is taken to be no less than this share of the signals' rms: no model is better than that.
 const LEAST_NOISE: f64 = 1e-3;
 
@@ -158,8 +160,11 @@ impl Scene {
         let all: Vec<usize> = (0..merged.positions.len())
             .filter(|&k| merged.is_among(k, known.among))
             .collect();
-        let order = farthest_first(&merged.positions, &all, detail.places + detail.presses);
-        let (mut places, presses) = shared(&order, detail);
+        let mut places = farthest_first(&merged.positions, &all, detail.places);
+        // A press may come to one of the places: what stands near it is its own all the same.
+        let presses: Vec<usize> = (evenly(all.len(), detail.presses).into_iter())
+            .map(|k| all[k])
+            .collect();
         in_neighbourhoods(&mut places, &merged.positions);
         let around = Around::new(&merged.positions);
         let unit = unit(x, known.noise).recip();
@@ -301,27 +306,6 @@ fn farthest_first(positions: &[DVec3], among: &[usize], count: usize) -> Vec<usi
         order.push(among[next]);
     }
     order
-}
-
-/// Which of the places in order are compared with, and which are pressed: both lie all over the part, and none is
-/// both unless there are few.
-fn shared(order: &[usize], detail: Detail) -> (Vec<usize>, Vec<usize>) {
-    /// Fewer places than this are compared with and pressed.
-    const FEW: usize = 64;
-    if order.len() < FEW {
-        return (order.to_vec(), order.to_vec());
-    }
-    let every = (detail.places + detail.presses) / detail.presses.max(1);
-    let pressed = |k: usize| k % every == every - 1;
-    let (mut places, mut presses) = (Vec::new(), Vec::new());
-    for (k, &at) in order.iter().enumerate() {
-        if pressed(k) && presses.len() < detail.presses {
-            presses.push(at);
-        } else if places.len() < detail.places {
-            places.push(at);
-        }
-    }
-    (places, presses)
 }
 
 /// Puts places into an order in which those that follow each other lie together: halves along the longest extent,
