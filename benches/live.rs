@@ -287,8 +287,8 @@ impl Lab {
         let gauges = scene.gains.len();
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let errors = Errors {
-            noise: vec![NOISE; gauges],
             relative: scene.relative,
+            ..Errors::of_noise(NOISE, gauges)
         };
         let mut matching = Matching::new(Arc::clone(&scene.map), errors, 60.0);
         matching.used[FAILED] = !failed;
@@ -344,8 +344,8 @@ impl Lab {
         let samples: Vec<Vec<f64>> = self.touches.iter().map(|t| press(t, &mut rng)).collect();
         let again: Vec<Vec<f64>> = self.touches.iter().map(|t| press(t, &mut rng)).collect();
         let errors = Errors {
-            noise: vec![NOISE; gains.len()],
             relative: 0.03,
+            ..Errors::of_noise(NOISE, gains.len())
         };
         let mut matching = Matching::new(Arc::clone(&self.sensing.drawn.map), errors, 60.0);
         let contacts: Vec<_> = samples.iter().map(|x| matching.find(x)).collect();

@@ -28,6 +28,10 @@ macro_rules! wide {
 pub(crate) use wide;
 
 /// e to the power of x, for x up to 60: 2 to a whole number by its bits, and a polynomial between (to 3e-6).
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
 #[inline(always)]
 pub(crate) fn exponential(x: f32) -> f32 {
     /// Added to a number, it leaves the nearest whole one in the lowest bits.
@@ -40,6 +44,10 @@ pub(crate) fn exponential(x: f32) -> f32 {
 }
 
 /// The natural logarithm of a number above zero (to 3e-7), by that of its mantissa: 2 artanh((m - 1) / (m + 1)).
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
 #[inline(always)]
 pub(crate) fn logarithm(x: f32) -> f32 {
     /// Bits of the square root of a half: mantissas lie around one.

@@ -94,7 +94,13 @@ fn every_selector_answers_in_the_same_shape() {
     let folder = tempfile::tempdir().unwrap();
     let data = dataset(folder.path(), true);
     let data = data.to_str().unwrap();
-    for selector in ["greedy-svr", "pca-qr", "entropy", "mutual-information"] {
+    for selector in [
+        "greedy-svr",
+        "pca-qr",
+        "entropy",
+        "mutual-information",
+        "expected-error",
+    ] {
         let arguments = [
             "select",
             "--data",
@@ -621,4 +627,55 @@ fn repeats_of_a_place_are_judged_together() {
     assert_eq!(chosen["fold_of_touch"], together["fold_of_touch"]);
     assert_eq!(chosen["counts"]["places"], places);
     assert!(notes(&chosen).contains("150 touches lie at 50 places"));
+}
+
+#[test]
+fn expected_error_knows_noise_and_forces() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = dataset(folder.path(), true);
+    let data = data.to_str().unwrap();
+    let asked = |more: &[&str]| {
+        let fixed = [
+            "select",
+            "--data",
+            data,
+            "--selector",
+            "expected-error",
+            "--sensors",
+            "5",
+        ];
+        let answer = json(&[&fixed[..], more].concat());
+        let criteria = answer["criterion_mm"].as_array().unwrap();
+        criteria
+            .iter()
+            .map(|c| c.as_f64().unwrap())
+            .collect::<Vec<_>>()
+    };
+    let (quiet, loud) = (asked(&["--noise", "0.001"]), asked(&["--noise", "0.1"]));
+    // More gauges are better, and noise is worse.
+    assert!(quiet.windows(2).all(|w| w[1] < w[0]), "{quiet:?}");
+    assert!(
+        quiet.iter().zip(&loud).all(|(q, l)| q < l),
+        "{quiet:?} {loud:?}"
+    );
+    let flags = [
+        "select",
+        "--data",
+        data,
+        "--selector",
+        "pca-qr",
+        "--forces-n",
+        "1,10",
+    ];
+    misused(&flags, "--forces-n has no effect");
+    let flags = [
+        "select",
+        "--data",
+        data,
+        "--selector",
+        "expected-error",
+        "--forces-n",
+        "10,1",
+    ];
+    misused(&flags, "LIGHTEST,HARDEST");
 }

@@ -2,7 +2,7 @@
 
 use super::{HEARD_SEED, Inputs, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
-use crate::dataset::Signal;
+use crate::dataset::{GluingSlopes, Signal};
 use crate::placement::expected_error::{Detail, Forces, Knowledge, Scene, Variance, expected};
 use crate::uncertainty::Gluing;
 
@@ -61,7 +61,7 @@ impl<'a> Known<'a> {
         Knowledge {
             noise: self.noise,
             variance: Some(variance),
-            among: (self.simulated.dataset.slopes.as_ref()).map(|s| s.touches()),
+            among: (self.simulated.dataset.slopes.as_ref()).map(GluingSlopes::touches),
             forces: Some(Forces {
                 touches: &self.forces,
                 coming: self.range,

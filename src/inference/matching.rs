@@ -338,7 +338,7 @@ impl Matching {
     }
 
     /// The weights for a touch of a force, where gauges glued otherwise would read so much else (a newton).
-    fn weighed(&self, heard: &Heard, spread: Option<&[f64]>, force: f64) -> Weighed {
+    fn weighed(heard: &Heard, spread: Option<&[f64]>, force: f64) -> Weighed {
         let Some(spread) = spread else {
             return Weighed {
                 w: heard.w.clone(),
@@ -365,7 +365,7 @@ impl Matching {
         let spread = self.errors.spread.as_ref().map(|s| s.at(at));
         let spread = spread.as_deref();
         let fitting = || self.fitting_force(heard, &self.map.at(at), spread);
-        self.weighed(heard, spread, force.unwrap_or_else(fitting))
+        Self::weighed(heard, spread, force.unwrap_or_else(fitting))
     }
 
     /// The force that fits best at a place with these readings a newton: its weights depend on it, and two turns
@@ -373,7 +373,7 @@ impl Matching {
     fn fitting_force(&self, heard: &Heard, g: &[f64], spread: Option<&[f64]>) -> f64 {
         let mut force = first_force(heard, g).clamp(0.0, self.most_force);
         for _ in 0..TURNS {
-            let weighed = self.weighed(heard, spread, force);
+            let weighed = Self::weighed(heard, spread, force);
             force = weighed.measured(heard.x).fit(g, self.most_force).0;
         }
         force
@@ -528,7 +528,7 @@ impl Matching {
         let g = self.map.node(node);
         let spread = self.errors.spread.as_ref().map(|s| s.node(node));
         let force = spread.map_or(0.0, |_| self.fitting_force(heard, g, spread));
-        let weighed = self.weighed(heard, spread, force);
+        let weighed = Self::weighed(heard, spread, force);
         let d: f64 = g.iter().zip(&weighed.w).map(|(g, w)| w * g * g).sum();
         let (force, cost) = weighed.measured(heard.x).fit(g, self.most_force);
         // A force is never known worse than that it lies between nothing and the most.

@@ -337,6 +337,10 @@ fn predict(filters: &Filters, report: &Report, force: f32, rows: &mut Rows) {
 }
 
 /// One over the deviation; nothing where there is none to know.
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
 #[inline(always)]
 fn sharpness(variance: f32) -> f32 {
     if variance > 0.0 {
