@@ -162,6 +162,7 @@ const TEST_SEED: u64 = 0x7e57;
 const NOISE_SEED: u64 = 0x0153;
 const HEARD_SEED: u64 = 0x4ea8d;
 const WORKSHOP_SEED: u64 = 0x30b0;
+const PRESS_SEED: u64 = 0x94e55;
 
 /// What a design starts from.
 #[derive(Clone)]

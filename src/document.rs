@@ -371,7 +371,9 @@ impl Document {
     pub fn design_key_at(&self, quality: Quality) -> String {
         let (evaluation, gauge) = (&self.state.project.evaluation, &self.state.project.gauge);
         let judged = (evaluation, gauge.tolerance);
-        format!("{} {judged:?}", self.selection_key_at(quality))
+        // One estimator knows how hard anybody presses.
+        let judging = self.state.project.judging();
+        format!("{} {judged:?} {judging:?}", self.selection_key_at(quality))
     }
 }
 
@@ -409,6 +411,7 @@ fn hash(mask: &[bool]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::EstimatorKind;
     use crate::mesh::SurfacePoint;
 
     fn document() -> Document {
@@ -528,5 +531,16 @@ mod tests {
         assert_eq!(stale(other, pressed), [false; 3]);
         assert_eq!(stale(knows, glued), [false, true, true]);
         assert_eq!(stale(knows, pressed), [false, true, true]);
+    }
+
+    #[test]
+    fn another_estimator_is_another_judge() {
+        let matched = |p: &mut Project| p.evaluation.estimator = EstimatorKind::Matching;
+        assert_eq!(stale(SelectorKind::PcaQr, matched), [false, false, true]);
+        let mut d = document();
+        d.state.project.evaluation.estimator = EstimatorKind::Matching;
+        let before = d.design_key();
+        d.state.project.live.largest_force_n = 200.0;
+        assert_ne!(d.design_key(), before);
     }
 }

@@ -2,6 +2,8 @@
 
 pub mod estimate;
 pub mod failures;
+pub mod judging;
+pub mod matched;
 
 use std::borrow::Cow;
 
@@ -10,7 +12,10 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use self::failures::{FailureRow, FailureTrial, failures};
+pub use self::judging::{EstimatorKind, Forces, Judging};
+pub use self::matched::{Matched, MatchedRow};
+
+use self::failures::{FailureRow, FailureTrial, MOST_FAILED, failures};
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Signal, SignalMatrix};
 use crate::draw::normal;
@@ -24,6 +29,15 @@ pub struct Region {
     pub name: String,
     /// One value a test touch.
     pub contains: Vec<bool>,
+}
+
+impl Region {
+    /// Of one value a test touch, those inside.
+    fn within<T: Copy>(&self, values: &[T]) -> Vec<T> {
+        (values.iter().zip(&self.contains))
+            .filter_map(|(&v, &inside)| inside.then_some(v))
+            .collect()
+    }
 }
 
 /// Training on one model, judging on another: nothing here has seen the test touches.
@@ -57,12 +71,13 @@ pub struct EvaluationRow {
     pub median_mm: f64,
     pub p95_mm: f64,
     /// Mean error of the set as a workshop would build it, read with the regression trained for the
-    /// ideal one.
+    /// ideal one, or with a model that knows no more of it than how far off gauges usually are.
     pub workshop_mm: f64,
     pub touches: usize,
-    pub hyper: Hyper,
-    /// Whether the regression met its tolerance.
-    pub converged: bool,
+    /// Settings of the regression, where it was one.
+    pub hyper: Option<Hyper>,
+    /// Whether the regression met its tolerance, where it was one.
+    pub converged: Option<bool>,
 }
 
 /// Settings are searched for these set sizes and for no others; a size between two takes the settings
@@ -82,13 +97,21 @@ pub struct Candidate {
 
 /// The outcome: rows by set and region, and each set's errors touch by touch (mm), as drawn and as a
 /// workshop would build it.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Evaluation {
+    pub judging: Judging,
+    /// By matching: at the force in the middle.
     pub rows: Vec<EvaluationRow>,
     pub errors: Vec<Vec<f64>>,
     pub built: Vec<Vec<f64>>,
     /// What is left of each selector's largest set when gauges fail.
     pub failures: Vec<Failures>,
+    /// By matching: what was found of each set at each force, and what is quoted of that. The largest set of each
+    /// selector has all forces, those before it the one in the middle.
+    pub found: Vec<Matched>,
+    pub matched: Vec<MatchedRow>,
+    /// What a reader must know of how sets were judged.
+    pub notes: Vec<String>,
     pub work: Work,
 }
 
@@ -97,7 +120,7 @@ pub struct Evaluation {
 pub struct Failures {
     pub selector: String,
     pub sensors: usize,
-    /// Touches that were learned from.
+    /// Touches that were learned from; by matching, which learns from none, those that were judged.
     pub touches: usize,
     pub rows: Vec<FailureRow>,
 }
@@ -113,13 +136,7 @@ pub fn evaluate(
     watch: Watch,
 ) -> Result<Evaluation, Cancelled> {
     let noisy = Noisy::new(trial);
-    let mut evaluation = Evaluation {
-        rows: Vec::new(),
-        errors: Vec::new(),
-        built: Vec::new(),
-        failures: Vec::new(),
-        work: Work::default(),
-    };
+    let mut evaluation = Evaluation::default();
     let done = std::sync::atomic::AtomicUsize::new(0);
     let hypers = tune_sets(&noisy, trial, sets, budget, watch, &mut evaluation.work)?;
     let results: Result<Vec<_>, Cancelled> = sets
@@ -150,19 +167,14 @@ fn fail(
     budget: &Budget,
     watch: Watch,
 ) -> Result<Vec<Failures>, Cancelled> {
-    const MOST_FAILED: usize = 5;
     if budget.failure_subsets == 0 {
         return Ok(Vec::new());
     }
     let touches = evenly(trial.train_targets.len(), budget.failure_touches);
     let targets: Vec<[f64; 3]> = touches.iter().map(|&t| trial.train_targets[t]).collect();
     let train = noisy.train.select_columns(&touches);
-    let last_of_its_kind = |k: usize| {
-        let next = sets.get(k + 1);
-        sets[k].selector != BASELINE && next.is_none_or(|next| next.selector != sets[k].selector)
-    };
     (0..sets.len())
-        .filter(|&k| last_of_its_kind(k) && sets[k].rows.len() > 1)
+        .filter(|&k| is_largest(sets, k) && sets[k].rows.len() > 1)
         .map(|k| {
             let set = &sets[k];
             let rows = failures(
@@ -187,6 +199,12 @@ fn fail(
             })
         })
         .collect()
+}
+
+/// Whether a set is the last of its selector's, and so its largest; the baseline of all candidates is nobody's.
+pub(crate) fn is_largest(sets: &[Candidate], k: usize) -> bool {
+    let next = sets.get(k + 1);
+    sets[k].selector != BASELINE && next.is_none_or(|next| next.selector != sets[k].selector)
 }
 
 /// The trial's signals with noise, the same noise for a site in every set it is part of.
@@ -324,8 +342,8 @@ fn judge(
     let said = Said {
         selector: &set.selector,
         sensors: set.rows.len(),
-        hyper,
-        converged: model.converged().0,
+        hyper: Some(*hyper),
+        converged: Some(model.converged().0),
     };
     let rows = said.rows(trial.regions, [&errors, &built]);
     (rows, [errors, built], model.work)
@@ -344,13 +362,15 @@ impl Evaluation {
             let said = Said {
                 selector: &row.selector,
                 sensors: row.sensors,
-                hyper: &row.hyper,
+                hyper: row.hyper,
                 converged: row.converged,
             };
             said.rows(regions, [errors, built])
         });
+        let found = self.found.iter();
         Self {
             rows: rows.collect(),
+            matched: found.flat_map(|m| m.rows(regions)).collect(),
             ..self.clone()
         }
     }
@@ -360,32 +380,37 @@ impl Evaluation {
 struct Said<'a> {
     selector: &'a str,
     sensors: usize,
-    hyper: &'a Hyper,
-    converged: bool,
+    hyper: Option<Hyper>,
+    converged: Option<bool>,
 }
 
 impl Said<'_> {
     /// A row for all touches, and one for each region that has any.
     fn rows(&self, regions: &[Region], errors: [&[f64]; 2]) -> Vec<EvaluationRow> {
-        let everywhere = Region {
-            name: EVERYWHERE.into(),
-            contains: vec![true; errors[0].len()],
-        };
-        std::iter::once(&everywhere)
-            .chain(regions)
-            .filter(|region| region.contains.contains(&true))
-            .map(|region| row(self, region, errors))
-            .collect()
+        let regions = quoted(regions, errors[0].len());
+        regions.iter().map(|r| row(self, r, errors)).collect()
     }
 }
 
-fn row(set: &Said, region: &Region, [errors, built]: [&[f64]; 2]) -> EvaluationRow {
-    let within = |errors: &[f64]| -> Vec<f64> {
-        (errors.iter().zip(&region.contains))
-            .filter_map(|(&e, &inside)| inside.then_some(e))
-            .collect()
+/// What errors of so many touches are quoted for: all of them, and each region that has any.
+fn quoted(regions: &[Region], touches: usize) -> Vec<Region> {
+    let everywhere = Region {
+        name: EVERYWHERE.into(),
+        contains: vec![true; touches],
     };
-    let (mut inside, built) = (within(errors), within(built));
+    std::iter::once(&everywhere)
+        .chain(regions)
+        .filter(|region| region.contains.contains(&true))
+        .cloned()
+        .collect()
+}
+
+pub(crate) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn row(set: &Said, region: &Region, [errors, built]: [&[f64]; 2]) -> EvaluationRow {
+    let (mut inside, built) = (region.within(errors), region.within(built));
     inside.sort_by(f64::total_cmp);
     let quantile = |q: f64| {
         let last = inside.len().saturating_sub(1);
@@ -398,12 +423,12 @@ fn row(set: &Said, region: &Region, [errors, built]: [&[f64]; 2]) -> EvaluationR
         selector: set.selector.to_owned(),
         sensors: set.sensors,
         region: region.name.clone(),
-        error_mm: inside.iter().sum::<f64>() / inside.len() as f64,
+        error_mm: mean(&inside),
         median_mm: quantile(0.5),
         p95_mm: quantile(0.95),
-        workshop_mm: built.iter().sum::<f64>() / built.len() as f64,
+        workshop_mm: mean(&built),
         touches: inside.len(),
-        hyper: *set.hyper,
+        hyper: set.hyper,
         converged: set.converged,
     }
 }

@@ -40,6 +40,7 @@ impl SelectorKind {
         Self::MutualInformation,
         Self::ExpectedError,
     ];
+
     /// Those that the paper compares.
     pub const PAPER: [Self; 4] = [
         Self::GreedySvr,

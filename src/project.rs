@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::budget::{Budget, Limits, Quality};
 use crate::dataset::Signal;
 use crate::elasticity::{Material, Section};
+use crate::evaluation::{EstimatorKind, Forces, Judging};
 use crate::feasible::FeasibleRules;
 use crate::limb::BoxMm;
 use crate::mesh::unroll::Axis;
@@ -179,12 +180,30 @@ pub struct CandidateKeys {
     pub count: Option<usize>,
 }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationKeys {
+    // As `touch.forces_n`.
+    /// What finds the touches that sets of gauges are judged by.
+    #[serde(skip_serializing_if = "is_default")]
+    pub estimator: EstimatorKind,
+    /// How hard these touches are, rising; by regression they are as hard as those that it learned from.
+    #[serde(skip_serializing_if = "are_usual_judged_forces")]
+    pub forces_n: Vec<f64>,
     /// Regions that errors are quoted for, beside all touches.
     #[serde(rename = "region", skip_serializing_if = "Vec::is_empty")]
     pub regions: Vec<RegionKeys>,
+}
+
+/// How hard the touches are (N) that sets are judged by, where nothing else is said.
+const JUDGED_N: [f64; 3] = [3.0, 10.0, 25.0];
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+fn are_usual_judged_forces(forces_n: &[f64]) -> bool {
+    forces_n == JUDGED_N
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -280,6 +299,15 @@ impl Default for FeasibleKeys {
             edge_radius_mm: 2.1,
             painted: None,
             keep_out: None,
+        }
+    }
+}
+impl Default for EvaluationKeys {
+    fn default() -> Self {
+        Self {
+            estimator: EstimatorKind::default(),
+            forces_n: JUDGED_N.to_vec(),
+            regions: Vec::new(),
         }
     }
 }
@@ -388,6 +416,22 @@ impl Project {
             angle: tolerance.angle_deg * PI / 180.0,
             gain: tolerance.gain_percent / 100.0,
         }
+    }
+
+    /// How sets of gauges are judged. Matching knows strain only: sites that report displacements are judged by
+    /// regression whatever is asked for.
+    #[must_use]
+    pub fn judging(&self) -> Judging {
+        let asked = (self.evaluation.estimator, self.gauge.signal);
+        if asked != (EstimatorKind::Matching, Signal::Strain) {
+            return Judging::Svr;
+        }
+        let judged_n = self.evaluation.forces_n.clone();
+        let hardest = judged_n.iter().copied().fold(0.0, f64::max);
+        Judging::Matching(Forces {
+            most_n: self.live.largest_force_n.max(2.0 * hardest),
+            judged_n,
+        })
     }
 
     /// Force (N) and tip radius (m).

@@ -7,9 +7,11 @@ use clap::Args;
 
 use super::{Common, SelectorArg, out, prepare_folder, progress::Bar};
 use crate::design::{self, Design};
-use crate::evaluation::{BASELINE, EvaluationRow};
+use crate::evaluation::{BASELINE, EstimatorKind, EvaluationRow};
 use crate::io::artifacts::{self, Provenance};
 use crate::io::together::Together;
+use crate::placement::SelectorKind;
+use crate::project::Project;
 
 #[derive(Args, Debug, Clone)]
 pub struct DesignArgs {
@@ -27,6 +29,9 @@ pub struct DesignArgs {
     /// Keep this many candidates instead of as many as the project's variance needs.
     #[arg(long)]
     pub candidates: Option<usize>,
+    /// The comparison of the paper, whatever the project says: its four selectors, judged by regression.
+    #[arg(long)]
+    pub paper: bool,
 }
 
 /// Runs the command.
@@ -45,13 +50,14 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
     if args.candidates.is_some() {
         project.candidates.count = args.candidates;
     }
+    let paper = args.paper.then(|| as_in_the_paper(project));
     project.check()?;
     let existed = args.out.exists();
     prepare_folder(&mut loaded, &args.out)?;
     // Before anything is computed: what nobody else may write into meanwhile.
     let report = Together::claim(&args.out)?;
     let project = &loaded.inputs.project;
-    let kinds = project.selectors();
+    let kinds = paper.unwrap_or_else(|| project.selectors());
     let budget = project.budget.budget();
     let bar = Bar::default();
     let start = Instant::now();
@@ -83,6 +89,18 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Makes a project compare as the paper does, and says which selectors choose. One that the paper does not know gives
+/// way to the paper's own.
+fn as_in_the_paper(project: &mut Project) -> Vec<SelectorKind> {
+    project.evaluation.estimator = EstimatorKind::Svr;
+    let selection = &mut project.selection;
+    selection.compare = true;
+    if !SelectorKind::PAPER.contains(&selection.selector) {
+        selection.selector = SelectorKind::GreedySvr;
+    }
+    SelectorKind::PAPER.to_vec()
+}
+
 fn print_summary(design: &Design) -> anyhow::Result<()> {
     out::line(&format!(
         "{} inside sites, {} feasible, {} candidates, {} touches",
@@ -97,6 +115,7 @@ fn print_summary(design: &Design) -> anyhow::Result<()> {
     }
     print_gauges(design)?;
     let chosen = design.chosen().len();
+    print_forces(design, chosen)?;
     for row in design.evaluation.rows.iter().filter(|r| tells(r, chosen)) {
         out::line(&format!(
             "{:>14}, {:>3} gauges, {:<26} {:7.2} mm mean {:7.2} mm median",
@@ -111,6 +130,22 @@ fn print_summary(design: &Design) -> anyhow::Result<()> {
     }
     let total: f64 = design.seconds.iter().map(|s| s.seconds).sum();
     out::say(&format!("{total:.1} s"));
+    Ok(())
+}
+
+/// What matching does with the chosen gauges at every force that it was judged at.
+fn print_forces(design: &Design, chosen: usize) -> anyhow::Result<()> {
+    for row in design.evaluation.by_force(design.lead.name(), chosen) {
+        let calibrated = row.calibrated_mm;
+        let calibrated = calibrated.map_or(String::new(), |mm| format!(", {mm:.2} mm calibrated"));
+        out::line(&format!(
+            "touches of {} N, by matching: {:.2} mm mean as drawn, {:.2} mm as built{calibrated}",
+            row.force_n, row.error_mm, row.as_built_mm
+        ))?;
+    }
+    if let Some(force) = design.evaluation.judging.middle_n() {
+        out::line(&format!("touches of {force} N:"))?;
+    }
     Ok(())
 }
 
@@ -131,4 +166,26 @@ fn print_gauges(design: &Design) -> anyhow::Result<()> {
 /// compare with.
 fn tells(row: &EvaluationRow, chosen: usize) -> bool {
     [5, 10, chosen].contains(&row.sensors) || row.selector == BASELINE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_paper_knows_four_selectors_and_one_estimator() {
+        let mut project = Project::around("limb.stl", None);
+        project.evaluation.estimator = EstimatorKind::Matching;
+        project.selection.compare = false;
+        for (asked, led) in [
+            (SelectorKind::Entropy, SelectorKind::Entropy),
+            (SelectorKind::ExpectedError, SelectorKind::GreedySvr),
+        ] {
+            project.selection.selector = asked;
+            let kinds = as_in_the_paper(&mut project);
+            assert_eq!(kinds, SelectorKind::PAPER);
+            assert_eq!(project.selection.selector, led);
+            assert_eq!(project.judging().estimator(), EstimatorKind::Svr);
+        }
+    }
 }

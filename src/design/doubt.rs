@@ -96,7 +96,7 @@ impl Design {
         let mut doubts = self.simulated.doubts();
         doubts.extend(self.doubts_of_choice());
         let rows = &self.evaluation.rows;
-        let short = rows.iter().filter(|r| !r.converged).count();
+        let short = (rows.iter()).filter(|r| r.converged == Some(false)).count();
         if short > 0 {
             doubts.push(Doubt {
                 number: "regressions short of their tolerance",

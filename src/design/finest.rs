@@ -3,17 +3,16 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
-use super::judge::{judge, measured_by, noisy};
+use super::judge::{errors_mm, judge, measured_by, noisy};
 use super::layout::{lay_out_sites, touches_on};
-use super::sense::map_size;
+use super::sense::{map_size, point_gauge};
 use super::{Design, DesignError, Ground, Inputs, Laid, Simulated, Truth, ground};
 use crate::budget::{Budget, Elements, Watch};
-use crate::dataset::{Signal, SignalMatrix};
+use crate::dataset::Signal;
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::elasticity::{Model, Touch};
-use crate::evaluation::{Candidate, EvaluationRow};
+use crate::evaluation::{Candidate, EvaluationRow, mean};
 use crate::inference::{Errors, Matching, ResponseMap};
 
 /// Touches of its own that it judges by.
@@ -112,7 +111,7 @@ impl Finest {
         let set = Candidate {
             selector: design.lead.name().to_owned(),
             rows: rows_of(&truth, design.chosen()),
-            hyper: design.chosen_row().map(|r| r.hyper),
+            hyper: design.chosen_row().and_then(|r| r.hyper),
         };
         let budget = Budget {
             failure_subsets: 0,
@@ -147,9 +146,8 @@ impl Finest {
         let streams: Vec<u64> = truth.sites.iter().map(|&s| s as u64).collect();
         let [x, workshop] =
             [(&truth.x, 2), (&truth.workshop, 3)].map(|(x, draw)| noisy(inputs, x, draw, &streams));
-        let mut errors = self.found_by(matching, &x);
-        let built = self.found_by(matching, &workshop);
-        let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
+        let mut errors = errors_mm(matching, &x, &self.touches);
+        let built = errors_mm(matching, &workshop, &self.touches);
         let (mean_mm, workshop_mm) = (mean(&errors), mean(&built));
         errors.sort_by(f64::total_cmp);
         let at = |share: f64| errors[(share * (errors.len() - 1) as f64).round() as usize];
@@ -159,16 +157,6 @@ impl Finest {
             p95_mm: at(0.95),
             workshop_mm,
         })
-    }
-
-    /// Errors (mm) touch by touch.
-    fn found_by(&self, matching: &Matching, x: &SignalMatrix) -> Vec<f64> {
-        let error = |matching: &mut Matching, (t, touch): (usize, &Touch)| {
-            let reading: Vec<f64> = (0..x.rows()).map(|r| x.row(r)[t]).collect();
-            matching.find(&reading).position.distance(touch.position) * 1e3
-        };
-        let touches = self.touches.par_iter().enumerate();
-        touches.map_init(|| matching.clone(), error).collect()
     }
 
     fn truth(
@@ -199,25 +187,15 @@ fn rows_of(truth: &Truth, sites: &[usize]) -> Vec<usize> {
 /// # Errors
 /// [`DesignError`] as for the design's simulation.
 pub fn matching(inputs: &Inputs, design: &Design, watch: Watch) -> Result<Matching, DesignError> {
-    /// Side of a grid (m) that reads at a point.
-    const POINT: f64 = 1e-9;
     let project = &inputs.project;
     debug_assert_eq!(project.gauge.signal, Signal::Strain);
     let simulated = &design.simulated;
     let model = simulated.model()?;
     let mut sites = design.chosen().to_vec();
     sites.sort_unstable();
-    let gauge = |&s: &usize| {
-        let site = &simulated.dataset.sites[s];
-        Gauge {
-            position: site.position,
-            direction: site.direction,
-            normal: site.normal,
-            length: POINT,
-            width: POINT,
-        }
-    };
-    let gauges: Vec<Gauge> = sites.iter().map(gauge).collect();
+    let gauges: Vec<Gauge> = (sites.iter())
+        .map(|&s| point_gauge(&simulated.dataset.sites[s]))
+        .collect();
     let sensitivity = Sensitivity::new(&*model, &gauges, watch)?;
     let (force, tip) = project.tip();
     let mesh = simulated.ground.of_size(map_size(&simulated.ground, tip));

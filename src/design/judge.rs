@@ -1,22 +1,32 @@
 //! The judge: a finer model, touches of its own, and gauges as a workshop glues them.
 
+mod matched;
+mod presses;
+
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::layout::touches_on;
+use super::sense::proposed;
 use super::{
-    Design, DesignError, Ground, Inputs, NOISE_SEED, Reduced, Simulated, TEST_SEED, WORKSHOP_SEED,
+    Design, DesignError, Ground, Inputs, NOISE_SEED, PRESS_SEED, Reduced, Simulated, TEST_SEED,
+    WORKSHOP_SEED,
 };
 use crate::budget::{Budget, Cancelled, Watch, Work};
 use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
 use crate::elasticity::Model;
 use crate::elasticity::load::Touch;
-use crate::evaluation::{self, Candidate, Evaluation, Region, Trial};
+use crate::evaluation::{self, Candidate, EstimatorKind, Evaluation, Judging, Region, Trial};
+use crate::mesh::TriMesh;
 use crate::placement::Selection;
 use crate::project::Project;
 use crate::regression::folds::evenly;
 use crate::uncertainty::Gluing;
+
+pub use self::matched::BLIND;
+pub(super) use self::matched::errors_mm;
+pub use self::presses::{PRESSED_HARD, PRESSED_OFF, Press, Pressed};
 
 /// The judge: a model of finer elements, with touches of its own.
 #[derive(Clone)]
@@ -32,16 +42,20 @@ pub struct Truth {
     /// The same sites as a workshop would build them, and how far off that is.
     pub workshop: SignalMatrix,
     pub gluing: Gluing,
+    /// Known presses on the gauges as built, where an estimator learns from them.
+    pub pressed: Option<Pressed>,
 }
 
 impl Truth {
-    /// Whether it measures exactly these sites, in any order, and built by this workshop.
+    /// Whether it measures exactly these sites, in any order, built by this workshop, and what this estimator asks
+    /// for beside.
     #[must_use]
-    pub fn measures(&self, sites: &[usize], gluing: &Gluing) -> bool {
+    pub fn measures(&self, sites: &[usize], gluing: &Gluing, by: EstimatorKind) -> bool {
         let mut rows = sites.to_vec();
         rows.sort_unstable();
         rows.dedup();
-        rows == self.sites && *gluing == self.gluing
+        let presses = by == EstimatorKind::Svr || self.pressed.is_some();
+        rows == self.sites && *gluing == self.gluing && presses
     }
 
     /// The same, judged in the regions that a project asks for.
@@ -71,10 +85,39 @@ pub fn truth(
     let seed = inputs.project.budget.seed.wrapping_add(TEST_SEED);
     let touches = touches_on(&mesh, inputs, budget.test_touches, seed, false)?;
     let mut truth = measured_by(&*model, inputs, simulated, sites, touches, watch)?;
+    if inputs.project.judging().estimator() == EstimatorKind::Matching {
+        truth.press(&*model, &mesh, inputs, simulated, watch)?;
+    }
     let work = model.system().work();
     truth.work += work;
     truth.element_mm = Ground::element_mm(&laid);
     Ok(truth)
+}
+
+impl Truth {
+    /// Presses on a surface of the model as somebody does who calibrates, and reads the gauges as they are built.
+    fn press(
+        &mut self,
+        model: &dyn Model,
+        surface: &TriMesh,
+        inputs: &Inputs,
+        simulated: &Simulated,
+        watch: Watch,
+    ) -> Result<(), DesignError> {
+        let seed = inputs.project.budget.seed;
+        let asked = proposed(surface, inputs)?;
+        let presses = presses::by_hand(surface, asked, seed.wrapping_add(PRESS_SEED));
+        let made: Vec<Touch> = presses.iter().map(|p| p.made).collect();
+        let built = sites_as_built(simulated, &self.sites, &self.gluing, seed);
+        let signal = simulated.dataset.signal;
+        let (x, solves) = dataset::measure(model, &made, &built, signal, watch)?;
+        self.work.solves += solves as u64;
+        self.pressed = Some(Pressed {
+            presses,
+            x: x.scaled_rows(gains(&self.sites, &self.gluing, seed)),
+        });
+        Ok(())
+    }
 }
 
 /// Sites as a model reads them under touches. The size of its elements is for the caller to say.
@@ -93,16 +136,14 @@ pub(super) fn measured_by(
     // Both kinds of gauges in one measurement: the loads are solved for once.
     let drawn = rows.iter().map(|&s| simulated.dataset.sites[s]);
     let (gluing, seed) = (project.gluing(), project.budget.seed);
-    let built =
-        (rows.iter().zip(drawn.clone())).map(|(&s, site)| as_built(&site, &gluing, seed, s));
-    let gauges: Vec<Site> = drawn.clone().chain(built).collect();
+    let built = sites_as_built(simulated, &rows, &gluing, seed);
+    let gauges: Vec<Site> = drawn.chain(built).collect();
     let (signals, solves) =
         dataset::measure(model, &touches, &gauges, project.gauge.signal, watch)?;
     let half =
         |k: usize| signals.select_rows(&(k * rows.len()..(k + 1) * rows.len()).collect::<Vec<_>>());
     let (x, workshop) = (half(0), half(1));
-    let gains = (rows.iter()).map(|&s| workshop_draw(&gluing, seed, s).gain);
-    let workshop = workshop.scaled_rows(gains);
+    let workshop = workshop.scaled_rows(gains(&rows, &gluing, seed));
     Ok(Truth {
         regions: regions(project, &touches),
         element_mm: f64::NAN,
@@ -115,7 +156,22 @@ pub(super) fn measured_by(
         x,
         workshop,
         gluing,
+        pressed: None,
     })
+}
+
+/// Sites of a dataset as a workshop glues their gauges.
+fn sites_as_built(simulated: &Simulated, sites: &[usize], gluing: &Gluing, seed: u64) -> Vec<Site> {
+    let all = &simulated.dataset.sites;
+    let built = |&s: &usize| as_built(&all[s], gluing, seed, s);
+    sites.iter().map(built).collect()
+}
+
+/// The gains that these gauges end up with.
+fn gains(sites: &[usize], gluing: &Gluing, seed: u64) -> impl Iterator<Item = f64> {
+    sites
+        .iter()
+        .map(move |&s| workshop_draw(gluing, seed, s).gain)
 }
 
 /// What a workshop does to one gauge: where it is moved to and how far it is turned (radians), and its
@@ -171,10 +227,10 @@ fn regions(project: &Project, touches: &[Touch]) -> Vec<Region> {
         .collect()
 }
 
-/// Judges selections, with all candidates as the baseline, on the truth.
+/// Judges selections on the truth by the project's estimator; by regression with all candidates as the baseline.
 ///
 /// # Errors
-/// [`Cancelled`] when the watch asks for it.
+/// [`DesignError`] when the watch asks for a stop, and as for the design's simulation.
 pub fn evaluate(
     inputs: &Inputs,
     simulated: &Simulated,
@@ -183,7 +239,7 @@ pub fn evaluate(
     truth: &Truth,
     budget: &Budget,
     watch: Watch,
-) -> Result<Evaluation, Cancelled> {
+) -> Result<Evaluation, DesignError> {
     let row_of = |site: &usize| truth.sites.binary_search(site).ok();
     let mut sets = Vec::new();
     for selection in selections {
@@ -195,13 +251,15 @@ pub fn evaluate(
             });
         }
     }
-    sets.push(Candidate {
-        selector: evaluation::BASELINE.to_owned(),
-        rows: reduced.sites.iter().filter_map(row_of).collect(),
-        hyper: None,
-    });
+    if inputs.project.judging() == Judging::Svr {
+        sets.push(Candidate {
+            selector: evaluation::BASELINE.to_owned(),
+            rows: reduced.sites.iter().filter_map(row_of).collect(),
+            hyper: None,
+        });
+    }
     let streams: Vec<u64> = (0..truth.sites.len() as u64).collect();
-    judge(inputs, simulated, truth, &sets, &streams, budget, watch)
+    judge_as_asked(inputs, simulated, truth, &sets, &streams, budget, watch)
 }
 
 /// Judges one set of sites (as numbered in the dataset) that nobody selected, as a design's own sets were:
@@ -227,7 +285,7 @@ pub fn judge_set(
     let set = Candidate {
         selector: name.to_owned(),
         rows: rows.collect(),
-        hyper: own.map(|r| r.hyper),
+        hyper: own.and_then(|r| r.hyper),
     };
     // Sites that the design has measured keep their noise; others have streams beyond all of its own.
     let known = &design.truth.sites;
@@ -236,17 +294,43 @@ pub fn judge_set(
         Err(_) => (known.len() + s) as u64,
     };
     let streams: Vec<u64> = truth.sites.iter().map(stream).collect();
-    Ok(judge(
-        inputs,
-        simulated,
-        &truth,
-        &[set],
-        &streams,
-        budget,
-        watch,
-    )?)
+    let sets = [set];
+    judge_as_asked(inputs, simulated, &truth, &sets, &streams, budget, watch)
 }
 
+/// Judges sets by the estimator that the project asks for.
+fn judge_as_asked(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    truth: &Truth,
+    sets: &[Candidate],
+    streams: &[u64],
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Evaluation, DesignError> {
+    let project = &inputs.project;
+    if let Judging::Matching(forces) = &project.judging() {
+        let trial = matched::Trial {
+            inputs,
+            simulated,
+            truth,
+            streams,
+            forces,
+            budget,
+        };
+        return trial.judge(sets, watch);
+    }
+    let mut found = judge(inputs, simulated, truth, sets, streams, budget, watch)?;
+    if project.evaluation.estimator != EstimatorKind::Svr {
+        found.notes.push(format!(
+            "Judged by regression, although evaluation.estimator asks for matching: that knows strain only, and gauge.signal is {}.",
+            project.gauge.signal.name()
+        ));
+    }
+    Ok(found)
+}
+
+/// Judges sets by regression.
 pub(super) fn judge(
     inputs: &Inputs,
     simulated: &Simulated,
@@ -313,14 +397,23 @@ pub fn estimate(inputs: &Inputs, dataset: &Dataset, sites: &[usize], gamma: f64)
     evaluation::estimate::leave_one_out(&x, &targets, gamma)
 }
 
-/// Every site that the evaluation of some selections looks at.
+/// Every site that the evaluation of some selections looks at: of the candidates that nobody chose, those that a
+/// regression has for a baseline.
 #[must_use]
-pub fn sites_to_judge(reduced: &Reduced, selections: &[Selection]) -> Vec<usize> {
+pub fn sites_to_judge(
+    by: EstimatorKind,
+    reduced: &Reduced,
+    selections: &[Selection],
+) -> Vec<usize> {
+    let baseline: &[usize] = match by {
+        EstimatorKind::Svr => &reduced.sites,
+        EstimatorKind::Matching => &[],
+    };
     let chosen = selections
         .iter()
         .flat_map(|s| &s.sets)
         .flat_map(|s| &s.sites);
-    reduced.sites.iter().chain(chosen).copied().collect()
+    baseline.iter().chain(chosen).copied().collect()
 }
 
 #[cfg(test)]
@@ -369,9 +462,12 @@ mod tests {
             x: SignalMatrix::default(),
             workshop: SignalMatrix::default(),
             gluing: Gluing::default(),
+            pressed: None,
         };
-        assert!(truth.measures(&[5, 2, 5], &Gluing::default()));
-        assert!(!truth.measures(&[5, 3], &Gluing::default()));
-        assert!(!truth.measures(&[5, 2], &Gluing::EXACT));
+        let [svr, matching] = EstimatorKind::ALL;
+        assert!(truth.measures(&[5, 2, 5], &Gluing::default(), svr));
+        assert!(!truth.measures(&[5, 3], &Gluing::default(), svr));
+        assert!(!truth.measures(&[5, 2], &Gluing::EXACT, svr));
+        assert!(!truth.measures(&[5, 2], &Gluing::default(), matching));
     }
 }

@@ -10,7 +10,7 @@ use super::{
     select_step_by_step, simulate, sites_to_judge, truth,
 };
 use crate::budget::{Budget, Watch, Work};
-use crate::evaluation::{Evaluation, EvaluationRow};
+use crate::evaluation::{Evaluation, EvaluationRow, Matched, MatchedRow};
 use crate::feasible::Feasibility;
 use crate::mesh::{TriMesh, scatter};
 use crate::placement::{Selection, SelectorKind, SensorSet};
@@ -99,18 +99,37 @@ impl Design {
             }
         }
         let evaluation = Arc::make_mut(&mut design.evaluation);
-        let at = (evaluation.rows.iter())
-            .position(|r| r.selector == name && r.sensors == old)
-            .unwrap_or(evaluation.rows.len());
-        evaluation
-            .rows
-            .retain(|r| !(r.selector == name && r.sensors == old));
         let rows = judged.rows.iter().map(|r| EvaluationRow {
             selector: name.to_owned(),
             sensors: count,
             ..r.clone()
         });
-        evaluation.rows.splice(at..at, rows);
+        let is_old = |selector: &str, sensors: usize| selector == name && sensors == old;
+        put_in_place(
+            &mut evaluation.rows,
+            |r| is_old(&r.selector, r.sensors),
+            rows,
+        );
+        let found = judged.found.iter().map(|m| Matched {
+            selector: name.to_owned(),
+            sensors: count,
+            ..m.clone()
+        });
+        put_in_place(
+            &mut evaluation.found,
+            |m| is_old(&m.selector, m.sensors),
+            found,
+        );
+        let matched = judged.matched.iter().map(|r| MatchedRow {
+            selector: name.to_owned(),
+            sensors: count,
+            ..r.clone()
+        });
+        put_in_place(
+            &mut evaluation.matched,
+            |r| is_old(&r.selector, r.sensors),
+            matched,
+        );
         if let (Some(k), Some(errors), Some(built)) =
             (set, judged.errors.first(), judged.built.first())
         {
@@ -215,7 +234,8 @@ impl Design {
                 "Judged on elements as large as the model's own: finer ones would not have fitted into memory, so the errors leave out what elements of this size cost.".into(),
             );
         }
-        if self.evaluation.rows.iter().any(|r| !r.converged) {
+        notes.extend(self.evaluation.notes.iter().cloned());
+        if (self.evaluation.rows.iter()).any(|r| r.converged == Some(false)) {
             notes.push(
                 "Some regressions stopped at the effort allowed before they met their tolerance."
                     .into(),
@@ -223,6 +243,13 @@ impl Design {
         }
         notes
     }
+}
+
+/// Puts others where some of a list are, which go; at its end where there are none.
+fn put_in_place<T>(all: &mut Vec<T>, old: impl Fn(&T) -> bool, new: impl Iterator<Item = T>) {
+    let at = all.iter().position(&old).unwrap_or(all.len());
+    all.retain(|t| !old(t));
+    all.splice(at..at, new);
 }
 
 /// Runs the whole road. `clock` gives seconds since any fixed moment: the core has no clock of its own.
@@ -303,10 +330,13 @@ pub fn run_step_by_step(
         )?),
     };
     (hooks.entered)(Step::Evaluate);
-    let judged = sites_to_judge(&reduced, &selections);
+    let judging = inputs.project.judging();
+    let by = judging.estimator();
+    let judged = sites_to_judge(by, &reduced, &selections);
     let gluing = inputs.project.gluing();
-    let measured = known.truth.filter(|t| t.measures(&judged, &gluing));
-    let known = known.evaluation.filter(|_| measured.is_some());
+    let measured = known.truth.filter(|t| t.measures(&judged, &gluing, by));
+    let same = |e: &Arc<Evaluation>| measured.is_some() && e.judging == judging;
+    let known = known.evaluation.filter(same);
     let truth = match measured {
         Some(known) => Arc::new(known.in_regions_of(&inputs.project)),
         None => Arc::new(truth(inputs, &simulated, &judged, budget, watch)?),

@@ -9,12 +9,13 @@ use rayon::prelude::*;
 
 use super::layout::{lay_out_sites, lay_out_touches, touches_on};
 use super::{DesignError, Ground, Inputs, Laid, as_built, ground, workshop_draw};
-use crate::budget::{Budget, Watch};
+use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::elasticity::{Model, Touch};
 use crate::inference::{AsDrawn, ResponseMap};
 use crate::live::GaugeModel;
+use crate::mesh::TriMesh;
 use crate::project::{LiveKeys, Project};
 use crate::uncertainty::Gluing;
 
@@ -94,13 +95,8 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
     let sensitivity = Sensitivity::new(&*graded.model, &gauges, watch)?;
     let tip_radius = project.tip().1;
     let mesh = ground.of_size(map_size(&ground, tip_radius));
-    let moved: Vec<Gauge> = gauges.iter().flat_map(moved).collect();
-    let all = Sensitivity::new(&*graded.model, &moved, watch)?;
-    let drawn = as_drawn(
-        &ResponseMap::new(&all, mesh, tip_radius, watch)?,
-        gauges.len(),
-    );
-    let proposed = touches_on(&drawn.map.mesh, inputs, PROPOSED, PROPOSED_SEED, true)?;
+    let drawn = drawn_on(&*graded.model, &gauges, mesh, tip_radius, watch)?;
+    let proposed = proposed(&drawn.map.mesh, inputs)?;
     Ok(Sensing {
         gauges,
         sensitivity: Arc::new(sensitivity),
@@ -111,6 +107,38 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
         ground,
         laid: graded.laid,
     })
+}
+
+/// Known touches as they are proposed, on the surface that touches land on.
+pub(super) fn proposed(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<Touch>, DesignError> {
+    touches_on(mesh, inputs, PROPOSED, PROPOSED_SEED, true)
+}
+
+/// A gauge at a site of a design, where gauges read at a point.
+pub(super) fn point_gauge(site: &Site) -> Gauge {
+    /// Side of a grid (m) that reads at a point.
+    const POINT: f64 = 1e-9;
+    Gauge {
+        position: site.position,
+        direction: site.direction,
+        normal: site.normal,
+        length: POINT,
+        width: POINT,
+    }
+}
+
+/// What gauges read everywhere on a mesh, as drawn and as it changes with the way they are glued.
+pub(super) fn drawn_on(
+    model: &dyn Model,
+    gauges: &[Gauge],
+    mesh: Arc<TriMesh>,
+    tip_radius: f64,
+    watch: Watch,
+) -> Result<AsDrawn, Cancelled> {
+    let moved: Vec<Gauge> = gauges.iter().flat_map(moved).collect();
+    let all = Sensitivity::new(model, &moved, watch)?;
+    let all = ResponseMap::new(&all, mesh, tip_radius, watch)?;
+    Ok(as_drawn(&all, gauges.len()))
 }
 
 /// A gauge as drawn, and moved and turned either way.
@@ -139,7 +167,7 @@ fn moved(gauge: &Gauge) -> [Gauge; MOVES] {
 /// Of central differences: as far as a workshop is off.
 const STEP_MM: f64 = 0.75;
 const STEP_DEGREES: f64 = 3.0;
-const MOVES: usize = 7;
+pub(super) const MOVES: usize = 7;
 
 fn as_drawn(all: &ResponseMap, gauges: usize) -> AsDrawn {
     let change = |forth: usize, step: f64| {

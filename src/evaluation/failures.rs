@@ -42,6 +42,57 @@ pub struct FailureRow {
     pub worst_mm: f64,
 }
 
+/// Most gauges that fail together.
+pub const MOST_FAILED: usize = 5;
+
+/// Subsets of failed gauges that are tried: all there are, or so many of them drawn by a seed.
+pub(crate) struct Draw {
+    pub gauges: usize,
+    pub failed: usize,
+    /// Most subsets.
+    pub most: usize,
+    pub seed: u64,
+}
+
+impl Draw {
+    /// What the loss of each subset leaves of a set of gauges, by its error (mm).
+    ///
+    /// # Errors
+    /// [`Cancelled`] when `error` says so.
+    pub(crate) fn row(
+        &self,
+        retrained: bool,
+        error: impl Fn(&[usize]) -> Result<f64, Cancelled> + Sync,
+    ) -> Result<FailureRow, Cancelled> {
+        let subsets = subsets(self.gauges, self.failed, self.most, self.seed);
+        let errors: Result<Vec<f64>, Cancelled> =
+            subsets.par_iter().map(|lost| error(lost)).collect();
+        let errors = errors?;
+        Ok(FailureRow {
+            failed: self.failed,
+            retrained,
+            subsets: errors.len(),
+            of: binomial(self.gauges, self.failed),
+            error_mm: errors.iter().sum::<f64>() / errors.len() as f64,
+            worst_mm: errors.iter().copied().fold(0.0, f64::max),
+        })
+    }
+}
+
+impl FailureRow {
+    /// With all gauges.
+    pub(crate) fn unharmed(error_mm: f64) -> Self {
+        Self {
+            failed: 0,
+            retrained: false,
+            subsets: 1,
+            of: 1,
+            error_mm,
+            worst_mm: error_mm,
+        }
+    }
+}
+
 /// Every subset of one to so many failed gauges: all where they are few, a seeded sample otherwise. The
 /// first row has none failed.
 ///
@@ -54,39 +105,23 @@ pub fn failures(trial: &FailureTrial, watch: Watch) -> Result<Vec<FailureRow>, C
         let d = distances(p, trial.test_targets);
         d.iter().sum::<f64>() / d.len().max(1) as f64
     };
-    let unharmed = mean(&whole.predict(trial.test));
-    let mut rows = vec![FailureRow {
-        failed: 0,
-        retrained: false,
-        subsets: 1,
-        of: 1,
-        error_mm: unharmed,
-        worst_mm: unharmed,
-    }];
+    let mut rows = vec![FailureRow::unharmed(mean(&whole.predict(trial.test)))];
     for failed in 1..=trial.failed.min(gauges.saturating_sub(1)) {
         for retrained in [false, true] {
-            let most = trial.subsets * if retrained { 1 } else { 10 };
-            let subsets = subsets(gauges, failed, most, trial.seed);
-            let errors: Result<Vec<f64>, Cancelled> = subsets
-                .par_iter()
-                .map(|lost| {
-                    report(watch, "Failing gauges", failed - 1, trial.failed)?;
-                    Ok(mean(&if retrained {
-                        trial.without(lost)
-                    } else {
-                        whole.predict_without(trial.test, lost)
-                    }))
-                })
-                .collect();
-            let errors = errors?;
-            rows.push(FailureRow {
+            let draw = Draw {
+                gauges,
                 failed,
-                retrained,
-                subsets: errors.len(),
-                of: binomial(gauges, failed),
-                error_mm: errors.iter().sum::<f64>() / errors.len() as f64,
-                worst_mm: errors.iter().copied().fold(0.0, f64::max),
-            });
+                most: trial.subsets * if retrained { 1 } else { 10 },
+                seed: trial.seed,
+            };
+            rows.push(draw.row(retrained, |lost| {
+                report(watch, "Failing gauges", failed - 1, trial.failed)?;
+                Ok(mean(&if retrained {
+                    trial.without(lost)
+                } else {
+                    whole.predict_without(trial.test, lost)
+                }))
+            })?);
         }
     }
     Ok(rows)

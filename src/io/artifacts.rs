@@ -12,6 +12,7 @@ use super::together::Together;
 use super::{FileError, atomic, project_file, report, source};
 use crate::dataset::{Dataset, Signal, Site};
 use crate::design::{Design, Inputs};
+use crate::evaluation::{EstimatorKind, EvaluationRow};
 use crate::placement::information::Geometry;
 use crate::project::{ChosenSite, Project};
 
@@ -307,7 +308,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         "unexplained": design.reduced.candidates.unexplained,
         "unexplained_curve": design.reduced.candidates.curve,
         "selections": *design.selections,
-        "evaluation": design.evaluation.rows,
+        "evaluation": judged_rows(inputs, design),
         "failures": design.evaluation.failures,
         "gaussian_process": design.reduced.geometry().map(Geometry::summary),
         "doubts": design.doubts(),
@@ -328,6 +329,24 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
             "notes": design.notes(),
         },
     })
+}
+
+/// Errors set by set, with the estimator and the force that they are of.
+fn judged_rows(inputs: &Inputs, design: &Design) -> Value {
+    let evaluation = &design.evaluation;
+    if evaluation.judging.estimator() == EstimatorKind::Matching {
+        return json!(evaluation.matched);
+    }
+    let with_force = |row: &EvaluationRow| {
+        let mut value = json!(row);
+        value["estimator"] = json!(EstimatorKind::Svr);
+        value["force_n"] = json!(inputs.project.touch.force_n);
+        value["as_built_mm"] = json!(row.workshop_mm);
+        // Nothing is calibrated for a regression.
+        value["calibrated_mm"] = Value::Null;
+        value
+    };
+    evaluation.rows.iter().map(with_force).collect()
 }
 
 /// Rms strain over noise; absent when the project has no noise.

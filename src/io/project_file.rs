@@ -341,6 +341,8 @@ mod tests {
             across_mm: 1.5,
             turned_degrees: -3.25,
         });
+        p.evaluation.estimator = crate::evaluation::EstimatorKind::Matching;
+        p.evaluation.forces_n = vec![0.5, 1.0 / 3.0 + 1.0];
         p.evaluation.regions.push(RegionKeys {
             name: "middle".into(),
             box_mm: [[-1.0; 3], [1.0; 3]],
@@ -368,6 +370,7 @@ mod tests {
                     "place_mm",
                     "angle_deg",
                     "gain_percent",
+                    "estimator",
                 ];
                 !new.iter().any(|key| line.starts_with(key))
             })

@@ -1,15 +1,18 @@
 //! The placement report: one HTML file that needs nothing else.
 
+mod matched;
+
 use std::fmt::Write as _;
 
 use super::artifacts::{Provenance, range, run_key, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Paint, Series, escape};
 use crate::colormap::ColorMap;
 use crate::design::{Design, Inputs, Simulated};
-use crate::evaluation::Failures;
+use crate::evaluation::{EstimatorKind, Failures};
 use crate::gaussian_process::GpTrial;
 use crate::mesh::unroll::Unrolling;
 use crate::placement::SelectorKind;
+use crate::regression::Hyper;
 
 const STYLE: &str = "
 :root{color-scheme:light}body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1080px;margin:32px auto;padding:0 20px}
@@ -69,8 +72,10 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
         } else {
             ""
         },
-        inputs.project.touch.force_n
+        compared_n(inputs, design)
     );
+    let at_force =
+        (design.evaluation.judging.middle_n()).map_or(String::new(), |f| format!(", at {f} N"));
     for row in design
         .evaluation
         .rows
@@ -80,7 +85,7 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
         number(
             page,
             &format!("{:.2} mm", row.error_mm),
-            &format!("mean error, {}", row.region),
+            &format!("mean error, {}{at_force}", row.region),
         );
         number(page, &format!("{:.2} mm", row.median_mm), "median");
     }
@@ -88,6 +93,7 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
     number(page, &design.reduced.feasible.len().to_string(), "feasible");
     number(page, &design.reduced.sites.len().to_string(), "candidates");
     page.push_str("</div>");
+    matched::by_force(page, design);
     let doubts = design.doubts();
     if !doubts.is_empty() {
         page.push_str("<div class=\"doubts\"><b>Numbers here that cannot be trusted</b><ul>");
@@ -104,6 +110,12 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
         }
         page.push_str("</ul>");
     }
+}
+
+/// The force (N) that figures without one of their own are of.
+fn compared_n(inputs: &Inputs, design: &Design) -> f64 {
+    let judged = design.evaluation.judging.middle_n();
+    judged.unwrap_or(inputs.project.touch.force_n)
 }
 
 fn number(page: &mut String, value: &str, label: &str) {
@@ -275,7 +287,8 @@ fn error_map(page: &mut String, inputs: &Inputs, design: &Design) {
     let map = ColorMap::Viridis;
     let _ = write!(
         page,
-        "<h2>Where the error is</h2><p>Mean error around each place, of the chosen gauges on unseen touches.</p>{}<figure>{}<figcaption>unrolled, seen from outside</figcaption></figure>",
+        "<h2>Where the error is</h2><p>Mean error around each place, of the chosen gauges on unseen touches of {} N.</p>{}<figure>{}<figcaption>unrolled, seen from outside</figcaption></figure>",
+        compared_n(inputs, design),
         svg::legend(map, "error (mm)", 0.0, top),
         svg::unrolled(
             mesh,
@@ -380,13 +393,15 @@ pub fn curve(design: &Design, selector: SelectorKind, region: &str) -> Vec<(f64,
         .collect()
 }
 
-/// What the two ways to meet a failure are called.
+/// The ways in which an estimator meets a failure: whether it is trained anew, and what that is called.
 #[must_use]
-pub fn failure_title(retrained: bool) -> &'static str {
-    if retrained {
-        "Failed gauges, trained anew without them"
-    } else {
-        "Failed gauges, as trained with all"
+pub fn failure_ways(by: EstimatorKind) -> &'static [(bool, &'static str)] {
+    match by {
+        EstimatorKind::Svr => &[
+            (false, "Failed gauges, as trained with all"),
+            (true, "Failed gauges, trained anew without them"),
+        ],
+        EstimatorKind::Matching => &[(false, "Failed gauges, left out")],
     }
 }
 
@@ -411,7 +426,7 @@ pub fn failure_curve(set: &Failures, retrained: bool) -> Vec<(f64, f64)> {
 
 fn failures(page: &mut String, design: &Design) {
     page.push_str("<h2>When gauges fail</h2><div class=\"plots\">");
-    for retrained in [false, true] {
+    for &(retrained, title) in failure_ways(design.evaluation.judging.estimator()) {
         let series: Vec<Series> = design
             .evaluation
             .failures
@@ -421,13 +436,7 @@ fn failures(page: &mut String, design: &Design) {
                 points: failure_curve(set, retrained),
             })
             .collect();
-        page.push_str(&svg::plot(
-            failure_title(retrained),
-            "failed gauges",
-            "mm",
-            &series,
-            520.0,
-        ));
+        page.push_str(&svg::plot(title, "failed gauges", "mm", &series, 520.0));
     }
     page.push_str("</div><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Failed</th><th>Trained anew</th><th>Mean (mm)</th><th>Worst (mm)</th><th>Subsets</th></tr>");
     for set in &design.evaluation.failures {
@@ -463,6 +472,10 @@ fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
 }
 
 fn errors(page: &mut String, design: &Design) {
+    if design.evaluation.judging.estimator() == EstimatorKind::Matching {
+        matched::errors(page, design);
+        return;
+    }
     let _ = write!(
         page,
         "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, drawn off the nodes of a finer model ({:.2} mm). “As built”: every gauge {}, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
@@ -473,9 +486,10 @@ fn errors(page: &mut String, design: &Design) {
         design.truth.gluing.in_words()
     );
     for r in &design.evaluation.rows {
+        let [c, epsilon, gamma] = settings_of(r.hyper);
         let _ = write!(
             page,
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.3}</td></tr>",
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td>{c}</td><td>{epsilon}</td><td>{gamma}</td></tr>",
             escape(&r.selector),
             r.sensors,
             escape(&r.region),
@@ -483,13 +497,24 @@ fn errors(page: &mut String, design: &Design) {
             r.median_mm,
             r.p95_mm,
             r.workshop_mm,
-            r.touches,
-            r.hyper.c,
-            r.hyper.epsilon,
-            r.hyper.gamma
+            r.touches
         );
     }
     page.push_str("</table></details>");
+}
+
+/// C, ε and γ of a regression.
+fn settings_of(hyper: Option<Hyper>) -> [String; 3] {
+    hyper.map_or_else(
+        || ["–"; 3].map(Into::into),
+        |h| {
+            [
+                h.c.to_string(),
+                h.epsilon.to_string(),
+                format!("{:.3}", h.gamma),
+            ]
+        },
+    )
 }
 
 /// What the elastic model says of its own error, and what it was checked for.

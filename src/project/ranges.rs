@@ -14,6 +14,8 @@ use crate::elasticity::support::MOST;
 pub const GAUGES: RangeInclusive<usize> = 1..=10_000;
 pub const TOUCHES: RangeInclusive<usize> = 3..=1_000_000;
 pub const EDGE_NEIGHBOURS: RangeInclusive<usize> = 0..=1000;
+/// How many forces sets may be judged at.
+const JUDGED: RangeInclusive<usize> = 1..=20;
 /// How hard touches may come (N), and how far off gauges may be glued (mm, degrees, percent): likewise.
 pub const FORCES: RangeInclusive<f64> = 1e-3..=1e5;
 pub const PLACE_OFF: RangeInclusive<f64> = 0.0..=50.0;
@@ -35,6 +37,7 @@ impl Project {
     pub fn check(&self) -> Result<(), BadValue> {
         self.check_model()?;
         self.check_forces()?;
+        self.check_judged()?;
         self.check_room()?;
         self.check_counts()?;
         self.check_selection()?;
@@ -79,6 +82,33 @@ impl Project {
             key: "touch.forces_n".to_owned(),
             rule: "the lightest force and then the hardest".into(),
             value: format!("[{}, {}]", number(lightest), number(hardest)),
+        })
+    }
+
+    fn check_judged(&self) -> Result<(), BadValue> {
+        let forces = &self.evaluation.forces_n;
+        let rising = forces.windows(2).all(|pair| pair[0] < pair[1]);
+        for &force in forces {
+            bounded("evaluation.forces_n", force, &FORCES)?;
+        }
+        if rising && JUDGED.contains(&forces.len()) {
+            return Ok(());
+        }
+        let listed: Vec<String> = forces.iter().take(4).map(|&f| number(f)).collect();
+        let more = if forces.len() > listed.len() {
+            ", …"
+        } else {
+            ""
+        };
+        Err(BadValue {
+            key: "evaluation.forces_n".to_owned(),
+            rule: format!(
+                "{} to {} forces, each harder than the one before",
+                JUDGED.start(),
+                JUDGED.end()
+            )
+            .into(),
+            value: format!("[{}{more}]", listed.join(", ")),
         })
     }
 
@@ -373,7 +403,7 @@ mod tests {
     type Place = fn(&mut Project) -> &mut f64;
 
     /// Every number of a project that may not be just any.
-    const NUMBERS: [(&str, Place); 30] = [
+    const NUMBERS: [(&str, Place); 32] = [
         ("part.thickness_mm", |p| &mut p.part.thickness_mm),
         ("part.weld_mm", |p| &mut p.part.weld_mm),
         ("part.fill_holes_mm", |p| &mut p.part.fill_holes_mm),
@@ -406,6 +436,8 @@ mod tests {
         }),
         ("touch.forces_n", |p| &mut p.touch.forces_n[0]),
         ("touch.forces_n", |p| &mut p.touch.forces_n[1]),
+        ("evaluation.forces_n", |p| &mut p.evaluation.forces_n[0]),
+        ("evaluation.forces_n", |p| &mut p.evaluation.forces_n[2]),
         ("feasible.support_clearance_mm", |p| {
             &mut p.feasible.support_clearance_mm
         }),
@@ -476,6 +508,29 @@ mod tests {
         let expected =
             "touch.forces_n must be the lightest force and then the hardest, but is [30, 2]";
         assert_eq!(said, expected);
+    }
+
+    #[test]
+    fn sets_are_judged_at_some_forces_each_harder_than_the_one_before() {
+        let mut project = project();
+        for judged in [vec![7.0], vec![0.001, 1e5]] {
+            project.evaluation.forces_n = judged;
+            assert_eq!(project.check(), Ok(()));
+        }
+        let many: Vec<f64> = (1..=21).map(f64::from).collect();
+        for (judged, said) in [
+            (Vec::new(), "[]"),
+            (vec![3.0, 3.0], "[3, 3]"),
+            (vec![10.0, 3.0, 25.0], "[10, 3, 25]"),
+            (many, "[1, 2, 3, 4, …]"),
+        ] {
+            project.evaluation.forces_n = judged;
+            let refused = project.check().unwrap_err().to_string();
+            let expected = format!(
+                "evaluation.forces_n must be 1 to 20 forces, each harder than the one before, but is {said}"
+            );
+            assert_eq!(refused, expected);
+        }
     }
 
     #[test]

@@ -406,9 +406,8 @@ impl Studio {
             let (lead, count) = (design.lead.name(), design.chosen().len());
             let exact =
                 (design.evaluation.rows.iter()).find(|r| r.selector == lead && r.sensors == count);
-            let gamma = exact.map_or(1.0 / sites.len().max(1) as f64, |r| {
-                r.hyper.gamma * count as f64 / sites.len().max(1) as f64
-            });
+            let tuned = exact.and_then(|r| r.hyper).map(|h| h.gamma * count as f64);
+            let gamma = tuned.unwrap_or(1.0) / sites.len().max(1) as f64;
             let dataset = &design.simulated.dataset;
             let of = |sites: &[usize]| design::estimate(&inputs, dataset, sites, gamma);
             // What the estimate is off by for the chosen set it is off by for its neighbours.

@@ -7,6 +7,7 @@ use super::{Stage, Studio, quality_name};
 use crate::budget::{Limits, Quality};
 use crate::dataset::Signal;
 use crate::document::Layer;
+use crate::evaluation::EstimatorKind;
 use crate::limb::BoxMm;
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
@@ -111,7 +112,18 @@ impl Studio {
     fn evaluation_form(&mut self, ui: &mut Ui) {
         let (low, high) = self.document.part.bounds();
         let bounds = [low, high].map(|p| (p * 1000.0).to_array());
-        let regions = &mut self.document.state.project.evaluation.regions;
+        let evaluation = &mut self.document.state.project.evaluation;
+        rows(ui, "Judge", |ui| {
+            choice(
+                ui,
+                "Estimator",
+                &mut evaluation.estimator,
+                &EstimatorKind::ALL,
+                EstimatorKind::title,
+                "What finds the touches that sets of gauges are judged by; matching (strain only) is what live touch does",
+            );
+        });
+        let regions = &mut evaluation.regions;
         rows(ui, "Regions", |ui| regions_form(ui, regions, bounds));
     }
 }

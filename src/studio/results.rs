@@ -4,9 +4,9 @@ use egui::{Color32, Response, RichText, Role, Ui, WidgetInfo};
 use egui_plot::{Corner, HLine, Legend, Line, LineStyle, Plot, PlotPoints, PlotUi, Points};
 
 use super::Studio;
-use crate::evaluation::{BASELINE, EVERYWHERE};
+use crate::evaluation::{BASELINE, EVERYWHERE, EstimatorKind};
 use crate::io::artifacts::{range, signal_to_noise, signal_unit};
-use crate::io::report::{curve, failure_curve, failure_name, failure_title};
+use crate::io::report::{curve, failure_curve, failure_name, failure_ways};
 
 /// What is shown below the views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -227,9 +227,11 @@ impl Studio {
 
     fn failure_plots(&self, ui: &mut Ui) {
         let height = ui.available_height() - 26.0;
-        ui.columns(2, |columns| {
-            for (ui, retrained) in columns.iter_mut().zip([false, true]) {
-                let title = failure_title(retrained);
+        let design = self.design.as_ref().map(|d| &d.design);
+        let by = design.map_or(EstimatorKind::Svr, |d| d.evaluation.judging.estimator());
+        let ways = failure_ways(by);
+        ui.columns(ways.len(), |columns| {
+            for (ui, &(retrained, title)) in columns.iter_mut().zip(ways) {
                 ui.label(RichText::new(title).strong());
                 let id = ("failures", retrained);
                 let shown = plot(

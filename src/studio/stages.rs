@@ -364,9 +364,13 @@ impl Studio {
             .filter(|r| r.sensors == chosen && r.selector == lead)
             .map(|r| format!("{:.2} mm, {}", r.error_mm, r.region))
             .collect();
+        let judging = &d.design.evaluation.judging;
         lines.push(format!(
-            "{} unseen touches{}",
+            "{} unseen touches{}{}",
             d.design.truth.touches.len(),
+            judging
+                .middle_n()
+                .map_or(String::new(), |f| format!(" of {f} N, matched")),
             self.took("evaluate")
         ));
         lines.extend(self.promise_line());

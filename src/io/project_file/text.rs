@@ -204,6 +204,16 @@ fn feasible(t: &mut Text, project: &Project) {
 
 fn evaluation(t: &mut Text, project: &Project) {
     t.table("evaluation");
+    t.key(
+        "estimator",
+        quoted(project.evaluation.estimator.name()),
+        "what finds the touches that sets are judged by: \"svr\" (the paper's) or \"matching\" (as live touch)",
+    );
+    t.key(
+        "forces_n",
+        floats(&project.evaluation.forces_n),
+        "how hard these touches are, by matching",
+    );
     for region in &project.evaluation.regions {
         t.list("evaluation.region");
         t.key(
@@ -521,7 +531,12 @@ fn float(value: f64) -> String {
 }
 
 fn numbers<const N: usize>(values: &[f64; N]) -> String {
-    format!("[{}]", values.map(float).join(", "))
+    floats(values)
+}
+
+fn floats(values: &[f64]) -> String {
+    let values: Vec<String> = values.iter().copied().map(float).collect();
+    format!("[{}]", values.join(", "))
 }
 
 fn corners(values: &[[f64; 3]; 2]) -> String {

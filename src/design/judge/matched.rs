@@ -1,0 +1,343 @@
+//! Sets of gauges judged by what runs live: the design's elastic model, matched to what a finer one reads.
+//!
+//! As drawn, the estimator knows the noise; as built, how far off a workshop usually glues gauges too; after known
+//! presses, how these gauges were really glued, as far as the presses tell.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::{Truth, noisy};
+use crate::budget::{Budget, Cancelled, Watch, report};
+use crate::dataset::SignalMatrix;
+use crate::design::sense::{MOVES, drawn_on, map_size, point_gauge};
+use crate::design::{DesignError, Inputs, Simulated};
+use crate::elasticity::sensitivity::Gauge;
+use crate::elasticity::{Model, Touch};
+use crate::evaluation::failures::{Draw, FailureRow, MOST_FAILED};
+use crate::evaluation::{
+    Candidate, Evaluation, Failures, Forces, Judging, Matched, is_largest, mean,
+};
+use crate::inference::{AsDrawn, Errors, Known, Matching, ResponseMap, calibrate};
+use crate::mesh::TriMesh;
+use crate::regression::folds::evenly;
+
+/// Sites whose readings are known everywhere at the same time: those of more sets would fill the memory.
+const MOST_SITES: usize = 60;
+/// No reading is taken to be better than this (strain).
+const LEAST_NOISE: f64 = 1e-9;
+/// A touch that moves no gauge by more than so many deviations of the noise is blind.
+pub const BLIND: f64 = 3.0;
+/// Touches that sets with lost gauges are judged on.
+const FAILURE_TOUCHES: usize = 200;
+
+/// Which draw the noise of the known presses is; then come two for each force, as drawn and as built.
+const PRESS_DRAW: u64 = 4;
+const FIRST_DRAW: u64 = 5;
+
+/// What sets are judged with.
+pub(super) struct Trial<'a> {
+    pub inputs: &'a Inputs,
+    pub simulated: &'a Simulated,
+    pub truth: &'a Truth,
+    /// Numbers of the streams of noise, one for each site of the truth.
+    pub streams: &'a [u64],
+    pub forces: &'a Forces,
+    pub budget: &'a Budget,
+}
+
+/// Readings of all sites of the truth under touches of one force, with noise.
+struct Heard {
+    force_n: f64,
+    drawn: SignalMatrix,
+    built: SignalMatrix,
+}
+
+/// What the gauges at some sites read of touches anywhere, by the design's model.
+struct Everywhere {
+    /// Of the truth, rising: a channel each.
+    rows: Vec<usize>,
+    drawn: AsDrawn,
+    /// What gluing puts on the readings.
+    spread: ResponseMap,
+}
+
+impl Trial<'_> {
+    /// Judges sets, each at the force in the middle; the largest of each selector at all forces, after a calibration,
+    /// and with gauges lost.
+    ///
+    /// # Errors
+    /// [`DesignError`] as for the design's simulation.
+    pub fn judge(&self, sets: &[Candidate], watch: Watch) -> Result<Evaluation, DesignError> {
+        let heard = self.heard();
+        let middle = &heard[self.forces.middle()];
+        let model = self.simulated.model()?;
+        let ground = &self.simulated.ground;
+        let mesh = ground.of_size(map_size(ground, self.tip_radius()));
+        let mut work = model.system().work();
+        let (mut found, mut failures) = (Vec::new(), Vec::new());
+        for group in groups(sets) {
+            let everywhere = self.everywhere(&*model, &sets[group.clone()], &mesh, watch)?;
+            work.solves += (MOVES * everywhere.rows.len()) as u64;
+            for k in group {
+                report(watch, "Evaluating", k, sets.len())?;
+                let set = Set::new(self, &everywhere, &sets[k]);
+                if !is_largest(sets, k) {
+                    found.push(set.found(middle, None));
+                    continue;
+                }
+                let calibrated = set.calibrated(&everywhere);
+                let all: Vec<Matched> = (heard.iter())
+                    .map(|heard| set.found(heard, calibrated.as_ref()))
+                    .collect();
+                let whole = &all[self.forces.middle()].errors;
+                failures.extend(set.failures(middle, whole, watch)?);
+                found.extend(all);
+            }
+        }
+        let judging = Judging::Matching(self.forces.clone());
+        Ok(Evaluation {
+            failures,
+            work,
+            ..Evaluation::of_matched(judging, found, &self.truth.regions)
+        })
+    }
+
+    fn tip_radius(&self) -> f64 {
+        self.inputs.project.tip().1
+    }
+
+    /// Standard deviation of a reading (strain).
+    fn noise(&self) -> f64 {
+        (self.inputs.project.gauge.noise_microstrain * 1e-6).max(LEAST_NOISE)
+    }
+
+    /// Signals of the truth for a force (N) in place of that of its touches: the model is linear.
+    fn at_force(&self, x: &SignalMatrix, force_n: f64) -> SignalMatrix {
+        x.scaled(force_n / self.inputs.project.tip().0)
+    }
+
+    fn heard(&self) -> Vec<Heard> {
+        let heard = |(k, &force_n): (u64, &f64)| {
+            let with_noise = |x: &SignalMatrix, draw: u64| {
+                let x = self.at_force(x, force_n);
+                noisy(self.inputs, &x, draw, self.streams).into_owned()
+            };
+            Heard {
+                force_n,
+                drawn: with_noise(&self.truth.x, FIRST_DRAW + 2 * k),
+                built: with_noise(&self.truth.workshop, FIRST_DRAW + 2 * k + 1),
+            }
+        };
+        (0..).zip(&self.forces.judged_n).map(heard).collect()
+    }
+
+    fn everywhere(
+        &self,
+        model: &dyn Model,
+        sets: &[Candidate],
+        mesh: &Arc<TriMesh>,
+        watch: Watch,
+    ) -> Result<Everywhere, Cancelled> {
+        let mut rows: Vec<usize> = sets.iter().flat_map(|s| s.rows.iter().copied()).collect();
+        rows.sort_unstable();
+        rows.dedup();
+        let sites = &self.simulated.dataset.sites;
+        let gauges: Vec<Gauge> = (rows.iter())
+            .map(|&row| point_gauge(&sites[self.truth.sites[row]]))
+            .collect();
+        let drawn = drawn_on(model, &gauges, Arc::clone(mesh), self.tip_radius(), watch)?;
+        Ok(Everywhere {
+            spread: drawn.spread(&self.truth.gluing),
+            rows,
+            drawn,
+        })
+    }
+
+    /// Which touches of a force (N) move no gauge of a set far enough to be told from noise.
+    fn blind(&self, rows: &[usize], force_n: f64) -> Vec<bool> {
+        let least = BLIND * self.noise();
+        let x = self.at_force(&self.truth.x.select_rows(rows), force_n);
+        (0..x.columns())
+            .map(|touch| (0..x.rows()).all(|row| x.row(row)[touch].abs() <= least))
+            .collect()
+    }
+}
+
+/// Sets after one another, as many at a time as have few enough sites together; each at least alone.
+fn groups(sets: &[Candidate]) -> Vec<Range<usize>> {
+    let mut groups: Vec<Range<usize>> = Vec::new();
+    let mut rows: BTreeSet<usize> = BTreeSet::new();
+    for (k, set) in sets.iter().enumerate() {
+        let next = k + 1;
+        rows.extend(&set.rows);
+        match groups.last_mut() {
+            Some(group) if rows.len() <= MOST_SITES => group.end = next,
+            _ => {
+                rows = set.rows.iter().copied().collect();
+                groups.push(k..next);
+            }
+        }
+    }
+    groups
+}
+
+/// One set, and the estimators that its gauges are read with.
+struct Set<'a> {
+    trial: &'a Trial<'a>,
+    candidate: &'a Candidate,
+    /// Its channels among those that are known everywhere.
+    channels: Vec<Vec<(usize, f64)>>,
+    drawn: Matching,
+    built: Matching,
+}
+
+impl<'a> Set<'a> {
+    fn new(trial: &'a Trial<'a>, everywhere: &Everywhere, candidate: &'a Candidate) -> Self {
+        let channel = |row: &usize| Some(vec![(everywhere.rows.binary_search(row).ok()?, 1.0)]);
+        let channels: Vec<Vec<(usize, f64)>> = candidate.rows.iter().filter_map(channel).collect();
+        let map = Arc::new(everywhere.drawn.map.mixed(&channels));
+        let noise = Errors::of_noise(trial.noise(), channels.len());
+        let glued = Errors {
+            spread: Some(Arc::new(everywhere.spread.mixed(&channels))),
+            ..noise.clone()
+        };
+        let most_n = trial.forces.most_n;
+        Self {
+            drawn: Matching::new(Arc::clone(&map), noise, most_n),
+            built: Matching::new(map, glued, most_n),
+            trial,
+            candidate,
+            channels,
+        }
+    }
+
+    /// What is found of the set at one force.
+    fn found(&self, heard: &Heard, calibrated: Option<&Matching>) -> Matched {
+        let rows = &self.candidate.rows;
+        let errors = |matching: &Matching, x: &SignalMatrix| {
+            errors_mm(matching, &x.select_rows(rows), &self.trial.truth.touches)
+        };
+        Matched {
+            selector: self.candidate.selector.clone(),
+            sensors: rows.len(),
+            force_n: heard.force_n,
+            errors: errors(&self.drawn, &heard.drawn),
+            built: errors(&self.built, &heard.built),
+            calibrated: calibrated.map(|matching| errors(matching, &heard.built)),
+            blind: self.trial.blind(rows, heard.force_n),
+        }
+    }
+
+    /// The estimator after the known presses, where there are any.
+    fn calibrated(&self, everywhere: &Everywhere) -> Option<Matching> {
+        let trial = self.trial;
+        let pressed = trial.truth.pressed.as_ref()?;
+        let drawn = AsDrawn {
+            map: Arc::clone(&self.drawn.map),
+            changes: (everywhere.drawn.changes.each_ref()).map(|m| m.mixed(&self.channels)),
+        };
+        let x = noisy(trial.inputs, &pressed.x, PRESS_DRAW, trial.streams);
+        let x = x.select_rows(&self.candidate.rows);
+        let known: Vec<Known> = (pressed.presses.iter().enumerate())
+            .map(|(k, press)| Known {
+                at: drawn.map.index.nearest(press.asked.position).0,
+                force: press.asked.force,
+                reading: reading(&x, k),
+            })
+            .collect();
+        let noise = Errors::of_noise(trial.noise(), self.channels.len());
+        let calibration = calibrate(&drawn, &known, &noise.noise);
+        let errors = Errors {
+            relative: calibration.relative,
+            ..noise
+        };
+        let map = Arc::new(drawn.calibrated(&calibration));
+        Some(Matching::new(map, errors, trial.forces.most_n))
+    }
+
+    /// What is left of the set when gauges are lost, and left out without anything else: none for a single gauge. A
+    /// sample of the touches says what a loss adds to the errors of all touches, `whole` (mm).
+    fn failures(
+        &self,
+        heard: &Heard,
+        whole: &[f64],
+        watch: Watch,
+    ) -> Result<Option<Failures>, Cancelled> {
+        let (truth, most) = (self.trial.truth, self.trial.budget.failure_subsets);
+        let gauges = self.channels.len();
+        if most == 0 || gauges < 2 {
+            return Ok(None);
+        }
+        let sample = evenly(truth.touches.len(), FAILURE_TOUCHES);
+        let touches: Vec<Touch> = sample.iter().map(|&t| truth.touches[t]).collect();
+        let x = heard.drawn.select_rows(&self.candidate.rows);
+        let x = x.select_columns(&sample);
+        let sampled: Vec<f64> = sample.iter().map(|&t| whole[t]).collect();
+        let apart = mean(whole) - mean(&sampled);
+        let mut rows = vec![FailureRow::unharmed(mean(whole))];
+        for failed in 1..=MOST_FAILED.min(gauges - 1) {
+            let draw = Draw {
+                gauges,
+                failed,
+                most,
+                seed: self.trial.inputs.project.budget.seed,
+            };
+            rows.push(draw.row(false, |lost| {
+                report(watch, "Failing gauges", failed - 1, MOST_FAILED)?;
+                let mut matching = self.drawn.clone();
+                for &channel in lost {
+                    matching.used[channel] = false;
+                }
+                Ok(apart + mean(&errors_mm(&matching, &x, &touches)))
+            })?);
+        }
+        Ok(Some(Failures {
+            selector: self.candidate.selector.clone(),
+            sensors: gauges,
+            touches: sample.len(),
+            rows,
+        }))
+    }
+}
+
+/// What all channels read of one touch.
+fn reading(x: &SignalMatrix, touch: usize) -> Vec<f64> {
+    (0..x.rows()).map(|row| x.row(row)[touch]).collect()
+}
+
+/// How far from where they were (mm) touches are found by what gauges read of them (channels × touches).
+pub(in crate::design) fn errors_mm(
+    matching: &Matching,
+    x: &SignalMatrix,
+    touches: &[Touch],
+) -> Vec<f64> {
+    let error = |matching: &mut Matching, (t, touch): (usize, &Touch)| {
+        let found = matching.find(&reading(x, t));
+        found.position.distance(touch.position) * 1e3
+    };
+    let touches = touches.par_iter().enumerate();
+    touches.map_init(|| matching.clone(), error).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_go_together_as_long_as_they_have_few_sites() {
+        let set = |rows: Range<usize>| Candidate {
+            selector: String::new(),
+            rows: rows.collect(),
+            hyper: None,
+        };
+        // Sets within one another have no more sites than the largest.
+        let nested: Vec<Candidate> = (1..50).map(|n| set(0..n)).collect();
+        assert_eq!(groups(&nested).len(), 1);
+        let apart = [set(0..40), set(40..60), set(60..61), set(0..100), set(0..1)];
+        assert_eq!(groups(&apart), [0..2, 2..3, 3..4, 4..5]);
+        assert!(groups(&[]).is_empty());
+    }
+}

@@ -1,0 +1,95 @@
+//! Known presses as somebody makes them by hand to calibrate: a little beside the place that was asked for, and not
+//! quite as hard.
+
+use std::f64::consts::TAU;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::dataset::SignalMatrix;
+use crate::elasticity::Touch;
+use crate::mesh::TriMesh;
+use crate::mesh::locate::SurfaceIndex;
+
+/// A press, as it was asked for and as it was made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Press {
+    pub asked: Touch,
+    pub made: Touch,
+}
+
+/// Presses, and what gauges read of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pressed {
+    pub presses: Vec<Press>,
+    /// Sites, as a workshop would build them, × presses; without noise.
+    pub x: SignalMatrix,
+}
+
+/// How far off a hand presses (m), in any direction along the surface.
+pub const PRESSED_OFF: f64 = 1e-3;
+/// How much too hard or too soft, as a share of the force that was asked for.
+pub const PRESSED_HARD: f64 = 0.03;
+
+/// Presses on a surface as a hand makes them.
+pub(super) fn by_hand(mesh: &TriMesh, asked: Vec<Touch>, seed: u64) -> Vec<Press> {
+    let index = SurfaceIndex::new(mesh);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let make = |asked: Touch| {
+        let (sin, cos) = (TAU * rng.random::<f64>()).sin_cos();
+        let along = asked.normal.any_orthonormal_vector();
+        let across = asked.normal.cross(along);
+        let beside = asked.position + (along * cos + across * sin) * PRESSED_OFF;
+        let at = index.nearest(beside).0;
+        let off = if rng.random::<bool>() {
+            PRESSED_HARD
+        } else {
+            -PRESSED_HARD
+        };
+        Press {
+            asked,
+            made: Touch {
+                position: mesh.point(at),
+                normal: mesh.normal(at),
+                force: asked.force * (1.0 + off),
+                ..asked
+            },
+        }
+    };
+    asked.into_iter().map(make).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn a_hand_is_a_little_off_any_way_and_the_same_way_again() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let (mesh, _) = TriMesh::new(&corners, &[[0, 1, 2]], 0).unwrap();
+        let asked = |k: u32| Touch {
+            position: DVec3::new(0.3, 0.01 * f64::from(k), 0.0),
+            normal: DVec3::Z,
+            force: 10.0,
+            tip_radius: 5e-3,
+        };
+        let all: Vec<Touch> = (1..13).map(asked).collect();
+        let presses = by_hand(&mesh, all.clone(), 5);
+        let mut directions = DVec3::ZERO;
+        for (press, asked) in presses.iter().zip(&all) {
+            assert_eq!(press.asked, *asked);
+            let off = press.made.position - asked.position;
+            assert!((off.length() - PRESSED_OFF).abs() < 1e-9, "{off}");
+            let hard = (press.made.force / asked.force - 1.0).abs();
+            assert!((hard - PRESSED_HARD).abs() < 1e-12, "{hard}");
+            directions += off / PRESSED_OFF / all.len() as f64;
+        }
+        assert!(directions.length() < 0.9, "{directions}");
+        let hard = presses.iter().filter(|p| p.made.force > 10.0).count();
+        assert!((1..12).contains(&hard), "{hard}");
+        assert_eq!(by_hand(&mesh, all.clone(), 5), presses);
+        assert_ne!(by_hand(&mesh, all, 6), presses);
+    }
+}

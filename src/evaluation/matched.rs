@@ -1,0 +1,182 @@
+//! Errors of sets whose readings were matched to the elastic model: at several forces, as drawn, as built, and as
+//! built after known presses.
+
+use serde::Serialize;
+
+use super::{EstimatorKind, Evaluation, Judging, Region, Said, mean, quoted, row};
+
+/// What was found of one set under touches of one force: errors touch by touch (mm).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Matched {
+    /// Selector's name.
+    pub selector: String,
+    pub sensors: usize,
+    /// N.
+    pub force_n: f64,
+    /// As drawn.
+    pub errors: Vec<f64>,
+    /// As a workshop would build it, of which the estimator knows no more than how far off it usually is.
+    pub built: Vec<f64>,
+    /// The same gauges after known presses, where these were made.
+    pub calibrated: Option<Vec<f64>>,
+    /// Whether a touch moves no gauge of the set so far that it is told from noise.
+    pub blind: Vec<bool>,
+}
+
+/// Errors of one set under touches of one force in one region (mm).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MatchedRow {
+    pub estimator: EstimatorKind,
+    pub force_n: f64,
+    /// Selector's name.
+    pub selector: String,
+    pub sensors: usize,
+    pub region: String,
+    /// Mean Euclidean error as drawn.
+    pub error_mm: f64,
+    pub median_mm: f64,
+    pub p95_mm: f64,
+    /// Mean as a workshop would build it, uncalibrated.
+    pub as_built_mm: f64,
+    /// Mean of the same after known presses; absent where none were made.
+    pub calibrated_mm: Option<f64>,
+    /// Mean as drawn over the touches that are not blind; absent where all are.
+    pub sighted_mm: Option<f64>,
+    pub touches: usize,
+    /// Share of the touches that move no gauge so far that it is told from noise.
+    pub blind: f64,
+}
+
+impl Matched {
+    fn said(&self) -> Said<'_> {
+        Said {
+            selector: &self.selector,
+            sensors: self.sensors,
+            hyper: None,
+            converged: None,
+        }
+    }
+
+    /// A row for all touches, and one for each region that has any.
+    pub(super) fn rows(&self, regions: &[Region]) -> Vec<MatchedRow> {
+        let regions = quoted(regions, self.errors.len());
+        regions.iter().map(|region| self.row(region)).collect()
+    }
+
+    fn row(&self, region: &Region) -> MatchedRow {
+        let all = row(&self.said(), region, [&self.errors, &self.built]);
+        let blind = region.within(&self.blind);
+        let errors = region.within(&self.errors).into_iter().zip(&blind);
+        let sighted: Vec<f64> = errors.filter_map(|(e, b)| (!b).then_some(e)).collect();
+        MatchedRow {
+            estimator: EstimatorKind::Matching,
+            force_n: self.force_n,
+            selector: all.selector,
+            sensors: all.sensors,
+            region: all.region,
+            error_mm: all.error_mm,
+            median_mm: all.median_mm,
+            p95_mm: all.p95_mm,
+            as_built_mm: all.workshop_mm,
+            calibrated_mm: (self.calibrated.as_ref()).map(|errors| mean(&region.within(errors))),
+            sighted_mm: (!sighted.is_empty()).then(|| mean(&sighted)),
+            touches: all.touches,
+            blind: (blind.len() - sighted.len()) as f64 / blind.len() as f64,
+        }
+    }
+}
+
+impl Evaluation {
+    /// Of what was found by matching: rows and errors of every set are those at the force in the middle.
+    #[must_use]
+    pub(crate) fn of_matched(judging: Judging, found: Vec<Matched>, regions: &[Region]) -> Self {
+        let middle = judging.middle_n();
+        let of_set = || found.iter().filter(move |m| Some(m.force_n) == middle);
+        Self {
+            rows: of_set()
+                .flat_map(|m| m.said().rows(regions, [&m.errors, &m.built]))
+                .collect(),
+            errors: of_set().map(|m| m.errors.clone()).collect(),
+            built: of_set().map(|m| m.built.clone()).collect(),
+            matched: found.iter().flat_map(|m| m.rows(regions)).collect(),
+            found,
+            judging,
+            ..Self::default()
+        }
+    }
+
+    /// What was found of a set by matching over all touches, a row for each force.
+    pub fn by_force(&self, selector: &str, sensors: usize) -> impl Iterator<Item = &MatchedRow> {
+        let of_set = move |r: &&MatchedRow| {
+            r.selector == selector && r.sensors == sensors && r.region == super::EVERYWHERE
+        };
+        self.matched.iter().filter(of_set)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::{EVERYWHERE, Forces};
+
+    fn matched(sensors: usize, force_n: f64) -> Matched {
+        Matched {
+            selector: "pca-qr".into(),
+            sensors,
+            force_n,
+            errors: vec![1.0, 2.0, 3.0, 30.0],
+            built: vec![2.0, 2.0, 4.0, 40.0],
+            calibrated: (sensors > 1).then(|| vec![1.0, 2.0, 3.0, 34.0]),
+            blind: vec![false, false, false, true],
+        }
+    }
+
+    fn half() -> Region {
+        Region {
+            name: "half".into(),
+            contains: vec![true, true, false, false],
+        }
+    }
+
+    #[test]
+    fn errors_are_quoted_with_and_without_blind_touches() {
+        let rows = matched(2, 10.0).rows(&[half()]);
+        assert_eq!(rows.len(), 2);
+        let [all, half] = [&rows[0], &rows[1]];
+        assert_eq!((all.region.as_str(), all.touches), (EVERYWHERE, 4));
+        assert_eq!((all.error_mm, all.as_built_mm), (9.0, 12.0));
+        assert_eq!((all.calibrated_mm, all.sighted_mm), (Some(10.0), Some(2.0)));
+        assert_eq!((all.blind, half.blind), (0.25, 0.0));
+        assert_eq!((half.error_mm, half.calibrated_mm), (1.5, Some(1.5)));
+        let mut blind = matched(1, 10.0);
+        blind.blind = vec![true; 4];
+        let row = &blind.rows(&[])[0];
+        assert_eq!((row.sighted_mm, row.calibrated_mm), (None, None));
+    }
+
+    #[test]
+    fn sets_are_compared_at_the_force_in_the_middle_in_any_regions() {
+        let judging = Judging::Matching(Forces {
+            judged_n: vec![3.0, 10.0, 25.0],
+            most_n: 60.0,
+        });
+        let found = vec![
+            matched(1, 10.0),
+            matched(2, 3.0),
+            matched(2, 10.0),
+            matched(2, 25.0),
+        ];
+        let evaluation = Evaluation::of_matched(judging, found, &[]);
+        assert_eq!((evaluation.rows.len(), evaluation.errors.len()), (2, 2));
+        assert_eq!(evaluation.rows[1].workshop_mm, 12.0);
+        let forces: Vec<f64> = evaluation
+            .by_force("pca-qr", 2)
+            .map(|r| r.force_n)
+            .collect();
+        assert_eq!(forces, [3.0, 10.0, 25.0]);
+        let quoted = evaluation.in_regions(&[half()]);
+        assert_eq!((quoted.rows.len(), quoted.matched.len()), (4, 8));
+        assert_eq!(quoted.errors, evaluation.errors);
+        assert_eq!(quoted.in_regions(&[]).matched, evaluation.matched);
+    }
+}
