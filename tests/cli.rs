@@ -156,12 +156,12 @@ fn a_draft_design_leaves_everything_behind() {
             .map(|x| x.as_f64().unwrap().powi(2))
             .sum();
         assert!((d - 1.0).abs() < 1e-9);
-        // On the mid-surface of the tube, to the facets' sagitta.
+        // On the mid-surface of the tube, to the sagitta of elements of five millimetres.
         let r = site["x_mm"]
             .as_f64()
             .unwrap()
             .hypot(site["y_mm"].as_f64().unwrap());
-        assert!((r - 31.831).abs() < 0.05, "{r}");
+        assert!((r - 31.831).abs() < 0.1, "{r}");
     }
     let error = |selector: &str, sensors: u64, region: &str| {
         summary["evaluation"]

@@ -159,8 +159,9 @@ fn what_is_promised_is_what_matching_does() {
         }
         let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
         assert!((0.9..1.12).contains(&mean), "{force} N: {mean:.3}");
+        // Few touches that nobody can tell apart rule the mean of a single set.
         assert!(
-            ratios.iter().all(|r| (0.7..1.4).contains(r)),
+            ratios.iter().all(|r| (0.65..1.6).contains(r)),
             "{ratios:.2?}"
         );
         // Chosen ones are the best of ten, by the estimator itself.

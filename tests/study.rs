@@ -678,4 +678,14 @@ fn expected_error_knows_noise_and_forces() {
         "10,1",
     ];
     misused(&flags, "LIGHTEST,HARDEST");
+    let flags = [
+        "select",
+        "--data",
+        data,
+        "--selector",
+        "expected-error",
+        "--forces-n",
+        "1,10",
+    ];
+    misused(&flags, "--forces-n needs data");
 }

@@ -59,7 +59,7 @@ pub struct SelectArgs {
     /// What all gauges together may cost (with costs in the dataset; one each otherwise).
     #[arg(long, value_parser = between(1e-9, 1e15))]
     pub cost_budget: Option<f64>,
-    /// Stop at this cross-validated error (mm).
+    /// Stop at this cross-validated error (mm), or expected error where that is what is chosen by.
     #[arg(long, value_parser = between(1e-9, 1e9))]
     pub target_mm: Option<f64>,
     /// Probability that one gauge has failed when it is needed (greedy SVR only).
@@ -256,15 +256,22 @@ impl SelectArgs {
             kernel,
             kernel_noise,
             noise: self.criterion.noise,
-            forces: self.forces()?,
+            forces: self.forces(data)?,
             detail: Detail::default(),
         })
     }
 
-    fn forces(&self) -> anyhow::Result<Option<[f64; 2]>> {
+    fn forces(&self, data: &Data) -> anyhow::Result<Option<[f64; 2]>> {
         match self.forces_n[..] {
             [] => Ok(None),
-            [lightest, hardest] if lightest <= hardest => Ok(Some([lightest, hardest])),
+            [lightest, hardest] if lightest <= hardest => {
+                if data.forces.is_empty() {
+                    return Err(misuse(
+                        "--forces-n needs data that say the force of each touch (force_n): leave it out",
+                    ));
+                }
+                Ok(Some([lightest, hardest]))
+            }
             _ => Err(misuse(
                 "--forces-n takes the lightest force and the hardest (N): LIGHTEST,HARDEST",
             )),

@@ -10,7 +10,7 @@ use super::svg::escape;
 use super::together::Together;
 use super::{FileError, atomic, source};
 use crate::dataset::Signal;
-use crate::design::Inputs;
+use crate::design::{GLUED_BY_HAND, Inputs};
 use crate::placement::SelectorKind;
 use crate::project::{BudgetKeys, LiveKeys, Project};
 use crate::trade::{Bought, KnobReport, Measured, Point, front, knobs};
@@ -91,7 +91,7 @@ pub fn without_knobs(project: &Project) -> Project {
             ..BudgetKeys::default()
         },
         live: LiveKeys {
-            model_error: live.model_error,
+            model_error: GLUED_BY_HAND,
             largest_force_n: live.largest_force_n,
             ..LiveKeys::default()
         },

@@ -42,7 +42,14 @@ impl Selector for ExpectedError<'_> {
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
         let watch = request.watch;
-        let mut field = Field::new(pool, request.wishes)?;
+        if request.wishes.failure > 0.0 {
+            return Err(PlacementError::Refused {
+                selector: "Expected error",
+                why: "it weighs noise and gluing, and no gauge that is lost; use greedy SVR to expect failures",
+            });
+        }
+        let empty = Field::new(pool, request.wishes)?;
+        let mut field = empty.clone();
         let scenes = Scenes::new(pool, self, watch)?;
         let mut banks = scenes.banks(&[]);
         let mut sets: Vec<SensorSet> = Vec::new();
@@ -64,7 +71,7 @@ impl Selector for ExpectedError<'_> {
             (request.found)(&set);
             sets.push(set);
         }
-        let exchanged = exchange::exchange(&scenes, pool, request, &field, self.rounds)?;
+        let exchanged = exchange::exchange(&scenes, request, &empty, &field.chosen, self.rounds)?;
         let mut notes = field.constant_notes();
         if let (Some(last), Some((chosen, error))) = (sets.last_mut(), exchanged) {
             let gained = before - error;
@@ -80,6 +87,7 @@ impl Selector for ExpectedError<'_> {
                 (request.found)(last);
             }
         }
+        notes.extend(unreached(&sets, request));
         notes.extend(lead::ties(&sets, lead::TOLERANCE));
         let wanted = request.wishes.sensors;
         let why = field.closed();
@@ -115,6 +123,16 @@ fn reached(sets: &[SensorSet], request: &Request) -> bool {
     let target = request.wishes.target_mm;
     matches!((error, target), (Some(error), Some(target)) if error <= target)
         && sets.len() >= request.wishes.required.len()
+}
+
+/// A note where the wished error is not reached.
+fn unreached(sets: &[SensorSet], request: &Request) -> Option<String> {
+    let error = sets.last().and_then(|s| s.criterion)?;
+    let target = request.wishes.target_mm.filter(|t| error > *t)?;
+    Some(format!(
+        "The error asked for, {target} mm, was not reached: {error:.2} mm with {} gauges.",
+        sets.len()
+    ))
 }
 
 fn set_of(pool: &Pool, chosen: &[usize], error: f64, lead: Option<f64>) -> SensorSet {
@@ -210,4 +228,86 @@ fn scan(
 pub fn expected(scene: &Scene, sites: &[usize]) -> (f64, Vec<f64>) {
     let bank = Bank::of(scene, sites);
     (bank.error(), bank.errors())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+    use crate::dataset::SignalMatrix;
+    use crate::placement::Wishes;
+
+    fn chosen(
+        targets: &[[f64; 3]],
+        wishes: &Wishes,
+        rounds: usize,
+    ) -> Result<Selection, PlacementError> {
+        let signal = |k: usize| (1.7 * (k + 1) as f64).sin();
+        let values = (0..6 * targets.len()).map(signal).collect();
+        let x = SignalMatrix::new(targets.len(), values);
+        let pool = Pool {
+            x: &x,
+            targets,
+            sites: &[0, 1, 2, 3, 4, 5],
+            positions: &[],
+        };
+        let request = Request {
+            wishes,
+            watch: &unwatched,
+            found: &|_| {},
+        };
+        let selector = ExpectedError {
+            known: Knowledge {
+                noise: 0.0,
+                variance: None,
+                among: None,
+                forces: None,
+                seed: 1,
+            },
+            detail: Detail::default(),
+            rounds,
+        };
+        selector.select(&pool, &request)
+    }
+
+    fn in_a_line(touches: usize) -> Vec<[f64; 3]> {
+        (0..touches).map(|t| [3.0 * t as f64, 0.0, 7.0]).collect()
+    }
+
+    #[test]
+    fn few_touches_and_odd_ones_have_an_error() {
+        for targets in [in_a_line(2), in_a_line(3), in_a_line(40), vec![[1.3; 3]; 4]] {
+            let selection = chosen(&targets, &Wishes::count(3), ROUNDS).unwrap();
+            assert_eq!(selection.sets.len(), 3);
+            for set in &selection.sets {
+                let error = set.criterion.unwrap();
+                assert!(error.is_finite() && error >= 0.0, "{targets:?} {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn failures_are_refused() {
+        let wishes = Wishes {
+            failure: 0.3,
+            ..Wishes::count(3)
+        };
+        let refused = chosen(&in_a_line(9), &wishes, ROUNDS);
+        assert!(matches!(refused, Err(PlacementError::Refused { .. })));
+    }
+
+    #[test]
+    fn an_exchange_costs_nothing_more() {
+        let costs = [1.0, 5.0, 2.0, 9.0, 3.0, 4.0];
+        let wishes = Wishes {
+            costs: Some(costs.to_vec()),
+            ..Wishes::count(3)
+        };
+        let cost = |rounds: usize| -> f64 {
+            let selection = chosen(&in_a_line(30), &wishes, rounds).unwrap();
+            let sites = &selection.sets.last().unwrap().sites;
+            sites.iter().map(|&s| costs[s]).sum()
+        };
+        assert!(cost(ROUNDS) <= cost(0));
+    }
 }

@@ -435,7 +435,7 @@ fn live(t: &mut Text, project: &Project) {
     t.key(
         "model_error",
         float(live.model_error),
-        "what model and gluing are off by, as a share of the reading; a calibration finds it",
+        "what the model is off by beside gluing, as a share of the reading; a calibration finds what is left",
     );
     t.key(
         "largest_force_n",

@@ -104,7 +104,7 @@ impl<'a> Bank<'a> {
             ],
         };
         let presses = scene.presses.iter().map(|press| {
-            let own = |p: &Place| p.position.distance(press.position) < OWN * p.reach;
+            let own = |p: &Place| p.position.distance(press.position) <= OWN * p.reach;
             let mut own_mass: f64 = scene.places.iter().filter(|p| own(p)).map(|p| p.mass).sum();
             if own_mass <= 0.0 {
                 own_mass = press.mass;
@@ -288,7 +288,8 @@ struct Own {
 impl Own {
     fn corrected(&self, press: &Press) -> (Matrix3<f64>, Vector3<f64>, f64) {
         let spread = press.covariance * self.row;
-        let predicted = 1.0 + self.row.dot(&spread);
+        // Never less than the noise: rounding would take more.
+        let predicted = (1.0 + self.row.dot(&spread)).max(1.0);
         let off = self.reading - self.row.dot(&press.estimate);
         let cost = press.cost + off * off / (2.0 * predicted) + 0.5 * predicted.ln() + self.log;
         (
@@ -480,7 +481,8 @@ wide! {
                 xy[k] * r[0] + yy[k] * r[1] + yf[k] * r[2],
                 xf[k] * r[0] + yf[k] * r[1] + ff[k] * r[2],
             ];
-            let predicted = 1.0 + r[0] * spread[0] + r[1] * spread[1] + r[2] * spread[2];
+            // Never less than the noise: where signals are far above it, rounding would take more.
+            let predicted = (1.0 + r[0] * spread[0] + r[1] * spread[1] + r[2] * spread[2]).max(1.0);
             let share = predicted.recip();
             [r0[k], r1[k], r2[k]] = r;
             scales[k] = scale;

@@ -1,24 +1,25 @@
-//! Better sets by exchange: each gauge in turn is taken out, and the best of all sites put in.
+//! Better sets by exchange: each gauge in turn is taken out, and the best of all sites put in that cost no more.
 
 use super::Scenes;
+use crate::budget::Cancelled;
+use crate::placement::Request;
 use crate::placement::wishes::Field;
-use crate::placement::{PlacementError, Pool, Request};
 
 /// An exchange must gain this share of the error: less is rounding.
 const LEAST: f64 = 1e-4;
 
-/// The set after at most so many rounds, with its expected error (mm); nothing where there is nothing to exchange.
+/// The set after at most so many rounds, from one that was `chosen` on an `empty` field, with its expected error (mm); nothing where there is nothing to exchange.
 ///
 /// # Errors
-/// [`PlacementError`] when the watch asks for a stop.
+/// [`Cancelled`] when the watch asks for a stop.
 pub(super) fn exchange(
     scenes: &Scenes,
-    pool: &Pool,
     request: &Request,
-    field: &Field,
+    empty: &Field,
+    chosen: &[usize],
     rounds: usize,
-) -> Result<Option<(Vec<usize>, f64)>, PlacementError> {
-    let mut chosen = field.chosen.clone();
+) -> Result<Option<(Vec<usize>, f64)>, Cancelled> {
+    let mut chosen = chosen.to_vec();
     let kept = request.wishes.required.len();
     if chosen.len() <= kept || rounds == 0 {
         return Ok(None);
@@ -28,11 +29,13 @@ pub(super) fn exchange(
     for turn in 0..rounds * (chosen.len() - kept) {
         let k = kept + turn % (chosen.len() - kept);
         let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != chosen[k]).collect();
-        let mut open = Field::new(pool, request.wishes)?;
+        let mut field = empty.clone();
         for &place in &others {
-            open.add(place);
+            field.add(place);
         }
-        let open = open.open();
+        let mut open = field.open();
+        // What a gain may cost was weighed when the gauge was chosen.
+        open.retain(|&place| field.cost(place) <= field.cost(chosen[k]));
         let step = (chosen.len(), chosen.len());
         let banks = scenes.banks(&others);
         let errors = banks.scan(&open, request.watch, step)?;

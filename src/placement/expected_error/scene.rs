@@ -162,9 +162,8 @@ impl Scene {
             .collect();
         let mut places = farthest_first(&merged.positions, &all, detail.places);
         // A press may come to one of the places: what stands near it is its own all the same.
-        let presses: Vec<usize> = (evenly(all.len(), detail.presses).into_iter())
-            .map(|k| all[k])
-            .collect();
+        let presses = in_turns(&evenly(all.len(), detail.presses));
+        let presses: Vec<usize> = presses.into_iter().map(|k| all[k]).collect();
         in_neighbourhoods(&mut places, &merged.positions);
         let around = Around::new(&merged.positions);
         let unit = unit(x, known.noise).recip();
@@ -210,7 +209,14 @@ fn unit(x: &SignalMatrix, noise: f64) -> f64 {
     noise.max(LEAST_NOISE * rms).max(f64::MIN_POSITIVE)
 }
 
-/// Presses with the same place in every third: each force comes everywhere.
+/// Every third of some places, then the next of every three, and so on: however data are ordered, each force comes
+/// everywhere.
+fn in_turns(places: &[usize]) -> Vec<usize> {
+    let turn = move |first: usize| places.iter().skip(first).step_by(LEVELS).copied();
+    (0..LEVELS).flat_map(turn).collect()
+}
+
+/// A third of the presses for each force.
 fn levels(presses: usize, range: Option<[f64; 2]>) -> Vec<Level> {
     let Some([lightest, hardest]) = range else {
         return vec![Level {
