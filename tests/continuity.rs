@@ -54,7 +54,8 @@ fn selected(inputs: &Inputs) -> (Simulated, Vec<Selection>) {
         design::reduce_sites(inputs, &simulated, &feasibility, &budget, &unwatched).unwrap();
     let select =
         |kind| design::select(inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap();
-    let selections = SelectorKind::ALL.map(select).to_vec();
+    // Expected error is judged on a sample of presses, whose own scatter is more than elements leave open.
+    let selections = SelectorKind::PAPER.map(select).to_vec();
     (simulated, selections)
 }
 

@@ -206,7 +206,7 @@ fn painted_with_a_real_pointer_and_saved_with_real_keys() {
     hand.drag((0..12).map(|k| (690, 260 + 14 * k)));
     // The region is sea-green.
     wait("the painted region", 20, || {
-        let green = |c: &&[u8; 3]| c[1] > c[2] + 25 && c[1] > 80;
+        let green = |c: &&[u8; 3]| c[1] > c[2].saturating_add(25) && c[1] > 80;
         let seen = hand.colours(660, 240, 80).iter().filter(green).count();
         (seen > 400).then_some(())
     });
