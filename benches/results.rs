@@ -71,6 +71,11 @@ Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the eleme
 fn assembled() -> String {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let mut text = read(DESIGNS);
+    let _ = writeln!(
+        text,
+        "## Gauges for the estimator that reads them\n\n<!-- gauges: from benches/gauges.md, by `cargo bench --bench gauges` -->\n\n{}\n\n<!-- end of gauges -->\n",
+        read("benches/gauges.md").trim_end()
+    );
     for path in [
         "benches/elastic.md",
         "benches/solid.md",

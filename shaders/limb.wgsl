@@ -6,7 +6,7 @@ struct Scene {
     target_scale: vec4f, // xyz: target (m), w: 1 / distance
     deform: vec4f,     // x: exaggeration, y: 1 when a field is shown, z: 1 when the region is shown
     section: vec4f,    // what lies on the positive side of this plane is cut away, relative units
-    look: vec4f,       // x: how much a wall in front covers
+    look: vec4f,       // x: how much a wall in front covers, y: 1 when the first layer marks what is blind
 };
 
 @group(0) @binding(0) var<uniform> scene: Scene;
@@ -56,6 +56,12 @@ fn colour(f: Fragment, front: bool) -> vec3f {
     if (scene.deform.y > 0.5) {
         let color = textureSampleLevel(map, map_sampler, vec2f(clamp(f.value, 0.0, 1.0), 0.5), 0.0).rgb;
         base = select(color * 0.72, color, front);
+    }
+    if (scene.look.y > 0.5) {
+        // Grey stripes, which no colour of a map looks like.
+        let stripe = step(0.5, fract((f.world.x + f.world.y + f.world.z) * 36.0));
+        let grey = mix(vec3f(0.48), vec3f(0.70), stripe);
+        base = mix(base, select(grey * 0.72, grey, front), smoothstep(0.35, 0.65, f.region.x));
     }
     let shine = select(0.0, 0.06 * pow(headlight, 40.0), front);
     return base * light + shine;

@@ -91,8 +91,17 @@ pub struct Achieved {
     pub unit: &'static str,
     pub effort: Work,
     pub stop_reason: StopReason,
-    /// What a reader must know before trusting the number, in plain words.
+    /// What may change a decision, in plain words: the weightiest first.
+    pub cautions: Vec<String>,
+    /// How the number came about.
     pub notes: Vec<String>,
+}
+
+impl Achieved {
+    /// All that there is to say, what may change a decision first.
+    pub fn words(&self) -> impl Iterator<Item = &String> {
+        self.cautions.iter().chain(&self.notes)
+    }
 }
 
 /// The three named trades; each only builds an explicit [`Budget`].

@@ -5,6 +5,7 @@ pub mod calibration;
 pub mod chain;
 pub mod map;
 pub mod matching;
+pub mod measured;
 pub mod region;
 pub mod trained;
 
@@ -13,5 +14,6 @@ pub use calibration::{AsDrawn, Calibration, Known, calibrate};
 pub use chain::Chain;
 pub use map::ResponseMap;
 pub use matching::{Contact, Errors, Matching};
+pub use measured::MeasuredMatching;
 pub use region::Region;
 pub use trained::{Features, Lessons, Trained};

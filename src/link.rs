@@ -1,6 +1,7 @@
 //! Ports: serial lines, sockets and recordings behind one small trait, and the thread that listens.
 
 mod host;
+mod recorded;
 mod recording;
 mod replay;
 mod serial;
@@ -11,6 +12,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 pub use host::{Doorway, Entrance, Hosted, host};
+pub use recorded::record;
 pub use recording::{Recorder, old_note};
 pub use serial::{PortInfo, ports};
 pub use session::{Command, Connection, Heard, Listener, State, Timing};

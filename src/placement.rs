@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::budget::{Achieved, Cancelled, Watch};
 use crate::dataset::SignalMatrix;
 use crate::pca::PcaError;
+pub use expected_error::Certificate;
 pub use wishes::Wishes;
 
 /// The selectors a project can name.
@@ -25,20 +26,20 @@ pub use wishes::Wishes;
 #[serde(rename_all = "kebab-case")]
 pub enum SelectorKind {
     #[default]
+    ExpectedError,
     GreedySvr,
     PcaQr,
     Entropy,
     MutualInformation,
-    ExpectedError,
 }
 
 impl SelectorKind {
     pub const ALL: [Self; 5] = [
+        Self::ExpectedError,
         Self::GreedySvr,
         Self::PcaQr,
         Self::Entropy,
         Self::MutualInformation,
-        Self::ExpectedError,
     ];
 
     /// Those that the paper compares.
@@ -113,6 +114,17 @@ pub struct SensorSet {
     /// there was no choice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lead: Option<f64>,
+    /// How far the set is at most from the best of as many gauges; only of the last set of a choice by expected error.
+    #[serde(flatten)]
+    pub certificate: Option<Certificate>,
+}
+
+impl SensorSet {
+    /// How far the set is at most from the best one, in words; absent where nothing is known of that.
+    #[must_use]
+    pub fn certified(&self) -> Option<String> {
+        Some(self.certificate?.words(self.criterion_mm?))
+    }
 }
 
 /// What a selector chose: one set for each number of gauges from one up.

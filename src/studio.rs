@@ -4,16 +4,20 @@
 
 mod advice;
 mod commands;
+mod confusions;
 mod dialogs;
 mod display;
 mod drive;
+mod expected;
 mod fields;
 mod form;
 mod gauges;
+mod helping;
 mod inspector;
 mod jobs;
 mod kept;
 mod labels;
+mod latest;
 mod live;
 mod measure;
 mod opening;
@@ -110,6 +114,8 @@ pub struct Studio {
     /// Numbers of the gauges that are picked, from zero.
     pub picked: Vec<usize>,
     by_hand: gauges::ByHand,
+    expected: expected::Expecting,
+    confusions: confusions::Confusions,
     /// Names of the kept selections that are shown.
     shown_kept: BTreeSet<String>,
     slow: fields::Slow,
@@ -192,6 +198,8 @@ impl Studio {
         self.advance(ctx);
         self.refresh_feasibility(ctx);
         self.refresh_by_hand(ctx);
+        self.refresh_expected(ctx);
+        self.refresh_confusions(ctx);
         self.refresh_live(ctx);
         self.refresh_trade(ctx);
     }

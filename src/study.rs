@@ -1,17 +1,21 @@
 //! Choosing and judging on signals alone, without a part behind them.
 
+mod templates;
+
 use std::borrow::Cow;
 
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::budget::Watch;
+use crate::budget::{Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::evaluation::add_noise;
 use crate::evaluation::failures::{FailureRow, FailureTrial, failures};
 use crate::gaussian_process::{self, Covariance, Distances, GpKernel};
 use crate::placement::entropy::Entropy;
-use crate::placement::expected_error::{Detail, ExpectedError, Forces, Knowledge, ROUNDS};
+use crate::placement::expected_error::{
+    Detail, ExpectedError, Forces, Knowledge, ROUNDS, Scatter, Variance,
+};
 use crate::placement::greedy_svr::{Audit, Comparison, GreedySvr};
 use crate::placement::information::{Geometry, GeometrySummary};
 use crate::placement::mutual_information::MutualInformation;
@@ -57,35 +61,48 @@ pub struct Settings {
     pub detail: Detail,
 }
 
-impl Settings {
-    /// What a choice by expected error is told of the signals.
-    #[must_use]
-    pub fn knowledge<'a>(&self, data: &'a Data) -> Knowledge<'a> {
-        /// Forces that come, over the middle one of the data.
-        const COMING: [f64; 2] = [1.0 / 3.0, 3.0];
-        /// The hardest that is thought possible, over the hardest that comes.
-        const POSSIBLE: f64 = 2.0;
-        let coming = || {
-            let mut sorted = data.forces.clone();
-            sorted.sort_by(f64::total_cmp);
-            COMING.map(|share| share * sorted[sorted.len() / 2])
-        };
-        let known = !data.forces.is_empty();
-        Knowledge {
-            noise: self.noise,
-            variance: None,
-            among: None,
-            forces: known.then(|| {
-                let coming = self.forces.unwrap_or_else(coming);
-                Forces {
-                    touches: &data.forces,
-                    coming,
-                    possible: POSSIBLE * coming[1],
-                }
-            }),
-            seed: self.svr.seed,
+/// What is known of signals beside their values, where each touch has a force (N) or none has; of forces that come, a
+/// third to three times the middle one where nobody says.
+fn knowledge<'a>(
+    forces: &'a [f64],
+    coming: Option<[f64; 2]>,
+    noise: f64,
+    seed: u64,
+    variance: Variance<'a>,
+) -> Knowledge<'a> {
+    /// The hardest that is thought possible, over the hardest that comes.
+    const POSSIBLE: f64 = 2.0;
+    let hardest = forces.iter().copied().fold(0.0, f64::max);
+    let forces = usual_forces(forces).map(|usual| {
+        let coming = coming.unwrap_or(usual);
+        Forces {
+            touches: forces,
+            coming,
+            possible: POSSIBLE * coming[1].max(hardest),
         }
+    });
+    Knowledge {
+        noise,
+        variance: Some(variance),
+        among: None,
+        forces,
+        seed,
     }
+}
+
+/// The lightest and the hardest touch (N) that are taken to come, from those of data; nothing where data have none.
+fn usual_forces(forces: &[f64]) -> Option<[f64; 2]> {
+    /// Over the middle force.
+    const COMING: [f64; 2] = [1.0 / 3.0, 3.0];
+    let mut sorted = forces.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = *sorted.get(sorted.len() / 2)?;
+    Some(COMING.map(|share| share * middle))
+}
+
+/// The force of each touch, where data say it.
+fn forces_of(data: &Data) -> Option<&[f64]> {
+    (!data.forces.is_empty()).then_some(&data.forces[..])
 }
 
 /// A choice with what it was made from.
@@ -93,8 +110,25 @@ impl Settings {
 pub struct Choice {
     pub selection: Selection,
     pub geometry: Option<GeometrySummary>,
+    /// What a choice by expected error weighed.
+    pub weighed: Option<Weighed>,
     /// Processor seconds of the distances, the search of the kernel, and the choice itself.
     pub seconds: ChoiceSeconds,
+}
+
+/// What a choice by expected error took to be off.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Weighed {
+    /// Standard deviation of the noise of a reading, beside what the data scatter by; in the unit of the signals.
+    pub noise: f64,
+    /// The lightest and the hardest touch that come (N); absent where the data do not say how hard touches were.
+    pub forces_n: Option<[f64; 2]>,
+    pub seed: u64,
+    /// For each gauge of the last set: standard deviation of a reading about its template, as the data show it, over
+    /// the rms of its readings (%).
+    pub scatter_percent: Vec<f64>,
+    /// Touches that repeat one before, from which a part of that is known.
+    pub repeats: usize,
 }
 
 /// Seconds by the caller's clock.
@@ -187,18 +221,18 @@ pub fn select(
     };
     let before = clock();
     let geometry = geometry.as_ref();
+    let mut weighed = None;
     let selection = match (settings.kind, geometry) {
         (SelectorKind::Entropy, Some(geometry)) => Entropy { geometry }.select(&pool, &request),
         (SelectorKind::MutualInformation, Some(geometry)) => {
             MutualInformation { geometry }.select(&pool, &request)
         }
         (SelectorKind::PcaQr, _) => PcaQr.select(&pool, &request),
-        (SelectorKind::ExpectedError, _) => ExpectedError {
-            known: settings.knowledge(data),
-            detail: settings.detail,
-            rounds: ROUNDS,
-        }
-        .select(&pool, &request),
+        (SelectorKind::ExpectedError, _) => by_expected_error(&pool, &request, data, settings)
+            .map(|(selection, what)| {
+                weighed = Some(what);
+                selection
+            }),
         _ => settings.svr.select(&pool, &request),
     }?;
     // The covariance is part of the choice.
@@ -206,9 +240,51 @@ pub fn select(
     Ok(Choice {
         selection,
         geometry: geometry.map(Geometry::summary),
+        weighed,
         seconds,
     })
 }
+
+/// A choice by expected error: what readings are off by is what the data scatter by, beside the noise.
+fn by_expected_error(
+    pool: &Pool,
+    request: &Request,
+    data: &Data,
+    settings: &Settings,
+) -> Result<(Selection, Weighed), PlacementError> {
+    let (noise, seed) = (settings.noise, settings.svr.seed);
+    let scatter = Scatter::of(pool.x, pool.targets, forces_of(data));
+    let variance = |row: usize, touch: usize| scatter.variance(row, touch);
+    let known = knowledge(&data.forces, settings.forces, noise, seed, &variance);
+    let forces_n = known.forces.map(|f| f.coming);
+    let selector = ExpectedError {
+        known,
+        detail: settings.detail,
+        rounds: ROUNDS,
+    };
+    let mut selection = selector.select(pool, request)?;
+    if forces_n.is_none() {
+        selection.achieved.notes.push(NO_FORCES.to_owned());
+    }
+    if noise <= 0.0 {
+        selection.achieved.notes.push(NO_NOISE.to_owned());
+    }
+    let chosen = selection.sets.last().map_or(&[][..], |set| &set.sites[..]);
+    let rows = chosen
+        .iter()
+        .filter_map(|site| pool.sites.iter().position(|s| s == site));
+    let weighed = Weighed {
+        noise,
+        forces_n,
+        seed,
+        scatter_percent: rows.map(|row| 100.0 * scatter.share(row)).collect(),
+        repeats: scatter.repeats(),
+    };
+    Ok((selection, weighed))
+}
+
+const NO_FORCES: &str = "The data do not say how hard touches were (force_n): readings are compared as they are, and what differs with the force counts as scatter.";
+const NO_NOISE: &str = "No noise was given (--noise): what is weighed is what the data themselves scatter by.";
 
 /// A geometry of straight lines: without a mesh nobody knows the way over the surface. Sites that are
 /// kept out still count as locations.
@@ -355,12 +431,7 @@ pub fn places(svr: &GreedySvr, targets: &[[f64; 3]]) -> usize {
 /// A word on touches that repeat places, where some do.
 #[must_use]
 pub fn place_note(svr: &GreedySvr, targets: &[[f64; 3]]) -> Option<String> {
-    let (places, touches) = (places(svr, targets), targets.len());
-    (places < touches).then(|| {
-        format!(
-            "{touches} touches lie at {places} places: none is learned from and judged on at the same place (--split touch divides them one by one)."
-        )
-    })
+    repeat_note(places(svr, targets), targets.len(), None)
 }
 
 /// A word on each of the sites whose signal never changes.
@@ -375,11 +446,29 @@ fn constant_notes(x: &SignalMatrix, sites: &[usize]) -> Vec<String> {
     constant.into_iter().map(said).collect()
 }
 
+/// What turns readings into places, learned from data alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    /// A support vector regression trained for each set.
+    #[default]
+    Svr,
+    /// Readings matched to those of known touches, weighted by noise and by what the data scatter by.
+    Matching,
+    /// The mean of the nearest known touches.
+    Nearest,
+}
+
 /// What is asked about given sites.
 pub struct Question<'a> {
     pub sites: &'a [usize],
+    pub estimator: Estimator,
+    /// The group of each touch, numbered from zero without gaps: none is divided between learning and judging. Where
+    /// nobody says, by the regression's grouping.
+    pub groups: Option<&'a [usize]>,
     pub svr: &'a GreedySvr,
-    /// Standard deviation of the noise added to the signals, in their unit.
+    /// Standard deviation of the noise added to the signals, in their unit. Regression learns from noisy signals;
+    /// templates are as they were measured, and what is compared with them is noisy.
     pub noise: f64,
     /// Search the regression's settings for each number of gauges.
     pub tune: bool,
@@ -397,8 +486,32 @@ pub struct HeldOut {
     pub error_mm: f64,
     pub median_mm: f64,
     pub p95_mm: f64,
-    pub hyper: Hyper,
-    pub converged: bool,
+    /// Of the regression, and whether its fit ended.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hyper: Option<Hyper>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub converged: Option<bool>,
+    /// How many nearest touches are averaged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub neighbours: Option<usize>,
+}
+
+impl HeldOut {
+    /// Of errors (mm), at least one, by an estimator without settings.
+    fn of(sensors: usize, mut errors: Vec<f64>) -> Self {
+        errors.sort_by(f64::total_cmp);
+        let last = errors.len() - 1;
+        let quantile = |q: f64| errors[(q * last as f64).round() as usize];
+        Self {
+            sensors,
+            error_mm: errors.iter().sum::<f64>() / errors.len() as f64,
+            median_mm: quantile(0.5),
+            p95_mm: quantile(0.95),
+            hyper: None,
+            converged: None,
+            neighbours: None,
+        }
+    }
 }
 
 /// The answers: for one gauge, two, … all of them in the order given.
@@ -417,34 +530,86 @@ pub struct Verdict {
     pub notes: Vec<String>,
 }
 
+/// What an estimator makes of a question.
+struct Judged {
+    criteria_mm: Vec<f64>,
+    errors: Vec<HeldOut>,
+    baseline: Option<HeldOut>,
+    failures: Vec<FailureRow>,
+}
+
+/// Which touches are learned from, and which are judged on.
+struct Parts<'a> {
+    groups: &'a [usize],
+    /// Of the criterion.
+    folds: &'a Folds,
+    train: &'a [usize],
+    test: &'a [usize],
+    /// The signals with noise.
+    heard: &'a SignalMatrix,
+}
+
 /// Judges given sites.
 ///
 /// # Errors
 /// [`PlacementError`] for too few touches, or when the watch asks for a stop.
 pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdict, PlacementError> {
     let svr = question.svr;
-    let groups = svr.grouping.of(&data.targets);
+    let groups = match question.groups {
+        Some(groups) => Cow::Borrowed(groups),
+        None => Cow::Owned(svr.grouping.of(&data.targets)),
+    };
     let places = number_of(&groups);
     if !question.divides(places) {
         let least = (places..=MOST_PLACES).find(|&n| question.divides(n));
         return Err(svr.too_few(&groups, least.unwrap_or(MOST_PLACES)));
     }
     let noisy = add_noise(&data.x, question.noise, svr.seed);
-    let all: Vec<usize> = (0..noisy.rows()).collect();
-    let pool = Pool {
-        x: &noisy,
-        targets: &data.targets,
-        sites: &all,
-        positions: &data.positions,
-    };
-    let prefixes: Vec<Vec<usize>> = (1..=question.sites.len())
-        .map(|k| question.sites[..k].to_vec())
-        .collect();
-    let criteria_mm = svr.criteria(&pool, &prefixes, watch)?;
+    let folds = Folds::of_groups(&groups, svr.folds, svr.seed);
     // Another draw than the folds'.
     let draw = svr.seed.wrapping_add(0x7e57);
     let (mut test, train) = hold_out(&groups, question.tests(places), draw);
-    let split = Split::new(&noisy, &data.targets, &train, &test);
+    let parts = Parts {
+        groups: &groups,
+        folds: &folds,
+        train: &train,
+        test: &test,
+        heard: &noisy,
+    };
+    let judged = match question.estimator {
+        Estimator::Svr => by_regression(data, question, &parts, watch)?,
+        Estimator::Matching | Estimator::Nearest => {
+            templates::judge(data, question, &parts, watch)?
+        }
+    };
+    test.sort_unstable();
+    let mut notes = constant_notes(&noisy, question.sites);
+    notes.extend(repeat_note(places, data.targets.len(), question.groups));
+    Ok(Verdict {
+        criteria_mm: judged.criteria_mm,
+        fold_of_touch: folds.of_touches(),
+        errors: judged.errors,
+        baseline: judged.baseline,
+        failures: judged.failures,
+        test_touches: test,
+        places,
+        notes,
+    })
+}
+
+/// Judges by a regression trained for each set.
+fn by_regression(
+    data: &Data,
+    question: &Question,
+    parts: &Parts,
+    watch: Watch,
+) -> Result<Judged, PlacementError> {
+    let svr = question.svr;
+    let all: Vec<usize> = (0..parts.heard.rows()).collect();
+    let prefixes: Vec<Vec<usize>> = (1..=question.sites.len())
+        .map(|k| question.sites[..k].to_vec())
+        .collect();
+    let split = Split::new(parts.heard, &data.targets, parts.train, parts.test);
     let errors: Result<Vec<HeldOut>, PlacementError> = prefixes
         .iter()
         .map(|rows| split.judge(rows, question, watch))
@@ -454,7 +619,7 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
         .baseline
         .then(|| split.judge(&all, question, watch))
         .transpose()?;
-    let hyper = errors.last().map_or(svr.hyper, |e| e.hyper);
+    let hyper = errors.last().and_then(|e| e.hyper).unwrap_or(svr.hyper);
     let failures = failures(
         &FailureTrial {
             train: &split.train.select_rows(question.sites),
@@ -469,18 +634,62 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
         },
         watch,
     )?;
-    test.sort_unstable();
-    let mut notes = constant_notes(&noisy, question.sites);
-    notes.extend(place_note(svr, &data.targets));
-    Ok(Verdict {
+    let criteria_mm = if question.groups.is_none() {
+        let pool = Pool {
+            x: parts.heard,
+            targets: &data.targets,
+            sites: &all,
+            positions: &data.positions,
+        };
+        svr.criteria(&pool, &prefixes, watch)?
+    } else {
+        cross_validated(data, question, parts, &prefixes, watch)?
+    };
+    Ok(Judged {
         criteria_mm,
-        fold_of_touch: fold_of_touch(svr, &data.targets),
         errors,
         baseline,
         failures,
-        test_touches: test,
-        places,
-        notes,
+    })
+}
+
+/// The criterion (mm) of some sets with the regression as given, for folds of groups that only the user knows.
+fn cross_validated(
+    data: &Data,
+    question: &Question,
+    parts: &Parts,
+    sets: &[Vec<usize>],
+    watch: Watch,
+) -> Result<Vec<f64>, PlacementError> {
+    let folds = parts.folds;
+    let mut sums = vec![0.0; sets.len()];
+    for part in &folds.parts {
+        let (before, rest) = folds.order.split_at(part.start);
+        let (test, after) = rest.split_at(part.len());
+        let train = [before, after].concat();
+        let split = Split::new(parts.heard, &data.targets, &train, test);
+        for (k, (sum, rows)) in sums.iter_mut().zip(sets).enumerate() {
+            report(watch, "Cross-validating", k, sets.len())?;
+            *sum += split.with(rows, question.svr.hyper, question.svr).error_mm;
+        }
+    }
+    let share = (folds.parts.len() as f64).recip();
+    Ok(sums.into_iter().map(|sum| sum * share).collect())
+}
+
+/// A word on touches that are kept together by groups of the user, or because they repeat places.
+fn repeat_note(places: usize, touches: usize, given: Option<&[usize]>) -> Option<String> {
+    if places == touches {
+        return None;
+    }
+    Some(if given.is_some() {
+        format!(
+            "{touches} touches are of {places} groups: none is learned from and judged on in the same group (--groups none divides them one by one)."
+        )
+    } else {
+        format!(
+            "{touches} touches lie at {places} places: none is learned from and judged on at the same place (--split touch divides them one by one)."
+        )
     })
 }
 
@@ -528,8 +737,8 @@ impl Split {
         /// Touches that settings are searched on.
         const SEARCHED: usize = 1000;
         let svr = question.svr;
-        let train = self.train.select_rows(rows);
         let hyper = if question.tune {
+            let train = self.train.select_rows(rows);
             let some = evenly(self.train_targets.len(), SEARCHED);
             let targets: Vec<[f64; 3]> = some.iter().map(|&t| self.train_targets[t]).collect();
             let validation = CrossValidation {
@@ -546,19 +755,18 @@ impl Split {
         } else {
             svr.hyper
         };
+        Ok(self.with(rows, hyper, svr))
+    }
+
+    /// Errors of a regression with these settings.
+    fn with(&self, rows: &[usize], hyper: Hyper, svr: &GreedySvr) -> HeldOut {
+        let train = self.train.select_rows(rows);
         let model = PositionModel::train(&train, &self.train_targets, &hyper, svr.effort);
         let predicted = model.predict(&self.test.select_rows(rows));
-        let mut errors = distances(&predicted, &self.test_targets);
-        errors.sort_by(f64::total_cmp);
-        let last = errors.len() - 1;
-        let quantile = |q: f64| errors[(q * last as f64).round() as usize];
-        Ok(HeldOut {
-            sensors: rows.len(),
-            error_mm: errors.iter().sum::<f64>() / errors.len() as f64,
-            median_mm: quantile(0.5),
-            p95_mm: quantile(0.95),
-            hyper,
-            converged: model.converged().0,
-        })
+        HeldOut {
+            hyper: Some(hyper),
+            converged: Some(model.converged().0),
+            ..HeldOut::of(rows.len(), distances(&predicted, &self.test_targets))
+        }
     }
 }

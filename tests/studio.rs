@@ -12,7 +12,7 @@ use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;
 use hapdef::budget::Quality;
 use hapdef::document::{Brush, Layer};
-use hapdef::studio::Field;
+use hapdef::studio::{Command, Field, Studio};
 use image::RgbaImage;
 use window::Window;
 
@@ -486,4 +486,106 @@ fn what_was_not_saved_is_offered_again() {
 fn asks(window: &Window) -> bool {
     let dialog = window.harness.query_by_label("Recover unsaved changes?");
     dialog.is_some()
+}
+
+/// The bundled limb simulated, and its sites filtered.
+fn simulated() -> Option<Window> {
+    let mut w = Window::open()?;
+    w.press("Simulate");
+    w.wait("the simulation", 120, |s| !s.busy());
+    w.wait("the filters", 20, |s| s.feasibility.is_some());
+    Some(w)
+}
+
+fn gauges(w: &Window) -> Vec<hapdef::project::ChosenSite> {
+    let project = &w.harness.state().document.state.project;
+    project.selection.sites.clone()
+}
+
+fn expected(w: &mut Window) -> f64 {
+    w.wait("what is expected", 60, |s| s.expected_error().is_some());
+    w.harness.state().expected_error().unwrap()
+}
+
+#[test]
+fn the_expected_error_and_its_map_follow_the_hand() {
+    let Some(mut w) = simulated() else { return };
+    w.press("Gauges");
+    let before = expected(&mut w);
+    assert!(before > 0.05 && before < 30.0, "{before}");
+    for label in ["Expected error: ", "% blind at "] {
+        assert!(w.harness.query_by_label_contains(label).is_some());
+    }
+    w.harness.state_mut().view.field = Field::Expected;
+    w.wait("the map", 20, Studio::shows_field);
+    w.press("Unrolled");
+    let [x, y, z] = gauges(&w)[2].position_mm;
+    let from = w.flat_place(x, y, z);
+    let map = w.picture();
+    let path: Vec<Pos2> = (0..=10)
+        .map(|k| from + egui::vec2(3.0 * k as f32, 0.0))
+        .collect();
+    let sites = gauges(&w);
+    w.drag(&path);
+    assert_ne!(gauges(&w)[2], sites[2], "the gauge follows the pointer");
+    let after = expected(&mut w);
+    assert_ne!(after, before);
+    let moved = w.picture();
+    let both = map.pixels().zip(moved.pixels());
+    let changed = both.filter(|(a, b)| a != b).count();
+    assert!(changed > 1000, "the map follows: {changed} pixels changed");
+    // One move is one step; the figure is what it was, but for the order in which gauges are taken in.
+    w.key(Modifiers::COMMAND, egui::Key::Z);
+    assert_eq!(gauges(&w), sites);
+    let again = expected(&mut w);
+    assert!((again / before - 1.0).abs() < 0.02, "{again} {before}");
+    w.click_label("Confusions");
+    w.wait("the confusions", 60, |s| s.worst_confusions().is_some());
+    let pairs = w.harness.state().worst_confusions().unwrap();
+    if !pairs.is_empty() {
+        let target = w.harness.state().view.camera.target;
+        w.click_label("Confusion 1");
+        let looked_at = w.harness.state().view.camera.target;
+        assert_ne!(looked_at, target, "it looks there");
+    }
+    w.assert_named("the confusions");
+}
+
+#[test]
+fn one_key_adds_the_gauge_that_helps_most() {
+    let Some(w) = Window::open() else { return };
+    assert!(!w.harness.state().enabled(Command::AddHelpful));
+    drop(w);
+    let mut w = simulated().unwrap();
+    w.press("Gauges");
+    let before = expected(&mut w);
+    let sites = gauges(&w);
+    w.key(Modifiers::NONE, egui::Key::A);
+    w.wait("the gauge", 120, |s| !s.busy());
+    assert_eq!(gauges(&w).len(), sites.len() + 1);
+    assert_eq!(w.harness.state().picked, [sites.len()]);
+    let after = expected(&mut w);
+    assert!(after < before, "{after} {before}");
+    w.key(Modifiers::COMMAND, egui::Key::Z);
+    assert_eq!(gauges(&w), sites);
+}
+
+#[test]
+fn one_key_finds_the_gauge_that_helps_least() {
+    let Some(w) = Window::open() else { return };
+    assert!(!w.harness.state().enabled(Command::FindSpare));
+    drop(w);
+    let mut w = simulated().unwrap();
+    let sites = gauges(&w);
+    w.key(Modifiers::NONE, egui::Key::W);
+    w.wait("the gauge", 120, |s| !s.busy());
+    let picked = w.harness.state().picked.clone();
+    assert_eq!(picked.len(), 1);
+    assert_eq!(gauges(&w), sites, "it is marked, not taken");
+    w.key(Modifiers::NONE, egui::Key::Delete);
+    let mut left = sites.clone();
+    left.remove(picked[0]);
+    assert_eq!(gauges(&w), left);
+    w.key(Modifiers::COMMAND, egui::Key::Z);
+    assert_eq!(gauges(&w), sites);
 }

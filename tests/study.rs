@@ -129,7 +129,12 @@ fn every_selector_answers_in_the_same_shape() {
         );
         assert!(answer["cpu_seconds"].is_number());
         assert!(answer["achieved"]["stop_reason"].is_string());
-        assert_eq!(answer["fold_of_touch"].as_array().unwrap().len(), TOUCHES);
+        // Nothing is trained for a choice by expected error, and nothing held out.
+        let trained = selector != "expected-error";
+        let folds = answer["fold_of_touch"].as_array().map(Vec::len);
+        assert_eq!(folds, trained.then_some(TOUCHES), "{selector}");
+        assert_eq!(answer["criterion"]["c_mm"].is_number(), trained);
+        assert_eq!(answer["criterion"]["scatter_percent"].is_array(), !trained);
         let geometry = &answer["geometry"]["distance"];
         assert_eq!(
             geometry.is_string(),
@@ -524,7 +529,14 @@ fn flags_without_effect_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let data = dataset(folder.path(), true);
     let data = data.to_str().unwrap();
-    let idle: [(&str, &[&str]); 10] = [
+    let idle: [(&str, &[&str]); 17] = [
+        ("expected-error", &["--c", "100"]),
+        ("expected-error", &["--epsilon", "1"]),
+        ("expected-error", &["--gamma", "0.1"]),
+        ("expected-error", &["--tolerance", "1"]),
+        ("expected-error", &["--max-steps", "9"]),
+        ("expected-error", &["--folds", "4"]),
+        ("expected-error", &["--split", "touch"]),
         ("greedy-svr", &["--length-mm", "20"]),
         ("greedy-svr", &["--power", "1.5"]),
         ("greedy-svr", &["--kernel-noise", "0.1"]),
@@ -688,4 +700,202 @@ fn expected_error_knows_noise_and_forces() {
         "1,10",
     ];
     misused(&flags, "--forces-n needs data");
+}
+
+/// Normal deviates that are the same everywhere.
+fn deviate(k: usize) -> f64 {
+    let even = |k: f64| (k.sin() * 43_758.545_3).rem_euclid(1.0);
+    let k = k as f64;
+    (-2.0 * (1.0 - 0.999_999 * even(k + 1.0)).ln()).sqrt()
+        * (std::f64::consts::TAU * even(k + 20_000.5)).cos()
+}
+
+/// The plate pressed on a grid of 15 × 10 places, so many times each, with signals that are off by normal errors, in a
+/// file of its own; where forces are known the signals grow with them.
+fn pressed_again(folder: &Path, turns: usize, deviation: f64, forces: bool) -> String {
+    const PLACES: usize = 150;
+    let sites = signals().2;
+    let touches = turns * PLACES;
+    let place = |t: usize| {
+        let k = t % PLACES;
+        [
+            0.1 * ((k / 10) as f64 + 0.5) / 15.0,
+            0.06 * ((k % 10) as f64 + 0.5) / 10.0,
+        ]
+    };
+    let force = |t: usize| if forces { 1.0 + (t % 7) as f64 } else { 1.0 };
+    let x: Vec<f64> = (0..SITES * touches)
+        .map(|k| {
+            let (s, t) = (&sites[3 * (k / touches)..], k % touches);
+            let away = [s[0] - place(t)[0], s[1] - place(t)[1]];
+            let d = away[0] * away[0] + 2.0 * away[1] * away[1];
+            let clean = (-d / 0.0012).exp() + 0.3 * (30.0 * away[0]).sin();
+            force(t) * (clean + deviation * deviate(k))
+        })
+        .collect();
+    let p: Vec<f64> = (0..touches)
+        .flat_map(|t| [place(t)[0], place(t)[1], 0.0])
+        .collect();
+    let mut file = NpzFile::default();
+    file.add("X", &[SITES, touches], &x).unwrap();
+    file.add("p_m", &[touches, 3], &p).unwrap();
+    // Tenths of the plate, numbered somehow.
+    let strip: Vec<f64> = (0..touches).map(|t| (t % PLACES / 15) as f64 - 3.0).collect();
+    file.add("strip", &[touches], &strip).unwrap();
+    if forces {
+        let force: Vec<f64> = (0..touches).map(force).collect();
+        file.add("force_n", &[touches], &force).unwrap();
+    }
+    let path = folder.join(format!("{turns}-{deviation}-{forces}.npz"));
+    file.save(&path).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// Five sites by expected error, with what is promised of them.
+fn promised(data: &str, more: &[&str]) -> (String, f64, Value) {
+    let fixed = ["select", "--data", data, "--selector", "expected-error"];
+    let answer = json(&[&fixed[..], &["--sensors", "5"], more].concat());
+    let sites: Vec<String> = indices(&answer).iter().map(u64::to_string).collect();
+    let promised = *numbers(&answer["criterion_mm"]).last().unwrap();
+    (sites.join(","), promised, answer)
+}
+
+/// What an estimator does on places that it has not seen.
+fn held_out(data: &str, sites: &str, estimator: &str, more: &[&str]) -> Value {
+    let fixed = ["evaluate", "--data", data, "--sites", sites];
+    let how = ["--estimator", estimator, "--held-out", "0.25"];
+    json(&[&fixed[..], &how, &["--failed", "1"], more].concat())
+}
+
+fn last_error(answer: &Value) -> f64 {
+    let errors = answer["errors"].as_array().unwrap();
+    errors.last().unwrap()["error_mm"].as_f64().unwrap()
+}
+
+#[test]
+fn what_scattering_data_promise_is_what_matching_does() {
+    let folder = tempfile::tempdir().unwrap();
+    // With repeats that tell how far a press scatters, and without any.
+    for turns in [3, 1] {
+        let data = pressed_again(folder.path(), turns, 0.05, false);
+        let (sites, promised, answer) = promised(&data, &["--noise", "0.001"]);
+        let done = held_out(&data, &sites, "matching", &["--noise", "0.001"]);
+        // Over all places, a fifth of them unseen in turn.
+        let ratio = promised / numbers(&done["criterion_mm"])[4];
+        assert!((0.7..1.3).contains(&ratio), "{turns}: {promised} {done}");
+        let weighed = &answer["criterion"];
+        assert_eq!(weighed["noise"], 0.001);
+        assert_eq!(weighed["repeats"], 150 * (turns - 1));
+        assert!(weighed["forces_n"].is_null());
+        assert!(notes(&answer).contains("force_n"), "{answer}");
+        let scatter = numbers(&weighed["scatter_percent"]);
+        assert_eq!(scatter.len(), 5);
+        assert!(scatter.iter().all(|s| (5.0..120.0).contains(s)), "{scatter:?}");
+    }
+    // Without noise it is said that none was given.
+    let data = pressed_again(folder.path(), 1, 0.05, false);
+    assert!(notes(&promised(&data, &[]).2).contains("--noise"));
+}
+
+#[test]
+fn estimators_are_judged_alike() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = pressed_again(folder.path(), 2, 0.02, false);
+    let sites = "3,9,14,20,6";
+    let middle = 30.0;
+    for estimator in ["matching", "nearest", "svr"] {
+        let answer = held_out(&data, sites, estimator, &["--baseline"]);
+        assert_eq!(answer["estimator"], estimator);
+        assert!(last_error(&answer) < middle / 2.0, "{answer}");
+        let criteria = numbers(&answer["criterion_mm"]);
+        assert_eq!(criteria.len(), 5);
+        assert!(criteria[4] < criteria[0], "{criteria:?}");
+        // Places are whole, whoever judges: the same ones are held out.
+        assert_eq!(answer["places"], 150);
+        assert_eq!(answer["test_touches"].as_array().unwrap().len(), 76);
+        assert_eq!(answer["criterion"]["c_mm"].is_number(), estimator == "svr");
+        let error = &answer["errors"][4];
+        assert_eq!(error["hyper"].is_object(), estimator == "svr");
+        assert_eq!(error["neighbours"].is_number(), estimator == "nearest");
+        assert!(answer["baseline"]["error_mm"].as_f64().unwrap() > 0.0);
+        assert!(answer["failures"].as_array().unwrap().len() >= 2);
+    }
+    let idle: [&[&str]; 3] = [&["--c", "9"], &["--tune"], &["--max-steps", "9"]];
+    for flags in idle {
+        let base = ["evaluate", "--data", &data, "--sites", sites];
+        let how = ["--estimator", "nearest"];
+        misused(&[&base[..], &how, flags].concat(), flags[0]);
+    }
+}
+
+#[test]
+fn forces_scale_what_is_matched() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = pressed_again(folder.path(), 2, 0.02, true);
+    let (sites, promised, answer) = promised(&data, &["--noise", "0.01", "--forces-n", "1,7"]);
+    let forces = numbers(&answer["criterion"]["forces_n"]);
+    assert_eq!(forces, [1.0, 7.0]);
+    assert!(promised > 0.0);
+    let with = held_out(&data, &sites, "matching", &["--noise", "0.01"]);
+    assert_eq!(with["criterion"]["forces"], true);
+    // Neighbours know no force: a hard touch here reads as a light one elsewhere.
+    let nearest = held_out(&data, &sites, "nearest", &["--noise", "0.01"]);
+    assert!(last_error(&with) < last_error(&nearest), "{with} {nearest}");
+}
+
+#[test]
+fn groups_of_the_user_are_never_divided() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = pressed_again(folder.path(), 2, 0.02, false);
+    let sites = "3,9";
+    let group = |t: usize| t % 150 / 15;
+    for estimator in ["matching", "svr"] {
+        let answer = held_out(&data, sites, estimator, &["--groups", "strip", "--folds", "3"]);
+        assert_eq!(answer["places"], 10);
+        assert_eq!(answer["criterion"]["groups"], "strip");
+        let held = answer["test_touches"].as_array().unwrap();
+        let is_held = |t: usize| held.contains(&Value::from(t));
+        let folds = answer["fold_of_touch"].as_array().unwrap();
+        for t in 0..300 {
+            let whole = (0..300).any(|other| is_held(other) && group(other) == group(t));
+            assert_eq!(is_held(t), whole, "{t}");
+            assert_eq!(folds[t], folds[group(t) * 15], "{t}");
+        }
+    }
+    let apart = held_out(&data, sites, "matching", &["--groups", "none"]);
+    assert_eq!(apart["places"], 300);
+    let places = held_out(&data, sites, "nearest", &["--groups", "place"]);
+    assert_eq!(places["places"], 150);
+    // By a table, and by an array of that name without asking.
+    let rows: Vec<String> = (0..300).map(|t| (t % 150 / 15).to_string()).collect();
+    let table = folder.path().join("g.csv");
+    std::fs::write(&table, format!("group\n{}\n", rows.join("\n"))).unwrap();
+    let table = table.to_str().unwrap();
+    let by = |groups: &str| {
+        let how = ["--groups", groups, "--folds", "3"];
+        held_out(&data, sites, "matching", &how)
+    };
+    let (by_table, by_array) = (by(table), by("strip"));
+    assert_eq!(by_table["errors"], by_array["errors"]);
+    let (x, p, _) = signals();
+    let mut file = NpzFile::default();
+    file.add("X", &[SITES, TOUCHES], &x).unwrap();
+    file.add("p_m", &[TOUCHES, 3], &p).unwrap();
+    let groups: Vec<f64> = (0..TOUCHES).map(|t| (t / 5) as f64).collect();
+    file.add("groups", &[TOUCHES], &groups).unwrap();
+    file.add("odd", &[TOUCHES], &vec![0.5; TOUCHES]).unwrap();
+    file.add("few", &[3], &[1.0, 2.0, 3.0]).unwrap();
+    let named = folder.path().join("named.npz");
+    file.save(&named).unwrap();
+    let named = named.to_str().unwrap();
+    let taken = held_out(named, sites, "nearest", &[]);
+    assert_eq!(taken["criterion"]["groups"], "groups");
+    assert_eq!(taken["places"], 30);
+    let said = held_out(named, sites, "nearest", &["--split", "touch"]);
+    assert_eq!(said["places"], TOUCHES);
+    let base = ["evaluate", "--data", named, "--sites", sites, "--groups"];
+    refused(&[&base[..], &["odd"]].concat(), "whole numbers");
+    refused(&[&base[..], &["few"]].concat(), "one is needed a touch");
+    refused(&[&base[..], &["nothing"]].concat(), "nothing");
+    misused(&[&base[..], &["few", "--split", "touch"]].concat(), "--split");
 }

@@ -23,7 +23,7 @@ use crate::elasticity::Touch;
 use crate::given;
 use crate::inference::Chain;
 use crate::io::points;
-use crate::link::{Doorway, host, ports};
+use crate::link::{Doorway, Entrance, Recorder, host, ports, record};
 use crate::mesh::TriMesh;
 use crate::plain;
 use crate::wire::MOST_CHANNELS;
@@ -38,6 +38,9 @@ pub struct BoardArgs {
     /// Listen at a socket instead of a pseudo-terminal: HOST:PORT, port 0 for any that is free.
     #[arg(long, num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
     pub tcp: Option<String>,
+    /// Write what it sends into a recording (.hapdrec) instead, with the truth, without waiting for the time to pass.
+    #[arg(long, requires = "simulate", conflicts_with = "tcp")]
+    pub record: Option<PathBuf>,
     /// Samples a second, until the studio asks for others.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub rate: u16,
@@ -80,7 +83,7 @@ pub struct BoardArgs {
     /// Probability of a frame to be lost.
     #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 1.0))]
     pub lose: f64,
-    /// Seconds after which it ends by itself.
+    /// Seconds after which it ends by itself; a recording ends a second after the last touch of a script.
     #[arg(long, value_parser = between(0.0, 1e9))]
     pub seconds: Option<f64>,
 }
@@ -114,27 +117,76 @@ pub fn run(args: &BoardArgs) -> anyhow::Result<()> {
         Some(path) => Some(TruthFile::create(path, failed)?),
         None => None,
     };
-    let entrance = doorway(args)?.open().map_err(anyhow::Error::msg)?;
+    let outlet = Outlet::open(args, &plan)?;
     let bar = Bar::default();
     let board = args.common.in_pool(|| {
         let watch = |p| bar.show(p);
         build(args, plan, &loaded.inputs, &watch)
     });
     bar.finish();
-    let hosted = host(board?, entrance, move |t| {
+    let board = board?;
+    let tell = move |t: Truth| {
         if let Some(file) = &mut truth {
             file.write(&t);
         }
-    })
-    .map_err(anyhow::Error::msg)?;
+    };
+    match outlet {
+        Outlet::Door(entrance) => serve(args, board, entrance, tell, &failures)?,
+        Outlet::Recording { recorder, seconds } => {
+            let path = recorder.path.clone();
+            let samples = record(board, recorder, seconds, tell).map_err(anyhow::Error::msg)?;
+            let said = json!({ "recording": path, "seconds": seconds, "samples": samples });
+            out::line(&said.to_string())?;
+        }
+    }
+    // What was written last may have failed too.
+    check_truth(args, &failures)
+}
+
+/// Where the bytes of the board go.
+enum Outlet {
+    Door(Entrance),
+    Recording { recorder: Recorder, seconds: f64 },
+}
+
+impl Outlet {
+    fn open(args: &BoardArgs, plan: &Plan) -> anyhow::Result<Self> {
+        let Some(path) = &args.record else {
+            let entrance = doorway(args)?.open().map_err(anyhow::Error::msg)?;
+            return Ok(Self::Door(entrance));
+        };
+        let last = plan.presses.as_deref().and_then(end_of);
+        let seconds = args.seconds.or(last).context(
+            "--record: nobody knows how long it goes on. Say so with --seconds, or give the touches with --script",
+        )?;
+        Ok(Self::Recording {
+            recorder: Recorder::create(path).map_err(anyhow::Error::msg)?,
+            seconds,
+        })
+    }
+}
+
+/// A second after the last of some presses; nothing where there are none.
+fn end_of(presses: &[GivenPress]) -> Option<f64> {
+    let ends = presses.iter().map(|p| p.start_s + p.duration_s);
+    Some(ends.max_by(f64::total_cmp)? + 1.0)
+}
+
+/// Keeps the board at its port until its time is over.
+fn serve(
+    args: &BoardArgs,
+    board: SimulatedBoard,
+    entrance: Entrance,
+    tell: impl FnMut(Truth) + Send + 'static,
+    failures: &Receiver<std::io::Error>,
+) -> anyhow::Result<()> {
+    let hosted = host(board, entrance, tell).map_err(anyhow::Error::msg)?;
     out::line(&json!({ "port": hosted.port }).to_string())?;
     while args.seconds.is_none_or(|s| hosted.seconds() < s) {
-        check_truth(args, &failures)?;
+        check_truth(args, failures)?;
         std::thread::sleep(Duration::from_millis(20));
     }
-    // Its end brings what was not written yet.
-    drop(hosted);
-    check_truth(args, &failures)
+    Ok(())
 }
 
 /// Ends where the truth can be written no more: a table that is cut would be believed.

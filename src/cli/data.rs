@@ -66,6 +66,9 @@ const PAPER: Hyper = Hyper {
 };
 /// Tolerance on the bundled limb (mm).
 const USUAL_TOLERANCE_MM: f64 = 0.05;
+/// Most steps of a fit, and parts of the cross-validation, when left out.
+const USUAL_STEPS: usize = 1_000_000;
+const USUAL_FOLDS: usize = 5;
 /// Largest C over the spread of the touches: beyond it sums of coefficients lose the touches in their rounding,
 /// and fits do not end.
 const LARGEST_C: f64 = 1e7;
@@ -91,12 +94,12 @@ pub struct CriterionArgs {
     /// the same in m) for touches that spread as on the bundled limb and in proportion for others.
     #[arg(long, value_parser = between(1e-12, 1e9))]
     pub tolerance: Option<f64>,
-    /// Most steps of one fit.
-    #[arg(long, default_value_t = 1_000_000, value_parser = whole(1, 1_000_000_000))]
-    pub max_steps: usize,
-    /// Parts of the cross-validation.
-    #[arg(long, default_value_t = 5, value_parser = whole(2, 1_000_000))]
-    pub folds: usize,
+    /// Most steps of one fit; a million when left out.
+    #[arg(long, value_parser = whole(1, 1_000_000_000))]
+    pub max_steps: Option<usize>,
+    /// Parts of the cross-validation; 5 when left out.
+    #[arg(long, value_parser = whole(2, 1_000_000))]
+    pub folds: Option<usize>,
     /// What is never divided between learning and judging: single touches, or all touches at one place. Touches
     /// are at one place when they are nearer than 1e-5 of the extent of all; on a flat skin whatever their depth.
     #[arg(long, value_enum, default_value_t)]
@@ -110,7 +113,8 @@ pub struct CriterionArgs {
     /// Worker threads; all cores when left out. The result does not depend on it.
     #[arg(long, value_parser = super::threads)]
     pub threads: Option<usize>,
-    /// Standard deviation of noise added to the signals, in their unit.
+    /// Standard deviation of noise added to the signals, in their unit. Expected error, and estimators with templates,
+    /// take it for the noise of what is read, beside what the data themselves scatter by.
     #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 1e100))]
     pub noise: f64,
     /// Print one JSON object on stdout.
@@ -147,16 +151,39 @@ impl CriterionArgs {
         }
         Ok(GreedySvr {
             hyper,
-            folds: self.folds,
+            folds: self.folds.unwrap_or(USUAL_FOLDS),
             seed: self.seed,
             grouping: self.grouping()?,
             effort: Effort {
                 tolerance: mm(self.tolerance, USUAL_TOLERANCE_MM * size),
-                max_steps: self.max_steps,
+                max_steps: self.max_steps.unwrap_or(USUAL_STEPS),
             },
             tolerance: TOLERANCE,
             landmarks: 1.0,
         })
+    }
+
+    /// Flags that only a regression heeds, and whether they are given.
+    #[must_use]
+    pub fn of_regression(&self) -> [(&'static str, bool); 6] {
+        [
+            ("--c", self.c.is_some()),
+            ("--epsilon", self.epsilon.is_some()),
+            ("--gamma", self.gamma.is_some()),
+            ("--tolerance", self.tolerance.is_some()),
+            ("--max-steps", self.max_steps.is_some()),
+            ("--target-unit", self.target_unit != TargetUnit::Mm),
+        ]
+    }
+
+    /// Flags that say how touches are divided between learning and judging, and whether they are given.
+    #[must_use]
+    pub fn of_split(&self) -> [(&'static str, bool); 3] {
+        [
+            ("--folds", self.folds.is_some()),
+            ("--split", self.split == SplitArg::Touch),
+            ("--place-mm", self.place_mm.is_some()),
+        ]
     }
 
     fn grouping(&self) -> anyhow::Result<Grouping> {

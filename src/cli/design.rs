@@ -10,7 +10,7 @@ use crate::design::{self, Design};
 use crate::evaluation::{BASELINE, EstimatorKind, EvaluationRow};
 use crate::io::artifacts::{self, Provenance};
 use crate::io::together::Together;
-use crate::placement::SelectorKind;
+use crate::placement::{SelectorKind, SensorSet};
 use crate::project::Project;
 
 #[derive(Args, Debug, Clone)]
@@ -114,6 +114,9 @@ fn print_summary(design: &Design) -> anyhow::Result<()> {
         out::line(&format!("{count:>6} taken: {label}"))?;
     }
     print_gauges(design)?;
+    if let Some(words) = design.chosen_set().and_then(SensorSet::certified) {
+        out::line(&words)?;
+    }
     let chosen = design.chosen().len();
     print_forces(design, chosen)?;
     for row in design.evaluation.rows.iter().filter(|r| tells(r, chosen)) {
@@ -125,8 +128,13 @@ fn print_summary(design: &Design) -> anyhow::Result<()> {
     for doubt in design.doubts() {
         out::line(&format!("NOT TO BE TRUSTED: {}", doubt.words))?;
     }
-    for note in design.notes() {
+    let words = design.words();
+    for note in &words.open {
         out::line(&format!("note: {note}"))?;
+    }
+    if !words.folded.is_empty() {
+        let more = words.folded.len();
+        out::line(&format!("{more} more notes on how this came about stand in the report"))?;
     }
     let total: f64 = design.seconds.iter().map(|s| s.seconds).sum();
     out::say(&format!("{total:.1} s"));

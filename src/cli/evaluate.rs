@@ -1,14 +1,38 @@
 //! `hapdef evaluate`: how well given sites find touches, from a dataset alone.
 
-use clap::Args;
-use serde_json::json;
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
 
-use super::data::{CriterionArgs, DataArgs, criterion_json, site_json};
+use super::data::{CriterionArgs, DataArgs, SplitArg, criterion_json, site_json};
 use super::out;
 use super::progress::Bar;
-use super::ranges::{between, whole};
-use crate::io::cpu_seconds;
-use crate::study::{self, Verdict};
+use super::ranges::{between, misuse, whole};
+use crate::io::{cpu_seconds, dataset_file};
+use crate::placement::greedy_svr::GreedySvr;
+use crate::regression::Grouping;
+use crate::study::{self, Data, Estimator, Verdict};
+
+/// What turns readings into places.
+#[derive(ValueEnum, Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum EstimatorArg {
+    /// A support vector regression trained for each set.
+    #[default]
+    Svr,
+    /// Readings matched to those of the touches learned from.
+    Matching,
+    /// The mean of the nearest touches learned from.
+    Nearest,
+}
+
+impl From<EstimatorArg> for Estimator {
+    fn from(arg: EstimatorArg) -> Self {
+        match arg {
+            EstimatorArg::Svr => Self::Svr,
+            EstimatorArg::Matching => Self::Matching,
+            EstimatorArg::Nearest => Self::Nearest,
+        }
+    }
+}
 
 #[derive(Args, Debug, Clone)]
 pub struct EvaluateArgs {
@@ -19,6 +43,16 @@ pub struct EvaluateArgs {
     pub sites: Vec<usize>,
     #[command(flatten)]
     pub criterion: CriterionArgs,
+    /// What turns readings into places. `matching` weighs by noise and by what the data scatter by, and scales
+    /// touches by their force where `force_n` says it; `nearest` averages as many touches (1, 2, 4 or 8) as
+    /// cross-validation finds best.
+    #[arg(long, value_enum, default_value_t)]
+    pub estimator: EstimatorArg,
+    /// Touches that are never divided between learning and judging: `place` (repeats of one place), `none` (each
+    /// touch by itself), the name of an array of whole numbers in the NPZ, one a touch, or a CSV with a column
+    /// `group` and a row a touch. An array `groups` in the NPZ is taken by itself.
+    #[arg(long, value_name = "place|none|ARRAY|CSV")]
+    pub groups: Option<String>,
     /// Search C, epsilon and gamma for each number of gauges instead of taking them as given.
     #[arg(long)]
     pub tune: bool,
@@ -28,7 +62,7 @@ pub struct EvaluateArgs {
     /// Most failed gauges that are tried.
     #[arg(long, default_value_t = 5)]
     pub failed: usize,
-    /// Most subsets of failed gauges that the regression is trained anew for.
+    /// Most subsets of failed gauges that are tried; a regression is trained anew for each.
     #[arg(long, default_value_t = 20, value_parser = whole(1, 100_000))]
     pub subsets: usize,
     /// Also the error with all sites of the dataset.
@@ -41,8 +75,9 @@ pub struct EvaluateArgs {
 /// # Errors
 /// A message in the user's terms.
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
+    args.check()?;
     let (data, mut notes) = args.data.load()?;
-    let svr = args.criterion.criterion(&data.targets)?;
+    let (svr, groups) = args.divided(&data)?;
     for (k, &site) in args.sites.iter().enumerate() {
         anyhow::ensure!(
             site < data.x.rows(),
@@ -56,6 +91,8 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     }
     let question = study::Question {
         sites: &args.sites,
+        estimator: args.estimator.into(),
+        groups: groups.as_ref().map(|g| &g.of_touches[..]),
         svr: &svr,
         noise: args.criterion.noise,
         tune: args.tune,
@@ -82,7 +119,8 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
             "version": env!("CARGO_PKG_VERSION"),
             "sites": sites,
             "criterion_mm": verdict.criteria_mm,
-            "criterion": criterion_json(&svr),
+            "estimator": question.estimator,
+            "criterion": settings_json(&question, &data, groups.as_ref()),
             "fold_of_touch": verdict.fold_of_touch,
             "errors": verdict.errors,
             "baseline": verdict.baseline,
@@ -95,6 +133,99 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         return out::line(&summary.to_string());
     }
     print_table(&verdict)
+}
+
+/// Groups of touches that the user gave.
+struct Groups {
+    /// Numbered from zero without gaps.
+    of_touches: Vec<usize>,
+    /// The array or file that they are from.
+    source: String,
+}
+
+impl EvaluateArgs {
+    /// That no flag is given in vain.
+    fn check(&self) -> anyhow::Result<()> {
+        if self.groups.is_some() {
+            let split = [
+                ("--split", self.criterion.split == SplitArg::Touch),
+                ("--place-mm", self.criterion.place_mm.is_some()),
+            ];
+            if let Some((flag, _)) = split.iter().find(|(_, given)| *given) {
+                return Err(misuse(&format!(
+                    "{flag} and --groups both say what stays together: leave one of them out"
+                )));
+            }
+        }
+        if self.estimator == EstimatorArg::Svr {
+            return Ok(());
+        }
+        let idle = self.criterion.of_regression().into_iter();
+        match idle
+            .chain([("--tune", self.tune)])
+            .find(|(_, given)| *given)
+        {
+            Some((flag, _)) => {
+                let estimator = self.estimator.to_possible_value();
+                let name = estimator.map_or_else(String::new, |v| v.get_name().to_owned());
+                Err(misuse(&format!(
+                    "{flag} has no effect with --estimator {name}: leave it out"
+                )))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The regression with what it keeps together, and the groups that the user gave instead.
+    fn divided(&self, data: &Data) -> anyhow::Result<(GreedySvr, Option<Groups>)> {
+        /// Taken where nothing else is said.
+        const USUAL: &str = "groups";
+        let mut svr = self.criterion.criterion(&data.targets)?;
+        let said = self.criterion.split == SplitArg::Touch || self.criterion.place_mm.is_some();
+        let read = |name: &str| -> anyhow::Result<Option<Groups>> {
+            let found = dataset_file::groups(&self.data.data, name, data.targets.len())?;
+            Ok(found.map(|of_touches| Groups {
+                of_touches,
+                source: name.to_owned(),
+            }))
+        };
+        let groups = match self.groups.as_deref() {
+            Some("place") => None,
+            Some("none") => {
+                svr.grouping = Grouping::Touch;
+                None
+            }
+            Some(name) => Some(read(name)?.ok_or_else(|| {
+                misuse("--groups takes place, none, an array in an NPZ, or a CSV with a column group")
+            })?),
+            None if said || !dataset_file::holds(&self.data.data, USUAL)? => None,
+            None => read(USUAL)?,
+        };
+        Ok((svr, groups))
+    }
+}
+
+/// What was used beside the data: of the regression only where one was trained.
+fn settings_json(question: &study::Question, data: &Data, groups: Option<&Groups>) -> Value {
+    let mut used = if question.estimator == Estimator::Svr {
+        criterion_json(question.svr)
+    } else {
+        json!({
+            "folds": question.svr.folds,
+            "split": question.svr.grouping.name(),
+            "seed": question.svr.seed,
+        })
+    };
+    used["noise"] = json!(question.noise);
+    used["held_out"] = json!(question.held_out);
+    if question.estimator == Estimator::Matching {
+        used["forces"] = json!(!data.forces.is_empty());
+    }
+    if let Some(groups) = groups {
+        used["split"] = json!("groups");
+        used["groups"] = json!(groups.source);
+    }
+    used
 }
 
 fn print_table(verdict: &Verdict) -> anyhow::Result<()> {

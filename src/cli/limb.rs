@@ -12,7 +12,6 @@ use crate::design::Inputs;
 use crate::io::{atomic, glb, project_file};
 use crate::limb::{LimbSpec, LimbSupport};
 use crate::mesh::unroll::Axis;
-use crate::placement::SelectorKind;
 use crate::project::{Lattice, Masks, PartModel, Project, RegionKeys, SupportKeys, SupportKind};
 
 /// Lengths in millimetres. Without options it writes the bundled limb.
@@ -192,7 +191,7 @@ fn thicken(project: &mut Project) {
     }
 }
 
-/// Ten sites by a Draft design on strain with greedy SVR.
+/// Ten sites by a Draft design, as the project chooses them.
 fn choose_sites(
     project: &Project,
     mesh: crate::mesh::TriMesh,
@@ -213,7 +212,7 @@ fn choose_sites(
         &inputs,
         &simulated,
         &reduced,
-        SelectorKind::GreedySvr,
+        project.selection.selector,
         &budget,
         &unwatched,
     )?;

@@ -142,9 +142,13 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
             100.0 * step.excess()
         ));
     }
-    let said = study::place_note(&settings.svr, &data.targets).into_iter();
-    let said: Vec<String> = said
-        .chain(choice.selection.achieved.notes.iter().cloned())
+    // A choice by expected error divides no touches.
+    let divided = settings.kind != SelectorKind::ExpectedError;
+    let said: Vec<String> = divided
+        .then(|| study::place_note(&settings.svr, &data.targets))
+        .flatten()
+        .into_iter()
+        .chain(choice.selection.achieved.words().cloned())
         .collect();
     for note in &said {
         out::say(&format!("note: {note}"));
@@ -203,7 +207,7 @@ impl SelectArgs {
         let svr = kind == SelectorKind::GreedySvr;
         let expected = kind == SelectorKind::ExpectedError;
         let geometric = [SelectorKind::Entropy, SelectorKind::MutualInformation].contains(&kind);
-        let flags = [
+        let mut flags = vec![
             ("--length-mm", self.length_mm.is_some(), geometric),
             ("--power", self.power.is_some(), geometric),
             ("--kernel-noise", self.kernel_noise.is_some(), geometric),
@@ -217,21 +221,19 @@ impl SelectArgs {
             ("--forces-n", !self.forces_n.is_empty(), expected),
             ("--no-criterion", self.no_criterion, !svr && !expected),
         ];
+        // Nothing is trained for a choice by expected error, and nothing held out.
+        let fit = &self.criterion;
+        let trained = fit.of_regression().into_iter().chain(fit.of_split());
+        flags.extend(trained.map(|(flag, given)| (flag, given, !expected)));
         if let Some((flag, ..)) = flags.iter().find(|(_, given, heeded)| *given && !heeded) {
             return Err(misuse(&format!(
                 "{flag} has no effect with --selector {}: leave it out",
                 kind.name()
             )));
         }
-        let fit = &self.criterion;
-        let judged = [
-            ("--target-mm", self.target_mm.is_some()),
-            ("--c", fit.c.is_some()),
-            ("--epsilon", fit.epsilon.is_some()),
-            ("--gamma", fit.gamma.is_some()),
-            ("--tolerance", fit.tolerance.is_some()),
-        ];
-        match judged.iter().find(|(_, given)| *given) {
+        let target = [("--target-mm", self.target_mm.is_some())];
+        let mut judged = target.into_iter().chain(fit.of_regression());
+        match judged.find(|(_, given)| *given) {
             Some((flag, _)) if self.no_criterion => Err(misuse(&format!(
                 "{flag} is about the criterion, which --no-criterion leaves out: give one of them"
             ))),
@@ -354,19 +356,30 @@ fn summary(
                 "criterion_mm": set.criterion_mm,
                 "gap": set.gap,
                 "lead": set.lead,
+                "bound_mm": set.certificate.map(|c| c.bound_mm),
+                "local_mm": set.certificate.map(|c| c.local_mm),
             })
         })
         .collect();
+    // What a choice by expected error weighed stands in the place of a regression that nobody trained.
+    let (criterion, folds) = match &choice.weighed {
+        Some(weighed) => (json!(weighed), Value::Null),
+        None => (
+            criterion_json(&settings.svr),
+            json!(study::folds(data, settings)),
+        ),
+    };
     let mm: Vec<Option<f64>> = selection.sets.iter().map(|s| s.criterion_mm).collect();
     json!({
         "version": env!("CARGO_PKG_VERSION"),
         "selector": settings.kind,
         "sites": sites,
         "criterion_mm": mm,
+        "bound_mm": last.and_then(|s| s.certificate).map(|c| c.bound_mm),
         "steps": steps,
         "criterion_unit": selection.criterion_unit,
-        "criterion": criterion_json(&settings.svr),
-        "fold_of_touch": study::folds(data, settings),
+        "criterion": criterion,
+        "fold_of_touch": folds,
         "counts": {
             "sites": data.x.rows(),
             "touches": data.x.columns(),

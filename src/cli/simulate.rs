@@ -96,7 +96,7 @@ fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()>
         let first = &touches[..touches.len().min(vtu::TOUCHES)];
         vtu::write(path, model.mesh(), &vtu::fields(&*model, first))?;
     }
-    say(&simulated.achieved.notes);
+    say(&simulated.achieved.words().cloned().collect::<Vec<_>>());
     let dataset = &simulated.dataset;
     let summary = json!({
         "sites": dataset.sites.len(),

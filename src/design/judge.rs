@@ -24,7 +24,7 @@ use crate::project::Project;
 use crate::regression::folds::evenly;
 use crate::uncertainty::Gluing;
 
-pub use self::matched::BLIND;
+pub use crate::placement::expected_error::BLIND;
 pub(super) use self::matched::errors_mm;
 pub use self::presses::{PRESSED_HARD, PRESSED_OFF, Press, Pressed};
 

@@ -6,6 +6,12 @@ use crate::dataset::{GluingSlopes, Signal};
 use crate::placement::expected_error::{Detail, Forces, Knowledge, Scene, Variance, expected};
 use crate::uncertainty::Gluing;
 
+/// A few sites are looked at in more detail than a choice among thousands can.
+pub(super) const FINE: Detail = Detail {
+    places: 1000,
+    presses: 800,
+};
+
 /// What a choice by expected error is told of a simulation.
 pub(super) struct Known<'a> {
     simulated: &'a Simulated,
@@ -91,11 +97,6 @@ pub fn expected_errors(
     sets: &[Vec<usize>],
     watch: Watch,
 ) -> Result<Vec<f64>, Cancelled> {
-    /// A few sites are looked at in more detail than a choice among thousands can.
-    const FINE: Detail = Detail {
-        places: 1000,
-        presses: 800,
-    };
     let known = Known::new(inputs, simulated, &inputs.project.gluing());
     let mut sites: Vec<usize> = sets.concat();
     sites.sort_unstable();

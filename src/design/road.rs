@@ -83,7 +83,7 @@ impl Design {
         let count = sites.len();
         let selections = Arc::make_mut(&mut design.selections);
         if let Some(led) = selections.iter_mut().find(|s| s.selector == self.lead) {
-            led.achieved.notes.push(
+            led.achieved.cautions.push(
                 "Gauges were moved by hand: the chosen set and its errors are those of the gauges as they are, not of the selector. What it says of ties and gaps is of the set that it chose.".into(),
             );
             // Its figures for that set say nothing of this one.
@@ -95,6 +95,7 @@ impl Design {
                     criterion_mm: None,
                     gap: None,
                     lead: None,
+                    certificate: None,
                 };
             }
         }
@@ -157,10 +158,14 @@ impl Design {
 
     /// The chosen set: the project's selector at its number of gauges.
     #[must_use]
+    pub fn chosen_set(&self) -> Option<&SensorSet> {
+        self.led().and_then(|s| s.sets.last())
+    }
+
+    /// The sites of [`Self::chosen_set`].
+    #[must_use]
     pub fn chosen(&self) -> &[usize] {
-        self.led()
-            .and_then(|s| s.sets.last())
-            .map_or(&[], |set| &set.sites)
+        self.chosen_set().map_or(&[], |set| &set.sites)
     }
 
     /// What the chosen set was found to do, over all touches.
@@ -214,35 +219,64 @@ impl Design {
         work
     }
 
-    /// What the reader of any figure must know.
+    /// What may change a decision, in plain words, the weightiest first.
+    #[must_use]
+    pub fn cautions(&self) -> Vec<String> {
+        let mut cautions = Vec::new();
+        cautions.extend(self.led().map(|s| named(s, &s.achieved.cautions)));
+        cautions.push(self.evaluation.notes.clone());
+        cautions.push(self.simulated.achieved.cautions.clone());
+        if self.truth.element_mm >= self.simulated.element_mm {
+            cautions.push(vec![
+                "Judged on elements as large as the model's own: finer ones would not have fitted into memory, so the errors leave out what elements of this size cost.".into(),
+            ]);
+        }
+        if (self.evaluation.rows.iter()).any(|r| r.converged == Some(false)) {
+            cautions.push(vec![
+                "Some regressions stopped at the effort allowed before they met their tolerance."
+                    .into(),
+            ]);
+        }
+        cautions.concat()
+    }
+
+    /// How the design came about, in plain words.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes = self.simulated.achieved.notes.clone();
         notes.extend(self.reduced.candidates.notes.iter().cloned());
         for selection in self.selections.iter() {
-            let title = selection.selector.title();
-            notes.extend(
-                selection
-                    .achieved
-                    .notes
-                    .iter()
-                    .map(|n| format!("{title}: {n}")),
-            );
-        }
-        if self.truth.element_mm >= self.simulated.element_mm {
-            notes.push(
-                "Judged on elements as large as the model's own: finer ones would not have fitted into memory, so the errors leave out what elements of this size cost.".into(),
-            );
-        }
-        notes.extend(self.evaluation.notes.iter().cloned());
-        if (self.evaluation.rows.iter()).any(|r| r.converged == Some(false)) {
-            notes.push(
-                "Some regressions stopped at the effort allowed before they met their tolerance."
-                    .into(),
-            );
+            if selection.selector != self.lead {
+                notes.extend(named(selection, &selection.achieved.cautions));
+            }
+            notes.extend(named(selection, &selection.achieved.notes));
         }
         notes
     }
+
+    /// All words, those that may change a decision first; at most three of them are to be read at once.
+    #[must_use]
+    pub fn words(&self) -> Words {
+        /// More than that nobody reads before a decision.
+        const OPEN: usize = 3;
+        let mut open = self.cautions();
+        let mut folded = open.split_off(open.len().min(OPEN));
+        folded.extend(self.notes());
+        Words { open, folded }
+    }
+}
+
+/// What a design says of itself, sentence by sentence.
+pub struct Words {
+    /// What may change a decision.
+    pub open: Vec<String>,
+    pub folded: Vec<String>,
+}
+
+/// Words of a selection, with whose they are.
+fn named(selection: &Selection, words: &[String]) -> Vec<String> {
+    let title = selection.selector.title();
+    words.iter().map(|w| format!("{title}: {w}")).collect()
 }
 
 /// Puts others where some of a list are, which go; at its end where there are none.

@@ -176,7 +176,7 @@ fn read(
     let mut dataset =
         dataset::simulate(model, touches, &points, signal, directions, &slopes, watch)?;
     dataset.work += before;
-    let mut notes = if dataset.touches.len() < project.touch.count {
+    let notes = if dataset.touches.len() < project.touch.count {
         vec![format!(
             "{} touches instead of the project's {}: the budget of this quality.",
             dataset.touches.len(),
@@ -185,11 +185,11 @@ fn read(
     } else {
         Vec::new()
     };
-    notes.extend(open_solid(inputs));
-    notes.extend(on_supports(inputs, &dataset.touches)?);
-    notes.extend(checks.distrust());
-    notes.extend(cautions(&estimate, linearity.as_ref(), &budget.elements));
-    notes.extend(ground.cautions(&laid, project.tip().1));
+    let mut cautious = checks.distrust();
+    cautious.extend(cautions(&estimate, linearity.as_ref(), &budget.elements));
+    cautious.extend(ground.cautions(&laid, project.tip().1));
+    cautious.extend(open_solid(inputs));
+    cautious.extend(on_supports(inputs, &dataset.touches)?);
     let (mesh, held) = ground.gauge_surface(&laid);
     let index = SurfaceIndex::new(&mesh);
     let points = places.iter().map(|&p| index.nearest(p).0).collect();
@@ -204,6 +204,7 @@ fn read(
             } else {
                 StopReason::EffortSpent
             },
+            cautions: cautious,
             notes,
         },
         element_mm: Ground::element_mm(&laid),

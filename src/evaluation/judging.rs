@@ -6,15 +6,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorKind {
-    /// A support vector regression trained for each set, as in the paper.
-    #[default]
-    Svr,
     /// The elastic model matched to each reading, as live touch does.
+    #[default]
     Matching,
+    /// A support vector regression trained for each set, as in the paper.
+    Svr,
 }
 
 impl EstimatorKind {
-    pub const ALL: [Self; 2] = [Self::Svr, Self::Matching];
+    pub const ALL: [Self; 2] = [Self::Matching, Self::Svr];
 
     /// As in files.
     #[must_use]

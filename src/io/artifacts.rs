@@ -13,6 +13,7 @@ use super::{FileError, atomic, project_file, report, source};
 use crate::dataset::{Dataset, Signal, Site};
 use crate::design::{Design, Inputs};
 use crate::evaluation::{EstimatorKind, EvaluationRow};
+use crate::placement::expected_error::ASSUMES;
 use crate::placement::information::Geometry;
 use crate::project::{ChosenSite, Project};
 
@@ -284,6 +285,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
             ))
         })
         .collect();
+    let notes = [design.cautions(), design.notes()].concat();
     let seconds: serde_json::Map<String, Value> = design
         .seconds
         .iter()
@@ -308,6 +310,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         "unexplained": design.reduced.candidates.unexplained,
         "unexplained_curve": design.reduced.candidates.curve,
         "selections": *design.selections,
+        "certificate": certificate(design),
         "evaluation": judged_rows(inputs, design),
         "failures": design.evaluation.failures,
         "gaussian_process": design.reduced.geometry().map(Geometry::summary),
@@ -326,9 +329,24 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         "achieved": {
             "work": design.work(),
             "selection": design.led().map(|s| &s.achieved),
-            "notes": design.notes(),
+            "notes": notes,
         },
     })
+}
+
+/// How far the chosen set is at most from the best one; nothing where its selector cannot say.
+fn certificate(design: &Design) -> Option<Value> {
+    let set = design.chosen_set()?;
+    let (certificate, expected) = (set.certificate?, set.criterion_mm?);
+    Some(json!({
+        "sensors": set.sites.len(),
+        "expected_mm": expected,
+        "local_mm": certificate.local_mm,
+        "bound_mm": certificate.bound_mm,
+        "excess": certificate.excess(expected),
+        "words": certificate.words(expected),
+        "assumes": ASSUMES,
+    }))
 }
 
 /// Errors set by set, with the estimator and the force that they are of.

@@ -3,13 +3,14 @@
 mod exports;
 mod plausible;
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use glam::DVec3;
 
 use self::plausible::{Origin, Places};
 use super::FileError;
-use super::npz::Arrays;
+use super::npz::{self, Arrays};
 use super::table::Table;
 use crate::dataset::SignalMatrix;
 use crate::plain::quote;
@@ -33,12 +34,11 @@ pub struct GivenData {
 /// # Errors
 /// [`FileError`] naming the file, the place in it and what to do.
 pub fn read(path: &Path, touches: Option<&Path>) -> Result<GivenData, FileError> {
-    let ending = path.extension().unwrap_or_default().to_string_lossy();
     let found = if path.is_dir() {
         exports::read(path, Touches::read(needed(path, touches)?)?)
-    } else if ending.eq_ignore_ascii_case("npz") {
+    } else if ends_with(path, "npz") {
         read_npz(path)
-    } else if ending.eq_ignore_ascii_case("csv") {
+    } else if ends_with(path, "csv") {
         read_csv(path, Touches::read(needed(path, touches)?)?)
     } else {
         Err(FileError::broken(
@@ -223,6 +223,64 @@ fn positions(path: &Path, arrays: &mut Arrays, name: &str) -> Result<Vec<DVec3>,
         .chunks_exact(3)
         .map(DVec3::from_slice)
         .collect())
+}
+
+/// Whether a dataset is an NPZ with an array of this name.
+///
+/// # Errors
+/// [`FileError`] when it is no readable archive.
+pub fn holds(path: &Path, array: &str) -> Result<bool, FileError> {
+    Ok(ends_with(path, "npz") && npz::holds(path, array)?)
+}
+
+/// The group of each touch, numbered from zero as they first appear: from the column `group` of a CSV, or from an
+/// array of the dataset. Nothing where the dataset is no NPZ, and the name none of a CSV.
+///
+/// # Errors
+/// [`FileError`] where there are none, not one for each touch, or no whole numbers.
+pub fn groups(path: &Path, name: &str, touches: usize) -> Result<Option<Vec<usize>>, FileError> {
+    let file = Path::new(name);
+    let (source, values) = if ends_with(file, "csv") {
+        (file, group_column(file)?)
+    } else if ends_with(path, "npz") {
+        (path, Arrays::open(path)?.numbers(name)?.values)
+    } else {
+        return Ok(None);
+    };
+    let broken = |what: String| Err(FileError::broken(source, what));
+    if values.len() != touches {
+        return broken(format!(
+            "there are {touches} touches, but {} has {} groups: one is needed a touch",
+            quote(name),
+            values.len()
+        ));
+    }
+    let wrong = |v: &f64| !(v.is_finite() && v.fract() == 0.0);
+    if let Some(at) = values.iter().position(wrong) {
+        return broken(format!(
+            "the group of touch {at} in {} is {}: groups are whole numbers",
+            quote(name),
+            values[at]
+        ));
+    }
+    let mut known = HashMap::new();
+    let number = |value: &f64| {
+        let next = known.len();
+        // Zero has two signs.
+        *known.entry((value + 0.0).to_bits()).or_insert(next)
+    };
+    Ok(Some(values.iter().map(number).collect()))
+}
+
+fn group_column(path: &Path) -> Result<Vec<f64>, FileError> {
+    let table = Table::read(path)?;
+    let [group] = table.columns(&["group"])?;
+    table.rows().map(|row| row?.number(group)).collect()
+}
+
+fn ends_with(path: &Path, ending: &str) -> bool {
+    let found = path.extension().unwrap_or_default().to_string_lossy();
+    found.eq_ignore_ascii_case(ending) && !path.is_dir()
 }
 
 const PLACE: [&str; 3] = ["x_mm", "y_mm", "z_mm"];

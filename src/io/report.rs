@@ -1,5 +1,6 @@
 //! The placement report: one HTML file that needs nothing else.
 
+mod certificate;
 mod matched;
 
 use std::fmt::Write as _;
@@ -94,6 +95,7 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
     number(page, &design.reduced.sites.len().to_string(), "candidates");
     page.push_str("</div>");
     matched::by_force(page, design);
+    certificate::line(page, design);
     let doubts = design.doubts();
     if !doubts.is_empty() {
         page.push_str("<div class=\"doubts\"><b>Numbers here that cannot be trusted</b><ul>");
@@ -102,14 +104,28 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
         }
         page.push_str("</ul></div>");
     }
-    let notes = design.notes();
-    if !notes.is_empty() {
-        page.push_str("<ul class=\"notes\">");
-        for note in notes {
-            let _ = write!(page, "<li>{}</li>", escape(&note));
-        }
-        page.push_str("</ul>");
+    let words = design.words();
+    list(page, "notes", &words.open);
+    if !words.folded.is_empty() {
+        let _ = write!(
+            page,
+            "<details><summary>How this came about: {} notes</summary>",
+            words.folded.len()
+        );
+        list(page, "more", &words.folded);
+        page.push_str("</details>");
     }
+}
+
+fn list(page: &mut String, class: &str, items: &[String]) {
+    if items.is_empty() {
+        return;
+    }
+    let _ = write!(page, "<ul class=\"{class}\">");
+    for item in items {
+        let _ = write!(page, "<li>{}</li>", escape(item));
+    }
+    page.push_str("</ul>");
 }
 
 /// The force (N) that figures without one of their own are of.

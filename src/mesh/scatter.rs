@@ -7,27 +7,49 @@ use super::TriMesh;
 /// Places that share in a vertex's value.
 const NEAREST: usize = 8;
 
-/// One value a vertex: the mean over the nearest places on the same side of the wall, weighed by a
-/// Gaussian as wide as half of them lie apart (E. Nadaraya, Theory Probab. Appl. 9, 1964). Places are
-/// positions (m) with outward unit normals.
-#[must_use]
-pub fn to_vertices(mesh: &TriMesh, places: &[(DVec3, DVec3)], values: &[f64]) -> Vec<f64> {
-    if places.is_empty() {
-        return vec![0.0; mesh.positions().len()];
-    }
-    (mesh.positions().iter().zip(mesh.vertex_normals()))
-        .map(|(&position, &normal)| {
+/// What values at some places weigh at the vertices of a surface: found once, for values that change often.
+pub struct Scatter {
+    /// Of each vertex the places that share in its value, and their weights; none where there are no places.
+    shares: Vec<Vec<(usize, f64)>>,
+}
+
+impl Scatter {
+    /// Places are positions (m) with outward unit normals. Those on the same side of the wall share in a vertex's
+    /// value, weighed by a Gaussian as wide as half of them lie apart (E. Nadaraya, Theory Probab. Appl. 9, 1964).
+    #[must_use]
+    pub fn new(mesh: &TriMesh, places: &[(DVec3, DVec3)]) -> Self {
+        let share = |(&position, &normal): (&DVec3, &DVec3)| {
             let near = nearest(places, position, normal);
-            let width = near[near.len() / 2].0.max(f64::MIN_POSITIVE);
+            let width = (near.get(near.len() / 2)).map_or(1.0, |n| n.0.max(f64::MIN_POSITIVE));
+            let weighed = |(squared, place): (f64, usize)| (place, (-0.5 * squared / width).exp());
+            near.into_iter().map(weighed).collect()
+        };
+        Self {
+            shares: (mesh.positions().iter().zip(mesh.vertex_normals()))
+                .map(share)
+                .collect(),
+        }
+    }
+
+    /// One value a vertex, from one a place: the weighed mean of those that share in it; zero where none do.
+    #[must_use]
+    pub fn carry(&self, values: &[f64]) -> Vec<f64> {
+        let mean = |shares: &Vec<(usize, f64)>| {
             let (mut sum, mut weight) = (0.0, 0.0);
-            for (squared, place) in near {
-                let w = (-0.5 * squared / width).exp();
+            for &(place, w) in shares {
                 sum += w * values[place];
                 weight += w;
             }
-            sum / weight
-        })
-        .collect()
+            if weight > 0.0 { sum / weight } else { 0.0 }
+        };
+        self.shares.iter().map(mean).collect()
+    }
+}
+
+/// One value a vertex, from values at places as [`Scatter::new`] takes them.
+#[must_use]
+pub fn to_vertices(mesh: &TriMesh, places: &[(DVec3, DVec3)], values: &[f64]) -> Vec<f64> {
+    Scatter::new(mesh, places).carry(values)
 }
 
 /// Squared distances and numbers of the nearest places, rising. Those on the other side of the wall

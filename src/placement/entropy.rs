@@ -51,6 +51,7 @@ impl Selector for Entropy<'_> {
                 criterion_mm: None,
                 gap: None,
                 lead: best.lead(),
+                certificate: None,
             };
             (request.found)(&set);
             sets.push(set);

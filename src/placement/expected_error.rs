@@ -2,24 +2,33 @@
 //!
 //! The criterion is the error in mm that model matching (`inference::matching`) is expected to make, over where
 //! touches come, how hard they are, and what is off: noise, gluing, the model itself. Gauges are added one by one,
-//! always the best of all sites (`bank`), and then exchanged for better ones while there are any.
+//! always the best of all sites (`bank`), and then exchanged for better ones while there are any. How far what comes out
+//! of that can be from the best set says `certificate`.
 
 /// Rounds of exchange.
 pub const ROUNDS: usize = 4;
 
 mod bank;
+mod certificate;
 mod elliptic;
 mod exchange;
+mod hand;
+mod mistaken;
 mod scene;
 
 use rayon::prelude::*;
 
+pub use self::certificate::{ASSUMES, Certificate, certify};
 pub use self::elliptic::mean_length;
-pub use self::scene::{Detail, Forces, Knowledge, Scene, Variance};
+pub use self::hand::{BLIND, Hand, blind, least_helpful, most_helpful};
+pub use self::mistaken::{Mistaken, Pair, posterior, taken_for, worst_pairs};
+pub use self::scene::{
+    Detail, Forces, Knowledge, Reading, Scatter, Scene, Template, Variance, templates,
+};
 
 use self::bank::{Bank, Rows};
 use super::lead::{self, Best};
-use super::wishes::{Field, shortage};
+use super::wishes::{Field, shortage, unreached};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Achieved, Cancelled, StopReason, Watch, Work, report};
 
@@ -73,6 +82,7 @@ impl Selector for ExpectedError<'_> {
         }
         let exchanged = exchange::exchange(&scenes, request, &empty, &field.chosen, self.rounds)?;
         let mut notes = field.constant_notes();
+        let mut places = field.chosen.clone();
         if let (Some(last), Some((chosen, error))) = (sets.last_mut(), exchanged) {
             let gained = before - error;
             if gained > 0.0 {
@@ -85,15 +95,20 @@ impl Selector for ExpectedError<'_> {
                 ));
                 *last = set_of(pool, &chosen, error, None);
                 (request.found)(last);
+                places = chosen;
             }
         }
-        notes.extend(unreached(&sets, request));
+        if let Some(last) = sets.last_mut() {
+            let (allowed, required) = (empty.allowed(), &request.wishes.required);
+            last.certificate = certify(&scenes.fine, &allowed, required, &places, watch)?;
+        }
+        let mut cautions = Vec::from_iter(unreached(&sets, request.wishes));
         notes.extend(lead::ties(&sets, lead::TOLERANCE));
         let wanted = request.wishes.sensors;
         let why = field.closed();
         let short = why.is_some();
         if let Some(why) = why {
-            notes.push(shortage(&why, sets.len(), wanted));
+            cautions.push(shortage(&why, sets.len(), wanted));
         }
         Ok(Selection {
             selector: SelectorKind::ExpectedError,
@@ -108,6 +123,7 @@ impl Selector for ExpectedError<'_> {
                 } else {
                     StopReason::Converged
                 },
+                cautions,
                 notes,
             },
             sets,
@@ -125,16 +141,6 @@ fn reached(sets: &[SensorSet], request: &Request) -> bool {
         && sets.len() >= request.wishes.required.len()
 }
 
-/// A note where the wished error is not reached.
-fn unreached(sets: &[SensorSet], request: &Request) -> Option<String> {
-    let error = sets.last().and_then(|s| s.criterion)?;
-    let target = request.wishes.target_mm.filter(|t| error > *t)?;
-    Some(format!(
-        "The error asked for, {target} mm, was not reached: {error:.2} mm with {} gauges.",
-        sets.len()
-    ))
-}
-
 fn set_of(pool: &Pool, chosen: &[usize], error: f64, lead: Option<f64>) -> SensorSet {
     SensorSet {
         sites: chosen.iter().map(|&p| pool.sites[p]).collect(),
@@ -142,6 +148,7 @@ fn set_of(pool: &Pool, chosen: &[usize], error: f64, lead: Option<f64>) -> Senso
         criterion_mm: Some(error),
         gap: None,
         lead,
+        certificate: None,
     }
 }
 
@@ -228,6 +235,13 @@ fn scan(
 pub fn expected(scene: &Scene, sites: &[usize]) -> (f64, Vec<f64>) {
     let bank = Bank::of(scene, sites);
     (bank.error(), bank.errors())
+}
+
+/// The part of the expected error (mm) of a set of sites that is left where one place is meant: its Bayesian
+/// Cramér–Rao bound.
+#[must_use]
+pub fn local(scene: &Scene, sites: &[usize]) -> f64 {
+    Bank::of(scene, sites).local()
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use self::exact::{Judge, Judged};
 use self::race::{Raced, Relation, Rules, Scored, race};
 use self::screen::{Base, LEVELS, Sieve, Stop};
 use super::lead;
-use super::wishes::{Field, Wishes, shortage};
+use super::wishes::{Field, Wishes, shortage, unreached};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Achieved, Cancelled, Progress, StopReason, Watch, Work, report};
 use crate::dataset::SignalMatrix;
@@ -81,6 +81,7 @@ impl Selector for GreedySvr {
                 criterion_mm: Some(step.error),
                 gap: Some(step.gap),
                 lead: step.lead,
+                certificate: None,
             });
             (request.found)(&sets[sets.len() - 1]);
             if request.wishes.target_mm.is_some_and(|t| step.error <= t) {
@@ -88,14 +89,16 @@ impl Selector for GreedySvr {
             }
         }
         let no_room = field.closed().filter(|_| stop == StopReason::NoRoom);
-        let mut notes = field.constant_notes();
+        let mut cautions = Vec::new();
         match no_room {
             Some(why) if sets.is_empty() => return Err(PlacementError::NoRoom { why }),
-            Some(why) => notes.push(shortage(&why, sets.len(), request.wishes.sensors)),
+            Some(why) => cautions.push(shortage(&why, sets.len(), request.wishes.sensors)),
             None if sets.is_empty() => return Err(PlacementError::NoSites),
             None => {}
         }
-        notes.extend(search.notes(&sets, request.wishes));
+        cautions.extend(unreached(&sets, request.wishes));
+        let mut notes = field.constant_notes();
+        notes.extend(search.notes(&sets));
         if !search.converged && stop == StopReason::Converged {
             stop = StopReason::EffortSpent;
         }
@@ -108,6 +111,7 @@ impl Selector for GreedySvr {
                 unit: "mm",
                 effort: search.work,
                 stop_reason: stop,
+                cautions,
                 notes,
             },
             sets,
@@ -595,7 +599,7 @@ impl<'a> Search<'a> {
         self.report(step).is_err()
     }
 
-    fn notes(&self, sets: &[SensorSet], wishes: &Wishes) -> Vec<String> {
+    fn notes(&self, sets: &[SensorSet]) -> Vec<String> {
         let mut notes = Vec::new();
         notes.extend(self.degenerate().or_else(|| self.out_of_scale()));
         notes.extend(lead::ties(sets, self.settings.tolerance));
@@ -611,14 +615,6 @@ impl<'a> Search<'a> {
             100.0 * self.widest,
             100.0 * gap
         ));
-        let reached = sets.last().and_then(|s| s.criterion);
-        let reached = reached.unwrap_or(f64::INFINITY);
-        if let Some(target) = wishes.target_mm.filter(|t| reached > *t) {
-            notes.push(format!(
-                "The error asked for, {target} mm, was not reached: {reached:.2} mm with {} gauges.",
-                sets.len()
-            ));
-        }
         notes
     }
 }

@@ -159,10 +159,11 @@ pub(super) fn finish(
     }
     notes.extend(field.constant_notes());
     notes.extend(lead::ties(&sets, lead::TOLERANCE));
+    let mut cautions = Vec::new();
     if let Some(why) = no_room {
-        notes.push(shortage(&why, sets.len(), wanted));
+        cautions.push(shortage(&why, sets.len(), wanted));
     } else if short {
-        notes.push(format!(
+        cautions.push(format!(
             "Only {} of {wanted} gauges: beyond them nothing uncertain is left that wishes allow.",
             sets.len()
         ));
@@ -176,6 +177,7 @@ pub(super) fn finish(
             unit: "",
             effort: Work::default(),
             stop_reason,
+            cautions,
             notes,
         },
         sets,

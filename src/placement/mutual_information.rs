@@ -68,6 +68,7 @@ impl Selector for MutualInformation<'_> {
                 criterion_mm: None,
                 gap: None,
                 lead: best.lead(),
+                certificate: None,
             };
             (request.found)(&set);
             sets.push(set);

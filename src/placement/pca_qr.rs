@@ -67,6 +67,7 @@ pub fn from_components(
                 criterion_mm: None,
                 gap: None,
                 lead,
+                certificate: None,
             };
             (request.found)(&set);
             sets.push(set);
@@ -97,10 +98,11 @@ pub fn from_components(
                 None if short => StopReason::Exhausted,
                 None => StopReason::Converged,
             },
-            notes: (no_room.map(|why| wishes::shortage(&why, reached, wanted)))
+            cautions: (no_room.map(|why| wishes::shortage(&why, reached, wanted)))
                 .or_else(|| short.then(|| shortage(pca, reached, wanted)))
                 .into_iter()
-                .chain(whole.constant_notes())
+                .collect(),
+            notes: (whole.constant_notes().into_iter())
                 .chain(lead::ties(&sets, lead::TOLERANCE))
                 .collect(),
         },

@@ -1,6 +1,6 @@
 //! What is asked of a choice beside its number of gauges, the same for every selector.
 
-use super::{PlacementError, Pool};
+use super::{PlacementError, Pool, SensorSet};
 use crate::pca::PcaError;
 use crate::regression::Standardizer;
 
@@ -38,6 +38,17 @@ impl Wishes {
 #[must_use]
 pub fn shortage(why: &str, reached: usize, wanted: usize) -> String {
     format!("Only {reached} of {wanted} gauges fit: {why}.")
+}
+
+/// What is to be said where the error that was asked for is not reached.
+#[must_use]
+pub fn unreached(sets: &[SensorSet], wishes: &Wishes) -> Option<String> {
+    let error = sets.last().and_then(|s| s.criterion)?;
+    let target = wishes.target_mm.filter(|t| error > *t)?;
+    Some(format!(
+        "The error asked for, {target} mm, was not reached: {error:.2} mm with {} gauges.",
+        sets.len()
+    ))
 }
 
 /// Which places may still be chosen, as the choice grows: none whose signal never changes.
@@ -139,6 +150,12 @@ impl<'a> Field<'a> {
         if let Some(&next) = self.wishes.required.get(self.chosen.len()) {
             return vec![next];
         }
+        self.allowed()
+    }
+
+    /// What may be chosen, were there nothing that must be.
+    #[must_use]
+    pub fn allowed(&self) -> Vec<usize> {
         (0..self.open.len())
             .filter(|&p| self.open[p] && self.affordable(p))
             .collect()

@@ -23,7 +23,7 @@ pub struct SelectionKeys {
     /// Places of gauges that must be there; the nearest site is taken.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub required_mm: Vec<[f64; 3]>,
-    /// Error at which greedy SVR adds no more gauges.
+    /// Error at which greedy SVR and expected error add no more gauges.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_mm: Option<f64>,
     /// What all gauges together may cost.
@@ -48,7 +48,7 @@ impl Default for SelectionKeys {
     fn default() -> Self {
         let hyper = Hyper::default();
         Self {
-            selector: SelectorKind::GreedySvr,
+            selector: SelectorKind::default(),
             sensors: 10,
             c_mm: hyper.c,
             epsilon_mm: hyper.epsilon,
@@ -59,7 +59,7 @@ impl Default for SelectionKeys {
             cost_budget: None,
             with_noise: false,
             failure: 0.0,
-            compare: true,
+            compare: false,
             gaussian_process: GaussianProcessKeys::default(),
             costs: Vec::new(),
             sites: Vec::new(),

@@ -41,6 +41,13 @@ impl Grouping {
     }
 }
 
+/// The point that each touch lies at (positions in mm), numbered as they first appear: as [`Grouping::Place`], but
+/// presses of several depths are apart, on a flat skin too. Only those that are not may be averaged.
+#[must_use]
+pub fn points(targets: &[[f64; 3]]) -> Vec<usize> {
+    grouped(targets, SAME * largest(extents(targets)), None)
+}
+
 /// Touches nearer than this share of the extent of all lie at one place. A probing machine comes back to a place
 /// to a few millionths of its reach; thousands of touches drawn at random come no nearer by chance.
 const SAME: f64 = 1e-5;
@@ -50,7 +57,12 @@ const FLAT: f64 = 0.25;
 /// The place of each touch: the first whose first touch is no farther than `reach` (mm). On a flat skin presses of
 /// several depths are at one place.
 fn places(targets: &[[f64; 3]], reach: f64) -> Vec<usize> {
-    let depth = depth(extents(targets));
+    grouped(targets, reach, depth(extents(targets)))
+}
+
+/// The group of each touch: the first whose first touch is no farther than `reach` (mm), whatever its place along
+/// the axis that does not count.
+fn grouped(targets: &[[f64; 3]], reach: f64, without: Option<usize>) -> Vec<usize> {
     let mut known = Known {
         reach,
         firsts: Vec::new(),
@@ -58,7 +70,7 @@ fn places(targets: &[[f64; 3]], reach: f64) -> Vec<usize> {
     };
     let along_the_skin = |target: &[f64; 3]| {
         let mut at = *target;
-        if let Some(axis) = depth {
+        if let Some(axis) = without {
             at[axis] = 0.0;
         }
         at
@@ -155,6 +167,11 @@ mod tests {
         // Depth is a place of its own where the skin is not flat.
         let round = pressed(|x, y| 0.02 * x * y, 1.5);
         assert_eq!(Grouping::Place.of(&round), Grouping::Touch.of(&round));
+        // And where they are to be averaged, on a flat skin too.
+        let flat = pressed(|_, _| 0.0, 1.5);
+        assert_eq!(points(&flat), Grouping::Touch.of(&flat));
+        let repeated = pressed(|_, _| 0.0, 0.0);
+        assert_eq!(points(&repeated), Grouping::Place.of(&repeated));
         let coarse = Grouping::Within(15.0).of(&round);
         assert!(*coarse.iter().max().unwrap() < 12);
     }

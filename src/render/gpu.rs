@@ -60,7 +60,8 @@ pub struct Shown {
     pub displacement: [f32; 3],
     /// Field, 0–1 over the legend's range.
     pub value: f32,
-    /// 255 where a layer is: gauges may go, touches come, held, gauges must not go.
+    /// 255 where a layer is: gauges may go (or what is blind, where that is marked), touches come, held, gauges
+    /// must not go.
     pub region: [u8; 4],
 }
 
@@ -74,7 +75,8 @@ pub struct Uniforms {
     pub deform: [f32; 4],
     /// A plane: what lies on its positive side is cut away.
     pub section: [f32; 4],
-    /// x: how much of the wall that faces the eye covers what is behind it, 1 for all.
+    /// x: how much of the wall that faces the eye covers what is behind it, 1 for all; y: 1 where the first layer
+    /// marks what is blind.
     pub look: [f32; 4],
 }
 

@@ -53,6 +53,8 @@ pub enum Command {
     Disconnect,
     Pin,
     RemoveGauges,
+    AddHelpful,
+    FindSpare,
     Nudge(Way),
     Frame,
     FramePicked,
@@ -102,6 +104,8 @@ impl Command {
             Self::Follow => "Follow changes",
             Self::Pin => "Pin picked gauges",
             Self::RemoveGauges => "Remove picked gauges",
+            Self::AddHelpful => "Add the gauge that helps most",
+            Self::FindSpare => "Find the gauge that helps least",
             Self::Nudge(Way::Left) => "Move picked gauges left",
             Self::Nudge(Way::Right) => "Move picked gauges right",
             Self::Nudge(Way::Up) => "Move picked gauges up",
@@ -147,6 +151,8 @@ impl Command {
             Self::Unrolled => "Unrolled",
             Self::Pin => "Pin",
             Self::RemoveGauges => "Remove",
+            Self::AddHelpful => "Add best",
+            Self::FindSpare => "Find least",
             other => other.name(),
         }
     }
@@ -191,6 +197,10 @@ impl Command {
             Self::Follow => "Compute anew what a change has made stale, a draft first; on or off",
             Self::Pin => "Selections must have a gauge there; pinned ones are let go",
             Self::RemoveGauges => "Take the picked gauges away",
+            Self::AddHelpful => "At the free site with which the expected error is least",
+            Self::FindSpare => {
+                "Pick the gauge without which the expected error is least; Delete then takes it away"
+            }
             Self::Nudge(_) => "To the next free site that way on the screen",
             Self::Frame => "Show the whole limb",
             Self::FramePicked => "Come near to the picked gauges",
@@ -241,6 +251,8 @@ impl Command {
             Self::Record => plain(Key::F9),
             Self::Pin => plain(Key::P),
             Self::RemoveGauges => plain(Key::Delete),
+            Self::AddHelpful => plain(Key::A),
+            Self::FindSpare => plain(Key::W),
             Self::Nudge(Way::Left) => plain(Key::ArrowLeft),
             Self::Nudge(Way::Right) => plain(Key::ArrowRight),
             Self::Nudge(Way::Up) => plain(Key::ArrowUp),
@@ -314,6 +326,8 @@ impl Command {
             Self::Disconnect,
             Self::Pin,
             Self::RemoveGauges,
+            Self::AddHelpful,
+            Self::FindSpare,
             Self::Frame,
             Self::FramePicked,
             Self::SeeThrough,
@@ -351,6 +365,7 @@ impl Studio {
             Command::Pin | Command::RemoveGauges | Command::FramePicked | Command::Nudge(_) => {
                 !self.picked.is_empty()
             }
+            Command::AddHelpful | Command::FindSpare => self.no_help(command).is_none(),
             _ => true,
         }
     }
@@ -427,6 +442,8 @@ impl Studio {
             Command::Follow => self.drive.follow = !self.drive.follow,
             Command::Pin => self.pin_picked(),
             Command::RemoveGauges => self.remove_picked(),
+            Command::AddHelpful => self.add_helpful(ctx),
+            Command::FindSpare => self.find_spare(ctx),
             Command::Nudge(way) => self.nudge(way),
             command => self.change_view(ctx, command),
         }
@@ -516,7 +533,8 @@ impl Studio {
         let response = ui
             .add_enabled(self.enabled(command), button)
             .accessible_name(command.name())
-            .on_hover_text(command.tooltip());
+            .on_hover_text(command.tooltip())
+            .on_disabled_hover_text(self.no_help(command).unwrap_or(command.tooltip()));
         if response.clicked() {
             let ctx = ui.ctx().clone();
             self.execute(&ctx, command);
@@ -543,6 +561,21 @@ impl Studio {
         }
         ui.separator();
         self.button(ui, Command::Follow);
+    }
+
+    fn gauges_menu(&mut self, ui: &mut egui::Ui) {
+        for command in [
+            Command::Pin,
+            Command::RemoveGauges,
+            Command::AddHelpful,
+            Command::FindSpare,
+        ] {
+            self.button(ui, command);
+        }
+        ui.separator();
+        for way in Way::ALL {
+            self.button(ui, Command::Nudge(way));
+        }
     }
 
     pub(super) fn menu(&mut self, ui: &mut egui::Ui) {
@@ -584,15 +617,7 @@ impl Studio {
                         self.button(ui, command);
                     }
                 });
-                ui.menu_button("Gauges", |ui| {
-                    for command in [Command::Pin, Command::RemoveGauges] {
-                        self.button(ui, command);
-                    }
-                    ui.separator();
-                    for way in Way::ALL {
-                        self.button(ui, Command::Nudge(way));
-                    }
-                });
+                ui.menu_button("Gauges", |ui| self.gauges_menu(ui));
                 ui.separator();
                 self.button(ui, Command::Palette);
             });

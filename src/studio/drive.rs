@@ -30,6 +30,9 @@ pub(super) enum Finished {
     Exported(PathBuf),
     Estimate(f64),
     Judged(Arc<Evaluation>),
+    InHand(Arc<design::InHand>),
+    Helped(Box<super::helping::Helped>),
+    Confused(Vec<crate::placement::expected_error::Pair>),
     Advised(Arc<crate::design::Advice>),
     Traded(Box<crate::io::trade_file::Record>),
     Field(Vec<f64>),
@@ -385,6 +388,9 @@ impl Studio {
             }
             // Of gauges that have moved on.
             Finished::Estimate(_) | Finished::Judged(..) => {}
+            Finished::InHand(in_hand) => self.take_in_hand(key, in_hand),
+            Finished::Helped(helped) => self.take_help(*helped, &key),
+            Finished::Confused(pairs) => self.take_confusions(key, pairs),
             Finished::Traded(record) => self.take_trade(*record, &key),
             Finished::Advised(advice) => self.advice = Some((key, advice)),
             Finished::Field(values) => self.slow = Some((key, Arc::new(values))),
@@ -393,7 +399,7 @@ impl Studio {
         }
     }
 
-    fn dropped(&mut self, what: &str) {
+    pub(super) fn dropped(&mut self, what: &str) {
         self.tell(format!(
             "The {what} was for settings that have changed since, and was dropped"
         ));
@@ -608,7 +614,13 @@ impl Studio {
 
     /// Ends whatever runs, at once; what is over before anybody notices goes on.
     pub fn cancel(&mut self) {
-        let ended = self.end_jobs(|task| !matches!(task, Task::Filter | Task::Field));
+        let quick = |task| {
+            matches!(
+                task,
+                Task::Filter | Task::Field | Task::Expect | Task::Confuse
+            )
+        };
+        let ended = self.end_jobs(|task| !quick(task));
         if !ended.is_empty() {
             self.tell(format!("Cancelled: {}", ended.join(", ")));
         }

@@ -25,18 +25,21 @@ pub enum Field {
     Displacement,
     SignalToNoise,
     Error,
+    /// By matching, of the gauges as they are; what they are blind to is marked.
+    Expected,
     Uncertainty,
     Faces,
     Thickness,
 }
 
 impl Field {
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Region,
         Self::Strain,
         Self::Displacement,
         Self::SignalToNoise,
         Self::Error,
+        Self::Expected,
         Self::Uncertainty,
         Self::Faces,
         Self::Thickness,
@@ -50,6 +53,7 @@ impl Field {
             Self::Displacement => "Displacement",
             Self::SignalToNoise => "Signal to noise",
             Self::Error => "Localization error",
+            Self::Expected => "Expected error",
             Self::Uncertainty => "GP variance",
             Self::Faces => "Faces",
             Self::Thickness => "Wall thickness",
@@ -98,7 +102,7 @@ pub(super) struct Built {
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Legend {
-    pub title: &'static str,
+    pub title: String,
     pub low: f64,
     pub high: f64,
     pub map: ColorMap,
@@ -168,7 +172,9 @@ impl Studio {
         let field = self.view.field;
         let slow = self.slow.as_ref().map(|(_, values)| Arc::as_ptr(values));
         format!(
-            "{field:?} {:?} {:?} {} {:?} {:?} {:?} {:?} {slow:?}",
+            "{field:?} {:?} {:?} {:?} {} {:?} {:?} {:?} {:?} {slow:?}",
+            (field == Field::Expected)
+                .then(|| (self.expected.version, self.expected_shown().is_some())),
             matches!(field, Field::Faces | Field::Thickness).then(|| {
                 (
                     self.advice.as_ref().map(|(_, a)| Arc::as_ptr(a)),
@@ -230,8 +236,8 @@ impl Studio {
 
     /// The chosen field a vertex of the part, in the units of its legend.
     fn field_values(&mut self, ctx: &Context, key: &str) -> Option<(Vec<f64>, Legend)> {
-        let legend = |title, low, high, map| Legend {
-            title,
+        let legend = |title: &str, low, high, map| Legend {
+            title: title.to_owned(),
             low,
             high,
             map,
@@ -281,6 +287,15 @@ impl Studio {
                 let map = ColorMap::Viridis;
                 Some((errors.to_vec(), legend("error (mm)", 0.0, top, map)))
             }
+            Field::Expected => {
+                let vertices = self.document.part.positions().len();
+                let answer = self.expected_shown()?;
+                let values = answer.expected.map_mm.clone();
+                let [lightest, hardest] = self.expected.in_hand()?.forces_n;
+                let title = format!("expected error (mm), {lightest}–{hardest} N");
+                let found = legend(&title, 0.0, answer.top_mm, ColorMap::Viridis);
+                (values.len() == vertices).then_some((values, found))
+            }
             Field::Uncertainty => {
                 let variances = self.slow_field(ctx, key)?;
                 let map = ColorMap::Viridis;
@@ -329,9 +344,22 @@ impl Studio {
         last
     }
 
-    /// Writes the layers into what is shown.
+    /// What the gauges are blind to, a vertex of the part, where that is marked.
+    fn blind_shown(&self) -> Option<&[f64]> {
+        let answer = self.expected_shown();
+        let answer = answer.filter(|_| self.view.field == Field::Expected)?;
+        Some(&answer.expected.blind_map)
+    }
+
+    /// Writes the layers into what is shown, or what the gauges are blind to in place of the first.
     fn colour_regions(&self, shown: &mut [Shown]) {
         let shades = |weight: f64| (255.0 * weight.clamp(0.0, 1.0)) as u8;
+        if let Some(blind) = self.blind_shown() {
+            for (shown, blind) in shown.iter_mut().zip(blind) {
+                shown.region = [shades(*blind), 0, 0, 0];
+            }
+            return;
+        }
         let verdicts = self.current_verdicts().map(|verdicts| {
             let passed = verdicts
                 .verdicts

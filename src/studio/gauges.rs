@@ -10,6 +10,7 @@ use super::drive::Finished;
 use super::jobs::Task;
 use super::tools::Gesture;
 use super::viewport::Pane;
+use crate::dataset::Site;
 use crate::design::{self, DesignError};
 use crate::elasticity::observe::tangent_frame;
 use crate::evaluation::{EVERYWHERE, Evaluation};
@@ -182,7 +183,7 @@ impl Studio {
     }
 
     /// Feasible sites (of the dataset) that no gauge other than one has.
-    fn free_sites(&self, number: usize) -> Vec<usize> {
+    pub(super) fn free_sites(&self, number: usize) -> Vec<usize> {
         // On a layout or by verdicts that no longer hold nothing is moved.
         let current = self.shown_feasible_key();
         let (Some(simulation), Some(key)) = (&self.simulation, current) else {
@@ -295,10 +296,20 @@ impl Studio {
 
     /// The gauges as sites of the dataset of the design, where each is one.
     fn gauge_sites(&self) -> Option<Vec<usize>> {
+        let result = self.design.as_ref()?;
+        self.gauges_among(&result.design.simulated.dataset.sites)
+    }
+
+    /// The same of the simulation that is shown.
+    pub(super) fn simulated_sites(&self) -> Option<Vec<usize>> {
+        let simulation = self.simulation.as_ref()?;
+        self.gauges_among(&simulation.simulated.dataset.sites)
+    }
+
+    /// The gauges as some sites, where each is one.
+    fn gauges_among(&self, all: &[Site]) -> Option<Vec<usize>> {
         /// What a direction at right angles counts, as a distance (m).
         const TURNED: f64 = 1e-3;
-        let result = self.design.as_ref()?;
-        let all = &result.design.simulated.dataset.sites;
         let spacing = self.document.state.project.sites.spacing_mm * 1e-3;
         let sites = &self.document.state.project.selection.sites;
         let find = |site: &ChosenSite| {
@@ -344,7 +355,12 @@ impl Studio {
         }
         let exact = self.by_hand.exact.as_ref();
         let row = exact.and_then(|e| e.rows.iter().find(|r| r.region == EVERYWHERE));
-        (self.by_hand.estimate, row.map(|r| r.error_mm))
+        let estimate = if self.is_matched() {
+            self.expected_error()
+        } else {
+            self.by_hand.estimate
+        };
+        (estimate, row.map(|r| r.error_mm))
     }
 
     /// Whether the gauges are those that the design chose.
@@ -395,7 +411,11 @@ impl Studio {
         format!("{:?} {}", self.by_hand.sites, self.by_hand.of)
     }
 
+    /// By regression; what is expected of matching is known anyway.
     fn start_estimate(&mut self, ctx: &Context) {
+        if self.is_matched() {
+            return;
+        }
         let (Some(sites), Some(result)) = (self.gauge_sites(), &self.design) else {
             return;
         };

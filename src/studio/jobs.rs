@@ -27,6 +27,12 @@ pub enum Task {
     /// Speed against accuracy.
     Trade,
     Judge,
+    /// What moves of gauges are asked of.
+    Expect,
+    /// The gauge that helps most, or least.
+    Help,
+    /// Touches that are taken for each other.
+    Confuse,
     /// A field that takes a while.
     Field,
     Measure,
@@ -54,6 +60,9 @@ impl Task {
             Self::Open => "Open".into(),
             Self::Estimate => "Estimate the error".into(),
             Self::Judge => "Judge the gauges".into(),
+            Self::Expect => "Prepare the expected error".into(),
+            Self::Help => "Look for a gauge".into(),
+            Self::Confuse => "Look for confusions".into(),
             Self::Advise => "Measure the walls".into(),
             Self::Trade => "Measure the trade".into(),
             Self::Field => "Compute the field".into(),
@@ -84,6 +93,8 @@ impl Task {
                 | Self::Open
                 | Self::Estimate
                 | Self::Advise
+                | Self::Expect
+                | Self::Confuse
                 | Self::Field
                 | Self::Measure
                 | Self::Save

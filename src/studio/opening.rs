@@ -10,7 +10,10 @@ use egui::Context;
 use super::drive::Finished;
 use super::jobs::Task;
 use super::viewport::Viewport;
-use super::{Stage, Studio, drive, gauges, jobs, live, recent, results, touching, trade};
+use super::{
+    Stage, Studio, confusions, drive, expected, gauges, jobs, live, recent, results, touching,
+    trade,
+};
 use crate::cli;
 use crate::design::Inputs;
 use crate::document::{Document, State};
@@ -228,6 +231,8 @@ impl Studio {
             last: BTreeMap::new(),
             picked: Vec::new(),
             by_hand: gauges::ByHand::default(),
+            expected: expected::Expecting::default(),
+            confusions: confusions::Confusions::default(),
             shown_kept: BTreeSet::new(),
             slow: None,
             advice: None,

@@ -17,6 +17,8 @@ use crate::render::gpu::{Frame3d, Slot, Uniforms};
 
 /// How much a wall covers what is behind it when it can be seen through.
 const GHOST: f32 = 0.22;
+/// What stands for the stripes of blind places in a key.
+const BLIND_KEY: Color32 = Color32::from_gray(150);
 /// Of a gauge's number (points).
 const MARK: f32 = 9.0;
 
@@ -52,12 +54,7 @@ impl Studio {
             target_scale: [target.x, target.y, target.z, (1.0 / camera.distance) as f32],
             deform: self.deform_flags(self.exaggeration().unwrap_or(0.0) as f32),
             section,
-            look: [
-                if self.view.see_through { GHOST } else { 1.0 },
-                0.0,
-                0.0,
-                0.0,
-            ],
+            look: self.look(if self.view.see_through { GHOST } else { 1.0 }),
         };
         let back = if transparent {
             Color32::TRANSPARENT
@@ -85,6 +82,12 @@ impl Studio {
         [exaggeration, flag(field), flag(region), 0.0]
     }
 
+    /// How much walls cover what is behind them, and whether blind places are marked.
+    fn look(&self, cover: f32) -> [f32; 4] {
+        let marked = self.view.field == Field::Expected && self.shows_field();
+        [cover, f32::from(u8::from(marked)), 0.0, 0.0]
+    }
+
     pub(super) fn paint_unrolled(&self, ui: &Ui, rect: Rect) {
         let Some((built, flat)) =
             (self.view.built.as_ref()).and_then(|built| Some((built, built.flat.as_ref()?)))
@@ -109,7 +112,7 @@ impl Studio {
             target_scale: [middle.x as f32, middle.y as f32, 0.0, (1.0 / unit) as f32],
             deform: self.deform_flags(0.0),
             section: [0.0, 0.0, 0.0, -1.0],
-            look: [1.0, 0.0, 0.0, 0.0],
+            look: self.look(1.0),
         };
         let back = theme::backdrop(ui.ctx().theme());
         let frame = Frame3d {
@@ -316,7 +319,10 @@ impl Studio {
             pos2(rect.right() - 34.0, bottom - 210.0),
             pos2(rect.right() - 16.0, bottom),
         );
-        let board = Rect::from_min_max(bar.min - vec2(86.0, 30.0), bar.max + vec2(8.0, 8.0));
+        let font = FontId::proportional(11.5);
+        let title = painter.layout_no_wrap(legend.title.clone(), font, Color32::WHITE);
+        let left = (bar.left() - 86.0).min(bar.right() - title.size().x - 8.0);
+        let board = Rect::from_min_max(pos2(left, bar.top() - 30.0), bar.max + vec2(8.0, 8.0));
         painter.rect_filled(board, 6.0, Color32::from_black_alpha(150));
         let strips = 64;
         for k in 0..strips {
@@ -344,13 +350,8 @@ impl Studio {
                 Color32::WHITE,
             );
         }
-        painter.text(
-            board.right_top() + vec2(-8.0, 6.0),
-            Align2::RIGHT_TOP,
-            legend.title,
-            FontId::proportional(11.5),
-            Color32::WHITE,
-        );
+        let corner = board.right_top() + vec2(-8.0 - title.size().x, 6.0);
+        painter.galley(corner, title, Color32::WHITE);
     }
 
     pub(super) fn paint_hint(&self, painter: &Painter, rect: Rect) {
@@ -393,6 +394,11 @@ impl Studio {
         if self.view.field == Field::Faces && self.shows_field() {
             return face_key(painter, rect);
         }
+        if self.view.field == Field::Expected && self.shows_field() {
+            let force = self.document.state.project.touch.force_n;
+            let blind = format!("Blind at {force} N");
+            return colour_key(painter, rect, std::iter::once((&*blind, BLIND_KEY)));
+        }
         if self.view.field != Field::Region {
             return;
         }
@@ -431,6 +437,16 @@ impl Studio {
             Field::Error if self.design.is_none() => {
                 "Press “Select gauges” to see where touches are found well and where not"
             }
+            Field::Expected if self.simulation_holds() != Some(true) => {
+                "Press “Simulate” to see where touches are expected to be found well and where not"
+            }
+            Field::Expected if self.document.state.project.selection.sites.is_empty() => {
+                "Put gauges to see what is expected of them: tool “Gauges”, Ctrl-click"
+            }
+            Field::Expected if self.expected_shown().is_some() => {
+                "Point at the limb: what a touch there is taken for   ·   drag gauges with the tool “Gauges”"
+            }
+            Field::Expected => "Preparing the expected error …",
             Field::Uncertainty if self.design.is_none() => {
                 "Press “Select gauges” to see what the gauges leave uncertain"
             }

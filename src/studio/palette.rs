@@ -109,7 +109,8 @@ impl Studio {
         let response = ui
             .add_enabled(self.enabled(command), button)
             .accessible_name(format!("Palette: {}", command.name()))
-            .on_hover_text(command.tooltip());
+            .on_hover_text(command.tooltip())
+            .on_disabled_hover_text(self.no_help(command).unwrap_or(command.tooltip()));
         if marked && moved {
             response.scroll_to_me(Some(Align2::CENTER_CENTER.y()));
         }

@@ -7,6 +7,8 @@ use super::Studio;
 use crate::evaluation::{BASELINE, EVERYWHERE, EstimatorKind};
 use crate::io::artifacts::{range, signal_to_noise, signal_unit};
 use crate::io::report::{curve, failure_curve, failure_name, failure_ways};
+use crate::placement::SensorSet;
+use crate::placement::expected_error::ASSUMES;
 
 /// What is shown below the views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -16,6 +18,7 @@ pub(super) enum Tab {
     Failures,
     Compare,
     Gauges,
+    Confusions,
     Reduction,
     Trade,
     Live,
@@ -23,11 +26,12 @@ pub(super) enum Tab {
 }
 
 impl Tab {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::Error,
         Self::Failures,
         Self::Compare,
         Self::Gauges,
+        Self::Confusions,
         Self::Reduction,
         Self::Trade,
         Self::Live,
@@ -40,6 +44,7 @@ impl Tab {
             Self::Failures => "Failures",
             Self::Compare => "Compare",
             Self::Gauges => "Gauge table",
+            Self::Confusions => "Confusions",
             Self::Reduction => "Reduction",
             Self::Trade => "Trade",
             Self::Live => "Strains",
@@ -110,6 +115,7 @@ impl Studio {
                 ui.colored_label(super::theme::STALE, "of settings that have changed since");
             }
             self.by_hand_label(ui);
+            self.certificate_label(ui);
             self.doubt_label(ui);
         });
         ui.separator();
@@ -131,6 +137,7 @@ impl Studio {
             Tab::Error => self.error_plots(ui),
             Tab::Failures => self.failure_plots(ui),
             Tab::Gauges => self.gauge_table(ui),
+            Tab::Confusions => self.confusions_tab(ui),
             Tab::Compare => self.compare_tab(ui),
             Tab::Reduction => self.reduction_plot(ui),
             Tab::Trade => self.trade_tab(ui),
@@ -153,6 +160,16 @@ impl Studio {
         let text = format!("not to be trusted: {}", numbers.join(", "));
         ui.colored_label(super::theme::ERROR, text)
             .on_hover_text(words.join("\n"));
+    }
+
+    /// How far the selected gauges are at most from the best ones, while they stand as they were selected.
+    fn certificate_label(&self, ui: &mut Ui) {
+        let set = self.design.as_ref().and_then(|d| d.design.chosen_set());
+        let words = set.and_then(SensorSet::certified);
+        if let Some(words) = words.filter(|_| self.results.is_of_design() && self.as_designed()) {
+            ui.separator();
+            ui.label(words).on_hover_text(ASSUMES);
+        }
     }
 
     /// What gauges that were moved by hand do to the error.

@@ -403,15 +403,13 @@ impl Studio {
 
     /// What a reader must know before a result is believed, folded up.
     fn notes_of(&self, ui: &mut Ui, stage: Stage) {
-        let known = self
-            .simulation
-            .as_ref()
-            .map(|s| &s.simulated.achieved.notes);
+        let of_model: Vec<String> = (self.simulation.as_ref())
+            .map(|s| s.simulated.achieved.words().cloned().collect())
+            .unwrap_or_default();
         let notes: Vec<String> = match (stage, &self.design) {
-            (Stage::Simulation, _) => known.cloned().unwrap_or_default(),
+            (Stage::Simulation, _) => of_model,
             (Stage::Evaluation, Some(d)) => {
-                let of_model = &d.design.simulated.achieved.notes;
-                let notes = d.design.notes().into_iter();
+                let notes = [d.design.cautions(), d.design.notes()].concat().into_iter();
                 notes.filter(|n| !of_model.contains(n)).collect()
             }
             _ => return,

@@ -46,7 +46,8 @@ impl Studio {
         let has = self.view.section.is_some()
             || self.view.tool.paints()
             || self.view.ranges.of(self.view.field).is_some()
-            || self.view.tool == Tool::Gauges;
+            || self.view.tool == Tool::Gauges
+            || self.view.field == Field::Expected;
         self.view.covered = egui::Rect::NOTHING;
         if !has {
             return;
@@ -66,6 +67,9 @@ impl Studio {
                     ui.set_max_width(190.0);
                     self.paint_controls(ui);
                     self.gauge_controls(ui);
+                    if self.view.tool == Tool::Gauges || self.view.field == Field::Expected {
+                        self.expected_lines(ui);
+                    }
                     self.section_controls(ui);
                     self.range_controls(ui);
                 });
@@ -83,6 +87,10 @@ impl Studio {
             self.toggle(ui, Command::Pin);
             self.toggle(ui, Command::RemoveGauges);
         });
+        ui.horizontal(|ui| {
+            self.toggle(ui, Command::AddHelpful);
+            self.toggle(ui, Command::FindSpare);
+        });
     }
 
     /// A small button for a command, pressed in while it is on.
@@ -96,7 +104,9 @@ impl Studio {
         if let Some(shortcut) = command.shortcut() {
             help = format!("{help} ({})", ui.ctx().format_shortcut(&shortcut));
         }
-        if button.on_hover_text(help).clicked() {
+        let why_not = self.no_help(command).unwrap_or(command.tooltip());
+        let button = button.on_hover_text(help).on_disabled_hover_text(why_not);
+        if button.clicked() {
             let ctx = ui.ctx().clone();
             self.execute(&ctx, command);
         }

@@ -1,9 +1,8 @@
 //! A click presses the limb: a worker keeps the factored model and solves the latest touch.
 
-use std::sync::mpsc::{Receiver, Sender, channel};
-
 use glam::DVec3;
 
+use super::latest::{Desk, Latest};
 use crate::budget::unwatched;
 use crate::design::{self, DesignError, Inputs};
 use crate::document::Document;
@@ -49,12 +48,12 @@ struct Request {
     touch: Touch,
 }
 
-type Reply = Result<Touched, String>;
+const BROKEN: &str = "An internal error stopped this touch. Please report it";
 
 /// The touch that is shown, and the worker that computes it.
 #[derive(Default)]
 pub(super) struct Touching {
-    worker: Option<(Sender<Request>, Receiver<Reply>)>,
+    worker: Option<Latest<Request, Touched>>,
     waiting: usize,
     result: Option<Touched>,
     /// Counts results, so that the view knows when to build its fields anew.
@@ -76,8 +75,8 @@ impl Touching {
                 tip_radius,
             },
         };
-        let (sender, _) = self.worker.get_or_insert_with(|| start_worker(ctx.clone()));
-        if sender.send(request).is_ok() {
+        let worker = (self.worker).get_or_insert_with(|| Latest::start(ctx, BROKEN, serve));
+        if worker.ask(request) {
             self.waiting += 1;
         }
     }
@@ -98,8 +97,8 @@ impl Touching {
     /// Takes in answers; an error in the user's terms comes back.
     pub fn collect(&mut self, document: &Document) -> Option<String> {
         let mut error = None;
-        if let Some((_, replies)) = &self.worker {
-            while let Ok(reply) = replies.try_recv() {
+        if let Some(worker) = &self.worker {
+            for reply in worker.answers() {
                 self.waiting = 0;
                 match reply {
                     Ok(touched) => {
@@ -122,41 +121,13 @@ impl Touching {
     }
 }
 
-fn start_worker(ctx: egui::Context) -> (Sender<Request>, Receiver<Reply>) {
-    let (requests, inbox) = channel::<Request>();
-    let (outbox, replies) = channel();
-    std::thread::spawn(move || {
-        let mut next = inbox.recv().ok();
-        while let Some(request) = next.take() {
-            let shared = std::panic::AssertUnwindSafe(|| serve(request, &inbox, &outbox, &ctx));
-            next = std::panic::catch_unwind(shared).unwrap_or_else(|_| {
-                let _ = outbox.send(Err(
-                    "An internal error stopped this touch. Please report it".into(),
-                ));
-                ctx.request_repaint();
-                inbox.recv().ok()
-            });
-        }
-    });
-    (requests, replies)
-}
-
 /// Answers requests on one model; returns the first that needs another.
-fn serve(
-    first: Request,
-    inbox: &Receiver<Request>,
-    outbox: &Sender<Reply>,
-    ctx: &egui::Context,
-) -> Option<Request> {
-    let answer = |reply: Reply| {
-        let _ = outbox.send(reply);
-        ctx.request_repaint();
-    };
+fn serve(first: Request, desk: &Desk<Request, Touched>) -> Option<Request> {
     let model = match build(&first.inputs) {
         Ok(model) => model,
         Err(error) => {
-            answer(Err(format!("The touch could not be computed: {error}")));
-            return inbox.recv().ok();
+            desk.answer(Err(format!("The touch could not be computed: {error}")));
+            return desk.wait();
         }
     };
     let vertices = design::carry(model.index(), &first.inputs.part);
@@ -165,14 +136,12 @@ fn serve(
     let mut request = first;
     loop {
         // Only the latest touch matters.
-        while let Ok(newer) = inbox.try_recv() {
-            request = newer;
-        }
+        request = desk.latest(request);
         if request.key != key {
             return Some(request);
         }
-        answer(Ok(solve(&*model, &observer, &request)));
-        request = inbox.recv().ok()?;
+        desk.answer(Ok(solve(&*model, &observer, &request)));
+        request = desk.wait()?;
     }
 }
 

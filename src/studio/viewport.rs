@@ -373,6 +373,7 @@ impl Studio {
         }
         let painter = ui.painter_at(rect);
         self.paint_kept(&painter, pane);
+        self.paint_confusions(&painter, pane);
         self.paint_gauges(&painter, pane);
         self.paint_touch(&painter, pane);
         self.paint_live(&painter, pane);

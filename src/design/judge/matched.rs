@@ -22,14 +22,13 @@ use crate::evaluation::{
 };
 use crate::inference::{AsDrawn, Errors, Known, Matching, ResponseMap, calibrate};
 use crate::mesh::TriMesh;
+use crate::placement::expected_error::BLIND;
 use crate::regression::folds::evenly;
 
 /// Sites whose readings are known everywhere at the same time: those of more sets would fill the memory.
 const MOST_SITES: usize = 60;
 /// No reading is taken to be better than this (strain).
 const LEAST_NOISE: f64 = 1e-9;
-/// A touch that moves no gauge by more than so many deviations of the noise is blind.
-pub const BLIND: f64 = 3.0;
 /// Touches that sets with lost gauges are judged on.
 const FAILURE_TOUCHES: usize = 200;
 

@@ -207,7 +207,7 @@ fn evaluation(t: &mut Text, project: &Project) {
     t.key(
         "estimator",
         quoted(project.evaluation.estimator.name()),
-        "what finds the touches that sets are judged by: \"svr\" (the paper's) or \"matching\" (as live touch)",
+        "what finds the touches that sets are judged by: \"matching\" (as live touch; strain only) or \"svr\" (the paper's)",
     );
     t.key(
         "forces_n",
@@ -339,7 +339,7 @@ fn selection(t: &mut Text, project: &Project) {
     t.key(
         "selector",
         quoted(selection.selector.name()),
-        "\"greedy-svr\", \"pca-qr\", \"entropy\" or \"mutual-information\"",
+        "\"expected-error\" (by matching, as live touch), or the paper's: \"greedy-svr\", \"pca-qr\", \"entropy\", \"mutual-information\"",
     );
     t.key("sensors", selection.sensors, "gauges to place");
     t.key(
@@ -363,7 +363,7 @@ fn selection(t: &mut Text, project: &Project) {
     t.maybe(
         "target_mm",
         selection.target_mm.map(float),
-        "error at which greedy SVR adds no more gauges",
+        "error at which greedy SVR and expected error add no more gauges",
     );
     t.maybe(
         "cost_budget",
@@ -373,7 +373,7 @@ fn selection(t: &mut Text, project: &Project) {
     t.key(
         "compare",
         selection.compare,
-        "whether the other selectors choose too",
+        "whether the other selectors choose too (minutes)",
     );
     t.key(
         "with_noise",

@@ -20,7 +20,7 @@ const LANES: usize = 16;
 const NEVER: f32 = 1e30;
 /// Places nearer to a press than so many of their reaches are the press's own: around those beyond, the normal
 /// distribution does not come as far as the press, which they would explain as well as its own place does.
-const OWN: f64 = 2.5;
+pub(super) const OWN: f64 = 2.5;
 
 /// The filters at all places, for one force.
 struct Filters {
@@ -116,17 +116,12 @@ impl<'a> Bank<'a> {
                     -p.mass.max(1e-12).ln()
                 }
             };
-            // As a disc of that radius.
-            let reach = nearest(&scene.places, press.position).reach * OWN / 2.0;
+            let known = prior(scene, press);
             Press {
                 estimates: [vec![0.0; count], vec![0.0; count], vec![mean as f32; count]],
                 costs: padded(&cost, NEVER),
                 blocks: (0..(count / LANES) as u32).collect(),
-                covariance: Matrix3::from_diagonal(&Vector3::new(
-                    reach * reach,
-                    reach * reach,
-                    deviation * deviation,
-                )),
+                covariance: Matrix3::from_diagonal(&known.component_mul(&known)),
                 estimate: Vector3::new(0.0, 0.0, mean),
                 cost: -own_mass.ln(),
             }
@@ -170,6 +165,13 @@ impl<'a> Bank<'a> {
         let errors = self.errors();
         let weighed = errors.iter().zip(&self.scene.presses);
         weighed.map(|(e, p)| e * p.mass).sum::<f64>() / self.mass
+    }
+
+    /// The part of [`Self::error`] (mm) that is left where one place is meant.
+    pub fn local(&self) -> f64 {
+        let places = self.presses.iter().zip(&self.scene.presses);
+        let weighed = places.map(|(press, place)| place.mass * local(&press.covariance));
+        weighed.sum::<f64>() / self.mass
     }
 
     /// Expected error (mm) of each press.
@@ -238,15 +240,14 @@ impl<'a> Bank<'a> {
     /// A site's reading of a press, as the filter at the true place takes it.
     fn own(&self, press: usize, site: usize, force: f64) -> (Own, f64) {
         let report = self.scene.at_presses.of(site);
-        let variance = 1.0 + force * force * f64::from(report.variance[press]);
+        let (row, variance) = row(&report, press, force);
         let deviation = variance.sqrt();
         let value = f64::from(report.value[press]);
         // Of the gauge's turn and not of its site: else the sites with the luckiest noise would be chosen.
         let draw = self.scene.draw(self.gauges, press);
         let reading = force * value + deviation * f64::from(draw);
-        let slope = |k: usize| force * f64::from(report.slopes[k][press]);
         let own = Own {
-            row: Vector3::new(slope(0), slope(1), value) / deviation,
+            row,
             reading: reading / deviation,
             log: 0.5 * variance.ln(),
         };
@@ -259,9 +260,70 @@ impl<'a> Bank<'a> {
         let there = self.scene.presses[press].position;
         let own = (1.0 + mass).recip();
         let elsewhere = (DVec3::new(x, y, z) - there * mass) * own;
-        let local = mean_length(covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]);
-        elsewhere.length().hypot(own * local)
+        elsewhere.length().hypot(own * local(covariance))
     }
+
+    /// Which turn the next gauge has: a set hears the same noise whichever of its gauges is added last.
+    pub(super) fn take_turn(&mut self, turn: usize) {
+        self.gauges = turn;
+    }
+
+    /// Expected error (mm) of each press with one more gauge.
+    pub(super) fn errors_with(&self, site: usize, rows: &mut Rows) -> Vec<f64> {
+        let mut errors = Vec::with_capacity(self.presses.len());
+        for (filters, level) in self.filters.iter().zip(&self.scene.levels) {
+            let report = self.scene.at_places.of(site);
+            predict(filters, &report, level.force as f32, rows);
+            errors.extend(level.presses.clone().map(|k| {
+                let press = &self.presses[k];
+                let (own, reading) = self.own(k, site, level.force);
+                let (covariance, _, cost) = own.corrected(press);
+                let total = masses_with(press, rows, &self.positions, reading as f32, cost as f32);
+                self.error_of(k, &covariance, total)
+            }));
+        }
+        errors
+    }
+
+    /// What each place costs (minus the logarithm of its probability, up to what is the same for all) when the gauges
+    /// of a set read a press of some force (N) without noise.
+    pub(super) fn costs(scene: &Scene, set: &[usize], press: usize, force: f64) -> Vec<f64> {
+        let mut filters: Vec<Press> = scene
+            .places
+            .iter()
+            .map(|place| Press::at_rest(place, scene.hardest))
+            .collect();
+        for &site in set {
+            let (there, here) = (scene.at_presses.of(site), scene.at_places.of(site));
+            let reading = force * f64::from(there.value[press]);
+            for (k, filter) in filters.iter_mut().enumerate() {
+                let own = Own::at_place(&here, k, force, reading);
+                (filter.covariance, filter.estimate, filter.cost) = own.corrected(filter);
+            }
+        }
+        filters.iter().map(Press::cost_without_pulls).collect()
+    }
+}
+
+/// How far off (mm) an estimate of this covariance is.
+fn local(covariance: &Matrix3<f64>) -> f64 {
+    mean_length(covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)])
+}
+
+/// Deviations of what is known of a press before anything is read: along, across (mm) and force (N).
+pub(super) fn prior(scene: &Scene, press: &Place) -> Vector3<f64> {
+    // As a disc of that radius.
+    let reach = nearest(&scene.places, press.position).reach * OWN / 2.0;
+    Vector3::new(reach, reach, scene.hardest.unwrap_or(0.0))
+}
+
+/// What a site's reading of a press of some force says of along, across and force, over the reading's deviation, and
+/// the square of that.
+pub(super) fn row(report: &Report, press: usize, force: f64) -> (Vector3<f64>, f64) {
+    let variance = 1.0 + force * force * f64::from(report.variance[press]);
+    let slope = |k: usize| force * f64::from(report.slopes[k][press]);
+    let row = Vector3::new(slope(0), slope(1), f64::from(report.value[press]));
+    (row / variance.sqrt(), variance)
 }
 
 impl Press {
@@ -275,6 +337,31 @@ impl Press {
             costs[first..first + LANES].iter().any(|c| *c < limit)
         };
         self.blocks.retain(likely);
+    }
+
+    /// A touch around a place of which nothing was read yet; it compares itself with no other place.
+    fn at_rest(place: &Place, hardest: Option<f64>) -> Self {
+        let (mean, deviation) = hardest.map_or((1.0, 0.0), |hardest| (0.0, hardest));
+        let along = place.reach * place.reach;
+        Self {
+            estimates: [Vec::new(), Vec::new(), Vec::new()],
+            costs: Vec::new(),
+            blocks: Vec::new(),
+            covariance: Matrix3::from_diagonal(&Vector3::new(along, along, deviation * deviation)),
+            estimate: Vector3::new(0.0, 0.0, mean),
+            cost: -place.mass.max(1e-12).ln(),
+        }
+    }
+
+    /// What a touch costs that would have to pull, beside what it costs already.
+    fn cost_without_pulls(&self) -> f64 {
+        let variance = self.covariance[(2, 2)];
+        let pulls = if variance > 0.0 {
+            (self.estimate[2] / variance.sqrt()).min(0.0)
+        } else {
+            0.0
+        };
+        self.cost + 0.5 * pulls * pulls
     }
 }
 
@@ -297,6 +384,19 @@ impl Own {
             press.estimate + spread * (off / predicted),
             cost,
         )
+    }
+
+    /// What a site would measure of a touch of some force (N) around a place, for a reading (in units of the noise).
+    fn at_place(here: &Report, place: usize, force: f64, reading: f64) -> Self {
+        let variance = 1.0 + force * force * f64::from(here.variance[place]);
+        let deviation = variance.sqrt();
+        let slope = |axis: usize| force * f64::from(here.slopes[axis][place]);
+        let value = f64::from(here.value[place]);
+        Self {
+            row: Vector3::new(slope(0), slope(1), value) / deviation,
+            reading: reading / deviation,
+            log: 0.5 * variance.ln(),
+        }
     }
 }
 

@@ -1,16 +1,22 @@
 //! The touches that gauges are chosen for: places all over the part as every site would report them, and presses of
 //! known place, force and noise that the choice is tried on.
 
+mod around;
+mod merged;
+mod scatter;
+
 use glam::DVec3;
-use nalgebra::{Matrix3, SymmetricEigen};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+pub use self::scatter::Scatter;
+
+use self::around::{Around, Neighbour, longest};
+use self::merged::Merged;
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::draw::normal;
-use crate::regression::Grouping;
 use crate::regression::folds::evenly;
 
 /// How many places and presses a choice looks at.
@@ -44,7 +50,7 @@ impl Default for Detail {
 }
 
 /// Variance of each reading (sites × touches) that is not noise, in the square of the signal's unit, at the force of
-/// the touch: what gluing and model put on it.
+/// the touch: what gluing and model put on it, or what data scatter by ([`Scatter`]).
 pub type Variance<'a> = &'a (dyn Fn(usize, usize) -> f64 + Sync);
 
 /// How hard touches are.
@@ -62,7 +68,9 @@ pub struct Forces<'a> {
 pub struct Knowledge<'a> {
     /// Standard deviation of the noise, in the unit of the signals.
     pub noise: f64,
-    /// Absent where nothing but noise is known to be off.
+    /// Absent where nothing but noise is known to be off, which is true of no measurement: for data alone it is
+    /// [`Scatter`]'s. A simulation is exact, and knows what gluing and elements do to it; guessing at its scatter
+    /// from its neighbours would count how it bends twice.
     pub variance: Option<Variance<'a>>,
     /// Touches that places are taken from, rising: those whose variance is known. All where absent.
     pub among: Option<&'a [usize]>,
@@ -137,8 +145,6 @@ pub struct Scene {
 const LEVELS: usize = 3;
 /// Gauges with noise of their own; many more are never chosen.
 const TURNS: usize = 64;
-/// Neighbours that slopes are taken from.
-const NEIGHBOURS: usize = 9;
 /// What a place stands for reaches so far, over the distance of its neighbours: normal distributions around a lattice
 /// of places then add up to an even one, to a few thousandths.
 const REACH: f64 = 0.65;
@@ -157,22 +163,19 @@ impl Scene {
     ) -> Result<Self, Cancelled> {
         report(watch, "Looking at touches", 0, 2)?;
         let merged = Merged::new(targets, known.forces.map(|f| f.touches));
-        let all: Vec<usize> = (0..merged.positions.len())
-            .filter(|&k| merged.is_among(k, known.among))
-            .collect();
+        let all = merged.among(known.among);
         let mut places = farthest_first(&merged.positions, &all, detail.places);
         // A press may come to one of the places: what stands near it is its own all the same.
         let presses = in_turns(&evenly(all.len(), detail.presses));
         let presses: Vec<usize> = presses.into_iter().map(|k| all[k]).collect();
         in_neighbourhoods(&mut places, &merged.positions);
-        let around = Around::new(&merged.positions);
-        let unit = unit(x, known.noise).recip();
+        let around = Around::new(&merged.positions, &merged.groups);
         let reader = Reader {
             x,
             merged: &merged,
             around: &around,
             known,
-            unit,
+            unit: unit(x, known.noise).recip(),
         };
         let stand = |of: &[usize]| standing(&merged.positions, of);
         let (places_at, presses_at) = (stand(&places), stand(&presses));
@@ -249,43 +252,6 @@ fn draws(turns: usize, presses: usize, seed: u64) -> Vec<f32> {
         .collect()
 }
 
-/// Touches by place: repeats of one are one, per newton where forces are known.
-struct Merged {
-    positions: Vec<DVec3>,
-    /// For each place the touches there, with what each weighs in a reading.
-    touches: Vec<Vec<(usize, f64)>>,
-}
-
-impl Merged {
-    fn new(targets: &[[f64; 3]], forces: Option<&[f64]>) -> Self {
-        let groups = Grouping::Place.of(targets);
-        let count = groups.iter().max().map_or(0, |g| g + 1);
-        let mut members = vec![Vec::new(); count];
-        for (touch, &group) in groups.iter().enumerate() {
-            members[group].push(touch);
-        }
-        let force = |t: usize| forces.map_or(1.0, |f| f[t]);
-        let weighed = |touches: &Vec<usize>| {
-            let squares: f64 = touches.iter().map(|&t| force(t).powi(2)).sum();
-            let weight = |&t: &usize| (t, force(t) / squares.max(f64::MIN_POSITIVE));
-            touches.iter().map(weight).collect()
-        };
-        Self {
-            positions: (members.iter())
-                .map(|m| DVec3::from_array(targets[m[0]]))
-                .collect(),
-            touches: members.iter().map(weighed).collect(),
-        }
-    }
-
-    /// Whether all touches at a place are among some, which rise.
-    fn is_among(&self, place: usize, some: Option<&[usize]>) -> bool {
-        some.is_none_or(|some| {
-            (self.touches[place].iter()).all(|(t, _)| some.binary_search(t).is_ok())
-        })
-    }
-}
-
 /// At most `count` of some places, each as far as possible from those before it; the first is the one farthest from
 /// the middle.
 fn farthest_first(positions: &[DVec3], among: &[usize], count: usize) -> Vec<usize> {
@@ -323,14 +289,7 @@ fn in_neighbourhoods(places: &mut [usize], positions: &[DVec3]) {
     let bounds = (places.iter()).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), &k| {
         (l.min(positions[k]), u.max(positions[k]))
     });
-    let extent = bounds.1 - bounds.0;
-    let axis = if extent.x >= extent.max_element() {
-        0
-    } else if extent.y >= extent.max_element() {
-        1
-    } else {
-        2
-    };
+    let axis = longest(bounds.1 - bounds.0);
     places.sort_by(|&a, &b| {
         positions[a][axis]
             .total_cmp(&positions[b][axis])
@@ -356,97 +315,21 @@ fn standing(positions: &[DVec3], of: &[usize]) -> Vec<Place> {
         .zip(masses)
         .map(|(&at, mass)| Place {
             position: positions[at],
-            reach: REACH * spacing(positions, of, at),
+            reach: REACH * spacing(positions, of.iter().copied(), at),
             mass,
         })
         .collect()
 }
 
 /// How far the nearest others are away (mm), of six the mean.
-fn spacing(positions: &[DVec3], of: &[usize], at: usize) -> f64 {
+fn spacing(positions: &[DVec3], of: impl Iterator<Item = usize>, at: usize) -> f64 {
     const OTHERS: usize = 6;
-    let mut away: Vec<f64> = (of.iter().filter(|&&o| o != at))
-        .map(|&o| positions[o].distance(positions[at]))
+    let mut away: Vec<f64> = (of.filter(|&o| o != at))
+        .map(|o| positions[o].distance(positions[at]))
         .collect();
     away.sort_by(f64::total_cmp);
     away.truncate(OTHERS);
     away.iter().sum::<f64>() / away.len().max(1) as f64
-}
-
-/// How readings change around each place: what its neighbours weigh in the two slopes along the surface.
-struct Around<'a> {
-    positions: &'a [DVec3],
-}
-
-/// A neighbour, and what it weighs in both slopes (1/mm).
-struct Neighbour {
-    place: usize,
-    weights: [f64; 2],
-}
-
-impl<'a> Around<'a> {
-    fn new(positions: &'a [DVec3]) -> Self {
-        Self { positions }
-    }
-
-    fn neighbours(&self, at: usize) -> Vec<Neighbour> {
-        let centre = self.positions[at];
-        let mut near: Vec<(f64, usize)> = (0..self.positions.len())
-            .filter(|&k| k != at)
-            .map(|k| (self.positions[k].distance_squared(centre), k))
-            .collect();
-        let count = NEIGHBOURS.min(near.len());
-        if count == 0 {
-            return Vec::new();
-        }
-        near.select_nth_unstable_by(count - 1, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        near.truncate(count);
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let offsets: Vec<DVec3> = (near.iter())
-            .map(|(_, k)| self.positions[*k] - centre)
-            .collect();
-        let plane = plane(&offsets);
-        let flat: Vec<[f64; 2]> = (offsets.iter())
-            .map(|o| plane.map(|axis| o.dot(axis)))
-            .collect();
-        let weights = slope_weights(&flat);
-        (near.iter().zip(weights))
-            .map(|((_, place), weights)| Neighbour {
-                place: *place,
-                weights,
-            })
-            .collect()
-    }
-}
-
-/// The two directions in which neighbours lie most.
-fn plane(offsets: &[DVec3]) -> [DVec3; 2] {
-    let mut spread = Matrix3::zeros();
-    for o in offsets {
-        let o = nalgebra::Vector3::new(o.x, o.y, o.z);
-        spread += o * o.transpose();
-    }
-    let eigen = SymmetricEigen::new(spread);
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    [order[0], order[1]].map(|k| {
-        let v = eigen.eigenvectors.column(k);
-        DVec3::new(v[0], v[1], v[2])
-    })
-}
-
-/// What the differences to neighbours weigh in the slopes, by least squares; nothing in a direction that no
-/// neighbour lies in.
-fn slope_weights(flat: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    /// Over the larger spread.
-    const RIDGE: f64 = 1e-4;
-    let sum = |i: usize, j: usize| flat.iter().map(|p| p[i] * p[j]).sum::<f64>();
-    let ridge = RIDGE * (sum(0, 0) + sum(1, 1));
-    let (a, b, c) = (sum(0, 0) + ridge, sum(0, 1), sum(1, 1) + ridge);
-    let determinant = (a * c - b * b).max(f64::MIN_POSITIVE);
-    (flat.iter())
-        .map(|[x, y]| [(c * x - b * y) / determinant, (a * y - b * x) / determinant])
-        .collect()
 }
 
 struct Reader<'a> {
@@ -462,7 +345,7 @@ impl Reader<'_> {
     fn reports(&self, at: &[usize]) -> Reports {
         let neighbours: Vec<Vec<Neighbour>> = at
             .par_iter()
-            .map(|&at| self.around.neighbours(at))
+            .map(|&at| self.around.of(at).neighbours)
             .collect();
         let rows = |site: usize| {
             let mut rows = vec![0.0; Reports::ROWS * at.len()];
@@ -490,7 +373,7 @@ impl Reader<'_> {
             .collect();
         let slope = |k: usize| {
             (around.iter().zip(&rises))
-                .map(|(n, r)| n.weights[k] * r)
+                .map(|(n, r)| n.slopes[k] * r)
                 .sum::<f64>()
         };
         let slopes = [slope(0), slope(1)];
@@ -498,9 +381,7 @@ impl Reader<'_> {
     }
 
     fn value(&self, site: usize, place: usize) -> f64 {
-        let row = self.x.row(site);
-        let touches = self.merged.touches[place].iter();
-        touches.map(|&(t, weight)| weight * row[t]).sum::<f64>() * self.unit
+        self.merged.value(self.x.row(site), place) * self.unit
     }
 
     /// Per newton squared.
@@ -508,11 +389,76 @@ impl Reader<'_> {
         let Some(variance) = self.known.variance else {
             return 0.0;
         };
-        let touches = &self.merged.touches[place];
-        let of = |&(t, _): &(usize, f64)| {
+        let touches = || self.merged.touches[place].iter().map(|&(t, _)| t);
+        let of = |t: usize| {
             let force = self.known.forces.map_or(1.0, |f| f.touches[t]);
             variance(site, t) / (force * force)
         };
-        touches.iter().map(of).sum::<f64>() / touches.len() as f64 * self.unit * self.unit
+        touches().map(of).sum::<f64>() / touches().count() as f64 * self.unit * self.unit
     }
+}
+
+/// What every site reports of a touch at one place, in units of the noise and per newton where forces are known: the
+/// reading changes with the place along two directions, and is off by a variance of its own.
+#[derive(Clone, Debug)]
+pub struct Template {
+    /// mm.
+    pub position: DVec3,
+    /// The two directions along the surface, of unit length.
+    pub plane: [DVec3; 2],
+    /// Standard deviation (mm) along either of where a touch is that this place stands for.
+    pub reach: f64,
+    /// Of each site.
+    pub sites: Vec<Reading>,
+}
+
+/// What one site reports of a template.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    pub value: f64,
+    /// A millimetre.
+    pub slopes: [f64; 2],
+    /// Beside the noise's, which is 1.
+    pub variance: f64,
+}
+
+/// A template for every place of data, and the unit that their readings are in (in that of the signals): the very
+/// numbers that a choice by expected error is made with.
+#[must_use]
+pub fn templates(
+    x: &SignalMatrix,
+    targets: &[[f64; 3]],
+    known: &Knowledge,
+) -> (Vec<Template>, f64) {
+    let merged = Merged::new(targets, known.forces.map(|f| f.touches));
+    let around = Around::new(&merged.positions, &merged.groups);
+    let unit = unit(x, known.noise);
+    let reader = Reader {
+        x,
+        merged: &merged,
+        around: &around,
+        known,
+        unit: unit.recip(),
+    };
+    let template = |place: usize| {
+        let surroundings = around.of(place);
+        let near = surroundings.neighbours.iter().map(|n| n.place);
+        let reading = |site: usize| {
+            let [value, along, across, variance] =
+                reader.report(site, place, &surroundings.neighbours);
+            Reading {
+                value,
+                slopes: [along, across],
+                variance,
+            }
+        };
+        Template {
+            position: merged.positions[place],
+            plane: surroundings.plane,
+            reach: REACH * spacing(&merged.positions, near, place),
+            sites: (0..x.rows()).map(reading).collect(),
+        }
+    };
+    let all = (0..merged.len()).into_par_iter().map(template).collect();
+    (all, unit)
 }

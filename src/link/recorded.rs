@@ -1,0 +1,207 @@
+//! A simulated board that is recorded instead of listened to: in its own time, as fast as it can be computed.
+
+use std::collections::VecDeque;
+
+use super::Recorder;
+use crate::board::{SimulatedBoard, Truth};
+use crate::live::{Input, Receiver, Sample};
+use crate::wire::{Message, encode};
+
+/// The board's time between two looks at it (µs), about as often as a port is looked at.
+const TURN_US: u64 = 4000;
+
+/// Writes into a recording what a simulated board sends in so many seconds of its own time, and where it is really
+/// touched. `tell` hears what really happened at every sample. How many samples there are.
+///
+/// # Errors
+/// When the recording can be written no more.
+pub fn record(
+    mut board: SimulatedBoard,
+    recorder: Recorder,
+    seconds: f64,
+    mut tell: impl FnMut(Truth),
+) -> Result<u64, String> {
+    let end_us = (seconds * 1e6) as u64;
+    let mut scribe = Scribe::new(recorder);
+    let (mut now_us, mut plugged) = (0, false);
+    while now_us <= end_us {
+        if board.is_unplugged(now_us) {
+            plugged = false;
+        } else {
+            let mut bytes = Vec::new();
+            if !plugged {
+                plugged = true;
+                scribe.lose();
+                board.restart(now_us);
+            }
+            // Asked again where the answer was spoilt on the way.
+            if !scribe.greeted {
+                board.hear(&greeting(), now_us, &mut bytes);
+            }
+            board.say(now_us, &mut bytes, |truth| {
+                tell(truth);
+                scribe.truths.push_back(truth);
+            });
+            scribe.take(&bytes, now_us);
+        }
+        if let Some(why) = scribe.recorder.failed.take() {
+            return Err(why);
+        }
+        now_us += TURN_US;
+    }
+    scribe.end()
+}
+
+/// What one who listens says first.
+fn greeting() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for (sequence, message) in (0..).zip([Message::AskHello, Message::Start]) {
+        encode(&message, sequence, 0, 12, &mut bytes);
+    }
+    bytes
+}
+
+/// Understands the board's bytes as one who listens does, and writes them down.
+struct Scribe {
+    recorder: Recorder,
+    receiver: Receiver,
+    /// Whether the board has said what it is, without which nothing else is understood.
+    greeted: bool,
+    /// Of samples that have not come through yet.
+    truths: VecDeque<Truth>,
+    /// As it was written last.
+    told: Option<Truth>,
+}
+
+impl Scribe {
+    fn new(recorder: Recorder) -> Self {
+        Self {
+            recorder,
+            receiver: Receiver::default(),
+            greeted: false,
+            truths: VecDeque::new(),
+            told: None,
+        }
+    }
+
+    /// The plug was out.
+    fn lose(&mut self) {
+        self.receiver.reset();
+        self.greeted = false;
+    }
+
+    fn take(&mut self, bytes: &[u8], now_us: u64) {
+        let mut inputs = Vec::new();
+        self.receiver
+            .push(bytes, now_us, |input| inputs.push(input));
+        for input in inputs {
+            match input {
+                Input::Hello(hello) => {
+                    self.greeted = true;
+                    self.recorder.hello(&hello);
+                }
+                Input::Sample(sample) => self.sample(&sample),
+                Input::Log { .. } | Input::Note { .. } | Input::Pong(_) => {}
+            }
+        }
+    }
+
+    /// A sample behind what was true when it was taken. Samples before it that were lost on the way leave nothing.
+    fn sample(&mut self, sample: &Sample) {
+        let mut truth = None;
+        while let Some(next) = self.truths.front()
+            && next.time_us <= sample.time_us
+        {
+            truth = self.truths.pop_front();
+        }
+        if let Some(truth) = truth {
+            if self.told.is_none_or(|told| told.touch != truth.touch) {
+                let touch = truth.touch.map(|t| (t.position, t.force));
+                self.recorder.truth(touch);
+            }
+            self.told = Some(truth);
+        }
+        self.recorder.sample(sample);
+    }
+
+    fn end(mut self) -> Result<u64, String> {
+        self.recorder.flush();
+        match self.recorder.failed.take() {
+            Some(why) => Err(why),
+            None => Ok(self.recorder.samples),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::inference::Chain;
+    use crate::wire::Hello;
+
+    fn scribe(path: &Path) -> Scribe {
+        let mut scribe = Scribe::new(Recorder::create(path).unwrap());
+        let chain = Chain::default();
+        scribe.recorder.hello(&Hello {
+            version: crate::wire::VERSION,
+            board: 1,
+            channels: 2,
+            bits: chain.bits,
+            reference_mv: 3300,
+            supply_mv: 3300,
+            gain_milli: 100_000,
+            rate_hz: 1000,
+            name: "Board".into(),
+        });
+        scribe
+    }
+
+    fn truth(time_us: u64, force: Option<f64>) -> Truth {
+        let touch = force.map(|force| crate::elasticity::Touch {
+            position: glam::DVec3::X * 1e-3,
+            normal: glam::DVec3::Z,
+            force,
+            tip_radius: 5e-3,
+        });
+        Truth { time_us, touch }
+    }
+
+    /// The truth stands before the first sample that it holds for, and once.
+    #[test]
+    fn the_truth_goes_with_the_samples() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("board.hapdrec");
+        let mut scribe = scribe(&path);
+        for (k, force) in [None, None, Some(5.0), Some(5.0), None].iter().enumerate() {
+            scribe.truths.push_back(truth(1000 * k as u64, *force));
+        }
+        // The fourth is lost on the way, and the last comes twice.
+        for k in [0, 1, 2, 4, 4] {
+            scribe.sample(&Sample {
+                time_us: 1000 * k,
+                counts: vec![7.0, 9.0],
+            });
+        }
+        assert_eq!(scribe.end(), Ok(5));
+        let mut said = Vec::new();
+        let mut receiver = Receiver::default();
+        receiver.push(&std::fs::read(&path).unwrap(), 0, |input| match input {
+            Input::Note { text, .. } => said.push(text),
+            Input::Sample(sample) => said.push(sample.time_us.to_string()),
+            _ => {}
+        });
+        let expected = [
+            "truth none",
+            "0",
+            "1000",
+            "truth 1.0000 0.0000 0.0000 5.00000",
+            "2000",
+            "truth none",
+            "4000",
+            "4000",
+        ];
+        assert_eq!(said, expected);
+    }
+}
