@@ -40,7 +40,11 @@ const SECTIONS: [Section; 4] = [
     ("limb", "The bundled limb", limb),
     ("solid", "The solid limb", solid),
     ("shin", "A Poppy shin", shin),
-    ("agreement", "What is promised and what is done", agreement_of),
+    (
+        "agreement",
+        "What is promised and what is done",
+        agreement_of,
+    ),
 ];
 
 fn main() {
@@ -252,7 +256,9 @@ impl Part {
             let bound = sets.iter().find_map(|set| bound_mm(set));
             let cell = bound.map_or("–".into(), |b| format!("{b:.2}"));
             for ((selection, took), error) in self.chosen.iter().zip(errors) {
-                let above = bound.map_or("–".into(), |b| format!("{:.0} %", 100.0 * (error / b - 1.0)));
+                let above = bound.map_or("–".into(), |b| {
+                    format!("{:.0} %", 100.0 * (error / b - 1.0))
+                });
                 let _ = writeln!(
                     text,
                     "| {} | {sensors} | {error:.2} | {cell} | {above} | {took:.1} |",

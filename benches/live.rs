@@ -24,7 +24,7 @@ use hapdef::inference::{
 use hapdef::link::{Address, BAUD, Doorway, Heard, Listener, Pace, State, host};
 use hapdef::live::{Input, Pipeline, Receiver};
 use hapdef::regression::Hyper;
-use hapdef::uncertainty::Gluing;
+use hapdef::uncertainty::{Gluing, Pressing, Uncertainty};
 use hapdef::wire::{Hello, Message, VERSION, encode};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -95,6 +95,8 @@ struct Scene<'a> {
     gains: Vec<f64>,
     map: Arc<ResponseMap>,
     relative: f64,
+    /// What gluing may put on the readings, where the estimator is told of it.
+    spread: Option<Arc<ResponseMap>>,
 }
 
 /// Errors of one estimator: places (mm) and forces (N).
@@ -163,6 +165,7 @@ impl Lab {
             gains: gains.to_vec(),
             map: Arc::clone(drawn),
             relative,
+            spread: None,
         };
         let mut scenes = vec![
             scene(
@@ -173,12 +176,15 @@ impl Lab {
             ),
             scene("Truth from elements of half the size", finer, &none, 0.03),
             scene("Half the size, gains off by 3 %", finer, gains, 0.05),
-            scene(
-                "Half the size; gains off by 3 %, places by 1 mm, directions by 3°",
-                built,
-                gains,
-                0.2,
-            ),
+            Scene {
+                spread: Some(Arc::clone(&self.sensing.spread)),
+                ..scene(
+                    "Half the size; gains off by 3 %, places by 1 mm, directions by 3°",
+                    built,
+                    gains,
+                    self.sensing.off.elements,
+                )
+            },
         ];
         let calibrated = [
             ("Half the size, gains off by 3 %, calibrated", finer),
@@ -196,6 +202,11 @@ impl Lab {
                 gains: gains.to_vec(),
                 map,
                 relative: found.relative,
+                spread: Some(Arc::new(
+                    self.sensing
+                        .drawn
+                        .spread_of(&found.doubts, &self.sensing.off),
+                )),
             });
         }
         scenes
@@ -222,7 +233,11 @@ impl Lab {
                 ),
             })
             .collect();
-        calibrate(&self.sensing.drawn, &known, &vec![NOISE; gains.len()])
+        let off = Uncertainty {
+            pressing: Pressing::EXACT,
+            ..self.sensing.off
+        };
+        calibrate(&self.sensing.drawn, &known, &vec![NOISE; gains.len()], &off)
     }
 
     fn accuracy(&self, text: &mut String) {
@@ -288,6 +303,7 @@ impl Lab {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let errors = Errors {
             relative: scene.relative,
+            spread: scene.spread.clone(),
             ..Errors::of_noise(NOISE, gauges)
         };
         let mut matching = Matching::new(Arc::clone(&scene.map), errors, 60.0);

@@ -227,9 +227,11 @@ impl Document {
     #[must_use]
     pub fn elements_key_at(&self, quality: Quality) -> String {
         let p = &self.state.project;
-        // How hard touches come is for whoever chooses and judges: signals grow with the force.
+        // How hard touches come is for whoever chooses and judges: signals grow with the force. Nor is any touch
+        // simulated with another tip.
         let touch = TouchKeys {
             forces_n: TouchKeys::default().forces_n,
+            tip_tolerance_mm: TouchKeys::default().tip_tolerance_mm,
             ..p.touch.clone()
         };
         format!(
@@ -308,9 +310,10 @@ impl Document {
     pub fn feasible_key_at(&self, quality: Quality) -> String {
         let p = &self.state.project;
         let painted = self.state.painted.as_ref().map(|m| self.fingerprints.of(m));
-        // How far off gauges are glued decides nothing of where they can go.
+        // How far off gauges are glued, or drift, decides nothing of where they can go.
         let gauge = GaugeKeys {
             tolerance: ToleranceKeys::default(),
+            drift_microstrain: GaugeKeys::default().drift_microstrain,
             ..p.gauge.clone()
         };
         format!(
@@ -356,7 +359,8 @@ impl Document {
         // One selector knows how hard touches come, and how far off gauges are glued.
         let (p, knowing) = (&self.state.project, SelectorKind::ExpectedError);
         let knows = p.selectors().contains(&knowing);
-        let known = knows.then_some((p.touch.forces_n, p.gauge.tolerance));
+        let gauge = (p.gauge.tolerance, p.gauge.drift_microstrain);
+        let known = knows.then_some((p.touch.forces_n, gauge));
         format!("{} {asked:?} {known:?}", self.candidates_key_at(quality))
     }
 
@@ -369,8 +373,15 @@ impl Document {
     /// As [`Self::design_key`], of a quality that need not be the project's.
     #[must_use]
     pub fn design_key_at(&self, quality: Quality) -> String {
-        let (evaluation, gauge) = (&self.state.project.evaluation, &self.state.project.gauge);
-        let judged = (evaluation, gauge.tolerance);
+        let Project {
+            evaluation,
+            gauge,
+            touch,
+            calibration,
+            ..
+        } = &self.state.project;
+        let off = (gauge.tolerance, gauge.drift_microstrain, calibration);
+        let judged = (evaluation, off, touch.tip_tolerance_mm);
         // One estimator knows how hard anybody presses.
         let judging = self.state.project.judging();
         format!("{} {judged:?} {judging:?}", self.selection_key_at(quality))
@@ -531,6 +542,13 @@ mod tests {
         assert_eq!(stale(other, pressed), [false; 3]);
         assert_eq!(stale(knows, glued), [false, true, true]);
         assert_eq!(stale(knows, pressed), [false, true, true]);
+        // What only the judge's estimator knows.
+        let drifting = |p: &mut Project| p.gauge.drift_microstrain = 2.0;
+        let by_machine = |p: &mut Project| p.calibration.place_mm = 0.0;
+        let sized = |p: &mut Project| p.touch.tip_tolerance_mm = 0.5;
+        assert_eq!(stale(knows, drifting), [false, true, true]);
+        assert_eq!(stale(knows, by_machine), [false, false, true]);
+        assert_eq!(stale(knows, sized), [false, false, true]);
     }
 
     #[test]

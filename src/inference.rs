@@ -3,6 +3,7 @@
 pub mod bound;
 pub mod calibration;
 pub mod chain;
+pub mod drawn;
 pub mod map;
 pub mod matching;
 pub mod measured;
@@ -10,8 +11,9 @@ pub mod region;
 pub mod trained;
 
 pub use bound::cramer_rao;
-pub use calibration::{AsDrawn, Calibration, Known, calibrate};
+pub use calibration::{Calibration, Known, calibrate};
 pub use chain::Chain;
+pub use drawn::{AsDrawn, Doubt};
 pub use map::ResponseMap;
 pub use matching::{Contact, Errors, Matching};
 pub use measured::MeasuredMatching;

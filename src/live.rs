@@ -6,6 +6,6 @@ pub mod receiver;
 pub mod tare;
 
 pub use health::Health;
-pub use pipeline::{Estimator, GaugeModel, Guess, Pipeline, Settings, UNCALIBRATED, Update};
+pub use pipeline::{Estimator, GaugeModel, Guess, Pipeline, Settings, Update};
 pub use receiver::{Doubt, Input, Receiver, Sample, Traffic};
 pub use tare::Rest;

@@ -22,7 +22,7 @@ use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
 use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
-use crate::uncertainty::Gluing;
+use crate::uncertainty::{Gluing, Pressing, Uncertainty};
 
 use ranges::check;
 
@@ -31,7 +31,8 @@ pub use live::{GluedKeys, LiveKeys};
 pub use masks::Masks;
 pub use part::{Elements, MaterialKeys, Part, PartModel, SupportKeys, SupportKind, Unit};
 pub use ranges::{
-    ANGLE_OFF, EDGE_NEIGHBOURS, FARTHEST, FORCES, GAIN_OFF, GAUGES, PLACE_OFF, TOUCHES,
+    ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCE_OFF, FORCES, GAIN_OFF, GAUGES, PLACE_OFF,
+    TIP_OFF, TOUCHES,
 };
 pub use selection::{ChosenSite, CostKeys, GaussianProcessKeys, SelectionKeys};
 
@@ -66,6 +67,9 @@ pub struct Project {
     pub sites: SiteKeys,
     #[serde(default)]
     pub gauge: GaugeKeys,
+    // As `touch.forces_n`.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub calibration: CalibrationKeys,
     #[serde(default)]
     pub feasible: FeasibleKeys,
     #[serde(default)]
@@ -92,6 +96,9 @@ pub struct TouchKeys {
     #[serde(skip_serializing_if = "are_usual_forces")]
     pub forces_n: [f64; 2],
     pub tip_radius_mm: f64,
+    /// How far off that is (standard deviation): larger tips, or smaller ones, touch too.
+    #[serde(skip_serializing_if = "is_default")]
+    pub tip_tolerance_mm: f64,
     pub count: usize,
     pub edge_margin_mm: f64,
     /// Name of a mask (one value a vertex of the part): touches come only where it is set.
@@ -132,6 +139,11 @@ pub struct GaugeKeys {
     /// turned from it.
     pub directions: usize,
     pub noise_microstrain: f64,
+    /// What all channels have drifted by together since the rest was taken (standard deviation). A tare and a rest that
+    /// follows take away what is slower than a touch, and what wanders faster is in the noise as it is measured: beside
+    /// them nothing is left, unless touches last for minutes or warm the part.
+    #[serde(skip_serializing_if = "is_default")]
+    pub drift_microstrain: f64,
     pub range_microstrain: f64,
     pub least_signal_to_noise: f64,
     pub grid_length_mm: f64,
@@ -156,6 +168,16 @@ impl ToleranceKeys {
     fn is_usual(&self) -> bool {
         *self == Self::default()
     }
+}
+
+/// How known presses are made that gauges are calibrated with (standard deviations).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CalibrationKeys {
+    /// Rms distance from the place that is asked for, in any direction along the surface.
+    pub place_mm: f64,
+    /// Of the force that is asked for.
+    pub force_percent: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -253,6 +275,7 @@ impl Default for TouchKeys {
             force_n: 10.0,
             forces_n: FORCES_N,
             tip_radius_mm: 5.0,
+            tip_tolerance_mm: 0.0,
             count: 4000,
             edge_margin_mm: 2.4,
             region: None,
@@ -273,6 +296,7 @@ impl Default for GaugeKeys {
             signal: Signal::Strain,
             directions: 1,
             noise_microstrain: 1.0,
+            drift_microstrain: 0.0,
             range_microstrain: 30_000.0,
             least_signal_to_noise: 3.0,
             grid_length_mm: 5.0,
@@ -288,6 +312,14 @@ impl Default for ToleranceKeys {
             place_mm: 1.0,
             angle_deg: 3.0,
             gain_percent: 3.0,
+        }
+    }
+}
+impl Default for CalibrationKeys {
+    fn default() -> Self {
+        Self {
+            place_mm: 1.0,
+            force_percent: 3.0,
         }
     }
 }
@@ -343,6 +375,7 @@ impl Project {
             touch: TouchKeys::default(),
             sites: SiteKeys::default(),
             gauge: GaugeKeys::default(),
+            calibration: CalibrationKeys::default(),
             feasible: FeasibleKeys::default(),
             candidates: CandidateKeys::default(),
             selection: SelectionKeys::default(),
@@ -415,6 +448,30 @@ impl Project {
             place: tolerance.place_mm * MM,
             angle: tolerance.angle_deg * PI / 180.0,
             gain: tolerance.gain_percent / 100.0,
+        }
+    }
+
+    /// How a hand makes known presses.
+    #[must_use]
+    pub fn pressing(&self) -> Pressing {
+        Pressing {
+            place: self.calibration.place_mm * MM,
+            force: self.calibration.force_percent / 100.0,
+        }
+    }
+
+    /// Everything that is known to be off. What the elements leave is not: a simulation says that, and
+    /// [`Uncertainty::with_elements`] takes it in. Nor is the converter's resolution, which the board knows.
+    #[must_use]
+    pub fn uncertainty(&self) -> Uncertainty {
+        Uncertainty {
+            noise: self.gauge.noise_microstrain * MICRO,
+            gluing: self.gluing(),
+            stiffness: self.live.stiffness_percent / 100.0,
+            tip: self.touch.tip_tolerance_mm * MM,
+            drift: self.gauge.drift_microstrain * MICRO,
+            pressing: self.pressing(),
+            ..Uncertainty::default()
         }
     }
 

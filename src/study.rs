@@ -228,11 +228,12 @@ pub fn select(
             MutualInformation { geometry }.select(&pool, &request)
         }
         (SelectorKind::PcaQr, _) => PcaQr.select(&pool, &request),
-        (SelectorKind::ExpectedError, _) => by_expected_error(&pool, &request, data, settings)
-            .map(|(selection, what)| {
+        (SelectorKind::ExpectedError, _) => {
+            by_expected_error(&pool, &request, data, settings).map(|(selection, what)| {
                 weighed = Some(what);
                 selection
-            }),
+            })
+        }
         _ => settings.svr.select(&pool, &request),
     }?;
     // The covariance is part of the choice.
@@ -284,7 +285,8 @@ fn by_expected_error(
 }
 
 const NO_FORCES: &str = "The data do not say how hard touches were (force_n): readings are compared as they are, and what differs with the force counts as scatter.";
-const NO_NOISE: &str = "No noise was given (--noise): what is weighed is what the data themselves scatter by.";
+const NO_NOISE: &str =
+    "No noise was given (--noise): what is weighed is what the data themselves scatter by.";
 
 /// A geometry of straight lines: without a mesh nobody knows the way over the surface. Sites that are
 /// kept out still count as locations.

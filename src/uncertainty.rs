@@ -1,5 +1,20 @@
-//! What is known to be off between a gauge as it was drawn and the reading that comes from it: one description for
-//! whoever chooses gauges, judges them or builds them.
+//! What is known to be off between a touch on the model of a part and the readings that come from it: one description
+//! for whoever chooses gauges, judges them, builds them, calibrates them or listens to them.
+//!
+//! Each cause is a term of its own, in its own unit, because each enters readings in its own way:
+//!
+//! | term | enters as |
+//! |---|---|
+//! | noise, resolution | a variance of each reading, the same for every touch |
+//! | gluing | by the reading's slopes over the gauge's place and direction, and by its gain: grows with the force |
+//! | elements | a share of the readings |
+//! | tip | by the reading's slope over the tip's radius: grows with the force |
+//! | drift | common to all channels: a matrix of rank one beside the diagonal |
+//! | stiffness | a common factor of all readings, the same as another force: no place is worse for it, every force is |
+//! | pressing | nothing that is read later; known presses are off by it while gauges are calibrated |
+//!
+//! Friction is not among them: a tangential share of the force needs the readings of tangential touches too, which no
+//! map holds yet.
 
 use std::f64::consts::PI;
 
@@ -46,7 +61,6 @@ impl Gluing {
     /// How far off every gauge is, for a sentence.
     #[must_use]
     pub fn in_words(&self) -> String {
-        let tidy = |v: f64| (v * 100.0).round() / 100.0;
         format!(
             "{} mm and {}° off and its gain off by {} %",
             tidy(self.place * 1e3),
@@ -54,6 +68,142 @@ impl Gluing {
             tidy(self.gain * 100.0)
         )
     }
+}
+
+/// How far off a hand presses where and as hard as it was asked to (standard deviations).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Pressing {
+    /// Rms distance from the place that was asked for (m), in any direction along the surface.
+    pub place: f64,
+    /// Of the force, as a share of what was asked for.
+    pub force: f64,
+}
+
+impl Default for Pressing {
+    /// A hand with a force gauge, at a mark on the part: 1 mm and 3 %.
+    fn default() -> Self {
+        Self {
+            place: 1e-3,
+            force: 0.03,
+        }
+    }
+}
+
+/// A figure for a sentence.
+fn tidy(value: f64) -> f64 {
+    (value * 100.0).round() / 100.0
+}
+
+impl Pressing {
+    /// A machine: just there, and just as hard.
+    pub const EXACT: Self = Self {
+        place: 0.0,
+        force: 0.0,
+    };
+
+    /// How far off every press is, for a sentence.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        format!(
+            "{} mm beside its place and {} % too hard or too soft",
+            tidy(self.place * 1e3),
+            tidy(self.force * 100.0)
+        )
+    }
+}
+
+/// What the elements are taken to leave, as a share of a reading, where nobody has estimated it.
+pub const UNESTIMATED: f64 = 0.03;
+
+/// Everything that is known to be off (standard deviations).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Uncertainty {
+    /// Of each channel's noise (strain).
+    pub noise: f64,
+    /// What one count of the converter stands for (strain); zero where nobody knows it yet, or where the noise was
+    /// measured behind the converter and has it.
+    pub resolution: f64,
+    pub gluing: Gluing,
+    /// What the elements leave, as a share of a reading, each gauge for itself.
+    pub elements: f64,
+    /// Of the factor by which the part is stiffer or softer than its model.
+    pub stiffness: f64,
+    /// Of the tip's radius (m).
+    pub tip: f64,
+    /// Of what all channels have drifted by together since the rest (strain).
+    pub drift: f64,
+    /// How known presses are made.
+    pub pressing: Pressing,
+}
+
+impl Default for Uncertainty {
+    /// A workshop's gluing and a hand's presses on elements that nobody has judged, and nothing else.
+    fn default() -> Self {
+        Self {
+            noise: 0.0,
+            resolution: 0.0,
+            gluing: Gluing::default(),
+            elements: UNESTIMATED,
+            stiffness: 0.0,
+            tip: 0.0,
+            drift: 0.0,
+            pressing: Pressing::default(),
+        }
+    }
+}
+
+impl Uncertainty {
+    /// Everything just as it is said to be.
+    pub const NONE: Self = Self {
+        noise: 0.0,
+        resolution: 0.0,
+        gluing: Gluing::EXACT,
+        elements: 0.0,
+        stiffness: 0.0,
+        tip: 0.0,
+        drift: 0.0,
+        pressing: Pressing::EXACT,
+    };
+
+    /// With what the elements are estimated to leave, in percent of the strain; not a number where that is not known.
+    #[must_use]
+    pub fn with_elements(self, percent: f64) -> Self {
+        Self {
+            elements: if percent.is_nan() {
+                UNESTIMATED
+            } else {
+                (percent / 100.0).clamp(0.0, 1.0)
+            },
+            ..self
+        }
+    }
+
+    /// Standard deviation of a channel that nobody touches (strain): of its noise, and of what is rounded to counts.
+    #[must_use]
+    pub fn of_channel(&self) -> f64 {
+        self.noise.hypot(rounding(self.resolution))
+    }
+
+    /// The same, with what drifts. All channels do that together, so that it hides less than this says: for whoever
+    /// cannot tell a common error from others.
+    #[must_use]
+    pub fn of_channel_and_drift(&self) -> f64 {
+        self.of_channel().hypot(self.drift)
+    }
+
+    /// Whether gauges are built, pressed and read alike, whatever noise and elements are: what was measured on them and
+    /// judged for one holds for the other.
+    #[must_use]
+    pub fn builds_as(&self, other: &Self) -> bool {
+        let built = |off: &Self| (off.gluing, off.tip, off.drift, off.pressing);
+        built(self) == built(other)
+    }
+}
+
+/// Standard deviation of what is rounded to whole counts, in the unit of `count`: evenly spread over one of them.
+#[must_use]
+pub fn rounding(count: f64) -> f64 {
+    count / 12.0_f64.sqrt()
 }
 
 #[cfg(test)]
@@ -87,5 +237,48 @@ mod tests {
     fn the_usual_workshop_in_words() {
         let words = Gluing::default().in_words();
         assert_eq!(words, "1 mm and 3° off and its gain off by 3 %");
+        let words = Pressing::default().in_words();
+        assert_eq!(words, "1 mm beside its place and 3 % too hard or too soft");
+    }
+
+    #[test]
+    fn a_count_is_a_twelfth_of_a_variance() {
+        let count = 1000;
+        let off = |k: i32| ((f64::from(k) + 0.5) / f64::from(count) - 0.5).powi(2);
+        let variance = (0..count).map(off).sum::<f64>() / f64::from(count);
+        assert!((rounding(3.0) - 3.0 * variance.sqrt()).abs() < 1e-6);
+        let both = Uncertainty {
+            noise: 3e-6,
+            resolution: 12.0_f64.sqrt() * 4e-6,
+            drift: 12e-6,
+            ..Uncertainty::default()
+        };
+        assert!((both.of_channel() - 5e-6).abs() < 1e-15);
+        assert!((both.of_channel_and_drift() - 13e-6).abs() < 1e-15);
+    }
+
+    #[test]
+    fn elements_that_nobody_judged_are_not_perfect() {
+        let off = Uncertainty::default();
+        assert_eq!(off.with_elements(f64::NAN).elements, UNESTIMATED);
+        assert_eq!(off.with_elements(0.0).elements, 0.0);
+        assert_eq!(off.with_elements(1e9).elements, 1.0);
+        assert_eq!(off.with_elements(f64::INFINITY).elements, 1.0);
+    }
+
+    #[test]
+    fn noise_builds_nothing_anew() {
+        let off = Uncertainty::default();
+        let noisier = Uncertainty {
+            noise: 1.0,
+            elements: 0.2,
+            ..off
+        };
+        assert!(off.builds_as(&noisier));
+        let pressed = Uncertainty {
+            pressing: Pressing::EXACT,
+            ..off
+        };
+        assert!(!off.builds_as(&pressed));
     }
 }

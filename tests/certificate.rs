@@ -174,7 +174,10 @@ fn a_choice_says_how_far_from_the_best_it_can_be() {
             assert!(certificate.bound_mm <= certificate.local_mm, "{set:?}");
             let bound = (certificate.bound_mm * 100.0).floor() / 100.0;
             let words = set.certified().unwrap();
-            assert!(words.ends_with(&format!("(bound {bound:.2} mm)")), "{words}");
+            assert!(
+                words.ends_with(&format!("(bound {bound:.2} mm)")),
+                "{words}"
+            );
             let json = serde_json::to_value(&set).unwrap();
             assert_eq!(json["bound_mm"], certificate.bound_mm);
         }

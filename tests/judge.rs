@@ -96,8 +96,11 @@ fn errors_fall_with_force_and_gluing_costs() {
     assert!(light.error_mm > hard.error_mm, "{rows:?}");
     assert!(light.blind >= middle.blind && middle.blind >= hard.blind);
     assert!(hard.as_built_mm > hard.error_mm, "{hard:?}");
-    // What known presses bring back hangs on the part; six gauges on coarse elements may lose by them.
-    assert!(hard.calibrated_mm.unwrap().is_finite(), "{hard:?}");
+    // Presses by hand are off themselves, and that is known: little may be learned from them, but nothing is lost.
+    let sum = |of: &dyn Fn(&MatchedRow) -> f64| rows.iter().map(|r| of(r)).sum::<f64>();
+    let calibrated = sum(&|r| r.calibrated_mm.unwrap());
+    let as_built = sum(&|r| r.as_built_mm);
+    assert!(calibrated < 1.05 * as_built, "{rows:?}");
     for row in &matched().evaluation.matched {
         let figures = [row.error_mm, row.median_mm, row.p95_mm, row.as_built_mm];
         assert!(figures.iter().all(|v| v.is_finite()), "{row:?}");

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use glam::DVec3;
 use hapdef::budget::{Quality, unwatched};
-use hapdef::design::{self, Inputs, PRESSED_HARD, PRESSED_OFF, Sensing};
+use hapdef::design::{self, Inputs, Sensing};
 use hapdef::elasticity::Touch;
 use hapdef::inference::{Known, calibrate};
 use hapdef::io::project_file;
@@ -143,7 +143,9 @@ impl Designed {
             .collect();
         assert_eq!(places.len(), PRESSES);
         let mut script = String::from("start_s,duration_s,x_mm,y_mm,z_mm,force_n\n");
-        let presses = FORCES_N.iter().flat_map(|f| places.iter().map(move |p| (f, p)));
+        let presses = FORCES_N
+            .iter()
+            .flat_map(|f| places.iter().map(move |p| (f, p)));
         for (k, (force, p)) in presses.enumerate() {
             let start = FIRST_S + EVERY_S * k as f64;
             let _ = writeln!(
@@ -182,7 +184,11 @@ impl Designed {
         ]);
         let said: Value = serde_json::from_str(&said).unwrap();
         let seconds = FIRST_S + EVERY_S * (FORCES_N.len() * PRESSES) as f64;
-        assert!(said["seconds"].as_f64().is_some_and(|s| (s - seconds).abs() < 1.0));
+        assert!(
+            said["seconds"]
+                .as_f64()
+                .is_some_and(|s| (s - seconds).abs() < 1.0)
+        );
         path
     }
 
@@ -214,7 +220,8 @@ impl Designed {
         let mut project = self.inputs.project.clone();
         let noise = project.gauge.noise_microstrain * 1e-6;
         let noise = vec![noise; gains.len()];
-        project.live.take(&calibrate(drawn, &known, &noise));
+        let off = &self.sensing.off;
+        project.live.take(&calibrate(drawn, &known, &noise, off));
         let path = self.beside(&format!("calibrated-{seed}.hapdef.toml"));
         project_file::save(&path, &project, None, &self.inputs.masks).unwrap();
         path
@@ -222,14 +229,18 @@ impl Designed {
 
     /// A press that was asked for, as a hand makes it: beside its place in any direction, and too hard or too soft.
     fn by_hand(&self, asked: &Touch, k: usize) -> Touch {
-        let map = &self.sensing.drawn.map;
+        let (map, hand) = (&self.sensing.drawn.map, self.inputs.project.pressing());
         // The golden angle: no two alike, and all round.
         let (sin, cos) = (2.4 * k as f64).sin_cos();
         let along = asked.normal.any_orthonormal_vector();
         let across = asked.normal.cross(along);
-        let beside = asked.position + (along * cos + across * sin) * PRESSED_OFF;
+        let beside = asked.position + (along * cos + across * sin) * hand.place;
         let at = map.index.nearest(beside).0;
-        let off = if k.is_multiple_of(2) { PRESSED_HARD } else { -PRESSED_HARD };
+        let off = if k.is_multiple_of(2) {
+            hand.force
+        } else {
+            -hand.force
+        };
         Touch {
             position: map.mesh.point(at),
             normal: map.mesh.normal(at),
@@ -330,7 +341,8 @@ fn what_is_promised_is_what_is_achieved() {
     ] {
         for (force, achieved) in FORCES_N.into_iter().zip(achieved) {
             let promised = designed.promised(force, which);
-            let words = format!("{force} N, {which}: {promised:.2} promised, {achieved:.2} achieved");
+            let words =
+                format!("{force} N, {which}: {promised:.2} promised, {achieved:.2} achieved");
             println!("{words}");
             if !KEPT.contains(&(achieved / promised)) {
                 broken.push(words);
@@ -376,6 +388,9 @@ fn a_board_is_recorded_without_waiting() {
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&refused.stderr);
-    assert!(!refused.status.success() && said.contains("--seconds"), "{said}");
+    assert!(
+        !refused.status.success() && said.contains("--seconds"),
+        "{said}"
+    );
     assert!(!path.exists());
 }

@@ -740,7 +740,9 @@ fn pressed_again(folder: &Path, turns: usize, deviation: f64, forces: bool) -> S
     file.add("X", &[SITES, touches], &x).unwrap();
     file.add("p_m", &[touches, 3], &p).unwrap();
     // Tenths of the plate, numbered somehow.
-    let strip: Vec<f64> = (0..touches).map(|t| (t % PLACES / 15) as f64 - 3.0).collect();
+    let strip: Vec<f64> = (0..touches)
+        .map(|t| (t % PLACES / 15) as f64 - 3.0)
+        .collect();
     file.add("strip", &[touches], &strip).unwrap();
     if forces {
         let force: Vec<f64> = (0..touches).map(force).collect();
@@ -790,7 +792,10 @@ fn what_scattering_data_promise_is_what_matching_does() {
         assert!(notes(&answer).contains("force_n"), "{answer}");
         let scatter = numbers(&weighed["scatter_percent"]);
         assert_eq!(scatter.len(), 5);
-        assert!(scatter.iter().all(|s| (5.0..120.0).contains(s)), "{scatter:?}");
+        assert!(
+            scatter.iter().all(|s| (5.0..120.0).contains(s)),
+            "{scatter:?}"
+        );
     }
     // Without noise it is said that none was given.
     let data = pressed_again(folder.path(), 1, 0.05, false);
@@ -850,7 +855,12 @@ fn groups_of_the_user_are_never_divided() {
     let sites = "3,9";
     let group = |t: usize| t % 150 / 15;
     for estimator in ["matching", "svr"] {
-        let answer = held_out(&data, sites, estimator, &["--groups", "strip", "--folds", "3"]);
+        let answer = held_out(
+            &data,
+            sites,
+            estimator,
+            &["--groups", "strip", "--folds", "3"],
+        );
         assert_eq!(answer["places"], 10);
         assert_eq!(answer["criterion"]["groups"], "strip");
         let held = answer["test_touches"].as_array().unwrap();
@@ -897,5 +907,8 @@ fn groups_of_the_user_are_never_divided() {
     refused(&[&base[..], &["odd"]].concat(), "whole numbers");
     refused(&[&base[..], &["few"]].concat(), "one is needed a touch");
     refused(&[&base[..], &["nothing"]].concat(), "nothing");
-    misused(&[&base[..], &["few", "--split", "touch"]].concat(), "--split");
+    misused(
+        &[&base[..], &["few", "--split", "touch"]].concat(),
+        "--split",
+    );
 }

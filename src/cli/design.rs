@@ -134,7 +134,9 @@ fn print_summary(design: &Design) -> anyhow::Result<()> {
     }
     if !words.folded.is_empty() {
         let more = words.folded.len();
-        out::line(&format!("{more} more notes on how this came about stand in the report"))?;
+        out::line(&format!(
+            "{more} more notes on how this came about stand in the report"
+        ))?;
     }
     let total: f64 = design.seconds.iter().map(|s| s.seconds).sum();
     out::say(&format!("{total:.1} s"));

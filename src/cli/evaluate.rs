@@ -196,7 +196,9 @@ impl EvaluateArgs {
                 None
             }
             Some(name) => Some(read(name)?.ok_or_else(|| {
-                misuse("--groups takes place, none, an array in an NPZ, or a CSV with a column group")
+                misuse(
+                    "--groups takes place, none, an array in an NPZ, or a CSV with a column group",
+                )
             })?),
             None if said || !dataset_file::holds(&self.data.data, USUAL)? => None,
             None => read(USUAL)?,

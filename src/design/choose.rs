@@ -462,7 +462,7 @@ fn select_by_expected_error(
     watch: Watch,
     found: &(dyn Fn(&SensorSet) + Sync),
 ) -> Result<Selection, DesignError> {
-    let known = Known::new(inputs, simulated, &inputs.project.gluing());
+    let known = Known::new(inputs, simulated);
     let positions: Vec<DVec3> = (reduced.feasible.iter())
         .map(|&s| simulated.dataset.sites[s].position)
         .collect();

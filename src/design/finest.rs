@@ -5,15 +5,16 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::judge::{errors_mm, judge, measured_by, noisy};
+use super::known;
 use super::layout::{lay_out_sites, touches_on};
-use super::sense::{map_size, point_gauge};
+use super::sense::{POINT, drawn_on, gauge_at, map_size};
 use super::{Design, DesignError, Ground, Inputs, Laid, Simulated, Truth, ground};
 use crate::budget::{Budget, Elements, Watch};
 use crate::dataset::Signal;
-use crate::elasticity::sensitivity::{Gauge, Sensitivity};
+use crate::elasticity::sensitivity::Gauge;
 use crate::elasticity::{Model, Touch};
 use crate::evaluation::{Candidate, EvaluationRow, mean};
-use crate::inference::{Errors, Matching, ResponseMap};
+use crate::inference::{Errors, Matching};
 
 /// Touches of its own that it judges by.
 pub const JUDGED: usize = 1500;
@@ -167,7 +168,7 @@ impl Finest {
         watch: Watch,
     ) -> Result<Truth, DesignError> {
         let touches = self.touches.clone();
-        let truth = measured_by(&*self.model, inputs, simulated, sites, touches, watch)?;
+        let truth = measured_by(&*self.model, inputs, simulated, sites, touches, None, watch)?;
         Ok(Truth {
             element_mm: self.element_mm(),
             ..truth
@@ -181,12 +182,8 @@ fn rows_of(truth: &Truth, sites: &[usize]) -> Vec<usize> {
     sites.iter().filter_map(row).collect()
 }
 
-/// What gauges glued by hand are off by over the reading, as the matching of a measured trade takes it: a millimetre,
-/// three degrees and 3 % of gain are about this much on a compliant part.
-pub const GLUED_BY_HAND: f64 = 0.2;
-
 /// A design's elastic model, ready to be matched to what its chosen gauges read, in the order of their numbers in
-/// the dataset. Gauges here read at a point, as those of a design do.
+/// the dataset. Gauges here read at a point, as those of a design do, and may be glued as far off as the project says.
 ///
 /// # Errors
 /// [`DesignError`] as for the design's simulation.
@@ -198,16 +195,13 @@ pub fn matching(inputs: &Inputs, design: &Design, watch: Watch) -> Result<Matchi
     let mut sites = design.chosen().to_vec();
     sites.sort_unstable();
     let gauges: Vec<Gauge> = (sites.iter())
-        .map(|&s| point_gauge(&simulated.dataset.sites[s]))
+        .map(|&s| gauge_at(&simulated.dataset.sites[s], POINT))
         .collect();
-    let sensitivity = Sensitivity::new(&*model, &gauges, watch)?;
+    let off = known::off(project, simulated);
     let (force, tip) = project.tip();
     let mesh = simulated.ground.of_size(map_size(&simulated.ground, tip));
-    let map = ResponseMap::new(&sensitivity, mesh, tip, watch)?;
-    let errors = Errors {
-        relative: GLUED_BY_HAND,
-        ..Errors::of_noise(project.gauge.noise_microstrain * 1e-6, gauges.len())
-    };
+    let drawn = drawn_on(&*model, &gauges, &mesh, (tip, off.tip), watch)?;
+    let errors = Errors::known(&off, gauges.len(), Some(Arc::new(drawn.spread(&off))));
     let hardest = project.live.largest_force_n.max(2.0 * force);
-    Ok(Matching::new(Arc::new(map), errors, hardest))
+    Ok(Matching::new(drawn.map, errors, hardest))
 }

@@ -160,7 +160,7 @@ impl InHand {
 }
 
 fn scene(inputs: &Inputs, simulated: &Simulated, watch: Watch) -> Result<Scene, Cancelled> {
-    let known = Known::new(inputs, simulated, &inputs.project.gluing());
+    let known = Known::new(inputs, simulated);
     let variance = |site: usize, touch: usize| known.variance(site, touch);
     let dataset = &simulated.dataset;
     Scene::new(

@@ -6,9 +6,11 @@ mod presses;
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
+use super::known;
 use super::layout::touches_on;
-use super::sense::proposed;
+use super::sense::{gauge_at, proposed};
 use super::{
     Design, DesignError, Ground, Inputs, NOISE_SEED, PRESS_SEED, Reduced, Simulated, TEST_SEED,
     WORKSHOP_SEED,
@@ -17,16 +19,17 @@ use crate::budget::{Budget, Cancelled, Watch, Work};
 use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
 use crate::elasticity::Model;
 use crate::elasticity::load::Touch;
+use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::evaluation::{self, Candidate, EstimatorKind, Evaluation, Judging, Region, Trial};
 use crate::mesh::TriMesh;
 use crate::placement::Selection;
 use crate::project::Project;
 use crate::regression::folds::evenly;
-use crate::uncertainty::Gluing;
+use crate::uncertainty::{Gluing, Uncertainty};
 
-pub use crate::placement::expected_error::BLIND;
 pub(super) use self::matched::errors_mm;
-pub use self::presses::{PRESSED_HARD, PRESSED_OFF, Press, Pressed};
+pub use self::presses::{Press, Pressed};
+pub use crate::placement::expected_error::BLIND;
 
 /// The judge: a model of finer elements, with touches of its own.
 #[derive(Clone)]
@@ -39,23 +42,29 @@ pub struct Truth {
     /// Dataset sites that were measured, rising, and their signals.
     pub sites: Vec<usize>,
     pub x: SignalMatrix,
-    /// The same sites as a workshop would build them, and how far off that is.
+    /// The same sites as a workshop would build them.
     pub workshop: SignalMatrix,
-    pub gluing: Gluing,
+    /// How far off they are built, and all else that was known to be off when they were measured.
+    pub off: Uncertainty,
+    /// Length and width of the grids (m) that gauges read over; absent where they read at a point, as regressions
+    /// learn from.
+    pub grid: Option<[f64; 2]>,
     /// Known presses on the gauges as built, where an estimator learns from them.
     pub pressed: Option<Pressed>,
 }
 
 impl Truth {
-    /// Whether it measures exactly these sites, in any order, built by this workshop, and what this estimator asks
-    /// for beside.
+    /// Whether it measures exactly these sites, in any order, built and pressed as far off as that, and what this
+    /// estimator asks for beside.
     #[must_use]
-    pub fn measures(&self, sites: &[usize], gluing: &Gluing, by: EstimatorKind) -> bool {
+    pub fn measures(&self, sites: &[usize], off: &Uncertainty, project: &Project) -> bool {
         let mut rows = sites.to_vec();
         rows.sort_unstable();
         rows.dedup();
+        let by = project.judging().estimator();
         let presses = by == EstimatorKind::Svr || self.pressed.is_some();
-        rows == self.sites && *gluing == self.gluing && presses
+        let same = off.builds_as(&self.off) && grid(project) == self.grid;
+        rows == self.sites && same && presses
     }
 
     /// The same, judged in the regions that a project asks for.
@@ -84,7 +93,8 @@ pub fn truth(
     let mesh = simulated.ground.touched_surface(&laid);
     let seed = inputs.project.budget.seed.wrapping_add(TEST_SEED);
     let touches = touches_on(&mesh, inputs, budget.test_touches, seed, false)?;
-    let mut truth = measured_by(&*model, inputs, simulated, sites, touches, watch)?;
+    let grid = grid(&inputs.project);
+    let mut truth = measured_by(&*model, inputs, simulated, sites, touches, grid, watch)?;
     if inputs.project.judging().estimator() == EstimatorKind::Matching {
         truth.press(&*model, &mesh, inputs, simulated, watch)?;
     }
@@ -106,27 +116,60 @@ impl Truth {
     ) -> Result<(), DesignError> {
         let seed = inputs.project.budget.seed;
         let asked = proposed(surface, inputs)?;
-        let presses = presses::by_hand(surface, asked, seed.wrapping_add(PRESS_SEED));
+        let hand = &self.off.pressing;
+        let presses = presses::by_hand(surface, asked, hand, seed.wrapping_add(PRESS_SEED));
         let made: Vec<Touch> = presses.iter().map(|p| p.made).collect();
-        let built = sites_as_built(simulated, &self.sites, &self.gluing, seed);
-        let signal = simulated.dataset.signal;
-        let (x, solves) = dataset::measure(model, &made, &built, signal, watch)?;
+        let built = sites_as_built(simulated, &self.sites, &self.off.gluing, seed);
+        let (x, solves) = read(model, inputs, &made, &built, self.grid, watch)?;
         self.work.solves += solves as u64;
         self.pressed = Some(Pressed {
             presses,
-            x: x.scaled_rows(gains(&self.sites, &self.gluing, seed)),
+            x: x.scaled_rows(gains(&self.sites, &self.off.gluing, seed)),
         });
         Ok(())
     }
 }
 
-/// Sites as a model reads them under touches. The size of its elements is for the caller to say.
+/// Length and width of the grids (m) that a project's gauges are judged with: those that live touch reads them over, and
+/// none where a regression has learned from points.
+fn grid(project: &Project) -> Option<[f64; 2]> {
+    let keys = &project.gauge;
+    let matching = project.judging().estimator() == EstimatorKind::Matching;
+    matching.then(|| [keys.grid_length_mm * 1e-3, keys.grid_width_mm * 1e-3])
+}
+
+/// What gauges read under touches (sites × touches), over grids of this length and width (m) or at a point, and how many
+/// right-hand sides that took.
+fn read(
+    model: &dyn Model,
+    inputs: &Inputs,
+    touches: &[Touch],
+    sites: &[Site],
+    grid: Option<[f64; 2]>,
+    watch: Watch,
+) -> Result<(SignalMatrix, usize), Cancelled> {
+    let Some(grid) = grid else {
+        return dataset::measure(model, touches, sites, inputs.project.gauge.signal, watch);
+    };
+    let gauges: Vec<Gauge> = sites.iter().map(|site| gauge_at(site, grid)).collect();
+    let sensitivity = Sensitivity::new(model, &gauges, watch)?;
+    let columns: Vec<Vec<f64>> = touches.par_iter().map(|t| sensitivity.read(t)).collect();
+    let values = (0..gauges.len()).flat_map(|g| columns.iter().map(move |column| column[g]));
+    Ok((
+        SignalMatrix::new(touches.len(), values.collect()),
+        gauges.len(),
+    ))
+}
+
+/// Sites as a model reads them under touches, over grids of this length and width (m) or at a point. The size of its
+/// elements is for the caller to say.
 pub(super) fn measured_by(
     model: &dyn Model,
     inputs: &Inputs,
     simulated: &Simulated,
     sites: &[usize],
     touches: Vec<Touch>,
+    grid: Option<[f64; 2]>,
     watch: Watch,
 ) -> Result<Truth, DesignError> {
     let project = &inputs.project;
@@ -135,15 +178,14 @@ pub(super) fn measured_by(
     rows.dedup();
     // Both kinds of gauges in one measurement: the loads are solved for once.
     let drawn = rows.iter().map(|&s| simulated.dataset.sites[s]);
-    let (gluing, seed) = (project.gluing(), project.budget.seed);
-    let built = sites_as_built(simulated, &rows, &gluing, seed);
+    let (off, seed) = (known::off(project, simulated), project.budget.seed);
+    let built = sites_as_built(simulated, &rows, &off.gluing, seed);
     let gauges: Vec<Site> = drawn.chain(built).collect();
-    let (signals, solves) =
-        dataset::measure(model, &touches, &gauges, project.gauge.signal, watch)?;
+    let (signals, solves) = read(model, inputs, &touches, &gauges, grid, watch)?;
     let half =
         |k: usize| signals.select_rows(&(k * rows.len()..(k + 1) * rows.len()).collect::<Vec<_>>());
     let (x, workshop) = (half(0), half(1));
-    let workshop = workshop.scaled_rows(gains(&rows, &gluing, seed));
+    let workshop = workshop.scaled_rows(gains(&rows, &off.gluing, seed));
     Ok(Truth {
         regions: regions(project, &touches),
         element_mm: f64::NAN,
@@ -155,7 +197,8 @@ pub(super) fn measured_by(
         sites: rows,
         x,
         workshop,
-        gluing,
+        off,
+        grid,
         pressed: None,
     })
 }
@@ -461,13 +504,32 @@ mod tests {
             sites: vec![2, 5],
             x: SignalMatrix::default(),
             workshop: SignalMatrix::default(),
-            gluing: Gluing::default(),
+            off: Uncertainty::default(),
+            grid: None,
             pressed: None,
         };
-        let [svr, matching] = EstimatorKind::ALL;
-        assert!(truth.measures(&[5, 2, 5], &Gluing::default(), svr));
-        assert!(!truth.measures(&[5, 3], &Gluing::default(), svr));
-        assert!(!truth.measures(&[5, 2], &Gluing::EXACT, svr));
-        assert!(!truth.measures(&[5, 2], &Gluing::default(), matching));
+        let usual = Uncertainty::default();
+        let other = Uncertainty {
+            gluing: Gluing::EXACT,
+            ..usual
+        };
+        let mut project = Project::around("limb.stl", None);
+        project.evaluation.estimator = EstimatorKind::Svr;
+        assert!(truth.measures(&[5, 2, 5], &usual, &project));
+        assert!(!truth.measures(&[5, 3], &usual, &project));
+        assert!(!truth.measures(&[5, 2], &other, &project));
+        project.evaluation.estimator = EstimatorKind::Matching;
+        let matched = Truth {
+            grid: grid(&project),
+            pressed: Some(Pressed {
+                presses: Vec::new(),
+                x: SignalMatrix::default(),
+            }),
+            ..truth.clone()
+        };
+        assert!(!truth.measures(&[5, 2], &usual, &project));
+        assert!(matched.measures(&[5, 2], &usual, &project));
+        project.gauge.grid_length_mm += 1.0;
+        assert!(!matched.measures(&[5, 2], &usual, &project));
     }
 }

@@ -1,10 +1,16 @@
 //! What is known of the signals of a simulation beside their values: noise, gluing, and what its elements leave.
+//!
+//! Of what [`Uncertainty`] describes the choice leaves out two things. A drift that is common to all channels counts as
+//! noise of each, of the same variance: that they share it, so that differences between channels are free of it, would
+//! take an unknown more in every filter. And the tip's size counts for nothing: a tip of another size blurs readings
+//! alike at most sites, and what it does under every touch would take as many solves again.
 
 use super::{HEARD_SEED, Inputs, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::{GluingSlopes, Signal};
 use crate::placement::expected_error::{Detail, Forces, Knowledge, Scene, Variance, expected};
-use crate::uncertainty::Gluing;
+use crate::project::Project;
+use crate::uncertainty::Uncertainty;
 
 /// A few sites are looked at in more detail than a choice among thousands can.
 pub(super) const FINE: Detail = Detail {
@@ -15,35 +21,23 @@ pub(super) const FINE: Detail = Detail {
 /// What a choice by expected error is told of a simulation.
 pub(super) struct Known<'a> {
     simulated: &'a Simulated,
-    gluing: Gluing,
+    off: Uncertainty,
     /// Force of each touch (N).
     forces: Vec<f64>,
-    /// What the elements leave, as a share of a reading.
-    share: f64,
-    noise: f64,
     range: [f64; 2],
     possible: f64,
     seed: u64,
 }
 
 impl<'a> Known<'a> {
-    pub fn new(inputs: &Inputs, simulated: &'a Simulated, gluing: &Gluing) -> Self {
+    pub fn new(inputs: &Inputs, simulated: &'a Simulated) -> Self {
         let project = &inputs.project;
-        let dataset = &simulated.dataset;
-        let estimate = &simulated.discretization;
-        let share = match (dataset.signal, estimate.strain_percent.is_nan()) {
-            (Signal::Strain, false) => estimate.strain_percent / 100.0,
-            _ => 0.0,
-        };
         Self {
             simulated,
-            gluing: *gluing,
-            forces: dataset.touches.iter().map(|t| t.force).collect(),
-            share,
-            noise: match dataset.signal {
-                Signal::Strain => project.gauge.noise_microstrain * 1e-6,
-                Signal::Displacement | Signal::NormalDisplacement => 0.0,
-            },
+            off: off(project, simulated),
+            forces: (simulated.dataset.touches.iter())
+                .map(|t| t.force)
+                .collect(),
             range: project.touch.forces_n,
             possible: project.live.largest_force_n.max(project.touch.forces_n[1]),
             seed: project.budget.seed.wrapping_add(HEARD_SEED),
@@ -56,16 +50,19 @@ impl<'a> Known<'a> {
         let slopes = self.simulated.dataset.slopes.as_ref();
         let column = slopes.and_then(|s| s.touches().binary_search(&touch).ok());
         let glued = match (slopes, column) {
-            (Some(slopes), Some(column)) => slopes.variance(site, column, reading, &self.gluing),
+            (Some(slopes), Some(column)) => {
+                slopes.variance(site, column, reading, &self.off.gluing)
+            }
             _ => 0.0,
         };
-        glued + (self.share * reading).powi(2)
+        glued + (self.off.elements * reading).powi(2)
     }
 
     /// For a pool with this variance of its rows.
     pub fn knowledge<'b>(&'b self, variance: Variance<'b>) -> Knowledge<'b> {
         Knowledge {
-            noise: self.noise,
+            // All channels drift together, which a filter of three unknowns cannot hold: as if each did for itself.
+            noise: self.off.of_channel_and_drift(),
             variance: Some(variance),
             among: (self.simulated.dataset.slopes.as_ref()).map(GluingSlopes::touches),
             forces: Some(Forces {
@@ -75,6 +72,21 @@ impl<'a> Known<'a> {
             }),
             seed: self.seed,
         }
+    }
+}
+
+/// Everything that is known to be off with a simulation's signals: of strain what the project says and the elements are
+/// estimated to leave, of displacements nothing but the gluing.
+pub(super) fn off(project: &Project, simulated: &Simulated) -> Uncertainty {
+    let off = project.uncertainty();
+    match simulated.dataset.signal {
+        Signal::Strain => off.with_elements(simulated.discretization.strain_percent),
+        Signal::Displacement | Signal::NormalDisplacement => Uncertainty {
+            noise: 0.0,
+            drift: 0.0,
+            elements: 0.0,
+            ..off
+        },
     }
 }
 
@@ -97,7 +109,7 @@ pub fn expected_errors(
     sets: &[Vec<usize>],
     watch: Watch,
 ) -> Result<Vec<f64>, Cancelled> {
-    let known = Known::new(inputs, simulated, &inputs.project.gluing());
+    let known = Known::new(inputs, simulated);
     let mut sites: Vec<usize> = sets.concat();
     sites.sort_unstable();
     sites.dedup();

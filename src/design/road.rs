@@ -367,8 +367,8 @@ pub fn run_step_by_step(
     let judging = inputs.project.judging();
     let by = judging.estimator();
     let judged = sites_to_judge(by, &reduced, &selections);
-    let gluing = inputs.project.gluing();
-    let measured = known.truth.filter(|t| t.measures(&judged, &gluing, by));
+    let off = super::known::off(&inputs.project, &simulated);
+    let measured = (known.truth).filter(|t| t.measures(&judged, &off, &inputs.project));
     let same = |e: &Arc<Evaluation>| measured.is_some() && e.judging == judging;
     let known = known.evaluation.filter(same);
     let truth = match measured {

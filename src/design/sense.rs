@@ -17,7 +17,7 @@ use crate::inference::{AsDrawn, ResponseMap};
 use crate::live::GaugeModel;
 use crate::mesh::TriMesh;
 use crate::project::{LiveKeys, Project};
-use crate::uncertainty::Gluing;
+use crate::uncertainty::{Gluing, Uncertainty};
 
 /// A model of the chosen gauges, without the stiffness it came from.
 pub struct Sensing {
@@ -25,7 +25,10 @@ pub struct Sensing {
     pub sensitivity: Arc<Sensitivity>,
     /// Readings everywhere, as drawn and as they change with the way gauges are glued.
     pub drawn: Arc<AsDrawn>,
-    /// What the project's tolerance of gluing puts on the readings, while nothing is known of it.
+    /// What is known to be off.
+    pub off: Uncertainty,
+    /// What the project's tolerance of gluing, and of the tip, puts on the readings, while nothing is known of these
+    /// gauges.
     pub spread: Arc<ResponseMap>,
     /// Where known touches are best pressed: evenly over the part.
     pub proposed: Vec<Touch>,
@@ -95,12 +98,15 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
     let sensitivity = Sensitivity::new(&*graded.model, &gauges, watch)?;
     let tip_radius = project.tip().1;
     let mesh = ground.of_size(map_size(&ground, tip_radius));
-    let drawn = drawn_on(&*graded.model, &gauges, mesh, tip_radius, watch)?;
+    let off = (project.uncertainty()).with_elements(graded.estimate.strain_percent);
+    let tip = (tip_radius, off.tip);
+    let drawn = drawn_on(&*graded.model, &gauges, &mesh, tip, watch)?;
     let proposed = proposed(&drawn.map.mesh, inputs)?;
     Ok(Sensing {
         gauges,
         sensitivity: Arc::new(sensitivity),
-        spread: Arc::new(drawn.spread(&project.gluing())),
+        spread: Arc::new(drawn.spread(&off)),
+        off,
         drawn: Arc::new(drawn),
         proposed,
         element_mm: Ground::element_mm(&graded.laid),
@@ -114,31 +120,43 @@ pub(super) fn proposed(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<Touch>, De
     touches_on(mesh, inputs, PROPOSED, PROPOSED_SEED, true)
 }
 
-/// A gauge at a site of a design, where gauges read at a point.
-pub(super) fn point_gauge(site: &Site) -> Gauge {
-    /// Side of a grid (m) that reads at a point.
-    const POINT: f64 = 1e-9;
+/// Length and width (m) of the grid of a gauge that reads at a point.
+pub(super) const POINT: [f64; 2] = [1e-9, 1e-9];
+
+/// A gauge at a site of a design, with a grid of this length and width (m).
+pub(super) fn gauge_at(site: &Site, [length, width]: [f64; 2]) -> Gauge {
     Gauge {
         position: site.position,
         direction: site.direction,
         normal: site.normal,
-        length: POINT,
-        width: POINT,
+        length,
+        width,
     }
 }
 
-/// What gauges read everywhere on a mesh, as drawn and as it changes with the way they are glued.
+/// What gauges read everywhere on a mesh, as drawn, as it changes with the way they are glued, and with the tip where its
+/// radius (m) may be off (its standard deviation, m).
 pub(super) fn drawn_on(
     model: &dyn Model,
     gauges: &[Gauge],
-    mesh: Arc<TriMesh>,
-    tip_radius: f64,
+    mesh: &Arc<TriMesh>,
+    (tip_radius, off): (f64, f64),
     watch: Watch,
 ) -> Result<AsDrawn, Cancelled> {
     let moved: Vec<Gauge> = gauges.iter().flat_map(moved).collect();
-    let all = Sensitivity::new(model, &moved, watch)?;
-    let all = ResponseMap::new(&all, mesh, tip_radius, watch)?;
-    Ok(as_drawn(&all, gauges.len()))
+    let sensitivity = Sensitivity::new(model, &moved, watch)?;
+    let pressed = |radius: f64| ResponseMap::new(&sensitivity, Arc::clone(mesh), radius, watch);
+    let mut drawn = as_drawn(&pressed(tip_radius)?, gauges.len());
+    if off > 0.0 {
+        let larger = as_drawn(&pressed(tip_radius + off)?, gauges.len());
+        let rise = vec![[off.recip(), -off.recip()]; gauges.len()];
+        drawn.tip = Some(
+            larger
+                .map
+                .combined(std::array::from_ref(&*drawn.map), &rise),
+        );
+    }
+    Ok(drawn)
 }
 
 /// A gauge as drawn, and moved and turned either way.
@@ -185,6 +203,7 @@ fn as_drawn(all: &ResponseMap, gauges: usize) -> AsDrawn {
             change(3, STEP_MM),
             change(5, STEP_DEGREES),
         ],
+        tip: None,
     }
 }
 
@@ -285,11 +304,27 @@ impl Sensing {
     /// What gauges read as the project knows them to be glued.
     #[must_use]
     pub fn map_for(&self, live: &LiveKeys) -> GaugeModel {
-        match live.glued(self.gauges.len()) {
-            Some(glued) => Arc::new(self.drawn.glued(&glued)).into(),
-            None => GaugeModel {
+        let gauges = self.gauges.len();
+        let off = Uncertainty {
+            stiffness: live.stiffness_percent / 100.0,
+            ..self.off
+        };
+        let Some(glued) = live.glued(gauges) else {
+            return GaugeModel {
                 map: Arc::clone(&self.drawn.map),
                 spread: Some(Arc::clone(&self.spread)),
+                off,
+            };
+        };
+        let doubts = live.doubts(gauges);
+        let spread = doubts.map(|doubts| Arc::new(self.drawn.spread_of(&doubts, &off)));
+        GaugeModel {
+            map: Arc::new(self.drawn.glued(&glued)),
+            spread,
+            // What known touches have shown says more than what the elements were estimated to leave.
+            off: Uncertainty {
+                elements: 0.0,
+                ..off
             },
         }
     }

@@ -1,85 +1,41 @@
 //! How gauges were really glued, from a few touches whose place and force are known.
 //!
-//! A gauge that is off by a little reads x = f·(k g + a ∂g/∂s + b ∂g/∂t + c ∂g/∂φ): its gain, and how far it
-//! was moved along itself, across itself and turned. These four are fitted for every channel alone by least
-//! squares with normal priors, the same as maximum a posteriori. Few touches decide little, and then the priors
-//! hold.
+//! A gauge that is off by a little reads f·bᵀθ of a touch, with b = (g, ∂g/∂s, ∂g/∂t, ∂g/∂φ) at its place and θ = (gain,
+//! millimetres along and across, degrees). Known presses are off themselves: a hand is a millimetre beside the place and
+//! some per cent too hard. So each press k has three unknowns of its own, u = (two steps along the surface, a share of
+//! the force), and with the slopes J over them
+//!
+//! ```text
+//! x = B θ + J u + n,    u ~ N(0, S),  n ~ N(0, D)        (all channels of one press)
+//! ```
+//!
+//! which is the model of errors in variables, linearized as by F. R. Helmert (Die Ausgleichungsrechnung nach der Methode
+//! der kleinsten Quadrate, 1872; W. A. Fuller, Measurement Error Models, 1987). With u integrated out the residuals of a
+//! press are correlated over the channels,
+//!
+//! ```text
+//! V = D + J S Jᵀ + δ² 1 1ᵀ,      (P + Σ Bᵀ V⁻¹ B) (θ - θ₀) = Σ Bᵀ V⁻¹ (x - B θ₀),
+//! ```
+//!
+//! with δ a common drift, θ₀ = (1, 0, 0, 0) and the prior P that the workshop's gluing is: least squares of all gauges
+//! together. J depends on θ and is taken anew a few times. One unknown more is the factor by which the part is stiffer
+//! or softer, which all gauges share.
+//!
+//! D has a share of the readings that model and elements leave. Its size is where the squares of all residuals
+//! r = x - B θ₀, rᵀ(V + B P⁻¹ Bᵀ)⁻¹r, are as many as there are readings; what the elements are estimated to leave counts
+//! as some readings more, because a few presses say little of it. What is not known afterwards is the inverse of the normal
+//! matrix: never more than before, so that presses that say nothing leave everything as it was.
 
-use std::sync::Arc;
-
-use nalgebra::{Matrix4, Vector2, Vector4};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
 
-use super::map::{ResponseMap, Slope};
-use super::matching::{Errors, Measured, equations};
+use super::drawn::{AsDrawn, Doubt, covariance, doubt, upper_triangle};
+use super::map::Slope;
+use super::matching::Errors;
 use crate::mesh::SurfacePoint;
-use crate::uncertainty::Gluing;
+use crate::uncertainty::Uncertainty;
 
-/// What gauges read as drawn, and how that changes with the way they are glued.
-pub struct AsDrawn {
-    pub map: Arc<ResponseMap>,
-    /// A millimetre along the gauge, a millimetre across it, and a degree.
-    pub changes: [ResponseMap; 3],
-}
-
-impl AsDrawn {
-    /// As the gauges really are.
-    #[must_use]
-    pub fn calibrated(&self, calibration: &Calibration) -> ResponseMap {
-        self.glued(&calibration.glued)
-    }
-
-    /// For gauges with these gains, moved (mm) and turned (degrees) like that.
-    #[must_use]
-    pub fn glued(&self, glued: &[[f64; 4]]) -> ResponseMap {
-        self.map.combined(&self.changes, glued)
-    }
-
-    /// How far off readings per newton are by gluing (standard deviations), at every node of the map and for every
-    /// channel.
-    #[must_use]
-    pub fn spread(&self, gluing: &Gluing) -> ResponseMap {
-        let mesh = &self.map.mesh;
-        let nodes = mesh.positions().len() + mesh.edges().len();
-        let mut values = Vec::with_capacity(nodes * self.map.channels());
-        for node in 0..nodes {
-            let [along, across, turned] = self.changes.each_ref().map(|m| m.node(node));
-            let deviation = |(c, &reading): (usize, &f64)| {
-                // From a millimetre and a degree to a metre and a radian.
-                let (along, across) = (along[c] * 1e3, across[c] * 1e3);
-                let variance = gluing.variance(reading, along, across, turned[c].to_degrees());
-                variance.sqrt()
-            };
-            values.extend(self.map.node(node).iter().enumerate().map(deviation));
-        }
-        ResponseMap::of(Arc::clone(mesh), self.map.channels(), values)
-    }
-
-    /// Readings and slopes at one place for gauges that are glued like that.
-    fn slope(&self, at: SurfacePoint, glued: &[[f64; 4]]) -> Slope {
-        let mut slope = self.map.slope(at);
-        let changes = self.changes.each_ref().map(|m| m.slope(at));
-        for (c, factors) in glued.iter().enumerate() {
-            slope.reading[c] *= factors[0];
-            slope.change[c] *= factors[0];
-            for (change, factor) in changes.iter().zip(&factors[1..]) {
-                slope.reading[c] += factor * change.reading[c];
-                slope.change[c] += change.change[c] * *factor;
-            }
-        }
-        slope
-    }
-
-    /// What all four say of one newton at a place: readings as drawn and their changes, channel by channel.
-    fn basis(&self, at: SurfacePoint) -> Vec<Vector4<f64>> {
-        let [a, b, c] = self.changes.each_ref().map(|m| m.at(at));
-        (self.map.at(at).into_iter().enumerate())
-            .map(|(k, g)| Vector4::new(g, a[k], b[k], c[k]))
-            .collect()
-    }
-}
-
-/// A touch that was put where it was asked for.
+/// A touch that was put where it was asked for, or nearly: see [`crate::uncertainty::Pressing`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
     pub at: SurfacePoint,
@@ -95,108 +51,241 @@ pub struct Known {
 pub struct Calibration {
     /// For each channel its gain, millimetres along and across, and degrees.
     pub glued: Vec<[f64; 4]>,
+    /// What is not known of these.
+    pub doubts: Vec<Doubt>,
     /// Standard deviation of each gain.
     pub deviations: Vec<f64>,
-    /// What is still off, over the reading; see [`Errors::relative`].
+    /// What is still off beside that, over the reading; see [`Errors::relative`].
     pub relative: f64,
     pub touches: usize,
 }
 
-/// What is expected before anything is known: a gain of 1, and standard deviations of gain, millimetres and
-/// degrees.
-const BEFORE: [f64; 4] = [0.04, 0.8, 0.8, 3.0];
 /// Model and gauges are never trusted better than this.
 const LEAST: f64 = 0.002;
+/// Times that the slopes are taken at what was found.
+const TURNS: usize = 3;
+/// Readings that the estimate of the elements' error counts for.
+const BEFORE: f64 = 10.0;
 
-/// Fits all channels. How large the remaining errors are is what touches show that were left out of the fit.
+/// Fits all channels to known touches with this noise (strain, a channel each); `off` is what is known of everything
+/// else that is off. Touches that read no numbers are left out.
 #[must_use]
-pub fn calibrate(drawn: &AsDrawn, known: &[Known], noise: &[f64]) -> Calibration {
-    let bases: Vec<Vec<Vector4<f64>>> = known
-        .iter()
-        .map(|k| drawn.basis(k.at).into_iter().map(|b| b * k.force).collect())
-        .collect();
-    let mut relative = 0.03;
-    let mut fits = Vec::new();
-    // Weights need the size of the errors, and that the fits: both settle in a few turns.
-    for _ in 0..8 {
-        let errors = Errors {
-            relative,
-            ..Errors::of_noises(noise)
+pub fn calibrate(
+    drawn: &AsDrawn,
+    known: &[Known],
+    noise: &[f64],
+    off: &Uncertainty,
+) -> Calibration {
+    let read = |k: &&Known| k.reading.iter().all(|x| x.is_finite());
+    let known: Vec<&Known> = known.iter().filter(read).collect();
+    let channels = noise.len();
+    let mut glued = vec![[1.0, 0.0, 0.0, 0.0]; channels];
+    let mut relative = off.elements.max(LEAST);
+    let mut found = None;
+    for _ in 0..TURNS {
+        let presses: Vec<Press> = (known.iter())
+            .map(|k| Press::new(drawn, k, &glued, off))
+            .collect();
+        let least = Least {
+            presses: &presses,
+            noise,
+            off,
         };
-        fits = fit(known, &bases, &errors);
-        relative = still_off(known, &bases, &fits, noise);
+        relative = least.share_left();
+        let Some(fit) = least.fit(relative) else {
+            break;
+        };
+        glued = fit.glued();
+        found = Some(fit);
     }
-    // From few touches the size of the errors is itself uncertain, as is the fit: a prediction is wider.
-    let weighed = Errors {
-        relative,
-        ..Errors::of_noises(noise)
-    };
+    let doubts = found.map_or_else(
+        || vec![doubt(&off.gluing); channels],
+        |fit| fit.doubts(channels),
+    );
     Calibration {
-        glued: fits.iter().map(|f| f.glued.into()).collect(),
-        deviations: fits.iter().map(|f| f.covariance[(0, 0)].sqrt()).collect(),
-        relative: relative.max(misplaced(drawn, known, &bases, &weighed))
-            * (1.0 + 4.0 / known.len() as f64).sqrt(),
+        glued,
+        deviations: doubts.iter().map(|d| d[0].max(0.0).sqrt()).collect(),
+        doubts,
+        relative,
         touches: known.len(),
     }
 }
 
-/// The size of the relative errors at which the places that are found, for touches left out of the fit one
-/// after the other, are as far off as the posterior says: a quarter of their squared Mahalanobis distances lies
-/// above the upper quartile of χ² with two degrees of freedom. (A single touch far off would decide a mean.)
-fn misplaced(
-    drawn: &AsDrawn,
-    known: &[Known],
-    bases: &[Vec<Vector4<f64>>],
-    errors: &Errors,
-) -> f64 {
-    /// -2 ln ¼.
-    const QUARTILE: f64 = 2.772_588_722_239_781;
-    let slopes: Vec<Slope> = (0..known.len())
-        .map(|k| {
-            let others = |i: &usize| *i != k;
-            let rest: Vec<Known> = (0..known.len())
-                .filter(others)
-                .map(|i| known[i].clone())
-                .collect();
-            let bases: Vec<_> = (0..known.len())
-                .filter(others)
-                .map(|i| bases[i].clone())
-                .collect();
-            let fits = fit(&rest, &bases, errors);
-            let glued: Vec<[f64; 4]> = fits.iter().map(|f| f.glued.into()).collect();
-            drawn.slope(known[k].at, &glued)
+/// Unknowns of one gauge: gain, along, across, turned.
+const PER_GAUGE: usize = 4;
+
+/// One press, ready to be compared.
+struct Press<'a> {
+    reading: &'a [f64],
+    /// What each of θ says of each channel.
+    basis: Vec<Vector4<f64>>,
+    /// Slopes over the place and the share of the force, each times its standard deviation: channels × 3.
+    moved: DMatrix<f64>,
+}
+
+impl<'a> Press<'a> {
+    fn new(drawn: &AsDrawn, known: &'a Known, glued: &[[f64; 4]], off: &Uncertainty) -> Self {
+        let basis = drawn.basis(known.at);
+        let Slope {
+            reading, change, ..
+        } = drawn.slope(known.at, glued);
+        // In any direction: half of the square along each of two.
+        let place = off.pressing.place / 2.0_f64.sqrt() * known.force;
+        let force = off.pressing.force * known.force;
+        Self {
+            reading: &known.reading,
+            basis: basis.into_iter().map(|b| b * known.force).collect(),
+            moved: DMatrix::from_fn(reading.len(), 3, |c, k| match k {
+                0 => place * change[c].x,
+                1 => place * change[c].y,
+                _ => force * reading[c],
+            }),
+        }
+    }
+
+    /// As drawn, on a part as stiff as its model.
+    fn expected(&self) -> DVector<f64> {
+        DVector::from_iterator(self.basis.len(), self.basis.iter().map(|b| b[0]))
+    }
+
+    /// Covariance of its residuals, factored.
+    fn covariance(&self, errors: &Errors, drift: f64) -> Option<Cholesky<f64, Dyn>> {
+        let weights = errors.weights(self.reading, &vec![true; self.reading.len()]);
+        let mut covariance = &self.moved * self.moved.transpose();
+        covariance.add_scalar_mut(drift * drift);
+        for (c, w) in weights.iter().enumerate() {
+            covariance[(c, c)] += w.recip();
+        }
+        covariance.cholesky()
+    }
+
+    /// The unknowns that a channel's reading depends on, and by how much: its own four, and the common factor.
+    fn unknowns(&self, channel: usize) -> [(usize, f64); PER_GAUGE + 1] {
+        let basis = &self.basis[channel];
+        std::array::from_fn(|k| {
+            if k == PER_GAUGE {
+                (PER_GAUGE * self.basis.len(), basis[0])
+            } else {
+                (PER_GAUGE * channel + k, basis[k])
+            }
         })
-        .collect();
-    let used = vec![true; errors.noise.len()];
-    let excess = |relative: f64| {
-        let errors = Errors {
-            relative,
-            ..Errors::of_noises(&errors.noise)
-        };
-        let mut squares = Vec::new();
-        for (k, slope) in known.iter().zip(&slopes) {
-            let w = errors.weights(&k.reading, &used);
-            let measured = Measured {
-                x: &k.reading,
-                w: &w,
-                squares: 0.0,
-            };
-            let (normal, right) = equations(&measured, slope, k.force);
-            // The force is free: only the place counts.
-            let (Some(inverse), true) = (normal.try_inverse(), normal[(2, 2)] > 0.0) else {
-                continue;
-            };
-            let step = inverse * right;
-            let place = Vector2::new(step[0], step[1]);
-            if let Some(information) = inverse.fixed_view::<2, 2>(0, 0).into_owned().try_inverse() {
-                squares.push(place.dot(&(information * place)));
+    }
+
+    /// Adds what it says to the normal equations; its weighted squares.
+    fn add_to(
+        &self,
+        normal: &mut DMatrix<f64>,
+        right: &mut DVector<f64>,
+        inverse: &DMatrix<f64>,
+    ) -> f64 {
+        let left = DVector::from_column_slice(self.reading) - self.expected();
+        let weighed = inverse * &left;
+        let rows: Vec<_> = (0..self.basis.len()).map(|c| self.unknowns(c)).collect();
+        for (a, row) in rows.iter().enumerate() {
+            for &(i, by) in row {
+                right[i] += by * weighed[a];
+                for (b, other) in rows.iter().enumerate() {
+                    for &(j, and) in other {
+                        normal[(i, j)] += by * inverse[(a, b)] * and;
+                    }
+                }
             }
         }
-        squares.sort_by(f64::total_cmp);
-        let middle = squares.get((squares.len() * 3 / 4).min(squares.len().saturating_sub(1)));
-        middle.map_or(0.0, |m| m - QUARTILE)
-    };
-    zero_of(excess)
+        left.dot(&weighed)
+    }
+}
+
+/// The least squares of all presses.
+struct Least<'a> {
+    presses: &'a [Press<'a>],
+    noise: &'a [f64],
+    off: &'a Uncertainty,
+}
+
+/// What they say.
+struct Fit {
+    /// Of θ - θ₀, channel by channel, and of the common factor.
+    found: DVector<f64>,
+    /// The normal matrix.
+    normal: Cholesky<f64, Dyn>,
+    /// Weighted squares of all residuals, with those that the unknowns were drawn for.
+    squares: f64,
+}
+
+impl Least<'_> {
+    /// Solves with a share of the readings that the model leaves; nothing where numbers overflow.
+    fn fit(&self, relative: f64) -> Option<Fit> {
+        let errors = Errors {
+            relative,
+            ..Errors::of_noises(self.noise)
+        };
+        let mut normal = DMatrix::from_diagonal(&self.prior());
+        let mut right = DVector::zeros(normal.nrows());
+        let mut squares = 0.0;
+        for press in self.presses {
+            let inverse = press.covariance(&errors, self.off.drift)?.inverse();
+            squares += press.add_to(&mut normal, &mut right, &inverse);
+        }
+        let normal = normal.cholesky()?;
+        let found = normal.solve(&right);
+        squares -= found.dot(&right);
+        let sound = squares.is_finite() && found.iter().all(|v| v.is_finite());
+        sound.then_some(Fit {
+            found,
+            normal,
+            squares,
+        })
+    }
+
+    /// One over the variance of every unknown before anything is read.
+    fn prior(&self) -> DVector<f64> {
+        /// Nothing is known better than this (shares, millimetres, degrees).
+        const SURE: f64 = 1e-6;
+        let gauge = covariance(&doubt(&self.off.gluing)).diagonal();
+        let channels = self.noise.len();
+        let variance = |k: usize| {
+            if k == PER_GAUGE * channels {
+                self.off.stiffness.powi(2)
+            } else {
+                gauge[k % PER_GAUGE]
+            }
+        };
+        DVector::from_fn(PER_GAUGE * channels + 1, |k, _| {
+            variance(k).max(SURE * SURE).recip()
+        })
+    }
+
+    /// The share of the readings that the model leaves: where residuals are as large as they ought to be.
+    fn share_left(&self) -> f64 {
+        let readings = (self.presses.len() * self.noise.len()) as f64;
+        let estimated = self.off.elements.max(LEAST);
+        let excess = |relative: f64| {
+            let squares = self.fit(relative).map_or(readings, |fit| fit.squares);
+            squares - readings + BEFORE * ((estimated / relative).powi(2) - 1.0)
+        };
+        zero_of(excess)
+    }
+}
+
+impl Fit {
+    /// For each channel its gain, millimetres along and across, and degrees, with the factor that all share.
+    fn glued(&self) -> Vec<[f64; 4]> {
+        let common = 1.0 + self.found[self.found.len() - 1];
+        let gauges = self.found.as_slice().chunks_exact(PER_GAUGE);
+        let glued = |g: &[f64]| [1.0 + g[0], g[1], g[2], g[3]].map(|v| common * v);
+        gauges.map(glued).collect()
+    }
+
+    /// What is not known of each gauge.
+    fn doubts(&self, channels: usize) -> Vec<Doubt> {
+        let all = self.normal.inverse();
+        let of = |c: usize| -> Matrix4<f64> {
+            let first = PER_GAUGE * c;
+            all.fixed_view::<PER_GAUGE, PER_GAUGE>(first, first)
+                .into_owned()
+        };
+        (0..channels).map(|c| upper_triangle(&of(c))).collect()
+    }
 }
 
 /// Where a falling function is zero, between what is never trusted and all.
@@ -205,8 +294,8 @@ fn zero_of(excess: impl Fn(f64) -> f64) -> f64 {
     if excess(low) <= 0.0 {
         return low;
     }
-    for _ in 0..50 {
-        let middle = (low * high).sqrt();
+    for _ in 0..30 {
+        let middle = f64::sqrt(low * high);
         if excess(middle) > 0.0 {
             low = middle;
         } else {
@@ -216,109 +305,209 @@ fn zero_of(excess: impl Fn(f64) -> f64) -> f64 {
     high
 }
 
-struct Fit {
-    glued: Vector4<f64>,
-    covariance: Matrix4<f64>,
-}
-
-fn fit(known: &[Known], bases: &[Vec<Vector4<f64>>], errors: &Errors) -> Vec<Fit> {
-    let used = vec![true; errors.noise.len()];
-    let weights: Vec<Vec<f64>> = known
-        .iter()
-        .map(|k| errors.weights(&k.reading, &used))
-        .collect();
-    let prior = Matrix4::from_diagonal(&Vector4::from(BEFORE.map(|s| s.powi(-2))));
-    (0..errors.noise.len())
-        .map(|c| {
-            let mut normal = prior;
-            let mut right = prior * Vector4::x();
-            for ((k, basis), weights) in known.iter().zip(bases).zip(&weights) {
-                normal += basis[c] * basis[c].transpose() * weights[c];
-                right += basis[c] * (weights[c] * k.reading[c]);
-            }
-            let covariance = normal.try_inverse().unwrap_or_else(Matrix4::identity);
-            Fit {
-                glued: covariance * right,
-                covariance,
-            }
-        })
-        .collect()
-}
-
-/// The size of the relative errors at which the residuals are as large as they ought to be: each is divided by
-/// what the fit has left of it (one less its leverage), and then is what it were had the touch been left out.
-fn still_off(known: &[Known], bases: &[Vec<Vector4<f64>>], fits: &[Fit], noise: &[f64]) -> f64 {
-    let used = vec![true; fits.len()];
-    let count = (known.len() * fits.len()) as f64;
-    let excess = |relative: f64| {
-        let errors = Errors {
-            relative,
-            ..Errors::of_noises(noise)
-        };
-        let mut sum = 0.0;
-        for (k, basis) in known.iter().zip(bases) {
-            let weights = errors.weights(&k.reading, &used);
-            for (c, fit) in fits.iter().enumerate() {
-                let off = k.reading[c] - basis[c].dot(&fit.glued);
-                let share = (weights[c] * basis[c].dot(&(fit.covariance * basis[c]))).min(0.9);
-                sum += weights[c] * off * off / (1.0 - share).powi(2);
-            }
-        }
-        sum - count
-    };
-    zero_of(excess)
-}
-
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
+    use std::sync::Arc;
 
     use glam::DVec3;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     use super::*;
+    use crate::draw::normal;
+    use crate::inference::ResponseMap;
     use crate::mesh::TriMesh;
+    use crate::uncertainty::{Gluing, Pressing};
 
-    /// Two channels on one triangle, with the same readings per newton at all its six nodes.
-    fn map(mesh: &Arc<TriMesh>, readings: [f64; 2]) -> ResponseMap {
-        ResponseMap::of(Arc::clone(mesh), 2, readings.repeat(6))
+    const CHANNELS: usize = 5;
+    const NOISE: [f64; CHANNELS] = [1e-6; CHANNELS];
+    const FORCE: f64 = 10.0;
+
+    /// Gauges on one triangle of six centimetres: some microstrain a newton, and a few per cent of it a millimetre or a
+    /// degree that they are off.
+    fn drawn() -> AsDrawn {
+        let corners = [DVec3::ZERO, DVec3::X * 0.06, DVec3::Y * 0.06];
+        let (mesh, _) = TriMesh::new(&corners, &[[0, 1, 2]], 0).unwrap();
+        let mesh = Arc::new(mesh);
+        let map = |size: f64, by: f64| {
+            let value = |k: usize| size * (by * (k + 1) as f64).sin();
+            let values = (0..6 * CHANNELS).map(value).collect();
+            ResponseMap::of(Arc::clone(&mesh), CHANNELS, values)
+        };
+        AsDrawn {
+            map: Arc::new(map(10e-6, 1.7)),
+            changes: [map(1e-6, 2.3), map(0.8e-6, 0.7), map(0.5e-6, 3.1)],
+            tip: None,
+        }
+    }
+
+    fn off() -> Uncertainty {
+        Uncertainty {
+            elements: 0.01,
+            ..Uncertainty::default()
+        }
+    }
+
+    fn somewhere(rng: &mut ChaCha8Rng) -> SurfacePoint {
+        let mut share = || 0.15 + rng.random::<f64>();
+        let all = [share(), share(), share()];
+        let sum: f64 = all.iter().sum();
+        SurfacePoint {
+            triangle: 0,
+            barycentric: all.map(|v| v / sum),
+        }
+    }
+
+    /// Gauges as a workshop glues them.
+    fn built(gluing: &Gluing, rng: &mut ChaCha8Rng) -> Vec<[f64; 4]> {
+        let place = gluing.place * 1e3 / 2.0_f64.sqrt();
+        let gauge = |_| {
+            [
+                1.0 + gluing.gain * normal(rng),
+                place * normal(rng),
+                place * normal(rng),
+                gluing.angle.to_degrees() * normal(rng),
+            ]
+        };
+        (0..CHANNELS).map(gauge).collect()
+    }
+
+    /// A press of gauges as built, as it is taken to be.
+    fn press(real: &ResponseMap, pressing: &Pressing, rng: &mut ChaCha8Rng) -> Known {
+        let at = somewhere(rng);
+        let beside = pressing.place / 2.0_f64.sqrt();
+        let moved = DVec3::X * (beside * normal(rng)) + DVec3::Y * (beside * normal(rng));
+        let there = real.index.nearest(real.mesh.point(at) + moved).0;
+        let force = FORCE * (1.0 + pressing.force * normal(rng));
+        let read = |g: f64| force * g + NOISE[0] * normal(rng);
+        Known {
+            at,
+            force: FORCE,
+            reading: real.at(there).into_iter().map(read).collect(),
+        }
     }
 
     #[test]
-    fn the_spread_is_that_of_gauges_glued_so() {
-        const DIRECTIONS: u32 = 8;
-        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
-        let (mesh, _) = TriMesh::new(&corners, &[[0, 1, 2]], 0).unwrap();
-        let mesh = Arc::new(mesh);
-        let drawn = AsDrawn {
-            map: Arc::new(map(&mesh, [2e-6, -1e-6])),
-            changes: [[3e-7, 0.0], [-4e-7, 1e-7], [1e-7, 2e-7]].map(|c| map(&mesh, c)),
+    fn what_is_integrated_out_is_what_would_be_solved_for() {
+        let (drawn, off) = (drawn(), off());
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let real = drawn.glued(&built(&off.gluing, &mut rng));
+        let known: Vec<Known> = (0..3)
+            .map(|_| press(&real, &off.pressing, &mut rng))
+            .collect();
+        let glued = [[1.0, 0.0, 0.0, 0.0]; CHANNELS];
+        let presses: Vec<Press> = (known.iter())
+            .map(|k| Press::new(&drawn, k, &glued, &off))
+            .collect();
+        let least = Least {
+            presses: &presses,
+            noise: &NOISE,
+            off: &off,
         };
-        let gluing = Gluing::default();
-        // Every way of being off as far as a workshop is, each as likely as its opposite.
-        let mut squares = [0.0; 2];
-        let at = SurfacePoint {
-            triangle: 0,
-            barycentric: [0.2, 0.3, 0.5],
-        };
-        for k in 0..4 * DIRECTIONS {
-            let (s, c) = (TAU * f64::from(k / 4) / f64::from(DIRECTIONS)).sin_cos();
-            let [turn, gain] = [k % 2, k / 2 % 2].map(|bit| 2.0 * f64::from(bit) - 1.0);
-            let off = [
-                1.0 + gluing.gain * gain,
-                gluing.place * 1e3 * c,
-                gluing.place * 1e3 * s,
-                gluing.angle.to_degrees() * turn,
-            ];
-            let built = drawn.glued(&[off, off]).at(at);
-            for ((square, built), drawn) in squares.iter_mut().zip(built).zip(drawn.map.at(at)) {
-                *square += (built - drawn).powi(2) / f64::from(4 * DIRECTIONS);
+        let fit = least.fit(0.0).unwrap();
+        // The same with three unknowns more a press, in units of their deviations, and readings that are off each for
+        // itself.
+        let own = PER_GAUGE * CHANNELS + 1;
+        let all = own + 3 * presses.len();
+        let mut equations = DMatrix::<f64>::identity(all, all);
+        for (k, sure) in least.prior().iter().enumerate() {
+            equations[(k, k)] = *sure;
+        }
+        let mut right = DVector::<f64>::zeros(all);
+        for (p, press) in presses.iter().enumerate() {
+            for c in 0..CHANNELS {
+                let mut row = DVector::<f64>::zeros(all);
+                for (k, by) in press.unknowns(c) {
+                    row[k] = by / NOISE[c];
+                }
+                for k in 0..3 {
+                    row[own + 3 * p + k] = press.moved[(c, k)] / NOISE[c];
+                }
+                let left = (press.reading[c] - press.expected()[c]) / NOISE[c];
+                equations += &row * row.transpose();
+                right += row * left;
             }
         }
-        let spread = drawn.spread(&gluing).at(at);
-        for (spread, square) in spread.into_iter().zip(squares) {
-            assert!((spread - square.sqrt()).abs() < 1e-9 * spread, "{spread}");
+        let solved = equations.cholesky().unwrap().solve(&right);
+        for k in 0..own {
+            assert!((solved[k] - fit.found[k]).abs() < 1e-6, "{k}");
         }
-        let exact = drawn.spread(&Gluing::EXACT).at(at);
-        assert!(exact.iter().all(|&v| v == 0.0));
+    }
+
+    #[test]
+    fn no_presses_leave_everything_as_it_was() {
+        let (drawn, off) = (drawn(), off());
+        let found = calibrate(&drawn, &[], &NOISE, &off);
+        assert_eq!(found.glued, [[1.0, 0.0, 0.0, 0.0]; CHANNELS]);
+        assert!((found.relative - off.elements).abs() < 1e-6);
+        let before = drawn.spread(&off);
+        let after = drawn.spread_of(&found.doubts, &off);
+        for node in 0..6 {
+            for (a, b) in before.node(node).iter().zip(after.node(node)) {
+                assert!((a - b).abs() < 1e-6 * a, "{a} {b}");
+            }
+        }
+        // Nor does one that reads no numbers.
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut odd = press(&drawn.map, &off.pressing, &mut rng);
+        odd.reading[2] = f64::NAN;
+        assert_eq!(calibrate(&drawn, &[odd], &NOISE, &off), found);
+    }
+
+    #[test]
+    fn presses_by_hand_never_make_it_worse() {
+        const WORLDS: u64 = 20;
+        let (drawn, off) = (drawn(), off());
+        for count in [1, 2, 4, 12] {
+            let (mut before, mut after) = (0.0, 0.0);
+            for seed in 0..WORLDS {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                let real = drawn.glued(&built(&off.gluing, &mut rng));
+                let known: Vec<Known> = (0..count)
+                    .map(|_| press(&real, &off.pressing, &mut rng))
+                    .collect();
+                let found = calibrate(&drawn, &known, &NOISE, &off);
+                let prior = doubt(&off.gluing);
+                for doubts in &found.doubts {
+                    for k in [0, 4, 7, 9] {
+                        assert!((0.0..=1.000_001 * prior[k]).contains(&doubts[k]));
+                    }
+                }
+                let fitted = drawn.calibrated(&found);
+                for _ in 0..8 {
+                    let at = somewhere(&mut rng);
+                    let truth = real.at(at);
+                    let apart = |map: &ResponseMap| -> f64 {
+                        let pairs = map.at(at).into_iter().zip(&truth);
+                        pairs.map(|(a, b)| (a - b).powi(2)).sum()
+                    };
+                    before += apart(&drawn.map);
+                    after += apart(&fitted);
+                }
+            }
+            assert!(after < 1.02 * before, "{count}: {after:e} {before:e}");
+            // Many of them tell a good part of it.
+            assert!(count < 12 || after < 0.5 * before, "{after:e} {before:e}");
+        }
+    }
+
+    #[test]
+    fn a_machine_finds_a_part_that_is_softer() {
+        let drawn = drawn();
+        let off = Uncertainty {
+            stiffness: 0.1,
+            pressing: Pressing::EXACT,
+            ..off()
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let softer = [[1.1, 0.0, 0.0, 0.0]; CHANNELS];
+        let real = drawn.glued(&softer);
+        let known: Vec<Known> = (0..12)
+            .map(|_| press(&real, &off.pressing, &mut rng))
+            .collect();
+        let found = calibrate(&drawn, &known, &NOISE, &off);
+        for gauge in &found.glued {
+            assert!((gauge[0] - 1.1).abs() < 0.02, "{gauge:?}");
+        }
     }
 }

@@ -303,6 +303,13 @@ mod tests {
             angle_deg: 1.0 / 3.0,
             gain_percent: 0.0,
         };
+        p.gauge.drift_microstrain = 1.0 / 3.0;
+        p.touch.tip_tolerance_mm = 0.75;
+        p.calibration = crate::project::CalibrationKeys {
+            place_mm: 0.0,
+            force_percent: 7.5,
+        };
+        p.live.stiffness_percent = 12.5;
         p.selection.sites.push(ChosenSite {
             position_mm: [0.1, 1.0 / 3.0, -7e-17],
             direction: [0.0, 0.0, 1.0],
@@ -340,6 +347,7 @@ mod tests {
             along_mm: -0.25,
             across_mm: 1.5,
             turned_degrees: -3.25,
+            covariance: Some([1e-9, -0.5, 0.0, 1.0 / 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]),
         });
         p.evaluation.estimator = crate::evaluation::EstimatorKind::Matching;
         p.evaluation.forces_n = vec![0.5, 1.0 / 3.0 + 1.0];
@@ -370,6 +378,11 @@ mod tests {
                     "place_mm",
                     "angle_deg",
                     "gain_percent",
+                    "tip_tolerance_mm",
+                    "drift_microstrain",
+                    "[calibration]",
+                    "force_percent",
+                    "stiffness_percent",
                     "estimator",
                 ];
                 !new.iter().any(|key| line.starts_with(key))

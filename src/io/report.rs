@@ -499,7 +499,7 @@ fn errors(page: &mut String, design: &Design) {
         design.simulated.element_mm,
         design.truth.touches.len(),
         design.truth.element_mm,
-        design.truth.gluing.in_words()
+        design.truth.off.gluing.in_words()
     );
     for r in &design.evaluation.rows {
         let [c, epsilon, gamma] = settings_of(r.hyper);

@@ -10,7 +10,7 @@ use super::svg::escape;
 use super::together::Together;
 use super::{FileError, atomic, source};
 use crate::dataset::Signal;
-use crate::design::{GLUED_BY_HAND, Inputs};
+use crate::design::Inputs;
 use crate::placement::SelectorKind;
 use crate::project::{BudgetKeys, LiveKeys, Project};
 use crate::trade::{Bought, KnobReport, Measured, Point, front, knobs};
@@ -81,6 +81,9 @@ impl Record {
     }
 }
 
+/// What stands for the model's error in keys: it is no knob, and the records that were measured with this go on holding.
+const MODEL_ERROR: f64 = 0.2;
+
 /// A project with its knobs at one place and without what no figure depends on.
 #[must_use]
 pub fn without_knobs(project: &Project) -> Project {
@@ -91,7 +94,7 @@ pub fn without_knobs(project: &Project) -> Project {
             ..BudgetKeys::default()
         },
         live: LiveKeys {
-            model_error: GLUED_BY_HAND,
+            model_error: MODEL_ERROR,
             largest_force_n: live.largest_force_n,
             ..LiveKeys::default()
         },

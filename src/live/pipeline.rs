@@ -8,6 +8,7 @@ use super::health::{Expected, Health, Watcher};
 use super::receiver::Sample;
 use super::tare::{Rest, Taring};
 use crate::inference::{Chain, Contact, Errors, Matching, ResponseMap, Trained};
+use crate::uncertainty::{UNESTIMATED, Uncertainty, rounding};
 use crate::wire::Hello;
 
 /// Which estimator is shown.
@@ -43,7 +44,8 @@ pub struct Settings {
     pub chain: Chain,
     /// The board's channel of each gauge.
     pub channels: Vec<usize>,
-    /// What model and gauges are off by, over the reading; see [`Errors::relative`].
+    /// What model and gauges are off by, over the reading, where that is more than the model says of itself; see
+    /// [`Errors::relative`].
     pub relative: f64,
     /// Noise of a reading below which it is never taken to be (strain).
     pub least_noise: f64,
@@ -62,7 +64,7 @@ impl Settings {
         Self {
             chain: Chain::default(),
             channels: (0..gauges).collect(),
-            relative: UNCALIBRATED,
+            relative: UNESTIMATED,
             least_noise: 0.3e-6,
             most_force: 60.0,
             drift_s: Some(3.0),
@@ -70,9 +72,6 @@ impl Settings {
         }
     }
 }
-
-/// What the model is off by over the reading beside what gluing puts on it.
-pub const UNCALIBRATED: f64 = 0.03;
 
 /// Where and how hard, by an estimator that says no more.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,11 +116,31 @@ pub struct GaugeModel {
     pub map: Arc<ResponseMap>,
     /// See [`Errors::spread`].
     pub spread: Option<Arc<ResponseMap>>,
+    /// What else is known to be off. Noise and resolution are read off the signals.
+    pub off: Uncertainty,
 }
 
 impl From<Arc<ResponseMap>> for GaugeModel {
+    /// Gauges just as the map says.
     fn from(map: Arc<ResponseMap>) -> Self {
-        Self { map, spread: None }
+        Self {
+            map,
+            spread: None,
+            off: Uncertainty::NONE,
+        }
+    }
+}
+
+impl GaugeModel {
+    /// The estimator, with this noise of each channel (strain).
+    fn matching(self, noise: Vec<f64>, settings: &Settings) -> Matching {
+        let channels = self.map.channels();
+        let errors = Errors {
+            noise,
+            relative: settings.relative.max(self.off.elements),
+            ..Errors::known(&self.off, channels, self.spread)
+        };
+        Matching::new(self.map, errors, settings.most_force)
     }
 }
 
@@ -164,15 +183,11 @@ pub struct Pipeline {
 impl Pipeline {
     #[must_use]
     pub fn new(model: impl Into<GaugeModel>, settings: Settings) -> Self {
-        let model = model.into();
+        let model: GaugeModel = model.into();
         let gauges = model.map.channels();
-        let errors = Errors {
-            relative: settings.relative,
-            spread: model.spread,
-            ..Errors::of_noise(settings.least_noise.max(1e-9), gauges)
-        };
+        let noise = vec![settings.least_noise.max(1e-9); gauges];
         Self {
-            matching: Matching::new(model.map, errors, settings.most_force),
+            matching: model.matching(noise, &settings),
             settings,
             trained: [None, None],
             trained_for: Vec::new(),
@@ -196,7 +211,6 @@ impl Pipeline {
     /// Another model of the same gauges, or other settings: after a calibration. What the board has said of
     /// itself stays.
     pub fn set_model(&mut self, model: impl Into<GaugeModel>, settings: Settings) {
-        let GaugeModel { map, spread } = model.into();
         if settings.channels != self.settings.channels {
             // Other channels have another rest.
             (self.rest, self.taring) = (None, None);
@@ -206,14 +220,10 @@ impl Pipeline {
             chain = chain.of_board(hello);
         }
         let noise = self.matching.errors.noise.clone();
-        let errors = Errors {
-            noise,
-            relative: settings.relative,
-            spread,
-        };
         self.settings = Settings { chain, ..settings };
         let used = self.matching.used.clone();
-        self.matching = Matching::new(map, errors, self.settings.most_force);
+        let model: GaugeModel = model.into();
+        self.matching = model.matching(noise, &self.settings);
         self.matching.used = used;
         self.last = None;
     }
@@ -543,8 +553,8 @@ impl Pipeline {
         };
         let per_strain = self.settings.chain.counts_per_strain();
         for (noise, counts) in self.matching.errors.noise.iter_mut().zip(&rest.noise) {
-            // Quantization alone is 0.29 counts.
-            *noise = (counts.max(0.3) / per_strain).max(self.settings.least_noise);
+            // What was measured has the rounding to counts in it, unless the channel stood still on one of them.
+            *noise = (counts.max(rounding(1.0)) / per_strain).max(self.settings.least_noise);
         }
     }
 }

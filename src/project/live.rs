@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{BadValue, Project, check};
-use crate::inference::{Calibration, Chain};
-use crate::live::{Settings, UNCALIBRATED};
+use crate::inference::{Calibration, Chain, Doubt};
+use crate::live::Settings;
 
 /// Keys of the table `live`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,8 +16,13 @@ pub struct LiveKeys {
     pub gauge_factor: f64,
     /// Arms of each bridge that the strain changes.
     pub active_arms: u8,
-    /// What model and gauges are off by, as a share of the reading.
+    /// What the model is off by beside gluing, as a share of the reading, where that is more than its elements are
+    /// estimated to leave. Of gauges that are calibrated, what known touches have shown.
     pub model_error: f64,
+    // What is usual is not serialized, as of `touch.forces_n`.
+    /// How far off the stiffness of the part is (standard deviation): every force is off by it, and no place.
+    #[serde(skip_serializing_if = "is_usual_stiffness")]
+    pub stiffness_percent: f64,
     /// The hardest press that is thought possible.
     pub largest_force_n: f64,
     /// Seconds in which the rest follows a drift; zero: never.
@@ -25,6 +30,17 @@ pub struct LiveKeys {
     /// How the gauges were found to be glued, one each, by known touches.
     #[serde(rename = "glued", skip_serializing_if = "Vec::is_empty")]
     pub glued: Vec<GluedKeys>,
+}
+
+/// The modulus of a plastic that was printed or moulded, and its wall.
+const STIFFNESS_PERCENT: f64 = 5.0;
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde asks with a reference"
+)]
+fn is_usual_stiffness(percent: &f64) -> bool {
+    *percent == STIFFNESS_PERCENT
 }
 
 /// One gauge as it was found to be glued.
@@ -35,6 +51,9 @@ pub struct GluedKeys {
     pub along_mm: f64,
     pub across_mm: f64,
     pub turned_degrees: f64,
+    /// What is not known of these four: the upper triangle of their covariance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<Doubt>,
 }
 
 impl Default for LiveKeys {
@@ -44,7 +63,8 @@ impl Default for LiveKeys {
             channels: Vec::new(),
             gauge_factor: chain.gauge_factor,
             active_arms: chain.active_arms,
-            model_error: UNCALIBRATED,
+            model_error: 0.0,
+            stiffness_percent: STIFFNESS_PERCENT,
             largest_force_n: 60.0,
             drift_s: 3.0,
             glued: Vec::new(),
@@ -55,20 +75,25 @@ impl Default for LiveKeys {
 impl LiveKeys {
     /// Takes over what known touches have shown.
     pub fn take(&mut self, calibration: &Calibration) {
-        let keys = |&[gain, along_mm, across_mm, turned_degrees]: &[f64; 4]| GluedKeys {
-            gain,
-            along_mm,
-            across_mm,
-            turned_degrees,
+        let keys = |(glued, doubt): (&[f64; 4], &Doubt)| {
+            let [gain, along_mm, across_mm, turned_degrees] = *glued;
+            GluedKeys {
+                gain,
+                along_mm,
+                across_mm,
+                turned_degrees,
+                covariance: Some(*doubt),
+            }
         };
-        self.glued = calibration.glued.iter().map(keys).collect();
+        let glued = calibration.glued.iter().zip(&calibration.doubts);
+        self.glued = glued.map(keys).collect();
         self.model_error = calibration.relative;
     }
 
     /// Forgets it.
     pub fn forget(&mut self) {
         self.glued.clear();
-        self.model_error = UNCALIBRATED;
+        self.model_error = Self::default().model_error;
     }
 
     /// For each gauge its gain, millimetres along and across, and degrees; nothing without a calibration of
@@ -77,6 +102,15 @@ impl LiveKeys {
     pub fn glued(&self, gauges: usize) -> Option<Vec<[f64; 4]>> {
         let values = |g: &GluedKeys| [g.gain, g.along_mm, g.across_mm, g.turned_degrees];
         (self.glued.len() == gauges && gauges > 0).then(|| self.glued.iter().map(values).collect())
+    }
+
+    /// What is not known of each gauge; nothing without a calibration of as many gauges that says so of all of them.
+    #[must_use]
+    pub fn doubts(&self, gauges: usize) -> Option<Vec<Doubt>> {
+        if self.glued.len() != gauges || gauges == 0 {
+            return None;
+        }
+        self.glued.iter().map(|g| g.covariance).collect()
     }
 
     /// The first two gauges (from 0) that are on one channel, and that channel.
@@ -131,6 +165,9 @@ impl LiveKeys {
     }
 }
 
+/// Of a covariance: of more nobody would call gauges calibrated.
+const MOST_DOUBT: f64 = 1e6;
+
 impl Project {
     pub(super) fn check_live(&self) -> Result<(), BadValue> {
         let live = &self.live;
@@ -156,6 +193,12 @@ impl Project {
             "between 1 and 4",
             arms,
             (1.0..=4.0).contains(&arms),
+        )?;
+        check(
+            "live.stiffness_percent",
+            "between 0 and 50",
+            live.stiffness_percent,
+            (0.0..=50.0).contains(&live.stiffness_percent),
         )?;
         let error = live.model_error;
         check(
@@ -199,6 +242,15 @@ impl Project {
                 glued.gain,
                 glued.gain > 0.0 && sound.iter().all(|v| v.is_finite()),
             )?;
+            for &value in glued.covariance.iter().flatten() {
+                let known = value.abs() <= MOST_DOUBT;
+                check(
+                    "live.glued.covariance",
+                    "ten numbers between -1e6 and 1e6",
+                    value,
+                    known,
+                )?;
+            }
         }
         Ok(())
     }

@@ -21,6 +21,11 @@ pub const FORCES: RangeInclusive<f64> = 1e-3..=1e5;
 pub const PLACE_OFF: RangeInclusive<f64> = 0.0..=50.0;
 pub const ANGLE_OFF: RangeInclusive<f64> = 0.0..=45.0;
 pub const GAIN_OFF: RangeInclusive<f64> = 0.0..=50.0;
+/// How far off a hand presses (percent of the force), how much larger or smaller tips are (mm), and how far all channels
+/// drift together (µε): likewise.
+pub const FORCE_OFF: RangeInclusive<f64> = 0.0..=50.0;
+pub const TIP_OFF: RangeInclusive<f64> = 0.0..=50.0;
+pub const DRIFT: RangeInclusive<f64> = 0.0..=1e6;
 
 /// Of anything that is made (mm): from a nanometre to a kilometre.
 const LENGTH: RangeInclusive<f64> = 1e-6..=1e6;
@@ -114,9 +119,17 @@ impl Project {
 
     fn check_room(&self) -> Result<(), BadValue> {
         let (gauge, room) = (&self.gauge, &self.feasible);
-        let tolerance = &gauge.tolerance;
+        let (tolerance, hand) = (&gauge.tolerance, &self.calibration);
         all_bounded([
             ("touch.edge_margin_mm", self.touch.edge_margin_mm, ROOM),
+            (
+                "touch.tip_tolerance_mm",
+                self.touch.tip_tolerance_mm,
+                TIP_OFF,
+            ),
+            ("calibration.place_mm", hand.place_mm, PLACE_OFF),
+            ("calibration.force_percent", hand.force_percent, FORCE_OFF),
+            ("gauge.drift_microstrain", gauge.drift_microstrain, DRIFT),
             ("sites.spacing_mm", self.sites.spacing_mm, LENGTH),
             (
                 "gauge.noise_microstrain",
@@ -381,7 +394,7 @@ fn number(value: f64) -> String {
 mod tests {
     use super::*;
     use crate::project::{CostKeys, RegionKeys};
-    use crate::uncertainty::Gluing;
+    use crate::uncertainty::{Gluing, Pressing};
 
     fn project() -> Project {
         let mut project = Project::around("part.stl", None);
@@ -403,7 +416,7 @@ mod tests {
     type Place = fn(&mut Project) -> &mut f64;
 
     /// Every number of a project that may not be just any.
-    const NUMBERS: [(&str, Place); 32] = [
+    const NUMBERS: [(&str, Place); 37] = [
         ("part.thickness_mm", |p| &mut p.part.thickness_mm),
         ("part.weld_mm", |p| &mut p.part.weld_mm),
         ("part.fill_holes_mm", |p| &mut p.part.fill_holes_mm),
@@ -416,6 +429,15 @@ mod tests {
         ("touch.force_n", |p| &mut p.touch.force_n),
         ("touch.tip_radius_mm", |p| &mut p.touch.tip_radius_mm),
         ("touch.edge_margin_mm", |p| &mut p.touch.edge_margin_mm),
+        ("touch.tip_tolerance_mm", |p| &mut p.touch.tip_tolerance_mm),
+        ("gauge.drift_microstrain", |p| {
+            &mut p.gauge.drift_microstrain
+        }),
+        ("calibration.place_mm", |p| &mut p.calibration.place_mm),
+        ("calibration.force_percent", |p| {
+            &mut p.calibration.force_percent
+        }),
+        ("live.stiffness_percent", |p| &mut p.live.stiffness_percent),
         ("sites.spacing_mm", |p| &mut p.sites.spacing_mm),
         ("gauge.noise_microstrain", |p| {
             &mut p.gauge.noise_microstrain
@@ -546,6 +568,31 @@ mod tests {
         let said = project.check().unwrap_err().to_string();
         let expected = "gauge.tolerance.angle_deg must be between 0 and 45, but is 45.1";
         assert_eq!(said, expected);
+    }
+
+    #[test]
+    fn what_is_off_is_what_the_keys_say() {
+        let mut project = project();
+        let usual = project.uncertainty();
+        assert_eq!((usual.drift, usual.tip), (0.0, 0.0));
+        assert_eq!(usual.pressing, Pressing::default());
+        project.gauge.noise_microstrain = 2.0;
+        project.gauge.drift_microstrain = 3.0;
+        project.gauge.tolerance.place_mm = 0.5;
+        project.touch.tip_tolerance_mm = 0.25;
+        project.calibration.place_mm = 2.0;
+        project.calibration.force_percent = 10.0;
+        project.live.stiffness_percent = 20.0;
+        assert_eq!(project.check(), Ok(()));
+        let off = project.uncertainty();
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-15, "{a} {b}");
+        close(off.noise, 2e-6);
+        close(off.drift, 3e-6);
+        close(off.gluing.place, 0.5e-3);
+        close(off.tip, 0.25e-3);
+        close(off.pressing.place, 2e-3);
+        close(off.pressing.force, 0.1);
+        close(off.stiffness, 0.2);
     }
 
     #[test]

@@ -18,8 +18,7 @@ use crate::io::report::robust_top;
 use crate::job::Stop;
 use crate::project::ChosenSite;
 
-const BROKEN: &str =
-    "An internal error stopped the expected error of the gauges. Please report it";
+const BROKEN: &str = "An internal error stopped the expected error of the gauges. Please report it";
 
 /// A set of gauges, one of which is in hand.
 struct Question {
@@ -315,7 +314,12 @@ mod tests {
             // The map is of the same size, a vertex of the part.
             assert_eq!(expected.map_mm.len(), inputs.part.positions().len());
             let largest = expected.map_mm.iter().copied().fold(0.0, f64::max);
-            assert!(expected.map_mm.iter().all(|mm| mm.is_finite() && *mm >= 0.0));
+            assert!(
+                expected
+                    .map_mm
+                    .iter()
+                    .all(|mm| mm.is_finite() && *mm >= 0.0)
+            );
             assert!(largest > 0.5 * judged, "{largest} {judged}");
             assert!((0.0..=1.0).contains(&expected.blind));
             assert!(answer.top_mm > 0.0);

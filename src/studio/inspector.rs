@@ -12,8 +12,8 @@ use crate::limb::BoxMm;
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
 use crate::project::{
-    ANGLE_OFF, EDGE_NEIGHBOURS, FARTHEST, FORCES, GAIN_OFF, GAUGES, Lattice, PLACE_OFF, PartModel,
-    Project, RegionKeys, SupportKeys, SupportKind, TOUCHES, ToleranceKeys,
+    ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCES, GAIN_OFF, GAUGES, Lattice, PLACE_OFF,
+    PartModel, Project, RegionKeys, SupportKeys, SupportKind, TIP_OFF, TOUCHES, ToleranceKeys,
 };
 
 impl Studio {
@@ -431,6 +431,15 @@ fn touch(ui: &mut Ui, project: &mut Project) {
         " mm",
         "The tip spreads the force smoothly over this radius",
     );
+    number(
+        ui,
+        "Tip radius off",
+        &mut touch.tip_tolerance_mm,
+        TIP_OFF,
+        0.01,
+        " mm",
+        "How much larger or smaller tips are that touch (standard deviation)",
+    );
     count(
         ui,
         "Touches",
@@ -515,6 +524,15 @@ fn gauge(ui: &mut Ui, project: &mut Project) {
         0.1,
         " µε",
         "Standard deviation of a reading, in microstrain",
+    );
+    number(
+        ui,
+        "Common drift",
+        &mut gauge.drift_microstrain,
+        DRIFT,
+        0.1,
+        " µε",
+        "Standard deviation of what all channels drift by together while a touch lasts",
     );
     number(
         ui,

@@ -139,11 +139,16 @@ impl Studio {
     fn sensing_key(&self) -> String {
         let project = &self.document.state.project;
         format!(
-            "{} {:?} {} {}",
+            "{} {:?} {} {} {:?}",
             self.document.simulation_key_at(self.quality()),
             project.selection.sites,
             project.gauge.grid_length_mm,
-            project.gauge.grid_width_mm
+            project.gauge.grid_width_mm,
+            (
+                project.gluing(),
+                project.touch.tip_tolerance_mm,
+                project.gauge.drift_microstrain
+            )
         )
     }
 

@@ -62,15 +62,8 @@ impl Trial {
         let reduced =
             design::reduce_sites(&inputs, &simulated, &feasibility, &budget(), &unwatched).unwrap();
         let kind = SelectorKind::ExpectedError;
-        let selection = design::select(
-            &inputs,
-            &simulated,
-            &reduced,
-            kind,
-            &budget(),
-            &unwatched,
-        )
-        .unwrap();
+        let selection =
+            design::select(&inputs, &simulated, &reduced, kind, &budget(), &unwatched).unwrap();
         let sets = sets(&simulated, &feasibility.sites(), &selection, random);
         let sensing = (sets.iter())
             .map(|set| {

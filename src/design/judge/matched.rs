@@ -1,19 +1,24 @@
 //! Sets of gauges judged by what runs live: the design's elastic model, matched to what a finer one reads.
 //!
-//! As drawn, the estimator knows the noise; as built, how far off a workshop usually glues gauges too; after known
-//! presses, how these gauges were really glued, as far as the presses tell.
+//! The estimator knows what the truth was made with (`Truth::off`), as live touch does: as drawn, that gauges are glued
+//! just so; as built, how far off a workshop usually glues them; after known presses, how these gauges were really
+//! glued, as far as the presses tell.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::{Truth, noisy};
 use crate::budget::{Budget, Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
-use crate::design::sense::{MOVES, drawn_on, map_size, point_gauge};
+use crate::design::known;
+use crate::design::sense::{MOVES, POINT, drawn_on, gauge_at, map_size};
 use crate::design::{DesignError, Inputs, Simulated};
+use crate::draw::normal;
 use crate::elasticity::sensitivity::Gauge;
 use crate::elasticity::{Model, Touch};
 use crate::evaluation::failures::{Draw, FailureRow, MOST_FAILED};
@@ -24,17 +29,19 @@ use crate::inference::{AsDrawn, Errors, Known, Matching, ResponseMap, calibrate}
 use crate::mesh::TriMesh;
 use crate::placement::expected_error::BLIND;
 use crate::regression::folds::evenly;
+use crate::uncertainty::{Gluing, Uncertainty};
 
 /// Sites whose readings are known everywhere at the same time: those of more sets would fill the memory.
 const MOST_SITES: usize = 60;
-/// No reading is taken to be better than this (strain).
-const LEAST_NOISE: f64 = 1e-9;
 /// Touches that sets with lost gauges are judged on.
 const FAILURE_TOUCHES: usize = 200;
 
 /// Which draw the noise of the known presses is; then come two for each force, as drawn and as built.
 const PRESS_DRAW: u64 = 4;
 const FIRST_DRAW: u64 = 5;
+
+/// Of what all channels drift by together.
+const DRIFT_SEED: u64 = 0xd21f7;
 
 /// What sets are judged with.
 pub(super) struct Trial<'a> {
@@ -59,8 +66,10 @@ struct Everywhere {
     /// Of the truth, rising: a channel each.
     rows: Vec<usize>,
     drawn: AsDrawn,
-    /// What gluing puts on the readings.
+    /// What gluing and the tip's size put on the readings.
     spread: ResponseMap,
+    /// What the tip's size puts on them, where it may be off: gauges that are glued just so have that too.
+    sized: Option<ResponseMap>,
 }
 
 impl Trial<'_> {
@@ -108,9 +117,9 @@ impl Trial<'_> {
         self.inputs.project.tip().1
     }
 
-    /// Standard deviation of a reading (strain).
-    fn noise(&self) -> f64 {
-        (self.inputs.project.gauge.noise_microstrain * 1e-6).max(LEAST_NOISE)
+    /// What is known to be off.
+    fn off(&self) -> Uncertainty {
+        known::off(&self.inputs.project, self.simulated)
     }
 
     /// Signals of the truth for a force (N) in place of that of its touches: the model is linear.
@@ -122,7 +131,8 @@ impl Trial<'_> {
         let heard = |(k, &force_n): (u64, &f64)| {
             let with_noise = |x: &SignalMatrix, draw: u64| {
                 let x = self.at_force(x, force_n);
-                noisy(self.inputs, &x, draw, self.streams).into_owned()
+                let x = noisy(self.inputs, &x, draw, self.streams).into_owned();
+                self.drifted(x, draw)
             };
             Heard {
                 force_n,
@@ -131,6 +141,20 @@ impl Trial<'_> {
             }
         };
         (0..).zip(&self.forces.judged_n).map(heard).collect()
+    }
+
+    /// With what all channels have drifted by together, another amount for every touch.
+    fn drifted(&self, x: SignalMatrix, draw: u64) -> SignalMatrix {
+        let drift = self.off().drift;
+        if drift <= 0.0 {
+            return x;
+        }
+        let seed = self.inputs.project.budget.seed;
+        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(DRIFT_SEED));
+        rng.set_stream(draw);
+        let moved: Vec<f64> = (0..x.columns()).map(|_| drift * normal(&mut rng)).collect();
+        let rows = (0..x.rows()).flat_map(|row| x.row(row).iter().zip(&moved));
+        SignalMatrix::new(x.columns(), rows.map(|(x, moved)| x + moved).collect())
     }
 
     fn everywhere(
@@ -145,11 +169,23 @@ impl Trial<'_> {
         rows.dedup();
         let sites = &self.simulated.dataset.sites;
         let gauges: Vec<Gauge> = (rows.iter())
-            .map(|&row| point_gauge(&sites[self.truth.sites[row]]))
+            .map(|&row| {
+                gauge_at(
+                    &sites[self.truth.sites[row]],
+                    self.truth.grid.unwrap_or(POINT),
+                )
+            })
             .collect();
-        let drawn = drawn_on(model, &gauges, Arc::clone(mesh), self.tip_radius(), watch)?;
+        let off = self.off();
+        let tip = (self.tip_radius(), off.tip);
+        let drawn = drawn_on(model, &gauges, mesh, tip, watch)?;
+        let exact = Uncertainty {
+            gluing: Gluing::EXACT,
+            ..off
+        };
         Ok(Everywhere {
-            spread: drawn.spread(&self.truth.gluing),
+            spread: drawn.spread(&off),
+            sized: drawn.tip.is_some().then(|| drawn.spread(&exact)),
             rows,
             drawn,
         })
@@ -157,7 +193,7 @@ impl Trial<'_> {
 
     /// Which touches of a force (N) move no gauge of a set far enough to be told from noise.
     fn blind(&self, rows: &[usize], force_n: f64) -> Vec<bool> {
-        let least = BLIND * self.noise();
+        let least = BLIND * self.off().of_channel();
         let x = self.at_force(&self.truth.x.select_rows(rows), force_n);
         (0..x.columns())
             .map(|touch| (0..x.rows()).all(|row| x.row(row)[touch].abs() <= least))
@@ -198,14 +234,15 @@ impl<'a> Set<'a> {
         let channel = |row: &usize| Some(vec![(everywhere.rows.binary_search(row).ok()?, 1.0)]);
         let channels: Vec<Vec<(usize, f64)>> = candidate.rows.iter().filter_map(channel).collect();
         let map = Arc::new(everywhere.drawn.map.mixed(&channels));
-        let noise = Errors::of_noise(trial.noise(), channels.len());
-        let glued = Errors {
-            spread: Some(Arc::new(everywhere.spread.mixed(&channels))),
-            ..noise.clone()
+        let errors = |spread: Option<&ResponseMap>| {
+            let spread = spread.map(|s| Arc::new(s.mixed(&channels)));
+            Errors::known(&trial.off(), channels.len(), spread)
         };
+        let exact = errors(everywhere.sized.as_ref());
+        let glued = errors(Some(&everywhere.spread));
         let most_n = trial.forces.most_n;
         Self {
-            drawn: Matching::new(Arc::clone(&map), noise, most_n),
+            drawn: Matching::new(Arc::clone(&map), exact, most_n),
             built: Matching::new(map, glued, most_n),
             trial,
             candidate,
@@ -234,11 +271,9 @@ impl<'a> Set<'a> {
     fn calibrated(&self, everywhere: &Everywhere) -> Option<Matching> {
         let trial = self.trial;
         let pressed = trial.truth.pressed.as_ref()?;
-        let drawn = AsDrawn {
-            map: Arc::clone(&self.drawn.map),
-            changes: (everywhere.drawn.changes.each_ref()).map(|m| m.mixed(&self.channels)),
-        };
+        let (drawn, off) = (everywhere.drawn.mixed(&self.channels), trial.off());
         let x = noisy(trial.inputs, &pressed.x, PRESS_DRAW, trial.streams);
+        let x = trial.drifted(x.into_owned(), PRESS_DRAW);
         let x = x.select_rows(&self.candidate.rows);
         let known: Vec<Known> = (pressed.presses.iter().enumerate())
             .map(|(k, press)| Known {
@@ -247,11 +282,12 @@ impl<'a> Set<'a> {
                 reading: reading(&x, k),
             })
             .collect();
-        let noise = Errors::of_noise(trial.noise(), self.channels.len());
-        let calibration = calibrate(&drawn, &known, &noise.noise);
+        let before = &self.built.errors;
+        let calibration = calibrate(&drawn, &known, &before.noise, &off);
         let errors = Errors {
             relative: calibration.relative,
-            ..noise
+            spread: Some(Arc::new(drawn.spread_of(&calibration.doubts, &off))),
+            ..before.clone()
         };
         let map = Arc::new(drawn.calibrated(&calibration));
         Some(Matching::new(map, errors, trial.forces.most_n))

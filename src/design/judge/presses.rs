@@ -10,6 +10,7 @@ use crate::dataset::SignalMatrix;
 use crate::elasticity::Touch;
 use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
+use crate::uncertainty::Pressing;
 
 /// A press, as it was asked for and as it was made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,25 +27,20 @@ pub struct Pressed {
     pub x: SignalMatrix,
 }
 
-/// How far off a hand presses (m), in any direction along the surface.
-pub const PRESSED_OFF: f64 = 1e-3;
-/// How much too hard or too soft, as a share of the force that was asked for.
-pub const PRESSED_HARD: f64 = 0.03;
-
-/// Presses on a surface as a hand makes them.
-pub(super) fn by_hand(mesh: &TriMesh, asked: Vec<Touch>, seed: u64) -> Vec<Press> {
+/// Presses on a surface as a hand makes them: each as far off as is usual for it, in any direction and either way.
+pub(super) fn by_hand(mesh: &TriMesh, asked: Vec<Touch>, hand: &Pressing, seed: u64) -> Vec<Press> {
     let index = SurfaceIndex::new(mesh);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let make = |asked: Touch| {
         let (sin, cos) = (TAU * rng.random::<f64>()).sin_cos();
         let along = asked.normal.any_orthonormal_vector();
         let across = asked.normal.cross(along);
-        let beside = asked.position + (along * cos + across * sin) * PRESSED_OFF;
+        let beside = asked.position + (along * cos + across * sin) * hand.place;
         let at = index.nearest(beside).0;
         let off = if rng.random::<bool>() {
-            PRESSED_HARD
+            hand.force
         } else {
-            -PRESSED_HARD
+            -hand.force
         };
         Press {
             asked,
@@ -76,20 +72,24 @@ mod tests {
             tip_radius: 5e-3,
         };
         let all: Vec<Touch> = (1..13).map(asked).collect();
-        let presses = by_hand(&mesh, all.clone(), 5);
+        let hand = Pressing {
+            place: 2e-3,
+            force: 0.05,
+        };
+        let presses = by_hand(&mesh, all.clone(), &hand, 5);
         let mut directions = DVec3::ZERO;
         for (press, asked) in presses.iter().zip(&all) {
             assert_eq!(press.asked, *asked);
             let off = press.made.position - asked.position;
-            assert!((off.length() - PRESSED_OFF).abs() < 1e-9, "{off}");
+            assert!((off.length() - hand.place).abs() < 1e-9, "{off}");
             let hard = (press.made.force / asked.force - 1.0).abs();
-            assert!((hard - PRESSED_HARD).abs() < 1e-12, "{hard}");
-            directions += off / PRESSED_OFF / all.len() as f64;
+            assert!((hard - hand.force).abs() < 1e-12, "{hard}");
+            directions += off / hand.place / all.len() as f64;
         }
         assert!(directions.length() < 0.9, "{directions}");
         let hard = presses.iter().filter(|p| p.made.force > 10.0).count();
         assert!((1..12).contains(&hard), "{hard}");
-        assert_eq!(by_hand(&mesh, all.clone(), 5), presses);
-        assert_ne!(by_hand(&mesh, all, 6), presses);
+        assert_eq!(by_hand(&mesh, all.clone(), &hand, 5), presses);
+        assert_ne!(by_hand(&mesh, all, &hand, 6), presses);
     }
 }

@@ -135,6 +135,11 @@ fn touch(t: &mut Text, project: &Project) {
         "the tip spreads the force as (1 - r²/a²)²",
     );
     t.key(
+        "tip_tolerance_mm",
+        float(project.touch.tip_tolerance_mm),
+        "how far off that is (standard deviation): larger tips and smaller ones touch too",
+    );
+    t.key(
         "count",
         project.touch.count,
         "touches simulated; lower qualities take fewer",
@@ -295,6 +300,11 @@ fn gauge(t: &mut Text, project: &Project) {
         "standard deviation of a reading",
     );
     t.key(
+        "drift_microstrain",
+        float(gauge.drift_microstrain),
+        "standard deviation of what all channels drift by together while a touch lasts",
+    );
+    t.key(
         "range_microstrain",
         float(gauge.range_microstrain),
         "largest strain gauge and amplifier can take",
@@ -331,6 +341,14 @@ fn gauge(t: &mut Text, project: &Project) {
         float(gauge.tolerance.gain_percent),
         "of the reading",
     );
+    let hand = &project.calibration;
+    t.table("calibration");
+    t.key(
+        "place_mm",
+        float(hand.place_mm),
+        "how far off known presses are made, in any direction (standard deviations)",
+    );
+    t.key("force_percent", float(hand.force_percent), "of the force");
 }
 
 fn selection(t: &mut Text, project: &Project) {
@@ -435,7 +453,12 @@ fn live(t: &mut Text, project: &Project) {
     t.key(
         "model_error",
         float(live.model_error),
-        "what the model is off by beside gluing, as a share of the reading; a calibration finds what is left",
+        "what the model is off by beside gluing, as a share of the reading, where its elements leave less; a calibration finds it",
+    );
+    t.key(
+        "stiffness_percent",
+        float(live.stiffness_percent),
+        "how far off the part's stiffness is (standard deviation): forces are off by it, no places",
     );
     t.key(
         "largest_force_n",
@@ -457,6 +480,11 @@ fn live(t: &mut Text, project: &Project) {
         t.key("along_mm", float(glued.along_mm), "");
         t.key("across_mm", float(glued.across_mm), "");
         t.key("turned_degrees", float(glued.turned_degrees), "");
+        t.maybe(
+            "covariance",
+            glued.covariance.map(|c| floats(&c)),
+            "of these four, what is not known: its upper triangle",
+        );
     }
 }
 

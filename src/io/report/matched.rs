@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::escape;
-use crate::design::{BLIND, Design, PRESSED_HARD, PRESSED_OFF};
+use crate::design::{BLIND, Design};
 use crate::evaluation::MatchedRow;
 
 /// A figure that may not have been asked for (mm).
@@ -45,13 +45,12 @@ pub(super) fn errors(page: &mut String, design: &Design) {
     let presses = truth.pressed.as_ref().map_or(0, |p| p.presses.len());
     let _ = write!(
         page,
-        "<p>Each reading is matched with the model ({:.2} mm elements), which needs no training; judged on {} touches that no selection has seen, drawn off the nodes of a finer model ({:.2} mm). “As built”: every gauge {}, of which the model knows no more than that. “Calibrated”: the same gauges after {presses} known presses, each made by hand {} mm beside its place and {} % too hard or too soft. “Blind”: touches that move no gauge by more than {BLIND} times its noise.</p>",
+        "<p>Each reading is matched with the model ({:.2} mm elements), which needs no training; judged on {} touches that no selection has seen, drawn off the nodes of a finer model ({:.2} mm). “As built”: every gauge {}, of which the model knows no more than that. “Calibrated”: the same gauges after {presses} known presses, each made by hand {}. “Blind”: touches that move no gauge by more than {BLIND} times its noise.</p>",
         design.simulated.element_mm,
         truth.touches.len(),
         truth.element_mm,
-        truth.gluing.in_words(),
-        PRESSED_OFF * 1e3,
-        PRESSED_HARD * 100.0
+        truth.off.gluing.in_words(),
+        truth.off.pressing.in_words()
     );
     page.push_str("<details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Force (N)</th><th>Region</th><th>Touches</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Calibrated (mm)</th><th>Blind</th><th>Mean without blind (mm)</th></tr>");
     for r in &design.evaluation.matched {

@@ -210,7 +210,9 @@ impl Relaxed {
             let (length, slope) =
                 mean_length_and_slope(place[(0, 0)], place[(0, 1)], place[(1, 1)]);
             sensed.mm += mass * length;
-            sensed.slopes.push(upper.transpose() * slope * upper * *mass);
+            sensed
+                .slopes
+                .push(upper.transpose() * slope * upper * *mass);
         }
         Some(sensed)
     }
@@ -304,8 +306,7 @@ mod tests {
             .flat_map(|site| targets.iter().map(move |&at| felt(site, at)))
             .collect();
         let forces = vec![10.0; targets.len()];
-        let variance: Variance =
-            &|site: usize, touch: usize| 1e-3 * ((site + touch) % 5) as f64;
+        let variance: Variance = &|site: usize, touch: usize| 1e-3 * ((site + touch) % 5) as f64;
         let known = Knowledge {
             noise: 0.05,
             variance: Some(variance),

@@ -109,8 +109,10 @@ pub fn worst_pairs(
         });
         Ok(pairs.max_by(|a, b| a.cost_mm().total_cmp(&b.cost_mm())))
     };
-    let found: Result<Vec<Option<Pair>>, Cancelled> =
-        (0..scene.presses.len()).into_par_iter().map(worst).collect();
+    let found: Result<Vec<Option<Pair>>, Cancelled> = (0..scene.presses.len())
+        .into_par_iter()
+        .map(worst)
+        .collect();
     let mut all: Vec<Pair> = found?.into_iter().flatten().collect();
     // Stable: those of equal cost stay in the order of the presses.
     all.sort_by(|a, b| b.cost_mm().total_cmp(&a.cost_mm()));

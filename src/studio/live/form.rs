@@ -8,7 +8,7 @@ use super::known::{LEAST, WANTED};
 use crate::board::{ChannelFault, Illness};
 use crate::link::{State, ports};
 use crate::live::Estimator;
-use crate::project::LiveKeys;
+use crate::project::{FORCE_OFF, LiveKeys, PLACE_OFF};
 
 impl Studio {
     pub(in super::super) fn live_form(&mut self, ui: &mut Ui) {
@@ -299,6 +299,25 @@ impl Studio {
                 " N",
                 "That the next known touch is pressed with",
             );
+            let hand = &mut self.document.state.project.calibration;
+            number(
+                ui,
+                "Place off",
+                &mut hand.place_mm,
+                PLACE_OFF,
+                0.01,
+                " mm",
+                "How far beside its place a known touch is pressed, in any direction (standard deviation)",
+            );
+            number(
+                ui,
+                "Force off",
+                &mut hand.force_percent,
+                FORCE_OFF,
+                0.05,
+                " %",
+                "How much too hard or too soft a known touch is pressed (standard deviation)",
+            );
         });
         let (count, connected) = (self.live.known.len(), self.live.is_connected());
         ui.label(format!("{count} known touches of {WANTED}"));
@@ -370,7 +389,16 @@ fn measurement(ui: &mut Ui, live: &mut LiveKeys) {
         "Model error",
         &mut live.model_error,
         0.0..=100.0,
-        "What model and gluing are off by, over the reading; a calibration finds it",
+        "What the model is off by beside gluing, over the reading, where its elements leave less; a calibration finds it",
+    );
+    number(
+        ui,
+        "Stiffness off",
+        &mut live.stiffness_percent,
+        0.0..=50.0,
+        0.1,
+        " %",
+        "How far off the part's stiffness is (standard deviation): forces are off by it, no places",
     );
     number(
         ui,

@@ -11,6 +11,7 @@ use super::super::jobs::Task;
 use super::Brought;
 use crate::design::Sensing;
 use crate::inference::{Calibration, Known, calibrate};
+use crate::uncertainty::{Pressing, Uncertainty};
 
 /// How many are proposed, and how many a calibration takes at least.
 pub const WANTED: usize = crate::design::PROPOSED;
@@ -23,6 +24,8 @@ const FRAMES: usize = 10;
 pub struct Gathering {
     /// From the touches of a simulated board, until there are enough.
     pub from_board: bool,
+    /// Whether all of them were read off a board that tells where it is pressed, and how hard.
+    exact: bool,
     /// At a place that was proposed.
     pub at: Option<DVec3>,
     rows: Vec<Vec<f64>>,
@@ -43,6 +46,7 @@ impl Studio {
     /// Reads the press that is on as one at the proposed place.
     pub fn take_known(&mut self) {
         self.live.gathering.rows.clear();
+        self.live.gathering.exact = false;
         self.live.gathering.at = self.proposed_touch();
     }
 
@@ -50,6 +54,7 @@ impl Studio {
     pub fn calibrate_from_board(&mut self) {
         self.live.known.clear();
         self.live.gathering.from_board = true;
+        self.live.gathering.exact = true;
         self.live.gathering.rows.clear();
         self.live.gathering.truth = None;
     }
@@ -141,9 +146,16 @@ impl Studio {
                 "A calibration takes at least {LEAST} known touches"
             ));
         }
+        let mut off = Uncertainty {
+            elements: sensing.off.elements,
+            ..self.document.state.project.uncertainty()
+        };
+        if self.live.gathering.exact {
+            off.pressing = Pressing::EXACT;
+        }
         self.jobs
             .start(ctx, Task::Calibrate, self.sensing_key(), move |_| {
-                let found = calibrate(&sensing.drawn, &known, &noise);
+                let found = calibrate(&sensing.drawn, &known, &noise, &off);
                 Ok(Finished::Live(Box::new(Brought::Calibrated(found))))
             });
     }

@@ -1,0 +1,79 @@
+//! What is off with readings, as matching weighs it.
+
+use std::sync::Arc;
+
+use crate::inference::ResponseMap;
+use crate::uncertainty::Uncertainty;
+
+/// No reading is taken to be better than this (strain).
+const LEAST_NOISE: f64 = 1e-9;
+
+/// What is known of the readings' errors.
+#[derive(Clone)]
+pub struct Errors {
+    /// Standard deviation of each channel's noise (strain).
+    pub noise: Vec<f64>,
+    /// Standard deviation of what gains, places and model are off by, over the reading: half of it from the
+    /// channel's own reading, half from the mean square of all.
+    pub relative: f64,
+    /// Standard deviation a newton that gluing puts on each channel's reading, on the mesh of the readings; absent
+    /// where gauges are known to be glued as the readings say.
+    pub spread: Option<Arc<ResponseMap>>,
+    /// Standard deviation of what all channels have drifted by together (strain).
+    pub drift: f64,
+    /// Standard deviation of the factor by which the part is stiffer or softer than its model: of every force.
+    pub stiffness: f64,
+}
+
+impl Errors {
+    #[must_use]
+    pub fn of_noise(noise: f64, channels: usize) -> Self {
+        Self::of_noises(&vec![noise; channels])
+    }
+
+    /// Noise of each channel, and nothing else.
+    #[must_use]
+    pub fn of_noises(noise: &[f64]) -> Self {
+        Self {
+            noise: noise.to_vec(),
+            relative: 0.0,
+            spread: None,
+            drift: 0.0,
+            stiffness: 0.0,
+        }
+    }
+
+    /// As the project describes what is off, for so many channels whose gauges may be glued as `spread` says.
+    #[must_use]
+    pub fn known(off: &Uncertainty, channels: usize, spread: Option<Arc<ResponseMap>>) -> Self {
+        Self {
+            relative: off.elements,
+            spread,
+            drift: off.drift,
+            stiffness: off.stiffness,
+            ..Self::of_noise(off.of_channel().max(LEAST_NOISE), channels)
+        }
+    }
+
+    /// One over the variance of every channel for this reading; zero for a channel that is left out.
+    #[must_use]
+    pub fn weights(&self, reading: &[f64], used: &[bool]) -> Vec<f64> {
+        let count = used.iter().filter(|u| **u).count().max(1) as f64;
+        let squares = reading
+            .iter()
+            .zip(used)
+            .filter(|(_, u)| **u)
+            .map(|(x, _)| x * x);
+        let mean = squares.sum::<f64>() / count;
+        let weight = |((x, u), n): ((&f64, &bool), &f64)| {
+            let off = self.relative.powi(2) * f64::midpoint(x * x, mean);
+            if *u { (n * n + off).recip() } else { 0.0 }
+        };
+        reading
+            .iter()
+            .zip(used)
+            .zip(&self.noise)
+            .map(weight)
+            .collect()
+    }
+}

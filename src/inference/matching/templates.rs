@@ -1,0 +1,160 @@
+//! All templates at once: how well each explains a reading, and what they say together.
+
+use glam::DVec3;
+
+use super::kernels::{score_templates, score_with_gluing};
+use super::modes::Mode;
+use super::weighed::Heard;
+use super::{Contact, Matching};
+use crate::inference::map::LANES;
+use crate::inference::region::Region;
+
+/// Log-likelihoods so far below the best count for nothing.
+const NOTHING: f64 = 14.0;
+
+impl Matching {
+    /// How much better than nothing a touch at each template explains the reading.
+    pub(super) fn score(&mut self, heard: &Heard) {
+        let weights: Vec<f32> = heard.w.iter().map(|w| (w * 1e-12) as f32).collect();
+        let most = self.most_force as f32;
+        if let Some(spread) = &self.errors.spread {
+            let reading: Vec<f32> = heard.reading().iter().map(|x| (x * 1e6) as f32).collect();
+            score_with_gluing(
+                [&self.map.templates, &spread.templates],
+                &reading,
+                &weights,
+                (heard.drift * 1e12) as f32,
+                most,
+                &mut self.scores,
+                &mut self.highest,
+            );
+            return;
+        }
+        let scaled: Vec<f32> = (heard.reading().iter().zip(&heard.w))
+            .map(|(x, w)| (w * x * 1e-6) as f32)
+            .collect();
+        let unglued = heard.unglued();
+        score_templates(
+            &self.map.templates,
+            &scaled,
+            &weights,
+            [(unglued.taken * 1e12) as f32, (unglued.sum * 1e-6) as f32],
+            most,
+            &mut self.scores,
+            &mut self.highest,
+        );
+    }
+
+    /// The template with the highest score among those at places that are `allowed`.
+    pub(super) fn best_template(&self, allowed: &dyn Fn(DVec3) -> bool) -> Option<usize> {
+        let nodes = self.map.places.len();
+        let (mut best, mut highest) = (None, f32::NEG_INFINITY);
+        for (block, _) in self.highest.iter().enumerate() {
+            if self.highest[block] <= highest {
+                continue;
+            }
+            for node in block * LANES..((block + 1) * LANES).min(nodes) {
+                if self.scores[node] > highest && allowed(self.map.places[node]) {
+                    (best, highest) = (Some(node), self.scores[node]);
+                }
+            }
+        }
+        best
+    }
+
+    /// Mean, spread and region over all templates, each with the area it stands for.
+    pub(super) fn mean_of_templates(&self, heard: &Heard, best: &Mode) -> Contact {
+        let map = &self.map;
+        let highest = self.highest.iter().fold(0.0_f32, |m, s| m.max(*s));
+        let highest = f64::from(highest).max(0.5 * heard.squares - best.cost);
+        let floor = (highest - NOTHING - 1e-5 * highest) as f32;
+        let mut places = Vec::new();
+        let (mut total, mut centre, mut force, mut squares) = (0.0, DVec3::ZERO, 0.0, 0.0);
+        for (node, _) in self.scores[..map.places.len()]
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| **s >= floor)
+        {
+            let (mean, variance, log_likelihood) = self.force_at(heard, node);
+            let weight = map.areas[node] * (log_likelihood - highest).exp();
+            places.push((map.places[node], weight));
+            total += weight;
+            centre += map.places[node] * weight;
+            force += weight * mean;
+            squares += weight * (mean * mean + variance);
+        }
+        if total <= 0.0 || !total.is_finite() {
+            return self.contact_at(heard, best, false);
+        }
+        let at = map.index.nearest(centre / total).0;
+        let force = force / total;
+        let variance = (squares / total - force * force).max(0.0);
+        let region = Region::of_places(&places, map.mesh.point(at), map.mesh.normal(at));
+        self.contact(heard, at, (force, variance), region, best.cost, false)
+    }
+
+    /// Mean and variance of the force at a place, and the log-likelihood with the force integrated out.
+    fn force_at(&self, heard: &Heard, node: usize) -> (f64, f64, f64) {
+        let g = self.map.node(node);
+        let spread = self.errors.spread.as_ref().map(|s| s.node(node));
+        let force = spread.map_or(0.0, |_| self.fitting_force(heard, g, spread));
+        let weighed = heard.weighed(spread, force);
+        let measured = heard.measured(&weighed);
+        let (_, d) = measured.products(g);
+        let (force, cost) = measured.fit(g, self.most_force);
+        // A force is never known worse than that it lies between nothing and the most.
+        let variance = d.max(12.0 * self.most_force.powi(-2)).recip();
+        (
+            force,
+            variance,
+            0.5 * heard.squares - cost - weighed.log + 0.5 * variance.ln(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::Errors;
+    use super::super::tests::{CHANNELS, maps};
+    use super::*;
+
+    /// What a touch at a template explains, in double precision and one by one.
+    fn explained(matching: &Matching, heard: &Heard, node: usize) -> f64 {
+        let g = matching.map.node(node);
+        let spread = matching.errors.spread.as_ref().map(|s| s.node(node));
+        let force = matching.fitting_force(heard, g, spread);
+        let weighed = heard.weighed(spread, force);
+        let measured = heard.measured(&weighed);
+        let (s, d) = measured.products(g);
+        let left = measured.squares - force * (2.0 * s - force * d);
+        0.5 * (heard.squares - left) - weighed.log
+    }
+
+    #[test]
+    fn all_at_once_are_scored_as_one_by_one() {
+        let [map, spread] = maps();
+        let reading = [9e-6, 4e-6, 7e-6, 2e-6];
+        for drift in [0.0, 1e-6, 20e-6] {
+            for spread in [None, Some(Arc::clone(&spread))] {
+                let errors = Errors {
+                    spread,
+                    drift,
+                    ..Errors::of_noise(1e-6, CHANNELS)
+                };
+                let mut matching = Matching::new(Arc::clone(&map), errors, 50.0);
+                let heard = Heard::new(&reading, &matching.errors, &matching.used);
+                matching.score(&heard);
+                for node in 0..matching.map.places.len() {
+                    let expected = explained(&matching, &heard, node);
+                    let score = f64::from(matching.scores[node]);
+                    assert!(
+                        (score - expected).abs() < 1e-3 * (1.0 + heard.squares),
+                        "{score} {expected} {drift}"
+                    );
+                }
+            }
+        }
+    }
+}
