@@ -553,8 +553,8 @@ mod tests {
 
     #[test]
     fn another_estimator_is_another_judge() {
-        let matched = |p: &mut Project| p.evaluation.estimator = EstimatorKind::Matching;
-        assert_eq!(stale(SelectorKind::PcaQr, matched), [false, false, true]);
+        let trained = |p: &mut Project| p.evaluation.estimator = EstimatorKind::Svr;
+        assert_eq!(stale(SelectorKind::PcaQr, trained), [false, false, true]);
         let mut d = document();
         d.state.project.evaluation.estimator = EstimatorKind::Matching;
         let before = d.design_key();

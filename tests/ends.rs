@@ -24,7 +24,6 @@ fn project(folder: &Path, changes: &[(&str, &str)]) -> String {
         ("spacing_mm = 2.1", "spacing_mm = 4.1"),
         ("edge_radius_mm = 2.1", "edge_radius_mm = 4.0"),
         ("sensors = 10", "sensors = 3"),
-        ("compare = true", "compare = false"),
     ];
     for (from, to) in usual.iter().chain(changes) {
         assert!(text.contains(from), "{from} is not in the project");
@@ -51,7 +50,7 @@ fn design(folder: &Path, changes: &[(&str, &str)], more: &[&str]) -> Result<Valu
         Ok(serde_json::from_slice(&done.stdout).unwrap())
     } else {
         assert_eq!(done.status.code(), Some(1), "{said}");
-        assert!(said.starts_with("hapdef: "), "{said}");
+        assert!(said.lines().any(|l| l.starts_with("hapdef: ")), "{said}");
         Err(said)
     }
 }

@@ -62,6 +62,8 @@ fn forces_scale_signals_and_change_no_choice() {
         inputs.project.touch.force_n = force;
         inputs.project.gauge.noise_microstrain = 1.0 * scale;
         inputs.project.gauge.range_microstrain = 30_000.0 * scale;
+        inputs.project.touch.forces_n = inputs.project.touch.forces_n.map(|f| f * scale);
+        inputs.project.live.largest_force_n *= scale;
         let design = sound("force", &inputs);
         let ratio =
             design.simulated.dataset.x.values()[500] / base.simulated.dataset.x.values()[500];

@@ -233,7 +233,7 @@ fn displacements_are_judged_by_regression_and_it_is_said() {
     };
     let design = design::run(&asked, &KINDS, &budget, &|| 0.0, &unwatched).unwrap();
     assert!(design.evaluation.matched.is_empty() && !design.evaluation.rows.is_empty());
-    let notes = design.notes().join("\n");
+    let notes = design.cautions().join("\n");
     assert!(notes.contains("evaluation.estimator"), "{notes}");
     let summary = artifacts::summary(&asked, &design);
     let row = &summary["evaluation"][0];

@@ -478,7 +478,7 @@ fn fewer_touches_than_sensors_end_at_the_numerical_rank() {
     let chosen = choose(&PcaQr, &strip, &Wishes::count(20)).unwrap();
     assert!(chosen.sets.len() < 12);
     assert_eq!(chosen.achieved.stop_reason, StopReason::Exhausted);
-    assert!(chosen.achieved.notes[0].contains("independent patterns"));
+    assert!(chosen.achieved.cautions[0].contains("independent patterns"));
 }
 
 #[test]

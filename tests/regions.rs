@@ -211,8 +211,8 @@ fn gauges_put_by_hand_are_what_the_report_shows() {
         let table = artifacts::sites_csv(&inputs, &hand);
         assert_eq!(table.lines().count(), 1 + sites.len());
         assert!(table.contains(&format!(",{},2,", sites[1])), "{table}");
-        assert!(hand.notes().iter().any(|n| n.contains("by hand")));
-        assert!(design.notes().iter().all(|n| !n.contains("by hand")));
+        assert!(hand.cautions().iter().any(|n| n.contains("by hand")));
+        assert!(design.cautions().iter().all(|n| !n.contains("by hand")));
         let summary = artifacts::summary(&inputs, &hand);
         assert_eq!(summary["sites"].as_array().unwrap().len(), sites.len());
         // What the selector said of its own choice is not said of this one.
@@ -245,8 +245,8 @@ fn touches_on_a_wide_support_are_named() {
     let budget = Quality::Draft.budget();
     let says = |inputs: &Inputs| {
         let simulated = design::simulate(inputs, &budget, &unwatched).unwrap();
-        let notes = simulated.achieved.notes.join(" ");
-        notes.contains("press on what a support holds")
+        let mut words = simulated.achieved.words();
+        words.any(|w| w.contains("press on what a support holds"))
     };
     assert!(!says(&inputs), "its bosses are small");
     let lower_third = mask(&inputs, |p| p.z < 0.04);

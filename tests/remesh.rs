@@ -292,10 +292,6 @@ fn computed(part: Arc<TriMesh>) {
     assert!(estimate.strain_percent < 20.0);
     // A closed limb with thick walls is no thin shell everywhere, and that is said.
     assert!(
-        simulated
-            .achieved
-            .notes
-            .iter()
-            .any(|n| n.contains("thin-shell"))
+        (simulated.achieved.words()).any(|n| n.contains("thin-shell"))
     );
 }

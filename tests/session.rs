@@ -41,6 +41,11 @@ fn the_whole_design_task() {
     w.harness.state_mut().keep_unsaved_in(home.path());
     w.harness.run_ok();
 
+    // All selectors are to be seen beside each other.
+    let document = &mut w.harness.state_mut().document;
+    document.state.project.selection.compare = true;
+    w.harness.run_ok();
+
     // There is something to see and something to press.
     assert_eq!(standings(&w)[0], Standing::Current);
     assert_eq!(standings(&w)[2], Standing::Open);
@@ -133,7 +138,7 @@ fn press_and_paint(w: &mut Window) {
 /// Selections beside each other, and what is computed again for them.
 fn compare(w: &mut Window, design: &Arc<Design>) {
     let places = gauges_of(w);
-    // Another selector is there at once: all four were run.
+    // Another selector is there at once: all were run.
     w.press("Keep this selection");
     w.harness
         .state_mut()
@@ -153,7 +158,7 @@ fn compare(w: &mut Window, design: &Arc<Design>) {
         .state
         .project
         .selection
-        .selector = SelectorKind::GreedySvr;
+        .selector = SelectorKind::ExpectedError;
 
     // Would five do? Only what depends on the number is computed again.
     w.harness

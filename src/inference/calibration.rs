@@ -506,8 +506,17 @@ mod tests {
             .map(|_| press(&real, &off.pressing, &mut rng))
             .collect();
         let found = calibrate(&drawn, &known, &NOISE, &off);
-        for gauge in &found.glued {
-            assert!((gauge[0] - 1.1).abs() < 0.02, "{gauge:?}");
-        }
+        // Part of what the part is softer by may be told as gauges that lie elsewhere: what counts is what is read.
+        let gain = found.glued.iter().map(|g| g[0]).sum::<f64>() / CHANNELS as f64;
+        assert!((gain - 1.1).abs() < 0.03, "{:?}", found.glued);
+        let fitted = drawn.calibrated(&found);
+        let apart = |map: &ResponseMap, at| -> f64 {
+            let pairs = map.at(at).into_iter().zip(real.at(at));
+            pairs.map(|(a, b)| (a - b).powi(2)).sum()
+        };
+        let places: Vec<_> = (0..8).map(|_| somewhere(&mut rng)).collect();
+        let [before, after] = [&drawn.map, &fitted]
+            .map(|map| places.iter().map(|&at| apart(map, at)).sum::<f64>());
+        assert!(after < 0.05 * before, "{after:e} {before:e}");
     }
 }

@@ -46,7 +46,8 @@ pub struct Watcher {
     same: u64,
     /// Samples since one was at an end of the range.
     off_scale: Option<u64>,
-    /// Running mean of squared second differences over six: the variance of white noise.
+    /// Logarithm of the running median of what second differences say the deviation of white noise is. A median, so
+    /// that the samples in which a touch begins or ends are no noise, however steep it is.
     tremble: f64,
     /// Looks in a row in which a touch that it should have felt left no trace.
     silent: u32,
@@ -66,10 +67,13 @@ pub struct Expected {
     pub rate: f64,
 }
 
-/// Seconds of the same value that are no chance, of holding an off-scale mark, and of the running mean.
+/// Seconds of the same value that are no chance, of holding an off-scale mark, and in which the running median may
+/// rise or fall by a factor of e.
 const STUCK_S: f64 = 0.4;
 const HOLD_S: f64 = 0.3;
-const TREMBLE_S: f64 = 0.2;
+const TREMBLE_S: f64 = 0.25;
+/// Median of the absolute value of a normal variable over its deviation.
+const MEDIAN_OF_NORMAL: f64 = 0.6745;
 /// Noise at rest (counts) from which a channel cannot stay at one value.
 const TREMBLES: f64 = 0.35;
 /// Times the usual noise.
@@ -86,10 +90,11 @@ impl Watcher {
             0
         };
         if self.seen >= 2 {
-            let second = (count - 2.0 * b + a).powi(2) / 6.0;
-            // A single jump is a touch or a glitch, no noise.
-            let second = second.min(100.0 * (self.tremble + expected.usual_noise.powi(2) + 1.0));
-            self.tremble += (second - self.tremble) / (TREMBLE_S * expected.rate).max(1.0);
+            let second = (count - 2.0 * b + a).abs() / 6.0_f64.sqrt() / MEDIAN_OF_NORMAL;
+            let step = (TREMBLE_S * expected.rate).max(2.0).recip();
+            let up = second > self.tremble.exp();
+            // Between far less than counts can show and far more than a converter has.
+            self.tremble = (self.tremble + if up { step } else { -step }).clamp(-3.0, 25.0);
         }
         let at_end = count <= expected.lowest || count >= expected.highest;
         self.off_scale = if at_end {
@@ -128,7 +133,7 @@ impl Watcher {
             Health::OffScale
         } else if expected.own_noise > TREMBLES && !within(self.same, STUCK_S) {
             Health::Stuck
-        } else if self.tremble.sqrt() > NOISY * expected.usual_noise.max(0.5) {
+        } else if self.tremble.exp() > NOISY * expected.usual_noise.max(0.5) {
             Health::Noisy
         } else if self.dead {
             Health::Dead
@@ -178,6 +183,29 @@ mod tests {
         let rail = |k: u32| if k == 990 { 4095.0 } else { rest(k) };
         assert_eq!(after((0..1000).map(rail)), Health::OffScale);
         assert_eq!(after((0..1400).map(rail)), Health::Good);
+    }
+
+    /// Fingers that drum, at the rates of the slowest and the quickest boards, are no noise; and noise is told within a
+    /// second.
+    #[test]
+    fn steep_touches_are_no_noise_at_any_rate() {
+        for rate in [100.0, 1000.0, 4000.0] {
+            let expected = Expected { rate, ..EXPECTED };
+            for ramp_s in [0.002, 0.01, 0.08] {
+                let mut watcher = Watcher::default();
+                for k in 0..(5.0 * rate) as u32 {
+                    let into = (f64::from(k) / rate) % 0.5;
+                    let pressed = (into / ramp_s).min((0.4 - into) / ramp_s).clamp(0.0, 1.0);
+                    let pressed = pressed * pressed * (3.0 - 2.0 * pressed);
+                    watcher.push(2000.0 + noise(k) + 1500.0 * pressed, &expected);
+                    assert!(watcher.health(&expected).is_good(), "{rate} Hz {ramp_s} s {k}");
+                }
+                for k in 0..rate as u32 {
+                    watcher.push(2000.0 + 20.0 * noise(k), &expected);
+                }
+                assert_eq!(watcher.health(&expected), Health::Noisy, "{rate} Hz {ramp_s} s");
+            }
+        }
     }
 
     #[test]

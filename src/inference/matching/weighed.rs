@@ -234,7 +234,7 @@ mod tests {
         let spread = [0.3, 0.1, 0.0, 0.7];
         let force = 2.0;
         let variances: Vec<f64> = (errors.noise.iter().zip(spread))
-            .map(|(n, s)| n * n + (force * s).powi(2))
+            .map(|(n, s)| n * n + f64::powi(force * s, 2))
             .collect();
         let (inverse, determinant) = dense(&variances, 3.0);
         let squares: Vec<f64> = errors.noise.iter().map(|n| n * n).collect();
