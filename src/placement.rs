@@ -2,6 +2,7 @@
 
 pub mod candidates;
 pub mod entropy;
+mod exchange;
 pub mod expected_error;
 pub mod greedy_svr;
 pub mod information;
@@ -17,7 +18,7 @@ use crate::budget::{Achieved, Cancelled, Watch};
 use crate::dataset::SignalMatrix;
 use crate::pca::PcaError;
 pub use expected_error::Certificate;
-pub use wishes::Wishes;
+pub use wishes::{LostBy, Wishes};
 
 /// The selectors a project can name.
 #[derive(

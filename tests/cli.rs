@@ -168,7 +168,12 @@ fn a_draft_design_leaves_everything_behind() {
             .as_array()
             .unwrap()
             .iter()
-            .find(|r| r["selector"] == selector && r["sensors"] == sensors && r["region"] == region)
+            .find(|r| {
+                r["selector"] == selector
+                    && r["sensors"] == sensors
+                    && r["region"] == region
+                    && r["force_n"] == 10.0
+            })
             .unwrap_or_else(|| panic!("no row for {selector} {sensors} {region}"))["error_mm"]
             .as_f64()
             .unwrap()

@@ -291,7 +291,5 @@ fn computed(part: Arc<TriMesh>) {
     assert!(simulated.dataset.x.values().iter().all(|x| x.is_finite()));
     assert!(estimate.strain_percent < 20.0);
     // A closed limb with thick walls is no thin shell everywhere, and that is said.
-    assert!(
-        (simulated.achieved.words()).any(|n| n.contains("thin-shell"))
-    );
+    assert!((simulated.achieved.words()).any(|n| n.contains("thin-shell")));
 }

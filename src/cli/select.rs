@@ -14,6 +14,7 @@ use crate::gaussian_process::GpKernel;
 use crate::io::cpu_seconds;
 use crate::placement::expected_error::Detail;
 use crate::placement::greedy_svr::{Audit, Comparison};
+use crate::placement::wishes::{Loss, LostBy, Thorough};
 use crate::placement::{SelectorKind, SensorSet, Wishes};
 use crate::study::{self, Choice, Data, Settings};
 
@@ -62,9 +63,21 @@ pub struct SelectArgs {
     /// Stop at this cross-validated error (mm), or expected error where that is what is chosen by.
     #[arg(long, value_parser = between(1e-9, 1e9))]
     pub target_mm: Option<f64>,
-    /// Probability that one gauge has failed when it is needed (greedy SVR only).
+    /// Probability that gauges are lost when they are needed (expected error and greedy SVR).
     #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 1.0))]
     pub failure: f64,
+    /// How many gauges are lost together, any of them (with --failure; 1 when left out, greedy SVR knows no other).
+    #[arg(long, value_parser = whole(1, 5))]
+    pub lost: Option<usize>,
+    /// Count the worst loss instead of the mean over all (with --failure).
+    #[arg(long)]
+    pub worst_loss: bool,
+    /// Exchange gauges after all are chosen (greedy SVR, entropy and mutual information; expected error always does).
+    #[arg(long)]
+    pub exchange: bool,
+    /// First gauges that a set is begun from; the best set is kept (all but PCA-QR; 1 when left out).
+    #[arg(long, value_parser = whole(1, 20))]
+    pub starts: Option<usize>,
     /// Share of the criterion by which a choice of greedy SVR may be worse than the best; 0.002 when left out.
     #[arg(long, value_parser = between(0.0, 0.999))]
     pub selection_tolerance: Option<f64>,
@@ -219,6 +232,12 @@ impl SelectArgs {
             ("--landmarks", self.landmarks.is_some(), svr),
             ("--audit", self.audit > 0, svr),
             ("--forces-n", !self.forces_n.is_empty(), expected),
+            ("--exchange", self.exchange, svr || geometric),
+            (
+                "--starts",
+                self.starts.is_some(),
+                svr || geometric || expected,
+            ),
             ("--no-criterion", self.no_criterion, !svr && !expected),
         ];
         // Nothing is trained for a choice by expected error, and nothing held out.
@@ -229,6 +248,22 @@ impl SelectArgs {
             return Err(misuse(&format!(
                 "{flag} has no effect with --selector {}: leave it out",
                 kind.name()
+            )));
+        }
+        if self.audit > 0 && self.exchange {
+            return Err(misuse(
+                "--audit is about gauge after gauge, which --exchange goes beyond: give one of them",
+            ));
+        }
+        let losses = [
+            ("--lost", self.lost.is_some()),
+            ("--worst-loss", self.worst_loss),
+        ];
+        if let Some((flag, _)) = losses.iter().find(|(_, given)| *given)
+            && self.failure <= 0.0
+        {
+            return Err(misuse(&format!(
+                "{flag} has no effect without --failure: say how probable a loss is"
             )));
         }
         let target = [("--target-mm", self.target_mm.is_some())];
@@ -290,6 +325,18 @@ impl SelectArgs {
             budget: self.cost_budget,
             target_mm: self.target_mm,
             failure: self.failure,
+            loss: Loss {
+                gauges: self.lost.unwrap_or(Loss::default().gauges),
+                by: if self.worst_loss {
+                    LostBy::Worst
+                } else {
+                    LostBy::Expected
+                },
+            },
+            thorough: Thorough {
+                exchange: self.exchange,
+                starts: self.starts.unwrap_or(Thorough::default().starts),
+            },
         })
     }
 

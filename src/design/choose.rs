@@ -22,6 +22,7 @@ use crate::placement::expected_error::{self, ExpectedError};
 use crate::placement::greedy_svr::{self, GreedySvr};
 use crate::placement::information::Geometry;
 use crate::placement::mutual_information::MutualInformation;
+use crate::placement::wishes::{Loss, Thorough};
 use crate::placement::{
     PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes, lead,
     pca_qr,
@@ -271,27 +272,79 @@ pub fn geometry(
     })
 }
 
-/// What is asked of a selector beside the count: the project's wishes, by places in a pool of sites.
-fn wishes(inputs: &Inputs, positions: &[DVec3]) -> Result<Wishes, DesignError> {
-    let keys = &inputs.project.selection;
-    let nearest = |at: &[f64; 3]| {
-        let at = DVec3::from_array(*at) / 1000.0;
-        (0..positions.len())
-            .min_by(|&a, &b| {
-                (positions[a].distance_squared(at)).total_cmp(&positions[b].distance_squared(at))
-            })
-            .ok_or(PlacementError::NoSites)
-    };
-    let required: Result<Vec<usize>, PlacementError> =
-        keys.required_mm.iter().map(nearest).collect();
-    Ok(Wishes {
-        sensors: keys.sensors,
-        required: required?,
-        spacing: keys.spacing_mm / 1000.0,
-        costs: (!keys.costs.is_empty()).then(|| costs(&keys.costs, positions)),
-        budget: keys.cost_budget,
-        target_mm: keys.target_mm,
-        failure: keys.failure,
+/// Sites that a selector may choose from, with what the project asks of the choice.
+struct Offer<'a> {
+    /// As numbered in the dataset.
+    sites: &'a [usize],
+    positions: Vec<DVec3>,
+    wishes: Wishes,
+}
+
+impl<'a> Offer<'a> {
+    fn new(
+        inputs: &Inputs,
+        simulated: &Simulated,
+        sites: &'a [usize],
+    ) -> Result<Self, DesignError> {
+        let positions: Vec<DVec3> = (sites.iter())
+            .map(|&s| simulated.dataset.sites[s].position)
+            .collect();
+        let keys = &inputs.project.selection;
+        let near = |at: &[f64; 3]| nearest(&positions, *at).ok_or(PlacementError::NoSites);
+        let required: Result<Vec<usize>, PlacementError> =
+            keys.required_mm.iter().map(near).collect();
+        let wishes = Wishes {
+            sensors: keys.sensors,
+            required: required?,
+            spacing: keys.spacing_mm / 1000.0,
+            costs: (!keys.costs.is_empty()).then(|| costs(&keys.costs, &positions)),
+            budget: keys.cost_budget,
+            target_mm: keys.target_mm,
+            failure: keys.failure,
+            loss: Loss {
+                gauges: keys.lost,
+                by: keys.lost_by,
+            },
+            thorough: Thorough {
+                exchange: keys.exchange,
+                starts: keys.starts,
+            },
+        };
+        Ok(Self {
+            sites,
+            positions,
+            wishes,
+        })
+    }
+
+    /// What is chosen for signals of these sites under touches at some places (mm).
+    fn choose(
+        &self,
+        x: &SignalMatrix,
+        targets: &[[f64; 3]],
+        (watch, found): Telling,
+        selector: impl FnOnce(&Pool, &Request) -> Result<Selection, PlacementError>,
+    ) -> Result<Selection, PlacementError> {
+        let pool = Pool {
+            x,
+            targets,
+            sites: self.sites,
+            positions: &self.positions,
+        };
+        let request = Request {
+            wishes: &self.wishes,
+            watch,
+            found,
+        };
+        selector(&pool, &request)
+    }
+}
+
+/// Which of some positions (m) is nearest to a place (mm).
+fn nearest(positions: &[DVec3], at_mm: [f64; 3]) -> Option<usize> {
+    let at = DVec3::from_array(at_mm) / 1000.0;
+    (0..positions.len()).min_by(|&a, &b| {
+        (positions[a].distance_squared(at)).total_cmp(&positions[b].distance_squared(at))
     })
 }
 
@@ -385,65 +438,68 @@ fn choose(
     found: Found,
 ) -> Result<Selection, DesignError> {
     let found = |set: &SensorSet| found(kind, set, &simulated.dataset.sites);
-    let targets = simulated.dataset.targets_mm();
-    let positions = |sites: &[usize]| -> Vec<DVec3> {
-        sites
-            .iter()
-            .map(|&s| simulated.dataset.sites[s].position)
-            .collect()
-    };
-    if kind == SelectorKind::GreedySvr {
-        return select_by_svr(inputs, simulated, reduced, budget, watch, &found);
+    let telling: Telling = (watch, &found);
+    match kind {
+        SelectorKind::ExpectedError => {
+            select_by_expected_error(inputs, simulated, reduced, budget, telling)
+        }
+        SelectorKind::GreedySvr => select_by_svr(inputs, simulated, reduced, budget, telling),
+        SelectorKind::PcaQr => select_by_pivots(inputs, simulated, reduced, telling),
+        SelectorKind::Entropy | SelectorKind::MutualInformation => {
+            select_by_geometry(inputs, simulated, reduced, kind, budget, telling)
+        }
     }
-    if kind == SelectorKind::ExpectedError {
-        return select_by_expected_error(inputs, simulated, reduced, budget, watch, &found);
-    }
-    let places = positions(&reduced.feasible);
+}
+
+/// Who is asked whether to go on, and told of each set.
+type Telling<'a> = (Watch<'a>, &'a (dyn Fn(&SensorSet) + Sync));
+
+fn select_by_pivots(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    telling: Telling,
+) -> Result<Selection, DesignError> {
+    let offer = Offer::new(inputs, simulated, &reduced.feasible)?;
     let x = heard(inputs, reduced);
-    let pool = Pool {
-        x: &x,
-        targets: &targets,
-        sites: &reduced.feasible,
-        positions: &places,
-    };
-    let wishes = wishes(inputs, &places)?;
-    let request = Request {
-        wishes: &wishes,
-        watch,
-        found: &found,
-    };
-    if kind == SelectorKind::PcaQr && inputs.project.selection.with_noise {
-        return Ok(pca_qr::PcaQr.select(&pool, &request)?);
-    }
-    if kind == SelectorKind::PcaQr {
-        return Ok(pca_qr::from_components(&reduced.pca, &pool, &request)?);
-    }
+    let with_noise = inputs.project.selection.with_noise;
+    let targets = simulated.dataset.targets_mm();
+    let selection = offer.choose(&x, &targets, telling, |pool, request| {
+        if with_noise {
+            pca_qr::PcaQr.select(pool, request)
+        } else {
+            pca_qr::from_components(&reduced.pca, pool, request)
+        }
+    })?;
+    Ok(selection)
+}
+
+fn select_by_geometry(
+    inputs: &Inputs,
+    simulated: &Simulated,
+    reduced: &Reduced,
+    kind: SelectorKind,
+    budget: &Budget,
+    telling: Telling,
+) -> Result<Selection, DesignError> {
     let located = if let Some(known) = reduced.geometry.get() {
         known
     } else {
-        let made = geometry(inputs, simulated, reduced, budget, watch)?;
+        let made = geometry(inputs, simulated, reduced, budget, telling.0)?;
         reduced.geometry.get_or_init(|| made)
     };
     let Located { geometry, rows, .. } = located;
-    let x = reduced.x.select_rows(rows);
     let known: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
-    let places = positions(&known);
-    let wishes = self::wishes(inputs, &places)?;
-    let pool = Pool {
-        x: &x,
-        targets: &targets,
-        sites: &known,
-        positions: &places,
-    };
-    let request = Request {
-        wishes: &wishes,
-        ..request
-    };
-    let mut selection = if kind == SelectorKind::Entropy {
-        Entropy { geometry }.select(&pool, &request)?
-    } else {
-        MutualInformation { geometry }.select(&pool, &request)?
-    };
+    let offer = Offer::new(inputs, simulated, &known)?;
+    let x = reduced.x.select_rows(rows);
+    let targets = simulated.dataset.targets_mm();
+    let mut selection = offer.choose(&x, &targets, telling, |pool, request| {
+        if kind == SelectorKind::Entropy {
+            Entropy { geometry }.select(pool, request)
+        } else {
+            MutualInformation { geometry }.select(pool, request)
+        }
+    })?;
     if known.len() < reduced.feasible.len() {
         selection.achieved.notes.push(format!(
             "Chosen from {} of {} feasible sites, evenly taken.",
@@ -459,46 +515,30 @@ fn select_by_expected_error(
     simulated: &Simulated,
     reduced: &Reduced,
     budget: &Budget,
-    watch: Watch,
-    found: &(dyn Fn(&SensorSet) + Sync),
+    telling: Telling,
 ) -> Result<Selection, DesignError> {
     let known = Known::new(inputs, simulated);
-    let positions: Vec<DVec3> = (reduced.feasible.iter())
-        .map(|&s| simulated.dataset.sites[s].position)
-        .collect();
     let variance = |row: usize, touch: usize| known.variance(reduced.feasible[row], touch);
-    let targets = simulated.dataset.targets_mm();
-    let pool = Pool {
-        x: &reduced.x,
-        targets: &targets,
-        sites: &reduced.feasible,
-        positions: &positions,
-    };
-    let wishes = wishes(inputs, &positions)?;
-    let request = Request {
-        wishes: &wishes,
-        watch,
-        found,
-    };
     let selector = ExpectedError {
         known: known.knowledge(&variance),
         detail: detail(budget),
         rounds: expected_error::ROUNDS,
     };
-    Ok(selector.select(&pool, &request)?)
+    let offer = Offer::new(inputs, simulated, &reduced.feasible)?;
+    let targets = simulated.dataset.targets_mm();
+    let selection = offer.choose(&reduced.x, &targets, telling, |pool, request| {
+        selector.select(pool, request)
+    })?;
+    Ok(selection)
 }
 
 /// The feasible sites nearest to the places where gauges must be: rows of the reduced signals.
 fn required_rows(inputs: &Inputs, simulated: &Simulated, reduced: &Reduced) -> Vec<usize> {
-    let place = |row: usize| simulated.dataset.sites[reduced.feasible[row]].position;
+    let positions: Vec<DVec3> = (reduced.feasible.iter())
+        .map(|&s| simulated.dataset.sites[s].position)
+        .collect();
     let required = inputs.project.selection.required_mm.iter();
-    required
-        .filter_map(|&at| {
-            let at = DVec3::from_array(at) / 1000.0;
-            let off = |row: &usize| place(*row).distance_squared(at);
-            (0..reduced.feasible.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
-        })
-        .collect()
+    required.filter_map(|&at| nearest(&positions, at)).collect()
 }
 
 fn select_by_svr(
@@ -506,8 +546,7 @@ fn select_by_svr(
     simulated: &Simulated,
     reduced: &Reduced,
     budget: &Budget,
-    watch: Watch,
-    found: &(dyn Fn(&SensorSet) + Sync),
+    telling: Telling,
 ) -> Result<Selection, DesignError> {
     let all = simulated.dataset.targets_mm();
     let sensors = inputs.project.selection.sensors;
@@ -528,17 +567,6 @@ fn select_by_svr(
     let heard = heard(inputs, reduced);
     let x = heard.select_rows(&rows).select_columns(&touches);
     let targets: Vec<[f64; 3]> = touches.iter().map(|&t| all[t]).collect();
-    let positions: Vec<DVec3> = sites
-        .iter()
-        .map(|&s| simulated.dataset.sites[s].position)
-        .collect();
-    let pool = Pool {
-        x: &x,
-        targets: &targets,
-        sites: &sites,
-        positions: &positions,
-    };
-    let wishes = wishes(inputs, &positions)?;
     let selector = GreedySvr {
         hyper: inputs.project.hyper(),
         folds: budget.folds,
@@ -552,12 +580,10 @@ fn select_by_svr(
         tolerance: greedy_svr::TOLERANCE,
         landmarks: 1.0,
     };
-    let request = Request {
-        wishes: &wishes,
-        watch,
-        found,
-    };
-    let mut selection = selector.select(&pool, &request)?;
+    let offer = Offer::new(inputs, simulated, &sites)?;
+    let mut selection = offer.choose(&x, &targets, telling, |pool, request| {
+        selector.select(pool, request)
+    })?;
     if touches.len() < all.len() || sites.len() < reduced.sites.len() {
         selection.achieved.notes.push(format!(
             "Scored on {} of {} touches and {} of {} candidates.",

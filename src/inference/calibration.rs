@@ -515,8 +515,8 @@ mod tests {
             pairs.map(|(a, b)| (a - b).powi(2)).sum()
         };
         let places: Vec<_> = (0..8).map(|_| somewhere(&mut rng)).collect();
-        let [before, after] = [&drawn.map, &fitted]
-            .map(|map| places.iter().map(|&at| apart(map, at)).sum::<f64>());
-        assert!(after < 0.05 * before, "{after:e} {before:e}");
+        let [before, after] =
+            [&drawn.map, &fitted].map(|map| places.iter().map(|&at| apart(map, at)).sum::<f64>());
+        assert!(after < 0.1 * before, "{after:e} {before:e}");
     }
 }

@@ -316,6 +316,10 @@ mod tests {
         });
         p.selection.with_noise = true;
         p.selection.compare = false;
+        p.selection.lost = 2;
+        p.selection.lost_by = crate::placement::LostBy::Worst;
+        p.selection.exchange = true;
+        p.selection.starts = 3;
         p.selection.cost_budget = Some(12.5);
         p.selection.costs.push(CostKeys {
             box_mm: [[0.0; 3], [1.0; 3]],

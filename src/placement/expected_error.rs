@@ -2,21 +2,17 @@
 //!
 //! The criterion is the error in mm that model matching (`inference::matching`) is expected to make, over where
 //! touches come, how hard they are, and what is off: noise, gluing, the model itself. Gauges are added one by one,
-//! always the best of all sites (`bank`), and then exchanged for better ones while there are any. How far what comes out
-//! of that can be from the best set says `certificate`.
-
-/// Rounds of exchange.
-pub const ROUNDS: usize = 4;
+//! always the best of all sites (`bank`), and then exchanged for better ones while there are any. Where gauges may be
+//! lost, what is left of the set counts too (`expectation`). How far what comes out of that can be from the best set
+//! says `certificate`.
 
 mod bank;
 mod certificate;
 mod elliptic;
-mod exchange;
+mod expectation;
 mod hand;
 mod mistaken;
 mod scene;
-
-use rayon::prelude::*;
 
 pub use self::certificate::{ASSUMES, Certificate, certify};
 pub use self::elliptic::mean_length;
@@ -25,12 +21,15 @@ pub use self::mistaken::{Mistaken, Pair, posterior, taken_for, worst_pairs};
 pub use self::scene::{
     Detail, Forces, Knowledge, Reading, Scatter, Scene, Template, Variance, templates,
 };
+pub use super::exchange::ROUNDS;
 
-use self::bank::{Bank, Rows};
-use super::lead::{self, Best};
+use self::bank::Bank;
+use self::expectation::{Expectation, scan};
+use super::exchange::{self, Chosen};
+use super::lead;
 use super::wishes::{Field, shortage, unreached};
-use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
-use crate::budget::{Achieved, Cancelled, StopReason, Watch, Work, report};
+use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind};
+use crate::budget::{Achieved, Cancelled, StopReason, Work};
 
 /// The selector.
 pub struct ExpectedError<'a> {
@@ -50,184 +49,58 @@ impl Selector for ExpectedError<'_> {
     }
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
-        let watch = request.watch;
-        if request.wishes.failure > 0.0 {
-            return Err(PlacementError::Refused {
-                selector: "Expected error",
-                why: "it weighs noise and gluing, and no gauge that is lost; use greedy SVR to expect failures",
-            });
-        }
         let empty = Field::new(pool, request.wishes)?;
-        let mut field = empty.clone();
-        let scenes = Scenes::new(pool, self, watch)?;
-        let mut banks = scenes.banks(&[]);
-        let mut sets: Vec<SensorSet> = Vec::new();
-        let mut before = banks.fine.error();
-        while !field.full() && !reached(&sets, request) {
-            let step = (field.chosen.len(), request.wishes.sensors);
-            report(watch, SELECTING, step.0, step.1)?;
-            let open = field.open();
-            let errors = banks.scan(&open, watch, step)?;
-            let mut best = Best::default();
-            for (place, error) in errors {
-                best.offer(place, field.worth(place, before - error));
-            }
-            let Some(place) = best.place() else { break };
-            banks.add(place);
-            field.add(place);
-            before = banks.fine.error();
-            let set = set_of(pool, &field.chosen, before, best.lead());
-            (request.found)(&set);
-            sets.push(set);
-        }
-        let exchanged = exchange::exchange(&scenes, request, &empty, &field.chosen, self.rounds)?;
-        let mut notes = field.constant_notes();
-        let mut places = field.chosen.clone();
-        if let (Some(last), Some((chosen, error))) = (sets.last_mut(), exchanged) {
-            let gained = before - error;
-            if gained > 0.0 {
-                notes.push(format!(
-                    "{} of {} gauges were exchanged after all were chosen: {:.2} mm instead of {:.2}.",
-                    chosen.iter().filter(|c| !field.chosen.contains(c)).count(),
-                    chosen.len(),
-                    error,
-                    before
-                ));
-                *last = set_of(pool, &chosen, error, None);
-                (request.found)(last);
-                places = chosen;
-            }
-        }
-        if let Some(last) = sets.last_mut() {
-            let (allowed, required) = (empty.allowed(), &request.wishes.required);
-            last.certificate = certify(&scenes.fine, &allowed, required, &places, watch)?;
-        }
-        let mut cautions = Vec::from_iter(unreached(&sets, request.wishes));
-        notes.extend(lead::ties(&sets, lead::TOLERANCE));
-        let wanted = request.wishes.sensors;
-        let why = field.closed();
-        let short = why.is_some();
-        if let Some(why) = why {
-            cautions.push(shortage(&why, sets.len(), wanted));
-        }
-        Ok(Selection {
-            selector: SelectorKind::ExpectedError,
-            criterion_unit: "mm expected error",
-            pool: pool.sites.len(),
-            achieved: Achieved {
-                error_estimate: sets.last().and_then(|s| s.criterion),
-                unit: "mm expected error",
-                effort: Work::default(),
-                stop_reason: if short {
-                    StopReason::NoRoom
-                } else {
-                    StopReason::Converged
-                },
-                cautions,
-                notes,
-            },
-            sets,
-        })
+        let mut expectation = Expectation::new(self, pool, request)?;
+        let mut chosen = exchange::search(&mut expectation, pool, request, &empty, self.rounds)?;
+        certify_last(&expectation, request, &empty, &mut chosen)?;
+        let losses = expectation.losses_note(&chosen.places)?;
+        chosen.notes.extend(losses);
+        Ok(told(pool, request, chosen))
     }
 }
 
-const SELECTING: &str = "Selecting by expected error";
-
-/// Whether the wished error is reached.
-fn reached(sets: &[SensorSet], request: &Request) -> bool {
-    let error = sets.last().and_then(|s| s.criterion);
-    let target = request.wishes.target_mm;
-    matches!((error, target), (Some(error), Some(target)) if error <= target)
-        && sets.len() >= request.wishes.required.len()
-}
-
-fn set_of(pool: &Pool, chosen: &[usize], error: f64, lead: Option<f64>) -> SensorSet {
-    SensorSet {
-        sites: chosen.iter().map(|&p| pool.sites[p]).collect(),
-        criterion: Some(error),
-        criterion_mm: Some(error),
-        gap: None,
-        lead,
-        certificate: None,
-    }
-}
-
-/// The same touches in coarse and in fine detail.
-struct Scenes {
-    coarse: Scene,
-    fine: Scene,
-}
-
-impl Scenes {
-    fn new(pool: &Pool, selector: &ExpectedError, watch: Watch) -> Result<Self, Cancelled> {
-        let scene = |detail| Scene::new(pool.x, pool.targets, &selector.known, detail, watch);
-        Ok(Self {
-            coarse: scene(selector.detail.coarse())?,
-            fine: scene(selector.detail)?,
-        })
-    }
-
-    fn banks(&self, sites: &[usize]) -> Banks<'_> {
-        Banks {
-            coarse: Bank::of(&self.coarse, sites),
-            fine: Bank::of(&self.fine, sites),
-        }
-    }
-}
-
-struct Banks<'a> {
-    coarse: Bank<'a>,
-    fine: Bank<'a>,
-}
-
-impl Banks<'_> {
-    fn add(&mut self, site: usize) {
-        self.coarse.add(site);
-        self.fine.add(site);
-    }
-
-    /// Expected error (mm) with one place more: of all open ones, or while much is uncertain, of those that are
-    /// promising in coarse detail.
-    fn scan(
-        &self,
-        open: &[usize],
-        watch: Watch,
-        step: (usize, usize),
-    ) -> Result<Vec<(usize, f64)>, Cancelled> {
-        /// Share of the places from which many are uncertain.
-        const MUCH: f64 = 0.05;
-        const PROMISING: usize = 48;
-        let errors = |bank: &Bank, places: &[usize]| -> Result<Vec<(usize, f64)>, Cancelled> {
-            let errors = scan(bank, places, watch, step)?;
-            Ok(places.iter().copied().zip(errors).collect())
-        };
-        if open.len() <= PROMISING || self.fine.open_share() < MUCH {
-            return errors(&self.fine, open);
-        }
-        let mut screened = errors(&self.coarse, open)?;
-        screened.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-        let mut promising: Vec<usize> = screened.iter().take(PROMISING).map(|s| s.0).collect();
-        promising.sort_unstable();
-        errors(&self.fine, &promising)
-    }
-}
-
-/// Expected error (mm) with each of some places more.
-fn scan(
-    bank: &Bank,
-    open: &[usize],
-    watch: Watch,
-    step: (usize, usize),
-) -> Result<Vec<f64>, Cancelled> {
-    /// Places between two looks at the watch.
-    const PIECE: usize = 64;
-    let piece = |places: &[usize]| -> Result<Vec<f64>, Cancelled> {
-        report(watch, SELECTING, step.0, step.1)?;
-        let mut rows: Rows = bank.rows();
-        Ok(places.iter().map(|&p| bank.with(p, &mut rows)).collect())
+/// Puts beside the last set how far it is at most from the best one.
+fn certify_last(
+    expectation: &Expectation,
+    request: &Request,
+    empty: &Field,
+    chosen: &mut Chosen,
+) -> Result<(), Cancelled> {
+    let Some(last) = chosen.sets.last_mut() else {
+        return Ok(());
     };
-    let pieces: Result<Vec<Vec<f64>>, Cancelled> = open.par_chunks(PIECE).map(piece).collect();
-    Ok(pieces?.concat())
+    let (allowed, required) = (empty.allowed(), &request.wishes.required);
+    let (scene, watch) = (expectation.scene(), request.watch);
+    last.certificate = certify(scene, &allowed, required, &chosen.places, watch)?;
+    Ok(())
+}
+
+/// The selection, with what must be known of it.
+fn told(pool: &Pool, request: &Request, chosen: Chosen) -> Selection {
+    let Chosen { field, sets, .. } = chosen;
+    let mut notes = field.constant_notes();
+    notes.extend(chosen.notes);
+    notes.extend(lead::ties(&sets, lead::TOLERANCE));
+    let mut cautions = Vec::from_iter(unreached(&sets, request.wishes));
+    let mut stop_reason = StopReason::Converged;
+    if let Some(why) = field.closed() {
+        cautions.push(shortage(&why, sets.len(), request.wishes.sensors));
+        stop_reason = StopReason::NoRoom;
+    }
+    Selection {
+        selector: SelectorKind::ExpectedError,
+        criterion_unit: "mm expected error",
+        pool: pool.sites.len(),
+        achieved: Achieved {
+            error_estimate: sets.last().and_then(|s| s.criterion),
+            unit: "mm expected error",
+            effort: Work::default(),
+            stop_reason,
+            cautions,
+            notes,
+        },
+        sets,
+    }
 }
 
 /// The expected error (mm) of a set of sites, and of each press.
@@ -249,7 +122,7 @@ mod tests {
     use super::*;
     use crate::budget::unwatched;
     use crate::dataset::SignalMatrix;
-    use crate::placement::Wishes;
+    use crate::placement::wishes::{Loss, LostBy, Wishes};
 
     fn chosen(
         targets: &[[f64; 3]],
@@ -301,13 +174,28 @@ mod tests {
     }
 
     #[test]
-    fn failures_are_refused() {
-        let wishes = Wishes {
-            failure: 0.3,
-            ..Wishes::count(3)
+    fn a_failure_counts_as_what_is_left_does() {
+        let targets = in_a_line(40);
+        let error = |failure: f64, loss: Loss| -> f64 {
+            let wishes = Wishes {
+                required: vec![0, 1, 2, 3],
+                failure,
+                loss,
+                ..Wishes::count(4)
+            };
+            let selection = chosen(&targets, &wishes, ROUNDS).unwrap();
+            let said = selection.achieved.notes.iter().any(|n| n.contains("lost"));
+            assert_eq!(said, failure > 0.0);
+            selection.sets.last().unwrap().criterion.unwrap()
         };
-        let refused = chosen(&in_a_line(9), &wishes, ROUNDS);
-        assert!(matches!(refused, Err(PlacementError::Refused { .. })));
+        let loss = |gauges: usize, by: LostBy| Loss { gauges, by };
+        let whole = error(0.0, Loss::default());
+        let one = error(0.5, loss(1, LostBy::Expected));
+        let two = error(0.5, loss(2, LostBy::Expected));
+        let worst = error(0.5, loss(1, LostBy::Worst));
+        let all = error(0.5, loss(9, LostBy::Expected));
+        assert!(whole <= one && one <= two && one <= worst && two <= all);
+        assert!(all.is_finite() && whole < all);
     }
 
     #[test]

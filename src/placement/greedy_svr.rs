@@ -11,6 +11,7 @@ mod audit;
 mod exact;
 mod race;
 mod screen;
+mod sets;
 
 use rayon::prelude::*;
 
@@ -18,8 +19,9 @@ pub use self::audit::{Audit, Comparison};
 use self::exact::{Judge, Judged};
 use self::race::{Raced, Relation, Rules, Scored, race};
 use self::screen::{Base, LEVELS, Sieve, Stop};
+use super::exchange::{self, Chosen};
 use super::lead;
-use super::wishes::{Field, Wishes, shortage, unreached};
+use super::wishes::{Field, Wishes, reached, shortage, unreached};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Achieved, Cancelled, Progress, StopReason, Watch, Work, report};
 use crate::dataset::SignalMatrix;
@@ -64,44 +66,31 @@ impl Selector for GreedySvr {
     }
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
-        let folds = self.split(pool.targets)?;
-        let mut field = Field::new(pool, request.wishes)?;
-        let mut search = Search::new(self, pool, request, &folds);
-        let mut sets: Vec<SensorSet> = Vec::new();
-        let mut stop = StopReason::Converged;
-        while !field.full() {
-            let Some(step) = search.best_addition(&field)? else {
-                stop = StopReason::NoRoom;
-                break;
-            };
-            field.add(step.place);
-            sets.push(SensorSet {
-                sites: field.sites(),
-                criterion: Some(step.error),
-                criterion_mm: Some(step.error),
-                gap: Some(step.gap),
-                lead: step.lead,
-                certificate: None,
+        let wishes = request.wishes;
+        if wishes.failure > 0.0 && wishes.loss.gauges > 1 {
+            return Err(PlacementError::Refused {
+                selector: "Greedy SVR",
+                why: "it weighs the loss of one gauge, not of several together; use expected error for that",
             });
-            (request.found)(&sets[sets.len() - 1]);
-            if request.wishes.target_mm.is_some_and(|t| step.error <= t) {
-                break;
-            }
         }
-        let no_room = field.closed().filter(|_| stop == StopReason::NoRoom);
+        let folds = self.split(pool.targets)?;
+        let empty = Field::new(pool, wishes)?;
+        let mut search = Search::new(self, pool, request, &folds);
+        let rounds = exchange::rounds_asked(wishes);
+        let chosen = exchange::search(&mut search, pool, request, &empty, rounds)?;
+        let Chosen { field, sets, .. } = chosen;
+        let ended = field.full() || reached(&sets, wishes);
         let mut cautions = Vec::new();
-        match no_room {
+        match field.closed().filter(|_| !ended) {
             Some(why) if sets.is_empty() => return Err(PlacementError::NoRoom { why }),
-            Some(why) => cautions.push(shortage(&why, sets.len(), request.wishes.sensors)),
+            Some(why) => cautions.push(shortage(&why, sets.len(), wishes.sensors)),
             None if sets.is_empty() => return Err(PlacementError::NoSites),
             None => {}
         }
-        cautions.extend(unreached(&sets, request.wishes));
+        cautions.extend(unreached(&sets, wishes));
         let mut notes = field.constant_notes();
+        notes.extend(chosen.notes);
         notes.extend(search.notes(&sets));
-        if !search.converged && stop == StopReason::Converged {
-            stop = StopReason::EffortSpent;
-        }
         Ok(Selection {
             selector: SelectorKind::GreedySvr,
             criterion_unit: "mm, cross-validated",
@@ -110,7 +99,11 @@ impl Selector for GreedySvr {
                 error_estimate: sets.last().and_then(|s| s.criterion),
                 unit: "mm",
                 effort: search.work,
-                stop_reason: stop,
+                stop_reason: match (ended, search.converged) {
+                    (false, _) => StopReason::NoRoom,
+                    (true, false) => StopReason::EffortSpent,
+                    (true, true) => StopReason::Converged,
+                },
                 cautions,
                 notes,
             },
@@ -383,21 +376,13 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// The criterion when one gauge of the set may have failed: the chance of it weighs the mean over
-    /// the sets without one.
+    /// The criterion when one gauge of the set may have failed: the chance of it weighs what is left of the set.
     fn expected(&self, level: usize, place: usize, error: f64, stop: Stop) -> f64 {
-        let p = self.request.wishes.failure;
-        if p == 0.0 {
-            return error;
-        }
+        let wishes = self.request.wishes;
         let hyper = &self.settings.hyper;
-        let others: f64 = self
-            .without
-            .iter()
-            .map(|base| base.score(&self.sieves, level, place, hyper, stop))
-            .sum();
-        let mean = (others + self.base.error) / (self.without.len() + 1) as f64;
-        (1.0 - p) * error + p * mean
+        let others = self.without.iter();
+        let others = others.map(|base| base.score(&self.sieves, level, place, hyper, stop));
+        wishes.weighed(error, others.chain(std::iter::once(self.base.error)))
     }
 
     /// Exact fits of the most promising until no other can be better by more than the tolerance.

@@ -3,8 +3,9 @@
 
 use serde::Serialize;
 
+use super::exchange::Chosen;
 use super::wishes::{Field, shortage};
-use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet, lead};
+use super::{PlacementError, Pool, Request, Selection, SelectorKind, lead};
 use crate::budget::{Achieved, StopReason, Work};
 use crate::gaussian_process::{Covariance, GpKernel, GpTrial};
 
@@ -63,7 +64,7 @@ impl Geometry {
         if request.wishes.failure > 0.0 {
             return Err(PlacementError::Refused {
                 selector: name,
-                why: "it knows the geometry only and no error that a lost gauge would raise; use greedy SVR to expect failures",
+                why: "it knows the geometry only and no error that a lost gauge would raise; use expected error or greedy SVR to expect failures",
             });
         }
         if pool.sites.len() > self.covariance.k.nrows() {
@@ -133,9 +134,9 @@ pub(super) fn finish(
     pool: &Pool,
     request: &Request,
     geometry: &Geometry,
-    field: &Field,
-    sets: Vec<SensorSet>,
+    chosen: Chosen,
 ) -> Result<Selection, PlacementError> {
+    let Chosen { field, sets, .. } = chosen;
     if sets.is_empty() {
         return Err(match field.closed() {
             Some(why) => PlacementError::NoRoom { why },
@@ -158,6 +159,7 @@ pub(super) fn finish(
         ));
     }
     notes.extend(field.constant_notes());
+    notes.extend(chosen.notes);
     notes.extend(lead::ties(&sets, lead::TOLERANCE));
     let mut cautions = Vec::new();
     if let Some(why) = no_room {

@@ -8,10 +8,12 @@
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::{Mat, Par, Side};
 
+use super::exchange::{self, Criterion};
 use super::information::{Conditional, Geometry, finish};
 use super::lead::Best;
+use super::wishes::Field;
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
-use crate::budget::{Watch, report};
+use crate::budget::{Cancelled, Watch, report};
 
 /// The selector. The pool's sites must be the first locations of the geometry.
 pub struct MutualInformation<'a> {
@@ -30,72 +32,137 @@ impl Selector for MutualInformation<'_> {
     }
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
-        let mut field = self.geometry.field(pool, request, "Mutual information")?;
-        let covariance = &self.geometry.covariance;
-        let noise = covariance.noise;
-        let mut given = Conditional::nothing(covariance);
-        let mut rest = Rest::of(self.geometry, request.watch)?;
-        let mut sets = Vec::new();
-        let mut information = 0.0;
-        while !field.full() {
-            report(
-                request.watch,
-                STAGE,
-                field.chosen.len(),
-                request.wishes.sensors,
-            )?;
-            let gain =
-                |place: usize| 0.5 * ((given.variance(place) + noise) * rest.diagonal[place]).ln();
-            let open = field.open();
-            let mut best = Best::default();
-            for &place in &open {
-                let value = field.worth(place, gain(place));
-                let possible = given.uncertain(place) || field.is_required(place);
-                if possible {
-                    best.offer(place, value);
-                }
-            }
-            let Some(place) = best.place() else {
-                break;
-            };
-            information += gain(place);
-            given.observe(place);
-            rest.remove(place);
-            field.add(place);
-            let set = SensorSet {
-                sites: field.sites(),
-                criterion: Some(information),
-                criterion_mm: None,
-                gap: None,
-                lead: best.lead(),
-                certificate: None,
-            };
-            (request.found)(&set);
-            sets.push(set);
-        }
+        let empty = self.geometry.field(pool, request, "Mutual information")?;
+        let mut sought = Sought {
+            geometry: self.geometry,
+            inverse: Inverse::of(self.geometry, request.watch)?,
+            request,
+        };
+        let rounds = exchange::rounds_asked(request.wishes);
+        let chosen = exchange::search(&mut sought, pool, request, &empty, rounds)?;
         finish(
             SelectorKind::MutualInformation,
             "nats of mutual information",
             pool,
             request,
             self.geometry,
-            &field,
-            sets,
+            chosen,
         )
     }
 }
 
-/// The inverse covariance (with noise) of all locations not chosen: its diagonal, and what it takes to
-/// know a column.
-struct Rest {
-    /// L⁻¹ of the covariance of all locations.
-    inverse_factor: Mat<f64>,
-    diagonal: Vec<f64>,
-    /// Columns taken out so far, scaled.
-    removed: Vec<Vec<f64>>,
+/// What a set of measurements says of all other locations, negative.
+struct Sought<'a> {
+    geometry: &'a Geometry,
+    inverse: Inverse,
+    request: &'a Request<'a>,
 }
 
-impl Rest {
+/// A set of measurements: what it leaves uncertain, all locations beside it, and what it says of them (nats).
+struct Measured<'a> {
+    given: Conditional<'a>,
+    noise: f64,
+    rest: Rest<'a>,
+    information: f64,
+}
+
+impl Measured<'_> {
+    fn gain(&self, place: usize) -> f64 {
+        0.5 * ((self.given.variance(place) + self.noise) * self.rest.diagonal[place]).ln()
+    }
+
+    fn add(&mut self, place: usize) {
+        self.information += self.gain(place);
+        self.given.observe(place);
+        self.rest.remove(place);
+    }
+}
+
+impl Sought<'_> {
+    fn report(&self, chosen: usize) -> Result<(), Cancelled> {
+        let wanted = self.request.wishes.sensors;
+        report(self.request.watch, STAGE, chosen, wanted)
+    }
+
+    fn measured(&self, places: &[usize]) -> Result<Measured<'_>, Cancelled> {
+        let covariance = &self.geometry.covariance;
+        let mut measured = Measured {
+            given: Conditional::nothing(covariance),
+            noise: covariance.noise,
+            rest: Rest::of(&self.inverse),
+            information: 0.0,
+        };
+        for &place in places {
+            self.report(places.len())?;
+            measured.add(place);
+        }
+        Ok(measured)
+    }
+}
+
+impl Criterion for Sought<'_> {
+    const UNIT: &'static str = "nats";
+
+    fn told(value: f64) -> f64 {
+        -value
+    }
+
+    fn of(&mut self, set: &[usize]) -> Result<f64, PlacementError> {
+        Ok(-self.measured(set)?.information)
+    }
+
+    fn screened(&mut self, others: &Field, _: usize) -> Result<Vec<(usize, f64)>, PlacementError> {
+        let measured = self.measured(&others.chosen)?;
+        let mut open = others.open();
+        open.retain(|&place| measured.given.uncertain(place));
+        let with = |place: usize| (place, -(measured.information + measured.gain(place)));
+        Ok(open.into_iter().map(with).collect())
+    }
+
+    fn grow<'f>(
+        &mut self,
+        mut field: Field<'f>,
+        found: &dyn Fn(&SensorSet),
+    ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
+        let mut measured = self.measured(&[])?;
+        let mut sets = Vec::new();
+        while !field.full() {
+            self.report(field.chosen.len())?;
+            let mut best = Best::default();
+            for place in field.open() {
+                let value = field.worth(place, measured.gain(place));
+                if measured.given.uncertain(place) || field.is_required(place) {
+                    best.offer(place, value);
+                }
+            }
+            let Some(place) = best.place() else {
+                break;
+            };
+            measured.add(place);
+            field.add(place);
+            let set = SensorSet {
+                sites: field.sites(),
+                criterion: Some(measured.information),
+                criterion_mm: None,
+                gap: None,
+                lead: best.lead(),
+                certificate: None,
+            };
+            found(&set);
+            sets.push(set);
+        }
+        Ok((field, sets))
+    }
+}
+
+/// The inverse covariance (with noise) of all locations: its diagonal, and what it takes to know a column.
+struct Inverse {
+    /// L⁻¹ of the covariance.
+    factor: Mat<f64>,
+    diagonal: Vec<f64>,
+}
+
+impl Inverse {
     fn of(geometry: &Geometry, watch: Watch) -> Result<Self, PlacementError> {
         /// Least variance of a measurement: without any the inverse of a smooth field has no digits.
         const LEAST: f64 = 1e-8;
@@ -106,33 +173,49 @@ impl Rest {
             a[(i, i)] += covariance.noise.max(LEAST);
         }
         report(watch, STAGE, 0, 1)?;
-        let factor = a.llt(Side::Lower).map_err(|_| PlacementError::Singular)?;
+        let llt = a.llt(Side::Lower).map_err(|_| PlacementError::Singular)?;
         report(watch, STAGE, 0, 1)?;
-        let mut inverse_factor = Mat::zeros(n, n);
-        invert_lower_triangular(inverse_factor.as_mut(), factor.L(), Par::Seq);
+        let mut factor = Mat::zeros(n, n);
+        invert_lower_triangular(factor.as_mut(), llt.L(), Par::Seq);
         let diagonal = (0..n)
-            .map(|c| (c..n).map(|r| inverse_factor[(r, c)].powi(2)).sum())
+            .map(|c| (c..n).map(|r| factor[(r, c)].powi(2)).sum())
             .collect();
-        Ok(Self {
-            inverse_factor,
-            diagonal,
+        Ok(Self { factor, diagonal })
+    }
+
+    /// Of L⁻ᵀ L⁻¹.
+    fn column(&self, place: usize) -> Vec<f64> {
+        let n = self.diagonal.len();
+        let own = self.factor.col(place);
+        let entry = |c: usize| -> f64 {
+            let from = place.max(c);
+            (from..n).map(|r| self.factor[(r, c)] * own[r]).sum()
+        };
+        (0..n).map(entry).collect()
+    }
+}
+
+/// The same of all locations not chosen.
+struct Rest<'a> {
+    all: &'a Inverse,
+    diagonal: Vec<f64>,
+    /// Columns taken out so far, scaled.
+    removed: Vec<Vec<f64>>,
+}
+
+impl<'a> Rest<'a> {
+    fn of(all: &'a Inverse) -> Self {
+        Self {
+            diagonal: all.diagonal.clone(),
+            all,
             removed: Vec::new(),
-        })
+        }
     }
 
     /// Takes a location out.
     fn remove(&mut self, place: usize) {
-        let n = self.diagonal.len();
-        // Column of L⁻ᵀ L⁻¹, then the changes made so far.
-        let own = self.inverse_factor.col(place);
-        let mut column: Vec<f64> = (0..n)
-            .map(|c| {
-                let from = place.max(c);
-                (from..n)
-                    .map(|r| self.inverse_factor[(r, c)] * own[r])
-                    .sum()
-            })
-            .collect();
+        // As it was, then the changes made so far.
+        let mut column = self.all.column(place);
         for v in &self.removed {
             let share = v[place];
             for (c, v) in column.iter_mut().zip(v) {
@@ -174,7 +257,8 @@ mod tests {
             coinciding: 0,
             map: Vec::new(),
         };
-        let mut rest = Rest::of(&geometry, &unwatched).unwrap();
+        let inverse = Inverse::of(&geometry, &unwatched).unwrap();
+        let mut rest = Rest::of(&inverse);
         rest.remove(3);
         rest.remove(7);
         let left: Vec<usize> = (0..12).filter(|i| ![3, 7].contains(i)).collect();

@@ -37,7 +37,7 @@ pub fn from_components(
     if wishes.failure > 0.0 {
         return Err(PlacementError::Refused {
             selector: "PCA-QR",
-            why: "its criterion is the span of the patterns, in which a lost gauge has no price; use greedy SVR to expect failures",
+            why: "its criterion is the span of the patterns, in which a lost gauge has no price; use expected error or greedy SVR to expect failures",
         });
     }
     let whole = Field::new(pool, wishes)?;
@@ -104,11 +104,15 @@ pub fn from_components(
                 .collect(),
             notes: (whole.constant_notes().into_iter())
                 .chain(lead::ties(&sets, lead::TOLERANCE))
+                .chain(wishes.thorough.is_asked().then(|| AS_IT_IS.to_owned()))
                 .collect(),
         },
         sets,
     })
 }
+
+const AS_IT_IS: &str =
+    "Pivots have no criterion of a whole set: exchange and several starts change nothing here.";
 
 /// Every number of gauges has a choice of its own. Beyond what anyone compares one by one there is only
 /// the number asked for; on the way to an error, numbers half as large again each.

@@ -1,5 +1,7 @@
 //! What is asked of a choice beside its number of gauges, the same for every selector.
 
+use serde::{Deserialize, Serialize};
+
 use super::{PlacementError, Pool, SensorSet};
 use crate::pca::PcaError;
 use crate::regression::Standardizer;
@@ -18,10 +20,82 @@ pub struct Wishes {
     pub costs: Option<Vec<f64>>,
     /// What all gauges together may cost.
     pub budget: Option<f64>,
-    /// Cross-validated error (mm) at which no more gauges are added.
+    /// Error (mm) at which no more gauges are added: the selector's own where it has one in mm, else the
+    /// cross-validated one that is computed of its sets.
     pub target_mm: Option<f64>,
-    /// Probability that one of the gauges has failed when it is needed.
+    /// Probability that gauges are lost when they are needed, as `loss` says.
     pub failure: f64,
+    pub loss: Loss,
+    pub thorough: Thorough,
+}
+
+/// Which gauges are lost where any are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Loss {
+    /// How many together, any of them.
+    pub gauges: usize,
+    pub by: LostBy,
+}
+
+impl Default for Loss {
+    /// Any one.
+    fn default() -> Self {
+        Self {
+            gauges: 1,
+            by: LostBy::Expected,
+        }
+    }
+}
+
+/// What counts of all the gauges that may be lost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LostBy {
+    /// The mean: each is as likely to be lost as any other.
+    #[default]
+    Expected,
+    /// Those whose loss is the worst.
+    Worst,
+}
+
+impl LostBy {
+    pub const ALL: [Self; 2] = [Self::Expected, Self::Worst];
+
+    /// As in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Expected => "expected",
+            Self::Worst => "worst",
+        }
+    }
+}
+
+/// How far a choice goes beyond gauge after gauge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Thorough {
+    /// Whether gauges are exchanged after all are chosen. Expected error does that in any case.
+    pub exchange: bool,
+    /// From how many first gauges a set is begun; the best is kept.
+    pub starts: usize,
+}
+
+impl Default for Thorough {
+    /// As the paper's selectors.
+    fn default() -> Self {
+        Self {
+            exchange: false,
+            starts: 1,
+        }
+    }
+}
+
+impl Thorough {
+    /// Whether more is asked for than gauge after gauge.
+    #[must_use]
+    pub fn is_asked(self) -> bool {
+        self.exchange || self.starts > 1
+    }
 }
 
 impl Wishes {
@@ -32,6 +106,32 @@ impl Wishes {
             ..Self::default()
         }
     }
+
+    /// A criterion as it counts where gauges may be lost: with all of them, and after each of the losses that are
+    /// possible.
+    #[must_use]
+    pub fn weighed(&self, whole: f64, lost: impl Iterator<Item = f64>) -> f64 {
+        if self.failure <= 0.0 {
+            return whole;
+        }
+        let lost: Vec<f64> = lost.collect();
+        if lost.is_empty() {
+            return whole;
+        }
+        let counts = match self.loss.by {
+            LostBy::Expected => lost.iter().sum::<f64>() / lost.len() as f64,
+            LostBy::Worst => lost.into_iter().fold(f64::NEG_INFINITY, f64::max),
+        };
+        (1.0 - self.failure) * whole + self.failure * counts
+    }
+}
+
+/// Whether sets have come to the error (mm) that was asked for, with all gauges that must be there.
+#[must_use]
+pub fn reached(sets: &[SensorSet], wishes: &Wishes) -> bool {
+    let error = sets.last().and_then(|s| s.criterion_mm);
+    matches!((error, wishes.target_mm), (Some(error), Some(target)) if error <= target)
+        && sets.len() >= wishes.required.len()
 }
 
 /// A note on a choice that ended short of what was wanted, with what [`Field::closed`] says.
@@ -62,6 +162,10 @@ pub struct Field<'a> {
     /// Places whose signal is the same under every touch: chosen only where they must be.
     constant: Vec<bool>,
     spent: f64,
+    /// What no gauge may cost more than.
+    dearest: f64,
+    /// The gauge to be chosen after those that must be there, whatever it adds.
+    first: Option<usize>,
 }
 
 impl<'a> Field<'a> {
@@ -94,6 +198,8 @@ impl<'a> Field<'a> {
             open: vec![true; available],
             constant,
             spent: 0.0,
+            dearest: f64::INFINITY,
+            first: None,
         };
         field.check()?;
         field.chosen.clear();
@@ -117,6 +223,9 @@ impl<'a> Field<'a> {
         }
         if !(0.0..=1.0).contains(&wishes.failure) {
             return bad("the probability of a failure must lie between 0 and 1");
+        }
+        if wishes.failure > 0.0 && wishes.loss.gauges == 0 {
+            return bad("a failure must take one gauge at least");
         }
         if self.pool.positions.is_empty() && wishes.spacing > 0.0 {
             return bad("a spacing needs the positions of the sites (site_m)");
@@ -150,7 +259,50 @@ impl<'a> Field<'a> {
         if let Some(&next) = self.wishes.required.get(self.chosen.len()) {
             return vec![next];
         }
-        self.allowed()
+        let mut allowed = self.allowed();
+        if let Some(first) = self.first
+            && self.chosen.len() == self.wishes.required.len()
+        {
+            allowed.retain(|&place| place == first);
+        }
+        allowed
+    }
+
+    /// The same, with a place that is chosen after those that must be there, whatever it adds.
+    #[must_use]
+    pub(super) fn led_by(self, first: usize) -> Self {
+        Self {
+            first: Some(first),
+            ..self
+        }
+    }
+
+    /// How many gauges must be there.
+    #[must_use]
+    pub(super) fn required(&self) -> usize {
+        self.wishes.required.len()
+    }
+
+    /// Of a field with nothing chosen: with the gauges that must be there.
+    #[must_use]
+    pub(super) fn with_required(&self) -> Self {
+        let mut field = self.clone();
+        for &place in &self.wishes.required {
+            field.add(place);
+        }
+        field
+    }
+
+    /// Of a field with nothing chosen: with a set but for the gauge of a number, in whose stead none may come that
+    /// is dearer. What a gain may cost was weighed when that one was chosen.
+    #[must_use]
+    pub(super) fn without(&self, set: &[usize], number: usize) -> Self {
+        let mut field = self.clone();
+        for (_, &place) in set.iter().enumerate().filter(|(k, _)| *k != number) {
+            field.add(place);
+        }
+        field.dearest = self.cost(set[number]);
+        field
     }
 
     /// What may be chosen, were there nothing that must be.
@@ -171,7 +323,8 @@ impl<'a> Field<'a> {
         /// Sums of costs round.
         const ROUNDING: f64 = 1e-12;
         let budget = self.wishes.budget.unwrap_or(f64::INFINITY);
-        self.spent + self.cost(place) <= budget * (1.0 + ROUNDING)
+        let cost = self.cost(place);
+        cost <= self.dearest && self.spent + cost <= budget * (1.0 + ROUNDING)
     }
 
     #[must_use]

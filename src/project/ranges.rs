@@ -8,12 +8,16 @@ use glam::DVec3;
 use super::{BadValue, ChosenSite, Project};
 use crate::dataset::Signal;
 use crate::elasticity::support::MOST;
+use crate::evaluation::failures::MOST_FAILED;
 
 /// How many gauges can be asked for, how many touches, and how many neighbours the edge filter looks at: in a
 /// file as in the window.
 pub const GAUGES: RangeInclusive<usize> = 1..=10_000;
 pub const TOUCHES: RangeInclusive<usize> = 3..=1_000_000;
 pub const EDGE_NEIGHBOURS: RangeInclusive<usize> = 0..=1000;
+/// How many gauges may be lost together, and from how many first gauges a set may be begun: likewise.
+pub const LOST: RangeInclusive<usize> = 1..=MOST_FAILED;
+pub const STARTS: RangeInclusive<usize> = 1..=20;
 /// How many forces sets may be judged at.
 const JUDGED: RangeInclusive<usize> = 1..=20;
 /// How hard touches may come (N), and how far off gauges may be glued (mm, degrees, percent): likewise.
@@ -170,6 +174,8 @@ impl Project {
         let counts = [
             ("touch.count", self.touch.count, TOUCHES),
             ("selection.sensors", self.selection.sensors, GAUGES),
+            ("selection.lost", self.selection.lost, LOST),
+            ("selection.starts", self.selection.starts, STARTS),
             ("candidates.count", kept, 1..=100_000),
             (
                 "feasible.edge_neighbours",

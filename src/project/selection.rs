@@ -7,6 +7,7 @@ use super::MM;
 use crate::gaussian_process::GpKernel;
 use crate::limb::BoxMm;
 use crate::placement::SelectorKind;
+use crate::placement::wishes::{Loss, LostBy, Thorough};
 use crate::regression::Hyper;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,8 +32,14 @@ pub struct SelectionKeys {
     pub cost_budget: Option<f64>,
     /// Whether the gauge's noise is added to the signals that sites are chosen from.
     pub with_noise: bool,
-    /// Probability that one gauge has failed.
+    /// Probability that gauges are lost, how many together, and whether the mean or the worst of such losses counts.
     pub failure: f64,
+    pub lost: usize,
+    pub lost_by: LostBy,
+    /// Whether the paper's selectors exchange gauges after all are chosen, as expected error does in any case.
+    pub exchange: bool,
+    /// From how many first gauges a set is begun, of which the best is kept.
+    pub starts: usize,
     /// Whether the other selectors choose too, to be compared.
     pub compare: bool,
     pub gaussian_process: GaussianProcessKeys,
@@ -47,6 +54,7 @@ pub struct SelectionKeys {
 impl Default for SelectionKeys {
     fn default() -> Self {
         let hyper = Hyper::default();
+        let (loss, thorough) = (Loss::default(), Thorough::default());
         Self {
             selector: SelectorKind::default(),
             sensors: 10,
@@ -59,6 +67,10 @@ impl Default for SelectionKeys {
             cost_budget: None,
             with_noise: false,
             failure: 0.0,
+            lost: loss.gauges,
+            lost_by: loss.by,
+            exchange: thorough.exchange,
+            starts: thorough.starts,
             compare: false,
             gaussian_process: GaussianProcessKeys::default(),
             costs: Vec::new(),

@@ -401,7 +401,27 @@ fn selection(t: &mut Text, project: &Project) {
     t.key(
         "failure",
         float(selection.failure),
-        "probability that one gauge has failed when it is needed (greedy SVR)",
+        "probability that gauges are lost when they are needed (expected error, greedy SVR)",
+    );
+    t.key(
+        "lost",
+        selection.lost,
+        "how many together, any of them (greedy SVR: 1)",
+    );
+    t.key(
+        "lost_by",
+        quoted(selection.lost_by.name()),
+        "\"expected\": the mean over which ones are lost counts, or the \"worst\"",
+    );
+    t.key(
+        "exchange",
+        selection.exchange,
+        "exchange gauges after all are chosen (greedy SVR, entropy, mutual information; expected error always does)",
+    );
+    t.key(
+        "starts",
+        selection.starts,
+        "first gauges that a set is begun from; the best set is kept",
     );
     let process = &selection.gaussian_process;
     t.table("selection.gaussian_process");

@@ -142,8 +142,15 @@ impl<'a> Bank<'a> {
 
     /// With the gauges of a set.
     pub fn of(scene: &'a Scene, sites: &[usize]) -> Self {
+        Self::seated(scene, sites.iter().copied().enumerate())
+    }
+
+    /// With gauges at some sites, each in a turn of its own (turn, site): where some of a set are lost, the others
+    /// hear the noise that they heard with them.
+    pub fn seated(scene: &'a Scene, seats: impl IntoIterator<Item = (usize, usize)>) -> Self {
         let mut bank = Self::new(scene);
-        for &site in sites {
+        for (turn, site) in seats {
+            bank.take_turn(turn);
             bank.add(site);
         }
         bank
@@ -228,8 +235,9 @@ impl<'a> Bank<'a> {
                 let press = &mut self.presses[k];
                 let (covariance, estimate, cost) = own.corrected(press);
                 (press.covariance, press.estimate, press.cost) = (covariance, estimate, cost);
-                let before = press.estimates.each_mut();
-                correct(before, &mut press.costs, &rows, &gains, reading as f32);
+                let [along, across, force] = press.estimates.each_mut();
+                let before = [along, across, force, &mut press.costs];
+                correct(before, &rows, &gains, &press.blocks, reading as f32);
                 press.close();
             }
             shrink(&mut self.filters[level], &rows, &gains);
@@ -476,24 +484,22 @@ fn shrink(filters: &mut Filters, rows: &Rows, gains: &[Vec<f32>; 3]) {
     }
 }
 
+/// Takes a reading into account at the places that may still be meant.
 fn correct(
-    estimates: [&mut Vec<f32>; 3],
-    costs: &mut [f32],
+    before: [&mut Vec<f32>; 4],
     rows: &Rows,
     gains: &[Vec<f32>; 3],
+    blocks: &[u32],
     reading: f32,
 ) {
-    let [along, across, force] = estimates;
-    for k in 0..costs.len() {
-        let predicted = rows.slopes[0][k] * along[k]
-            + rows.slopes[1][k] * across[k]
-            + rows.slopes[2][k] * force[k];
-        let off = reading * rows.scale[k] - predicted;
-        costs[k] += off * off * rows.half[k] + rows.log[k];
-        along[k] += gains[0][k] * off;
-        across[k] += gains[1][k] * off;
-        force[k] += gains[2][k] * off;
-    }
+    let [r0, r1, r2] = rows.slopes.each_ref().map(|r| &r[..]);
+    correct_blocks(
+        before.map(Vec::as_mut_slice),
+        [r0, r1, r2, &rows.scale, &rows.half, &rows.log],
+        gains.each_ref().map(|g| &g[..]),
+        blocks,
+        reading,
+    );
 }
 
 /// Probability over that of the true place, and its first moments, of all places.
@@ -558,6 +564,35 @@ wide! {
             }
         }
         folded(sums)
+    }
+}
+
+wide! {
+    fn correct_blocks<'a>(
+        before: [&'a mut [f32]; 4],
+        row: [&'a [f32]; 6],
+        gains: [&'a [f32]; 3],
+        blocks: &'a [u32],
+        reading: f32,
+    ) {
+        let [along, across, force, cost] = before.map(|v| v.as_chunks_mut::<LANES>().0);
+        let [r0, r1, r2, scale, half, log] = row.map(|v| v.as_chunks::<LANES>().0);
+        let [g0, g1, g2] = gains.map(|v| v.as_chunks::<LANES>().0);
+        for &block in blocks {
+            let b = block as usize;
+            let (along, across) = (&mut along[b], &mut across[b]);
+            let (force, cost) = (&mut force[b], &mut cost[b]);
+            let [r0, r1, r2, scale] = [r0[b], r1[b], r2[b], scale[b]];
+            let [half, log, g0, g1, g2] = [half[b], log[b], g0[b], g1[b], g2[b]];
+            for l in 0..LANES {
+                let predicted = r0[l] * along[l] + r1[l] * across[l] + r2[l] * force[l];
+                let off = reading * scale[l] - predicted;
+                cost[l] += off * off * half[l] + log[l];
+                along[l] += g0[l] * off;
+                across[l] += g1[l] * off;
+                force[l] += g2[l] * off;
+            }
+        }
     }
 }
 

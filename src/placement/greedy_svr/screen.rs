@@ -192,6 +192,25 @@ impl Base {
         }
     }
 
+    /// A set whose fits left this criterion (mm), these residuals and these coefficients.
+    #[must_use]
+    pub fn of(
+        sieves: &[Sieve],
+        sites: &[usize],
+        hyper: &Hyper,
+        fitted: (f64, Mat<f64>, Mat<f64>),
+    ) -> Self {
+        let (error, residuals, beta) = fitted;
+        Self {
+            crosses: (sieves.iter())
+                .map(|sieve| sieve.over(sites, hyper.gamma))
+                .collect(),
+            residuals,
+            beta,
+            error,
+        }
+    }
+
     /// Makes one level's kernel anew after its landmarks have changed.
     pub fn renew(&mut self, sieve: &Sieve, level: usize, sites: &[usize], gamma: f64) {
         self.crosses[level] = sieve.over(sites, gamma);

@@ -1,0 +1,368 @@
+//! The error that a choice by expected error goes by: of a whole set, and of what is left of it where gauges may be
+//! lost. Nothing is learned anew then: a lost gauge is left out of the posterior.
+
+use rayon::prelude::*;
+
+use super::bank::{Bank, Rows};
+use super::scene::Scene;
+use super::{Detail, ExpectedError};
+use crate::budget::{Cancelled, Watch, report};
+use crate::draw::subsets;
+use crate::placement::exchange::Criterion;
+use crate::placement::lead::Best;
+use crate::placement::wishes::{Field, LostBy, Wishes, reached};
+use crate::placement::{PlacementError, Pool, Request, SensorSet};
+
+const SELECTING: &str = "Selecting by expected error";
+/// Sites that are looked at in fine detail, and with gauges lost.
+const PROMISING: usize = 48;
+
+/// The criterion.
+pub(super) struct Expectation<'a> {
+    scenes: Scenes,
+    pool: &'a Pool<'a>,
+    request: &'a Request<'a>,
+    losses: Option<Losses>,
+}
+
+/// The same touches in coarse and in fine detail.
+struct Scenes {
+    coarse: Scene,
+    fine: Scene,
+}
+
+/// Sets of gauges that may be lost.
+struct Losses {
+    /// How many together.
+    gauges: usize,
+    seed: u64,
+    /// Whether there are so many that what is left is looked at in coarse detail.
+    many: bool,
+}
+
+impl Losses {
+    /// Nothing where no gauge may be lost.
+    fn of(wishes: &Wishes, seed: u64) -> Option<Self> {
+        /// From so many on they are many.
+        const MANY: usize = 12;
+        let losses = Self {
+            gauges: wishes.loss.gauges,
+            seed,
+            many: false,
+        };
+        (wishes.failure > 0.0).then(|| Self {
+            many: losses.all(wishes.sensors).len() > MANY,
+            ..losses
+        })
+    }
+
+    /// Numbers of the gauges lost, out of a set of so many: all that may be, or a sample.
+    fn all(&self, count: usize) -> Vec<Vec<usize>> {
+        /// All pairs of ten gauges.
+        const MOST: usize = 45;
+        subsets(count, self.gauges.min(count), MOST, self.seed)
+    }
+}
+
+/// What is expected of a set.
+struct Expected {
+    /// With all gauges (mm).
+    whole: f64,
+    /// After each loss (mm).
+    lost: Vec<f64>,
+}
+
+impl<'a> Expectation<'a> {
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn new(
+        selector: &ExpectedError,
+        pool: &'a Pool<'a>,
+        request: &'a Request<'a>,
+    ) -> Result<Self, Cancelled> {
+        let known = &selector.known;
+        let scene = |detail: Detail| Scene::new(pool.x, pool.targets, known, detail, request.watch);
+        Ok(Self {
+            scenes: Scenes {
+                coarse: scene(selector.detail.coarse())?,
+                fine: scene(selector.detail)?,
+            },
+            pool,
+            request,
+            losses: Losses::of(request.wishes, known.seed),
+        })
+    }
+
+    /// The touches in the detail that counts.
+    pub fn scene(&self) -> &Scene {
+        &self.scenes.fine
+    }
+
+    /// The criterion (mm) of a set.
+    fn error(&self, set: &[usize]) -> Result<f64, Cancelled> {
+        let Expected { whole, lost } = self.expected(set)?;
+        Ok(self.request.wishes.weighed(whole, lost.into_iter()))
+    }
+
+    fn expected(&self, set: &[usize]) -> Result<Expected, Cancelled> {
+        self.report(set.len())?;
+        let whole = Bank::of(&self.scenes.fine, set).error();
+        let Some(losses) = &self.losses else {
+            let lost = Vec::new();
+            return Ok(Expected { whole, lost });
+        };
+        let scene = self.scene_of(losses);
+        let error = |lost: &Vec<usize>| -> Result<f64, Cancelled> {
+            self.report(set.len())?;
+            Ok(left(scene, seats(set, set.len()), lost).error())
+        };
+        let lost: Result<Vec<f64>, Cancelled> =
+            losses.all(set.len()).par_iter().map(error).collect();
+        Ok(Expected { whole, lost: lost? })
+    }
+
+    /// The touches in the detail in which losses are looked at.
+    fn scene_of(&self, losses: &Losses) -> &Scene {
+        if losses.many {
+            &self.scenes.coarse
+        } else {
+            &self.scenes.fine
+        }
+    }
+
+    fn banks(&self, others: &[usize], number: usize) -> Banks<'_> {
+        let bank = |scene| {
+            let mut bank = Bank::seated(scene, seats(others, number));
+            bank.take_turn(number);
+            bank
+        };
+        Banks {
+            coarse: bank(&self.scenes.coarse),
+            fine: bank(&self.scenes.fine),
+        }
+    }
+
+    /// The criterion (mm) with the gauge of a number at some places more: at all of them, or while much is uncertain
+    /// or gauges may be lost, at those that are promising without that. `worth` says how much a gain counts.
+    fn scan(
+        &self,
+        banks: &Banks,
+        (others, number): (&[usize], usize),
+        open: &[usize],
+        worth: &dyn Fn(usize, f64) -> f64,
+    ) -> Result<Vec<(usize, f64)>, Cancelled> {
+        /// Share of the places from which many are uncertain.
+        const MUCH: f64 = 0.05;
+        let look = |bank: &Bank, places: &[usize]| self.look(bank, places, others.len());
+        let errors = if open.len() <= PROMISING || banks.fine.open_share() < MUCH {
+            look(&banks.fine, open)?
+        } else {
+            let screened = look(&banks.coarse, open)?;
+            let promising = foremost(screened, banks.coarse.error(), worth);
+            let mut places: Vec<usize> = promising.into_iter().map(|p| p.0).collect();
+            places.sort_unstable();
+            look(&banks.fine, &places)?
+        };
+        match &self.losses {
+            None => Ok(errors),
+            Some(losses) => {
+                // Of those that losses make equal, the best without.
+                let promising = foremost(errors, banks.fine.error(), worth);
+                self.with_losses(losses, (others, number), &promising)
+            }
+        }
+    }
+
+    /// Expected error (mm) with a gauge at each of some places more, and none lost.
+    fn look(
+        &self,
+        bank: &Bank,
+        places: &[usize],
+        chosen: usize,
+    ) -> Result<Vec<(usize, f64)>, Cancelled> {
+        let step = (chosen, self.request.wishes.sensors);
+        let errors = scan(bank, places, self.request.watch, step)?;
+        Ok(places.iter().copied().zip(errors).collect())
+    }
+
+    /// The criterion (mm) at places of which the error with all gauges is known.
+    fn with_losses(
+        &self,
+        losses: &Losses,
+        (others, number): (&[usize], usize),
+        whole: &[(usize, f64)],
+    ) -> Result<Vec<(usize, f64)>, Cancelled> {
+        let scene = self.scene_of(losses);
+        let after = |lost: &Vec<usize>| -> Result<Vec<f64>, Cancelled> {
+            self.report(others.len())?;
+            let mut bank = left(scene, seats(others, number), lost);
+            if lost.contains(&number) {
+                return Ok(vec![bank.error(); whole.len()]);
+            }
+            bank.take_turn(number);
+            let mut rows = bank.rows();
+            Ok(whole.iter().map(|w| bank.with(w.0, &mut rows)).collect())
+        };
+        let all = losses.all(others.len() + 1);
+        let errors: Result<Vec<Vec<f64>>, Cancelled> = all.par_iter().map(after).collect();
+        let errors = errors?;
+        let weighed = whole.iter().enumerate().map(|(k, &(place, whole))| {
+            let lost = errors.iter().map(|after| after[k]);
+            (place, self.request.wishes.weighed(whole, lost))
+        });
+        Ok(weighed.collect())
+    }
+
+    fn report(&self, chosen: usize) -> Result<(), Cancelled> {
+        let wanted = self.request.wishes.sensors;
+        report(self.request.watch, SELECTING, chosen.min(wanted), wanted)
+    }
+
+    /// What a set is expected to do when gauges are lost, in words; nothing where none may be.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn losses_note(&self, set: &[usize]) -> Result<Option<String>, Cancelled> {
+        let wishes = self.request.wishes;
+        let Some(losses) = self.losses.as_ref().filter(|_| !set.is_empty()) else {
+            return Ok(None);
+        };
+        let Expected { whole, lost } = self.expected(set)?;
+        let mean = lost.iter().sum::<f64>() / lost.len().max(1) as f64;
+        let worst = lost.iter().copied().fold(0.0, f64::max);
+        let counts = match wishes.loss.by {
+            LostBy::Expected => "the mean",
+            LostBy::Worst => "the worst",
+        };
+        Ok(Some(format!(
+            "With all gauges {whole:.2} mm; with any {} lost {mean:.2} mm in the mean of {} cases and {worst:.2} mm in the worst. Counted: {counts}, with {:.0} %.",
+            losses.gauges.min(set.len()),
+            lost.len(),
+            100.0 * wishes.failure
+        )))
+    }
+}
+
+impl Criterion for Expectation<'_> {
+    const UNIT: &'static str = "mm";
+
+    fn of(&mut self, set: &[usize]) -> Result<f64, PlacementError> {
+        Ok(self.error(set)?)
+    }
+
+    fn screened(
+        &mut self,
+        others: &Field,
+        number: usize,
+    ) -> Result<Vec<(usize, f64)>, PlacementError> {
+        let bank = Bank::seated(&self.scenes.coarse, seats(&others.chosen, number));
+        Ok(self.look(&bank, &others.open(), others.chosen.len())?)
+    }
+
+    fn best_for(&mut self, others: &Field, number: usize) -> Result<Option<usize>, PlacementError> {
+        let banks = self.banks(&others.chosen, number);
+        // None of the open ones is dearer than what it replaces.
+        let gain = |_: usize, gain: f64| gain;
+        let errors = self.scan(&banks, (&others.chosen, number), &others.open(), &gain)?;
+        let best = errors.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        Ok(best.map(|(place, _)| place))
+    }
+
+    fn grow<'f>(
+        &mut self,
+        mut field: Field<'f>,
+        found: &dyn Fn(&SensorSet),
+    ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
+        let mut banks = self.banks(&[], 0);
+        let mut sets: Vec<SensorSet> = Vec::new();
+        let mut before = self.error(&[])?;
+        while !field.full() && !reached(&sets, self.request.wishes) {
+            let others = (&field.chosen[..], field.chosen.len());
+            let worth = |place: usize, gain: f64| field.worth(place, gain);
+            let errors = self.scan(&banks, others, &field.open(), &worth)?;
+            let mut best = Best::default();
+            for (place, error) in errors {
+                best.offer(place, field.worth(place, before - error));
+            }
+            let Some(place) = best.place() else { break };
+            banks.add(place);
+            field.add(place);
+            before = match self.losses {
+                Some(_) => self.error(&field.chosen)?,
+                None => banks.fine.error(),
+            };
+            let set = set_of(self.pool, &field.chosen, before, best.lead());
+            found(&set);
+            sets.push(set);
+        }
+        Ok((field, sets))
+    }
+}
+
+fn set_of(pool: &Pool, chosen: &[usize], error: f64, lead: Option<f64>) -> SensorSet {
+    SensorSet {
+        sites: chosen.iter().map(|&p| pool.sites[p]).collect(),
+        criterion: Some(error),
+        criterion_mm: Some(error),
+        gap: None,
+        lead,
+        certificate: None,
+    }
+}
+
+/// The turns and sites of the gauges of a set in which the one of a number is left free.
+fn seats(others: &[usize], number: usize) -> impl Iterator<Item = (usize, usize)> {
+    let seat = move |(k, &site): (usize, &usize)| (k + usize::from(k >= number), site);
+    others.iter().enumerate().map(seat)
+}
+
+/// What is left when the gauges of some turns are lost.
+fn left<'a>(
+    scene: &'a Scene,
+    seats: impl Iterator<Item = (usize, usize)>,
+    lost: &[usize],
+) -> Bank<'a> {
+    Bank::seated(scene, seats.filter(|(turn, _)| !lost.contains(turn)))
+}
+
+/// The places that promise most for the error (mm) there would be with each, the best first.
+fn foremost(
+    mut errors: Vec<(usize, f64)>,
+    before: f64,
+    worth: &dyn Fn(usize, f64) -> f64,
+) -> Vec<(usize, f64)> {
+    let worth = |&(place, error): &(usize, f64)| worth(place, before - error);
+    errors.sort_by(|a, b| worth(b).total_cmp(&worth(a)).then(a.0.cmp(&b.0)));
+    errors.truncate(PROMISING);
+    errors
+}
+
+struct Banks<'a> {
+    coarse: Bank<'a>,
+    fine: Bank<'a>,
+}
+
+impl Banks<'_> {
+    fn add(&mut self, site: usize) {
+        self.coarse.add(site);
+        self.fine.add(site);
+    }
+}
+
+/// Expected error (mm) with each of some places more.
+pub(super) fn scan(
+    bank: &Bank,
+    open: &[usize],
+    watch: Watch,
+    step: (usize, usize),
+) -> Result<Vec<f64>, Cancelled> {
+    /// Places between two looks at the watch.
+    const PIECE: usize = 64;
+    let piece = |places: &[usize]| -> Result<Vec<f64>, Cancelled> {
+        report(watch, SELECTING, step.0, step.1)?;
+        let mut rows: Rows = bank.rows();
+        Ok(places.iter().map(|&p| bank.with(p, &mut rows)).collect())
+    };
+    let pieces: Result<Vec<Vec<f64>>, Cancelled> = open.par_chunks(PIECE).map(piece).collect();
+    Ok(pieces?.concat())
+}
