@@ -291,6 +291,11 @@ pub struct Limits {
     pub touches: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub candidates: Option<usize>,
+    /// Most places and presses that a choice by expected error looks at.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_places: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_presses: Option<usize>,
     /// Most touches and candidates that greedy SVR scores.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub selection_touches: Option<usize>,
@@ -326,6 +331,8 @@ impl Budget {
         let counts = [
             (&mut self.touches, limits.touches),
             (&mut self.candidates, limits.candidates),
+            (&mut self.expected_places, limits.expected_places),
+            (&mut self.expected_presses, limits.expected_presses),
             (&mut self.selection_touches, limits.selection_touches),
             (&mut self.selection_candidates, limits.selection_candidates),
             (&mut self.tuning_touches, limits.tuning_touches),

@@ -18,7 +18,7 @@ use crate::project::BadValue;
 
 pub use self::front::{Asked, answer, clock, front};
 pub use self::knobs::{Bought, KnobReport, knobs};
-pub use self::setting::{Estimator, Knob, Setting};
+pub use self::setting::{Knob, Setting, Spent};
 pub use self::sweep::{Sweep, standards};
 
 /// What a setting costs and achieves.
@@ -33,7 +33,8 @@ pub struct Measured {
     pub judge_cpu_seconds: f64,
     /// Most memory that it took (MB), where the system says so; what an allocator kept from runs before is in it.
     pub memory_mb: Option<f64>,
-    /// Errors on the judge's touches: mean, median, 95th percentile, and the mean as a workshop would build it.
+    /// Errors on the judge's touches, by matching at the force in the middle of those that the project is judged at:
+    /// mean, median, 95th percentile, and the mean as a workshop would build it.
     #[serde(deserialize_with = "number")]
     pub error_mm: f64,
     #[serde(deserialize_with = "number")]
@@ -42,7 +43,8 @@ pub struct Measured {
     pub p95_mm: f64,
     #[serde(deserialize_with = "number")]
     pub workshop_mm: f64,
-    /// Mean error that the design itself states, on touches of its own and elements finer than its own.
+    /// Mean error that the design itself states, by the same estimator at the same force, on touches of its own and
+    /// elements finer than its own.
     #[serde(deserialize_with = "number")]
     pub own_error_mm: f64,
     /// Estimated error of the model's displacements (%).
@@ -148,18 +150,11 @@ fn attempt(
         }
         .into());
     }
-    let matching = match setting.estimator {
-        Estimator::Regression => None,
-        Estimator::Matching => Some(design::matching(&inputs, &design, watch)?),
-    };
     let cpu_seconds = meter.cpu_seconds() - cpu;
     let seconds = meter.seconds() - clock;
     let memory_mb = meter.most_memory_mb();
     let before = meter.cpu_seconds();
-    let judged = match &matching {
-        None => judge.judge(&inputs, &design, setting.raised(&inputs.project), watch)?,
-        Some(matching) => judge.judge_matching(&inputs, &design, matching, watch)?,
-    };
+    let judged = judge.judge(&inputs, &design, setting.raised(project), watch)?;
     let own = design.chosen_row().map_or(f64::NAN, |r| r.error_mm);
     let sites = &design.simulated.dataset.sites;
     Ok(Measured {

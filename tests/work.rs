@@ -46,8 +46,13 @@ fn until_it_stands(w: &mut Window) -> Tally {
     tally::now().since(before)
 }
 
+/// Matching learns nothing from touches.
+fn none_trained(t: Tally) -> bool {
+    t.kernel_evaluations + t.fits == 0
+}
+
 fn none_computed(t: Tally) -> bool {
-    t.factorizations + t.solves + t.kernel_evaluations + t.fits == 0
+    t.factorizations + t.solves == 0 && none_trained(t)
 }
 
 #[test]
@@ -64,9 +69,11 @@ fn a_change_costs_only_what_depends_on_it() {
     assert!(none_computed(tally::now().since(before)));
     w.press("Select gauges");
     let whole = until_it_stands(&mut w);
-    // Elements laid, laid anew and halved; twice, for few touches allow finer ones; then the truth.
-    assert_eq!(whole.factorizations, 6, "{whole:?}");
-    assert!(whole.solves > 200 && whole.fits > 100, "{whole:?}");
+    // Elements laid, laid anew and halved; twice, for few touches allow finer ones; then the truth, and the design's own
+    // elements once more, for what the chosen gauges read of touches anywhere: nobody keeps a factored model while gauges
+    // are chosen, for it may be large, and is soon had again.
+    assert_eq!(whole.factorizations, 7, "{whole:?}");
+    assert!(whole.solves > 200 && none_trained(whole), "{whole:?}");
 
     // At rest nothing is drawn, and nothing is sent.
     w.harness.render().unwrap();
@@ -89,38 +96,46 @@ fn a_change_costs_only_what_depends_on_it() {
     assert_eq!(view.uploads, 0, "the view: {view:?}");
     assert!((1..=60).contains(&view.redraws), "the view: {view:?}");
 
-    // The painted region: what it leaves is chosen from and judged anew; the model is not.
+    // The painted region: what it leaves is chosen from and judged anew, on the truth and with the model's readings of
+    // the new gauges; elements are not laid.
     w.harness.state_mut().document.fill(Layer::Feasible);
     change(&mut w, |p| p.feasible.support_clearance_mm += 1.0);
     let painted = until_it_stands(&mut w);
-    assert_eq!(painted.factorizations, 1, "the region: {painted:?}");
-    // The truth's gauges are solved for: at most two for each that is judged.
-    assert!(painted.solves < 200, "the region: {painted:?}");
-    assert!(painted.fits > 0);
+    assert_eq!(painted.factorizations, 2, "the region: {painted:?}");
+    // Gauges are solved for: on the truth as drawn, as built and as pressed, on the model as drawn and moved six ways;
+    // those of sets of one to four, which need not lie within one another.
+    assert!(
+        (1..200).contains(&painted.solves),
+        "the region: {painted:?}"
+    );
+    assert!(none_trained(painted), "the region: {painted:?}");
 
     // The number of gauges: the same.
     change(&mut w, |p| p.selection.sensors = 3);
     let number = until_it_stands(&mut w);
-    assert!(number.factorizations <= 1, "the number: {number:?}");
+    assert!(number.factorizations <= 2, "the number: {number:?}");
     assert!(number.solves < 200, "the number: {number:?}");
-    assert!(number.fits < painted.fits, "the number: {number:?}");
+    assert!(none_trained(number), "the number: {number:?}");
 
-    // What gauges report: read from the elements that are there.
+    // What gauges report: read from the elements that are there. Displacements are judged by regression, on the truth
+    // alone.
     change(&mut w, |p| p.gauge.signal = Signal::Displacement);
     let signal = until_it_stands(&mut w);
     assert_eq!(signal.factorizations, 2, "the signal: {signal:?}");
     assert!(signal.solves < whole.solves, "the signal: {signal:?}");
+    assert!(signal.fits > 0, "the signal: {signal:?}");
 
-    // Back: it is all there.
+    // Back: elements are all there, and matching needs no fits.
     change(&mut w, |p| p.gauge.signal = Signal::Strain);
     let back = until_it_stands(&mut w);
-    assert!(back.factorizations <= 2, "back: {back:?}");
+    assert!(back.factorizations <= 3, "back: {back:?}");
+    assert!(none_trained(back), "back: {back:?}");
 
     // The thickness: everything, once; elements may take another round (two more) to be fine enough.
     change(&mut w, |p| p.part.thickness_mm *= 1.1);
     let thickness = until_it_stands(&mut w);
     assert!(
-        [6, 8].contains(&thickness.factorizations),
+        [7, 9].contains(&thickness.factorizations),
         "the thickness: {thickness:?}"
     );
 
@@ -138,8 +153,8 @@ fn a_change_costs_only_what_depends_on_it() {
     // Another selector alone: neither model nor truth of what is known.
     change(&mut w, |p| p.selection.selector = SelectorKind::PcaQr);
     let other = until_it_stands(&mut w);
-    assert!(other.factorizations <= 1, "the selector: {other:?}");
-    assert!(other.kernel_evaluations < number.kernel_evaluations);
+    assert!(other.factorizations <= 2, "the selector: {other:?}");
+    assert!(none_trained(other), "the selector: {other:?}");
 
     // Looking at what is there computes nothing.
     let before = tally::now();

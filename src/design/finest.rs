@@ -1,20 +1,13 @@
 //! One judge for many designs: a model finer than any of theirs, built once, and touches that are nobody's.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 
-use super::judge::{errors_mm, judge, measured_by, noisy};
-use super::known;
+use super::judge::{ByMatching, grid, judge, measured_by};
 use super::layout::{lay_out_sites, touches_on};
-use super::sense::{POINT, drawn_on, gauge_at, map_size};
 use super::{Design, DesignError, Ground, Inputs, Laid, Simulated, Truth, ground};
 use crate::budget::{Budget, Elements, Watch};
-use crate::dataset::Signal;
-use crate::elasticity::sensitivity::Gauge;
 use crate::elasticity::{Model, Touch};
-use crate::evaluation::{Candidate, EvaluationRow, mean};
-use crate::inference::{Errors, Matching};
+use crate::evaluation::{Candidate, EvaluationRow, Judging};
 
 /// Touches of its own that it judges by.
 pub const JUDGED: usize = 1500;
@@ -92,12 +85,13 @@ impl Finest {
         self.touches.len()
     }
 
-    /// How a design's chosen gauges find the judge's touches with the regression that the design has trained:
-    /// nothing is tuned here. A design whose touches press on a face that lies `raised` (m) above the judge's is
-    /// asked for places on that face.
+    /// How a design's chosen gauges find the judge's touches by the project's estimator: with the regression that the
+    /// design has trained, of which nothing is tuned here, or with its elastic model matched to each reading, at the
+    /// force that sets are compared at. A design whose touches press on a face that lies `raised` (m) above the judge's
+    /// is asked for places on that face.
     ///
     /// # Errors
-    /// [`DesignError`] when the watch asks for a stop.
+    /// [`DesignError`] as for the design's simulation.
     pub fn judge(
         &self,
         inputs: &Inputs,
@@ -105,22 +99,33 @@ impl Finest {
         raised: f64,
         watch: Watch,
     ) -> Result<Judged, DesignError> {
-        let mut truth = self.truth(inputs, &design.simulated, design.chosen(), watch)?;
+        let (simulated, chosen) = (&*design.simulated, design.chosen());
+        let mut truth = self.truth(inputs, simulated, chosen, watch)?;
         for touch in &mut truth.touches {
             touch.position += touch.normal * raised;
         }
-        let set = Candidate {
+        let sets = [Candidate {
             selector: design.lead.name().to_owned(),
-            rows: rows_of(&truth, design.chosen()),
+            rows: rows_of(&truth, chosen),
             hyper: design.chosen_row().and_then(|r| r.hyper),
-        };
+        }];
         let budget = Budget {
             failure_subsets: 0,
             ..design.budget
         };
         let streams: Vec<u64> = truth.sites.iter().map(|&s| s as u64).collect();
-        let simulated = &design.simulated;
-        let found = judge(inputs, simulated, &truth, &[set], &streams, &budget, watch)?;
+        let found = match &inputs.project.judging().at_middle() {
+            Judging::Svr => judge(inputs, simulated, &truth, &sets, &streams, &budget, watch)?,
+            Judging::Matching(forces) => ByMatching {
+                inputs,
+                simulated,
+                truth: &truth,
+                streams: &streams,
+                forces,
+                budget: &budget,
+            }
+            .judge(&sets, watch)?,
+        };
         let everywhere = found.rows.first();
         let of = |figure: fn(&EvaluationRow) -> f64| everywhere.map_or(f64::NAN, figure);
         Ok(Judged {
@@ -131,35 +136,6 @@ impl Finest {
         })
     }
 
-    /// As [`Self::judge`], with the design's elastic model matched to each reading ([`matching`]) instead of a
-    /// regression.
-    ///
-    /// # Errors
-    /// [`DesignError`] as for the design's simulation.
-    pub fn judge_matching(
-        &self,
-        inputs: &Inputs,
-        design: &Design,
-        matching: &Matching,
-        watch: Watch,
-    ) -> Result<Judged, DesignError> {
-        let truth = self.truth(inputs, &design.simulated, design.chosen(), watch)?;
-        let streams: Vec<u64> = truth.sites.iter().map(|&s| s as u64).collect();
-        let [x, workshop] =
-            [(&truth.x, 2), (&truth.workshop, 3)].map(|(x, draw)| noisy(inputs, x, draw, &streams));
-        let mut errors = errors_mm(matching, &x, &self.touches);
-        let built = errors_mm(matching, &workshop, &self.touches);
-        let (mean_mm, workshop_mm) = (mean(&errors), mean(&built));
-        errors.sort_by(f64::total_cmp);
-        let at = |share: f64| errors[(share * (errors.len() - 1) as f64).round() as usize];
-        Ok(Judged {
-            mean_mm,
-            median_mm: at(0.5),
-            p95_mm: at(0.95),
-            workshop_mm,
-        })
-    }
-
     fn truth(
         &self,
         inputs: &Inputs,
@@ -167,8 +143,8 @@ impl Finest {
         sites: &[usize],
         watch: Watch,
     ) -> Result<Truth, DesignError> {
-        let touches = self.touches.clone();
-        let truth = measured_by(&*self.model, inputs, simulated, sites, touches, None, watch)?;
+        let (touches, grid) = (self.touches.clone(), grid(&inputs.project));
+        let truth = measured_by(&*self.model, inputs, simulated, sites, touches, grid, watch)?;
         Ok(Truth {
             element_mm: self.element_mm(),
             ..truth
@@ -180,28 +156,4 @@ impl Finest {
 fn rows_of(truth: &Truth, sites: &[usize]) -> Vec<usize> {
     let row = |s: &usize| truth.sites.binary_search(s).ok();
     sites.iter().filter_map(row).collect()
-}
-
-/// A design's elastic model, ready to be matched to what its chosen gauges read, in the order of their numbers in
-/// the dataset. Gauges here read at a point, as those of a design do, and may be glued as far off as the project says.
-///
-/// # Errors
-/// [`DesignError`] as for the design's simulation.
-pub fn matching(inputs: &Inputs, design: &Design, watch: Watch) -> Result<Matching, DesignError> {
-    let project = &inputs.project;
-    debug_assert_eq!(project.gauge.signal, Signal::Strain);
-    let simulated = &design.simulated;
-    let model = simulated.model()?;
-    let mut sites = design.chosen().to_vec();
-    sites.sort_unstable();
-    let gauges: Vec<Gauge> = (sites.iter())
-        .map(|&s| gauge_at(&simulated.dataset.sites[s], POINT))
-        .collect();
-    let off = known::off(project, simulated);
-    let (force, tip) = project.tip();
-    let mesh = simulated.ground.of_size(map_size(&simulated.ground, tip));
-    let drawn = drawn_on(&*model, &gauges, &mesh, (tip, off.tip), watch)?;
-    let errors = Errors::known(&off, gauges.len(), Some(Arc::new(drawn.spread(&off))));
-    let hardest = project.live.largest_force_n.max(2.0 * force);
-    Ok(Matching::new(drawn.map, errors, hardest))
 }

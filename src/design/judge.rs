@@ -27,7 +27,7 @@ use crate::project::Project;
 use crate::regression::folds::evenly;
 use crate::uncertainty::{Gluing, Uncertainty};
 
-pub(super) use self::matched::errors_mm;
+pub(super) use self::matched::ByMatching;
 pub use self::presses::{Press, Pressed};
 pub use crate::placement::expected_error::BLIND;
 
@@ -117,7 +117,12 @@ impl Truth {
         let seed = inputs.project.budget.seed;
         let asked = proposed(surface, inputs)?;
         let hand = &self.off.pressing;
-        let presses = presses::by_hand(surface, asked, hand, seed.wrapping_add(PRESS_SEED));
+        let presses: Vec<Press> = (0..presses::ROUNDS)
+            .flat_map(|round| {
+                let seed = seed.wrapping_add(PRESS_SEED).wrapping_add(round);
+                presses::by_hand(surface, asked.clone(), hand, seed)
+            })
+            .collect();
         let made: Vec<Touch> = presses.iter().map(|p| p.made).collect();
         let built = sites_as_built(simulated, &self.sites, &self.off.gluing, seed);
         let (x, solves) = read(model, inputs, &made, &built, self.grid, watch)?;
@@ -132,7 +137,7 @@ impl Truth {
 
 /// Length and width of the grids (m) that a project's gauges are judged with: those that live touch reads them over, and
 /// none where a regression has learned from points.
-fn grid(project: &Project) -> Option<[f64; 2]> {
+pub(super) fn grid(project: &Project) -> Option<[f64; 2]> {
     let keys = &project.gauge;
     let matching = project.judging().estimator() == EstimatorKind::Matching;
     matching.then(|| [keys.grid_length_mm * 1e-3, keys.grid_width_mm * 1e-3])
@@ -353,7 +358,7 @@ fn judge_as_asked(
 ) -> Result<Evaluation, DesignError> {
     let project = &inputs.project;
     if let Judging::Matching(forces) = &project.judging() {
-        let trial = matched::Trial {
+        let trial = ByMatching {
             inputs,
             simulated,
             truth,

@@ -71,6 +71,18 @@ impl Judging {
         }
     }
 
+    /// The same under touches of no other force than the one that sets are compared at.
+    #[must_use]
+    pub fn at_middle(&self) -> Self {
+        match self {
+            Self::Svr => Self::Svr,
+            Self::Matching(forces) => Self::Matching(Forces {
+                judged_n: self.middle_n().into_iter().collect(),
+                ..forces.clone()
+            }),
+        }
+    }
+
     /// The force (N) that sets are compared at, where it is not that of the touches which were learned from.
     #[must_use]
     pub fn middle_n(&self) -> Option<f64> {
@@ -98,5 +110,13 @@ mod tests {
         assert_eq!(middle(&[3.0, 10.0]), Some(10.0));
         assert_eq!(middle(&[3.0, 10.0, 25.0]), Some(10.0));
         assert_eq!(Judging::Svr.middle_n(), None);
+        let forces = |judged_n: &[f64]| {
+            Judging::Matching(Forces {
+                judged_n: judged_n.to_vec(),
+                most_n: 60.0,
+            })
+        };
+        assert_eq!(forces(&[3.0, 10.0, 25.0]).at_middle(), forces(&[10.0]));
+        assert_eq!(Judging::Svr.at_middle(), Judging::Svr);
     }
 }

@@ -290,6 +290,8 @@ mod tests {
             vertices: Some(1500),
             touches: Some(700),
             candidates: Some(90),
+            expected_places: Some(500),
+            expected_presses: Some(120),
             selection_touches: Some(300),
             selection_candidates: Some(50),
             tuning_touches: Some(200),

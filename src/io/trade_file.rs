@@ -13,7 +13,7 @@ use crate::dataset::Signal;
 use crate::design::Inputs;
 use crate::placement::SelectorKind;
 use crate::project::{BudgetKeys, LiveKeys, Project};
-use crate::trade::{Bought, KnobReport, Measured, Point, front, knobs};
+use crate::trade::{Bought, Knob, KnobReport, Measured, Point, Setting, Spent, front, knobs};
 
 /// Everything that was measured of one project on one machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,7 +36,8 @@ pub struct Judge {
     pub touches: usize,
 }
 
-const FORMAT: u32 = 1;
+/// 2: settings say which estimator they are judged by, and what expected error looks at.
+const FORMAT: u32 = 2;
 
 impl Record {
     /// Nothing measured yet.
@@ -63,15 +64,18 @@ impl Record {
     /// # Errors
     /// What is wrong with the text.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let record: Self = serde_json::from_str(text).map_err(|e| e.to_string())?;
-        if record.format == FORMAT {
-            Ok(record)
-        } else {
-            Err(format!(
-                "it is of format {}, this version reads {FORMAT}",
-                record.format
-            ))
+        #[derive(Deserialize)]
+        struct Head {
+            format: u32,
         }
+        // First: a record of another format need not have the rest.
+        let Head { format } = serde_json::from_str(text).map_err(|e| e.to_string())?;
+        if format != FORMAT {
+            return Err(format!(
+                "it is of format {format}, this version reads {FORMAT}"
+            ));
+        }
+        serde_json::from_str(text).map_err(|e| e.to_string())
     }
 
     /// What goes into `trade.json`.
@@ -81,21 +85,17 @@ impl Record {
     }
 }
 
-/// What stands for the model's error in keys: it is no knob, and the records that were measured with this go on holding.
-const MODEL_ERROR: f64 = 0.2;
-
 /// A project with its knobs at one place and without what no figure depends on.
 #[must_use]
 pub fn without_knobs(project: &Project) -> Project {
-    let live = &project.live;
+    let largest_force_n = project.live.largest_force_n;
     let mut project = Project {
         budget: BudgetKeys {
             seed: project.budget.seed,
             ..BudgetKeys::default()
         },
         live: LiveKeys {
-            model_error: MODEL_ERROR,
-            largest_force_n: live.largest_force_n,
+            largest_force_n,
             ..LiveKeys::default()
         },
         kept: Vec::new(),
@@ -104,7 +104,7 @@ pub fn without_knobs(project: &Project) -> Project {
     project.part.mesh.clear();
     project.selection.sites.clear();
     project.selection.selector = SelectorKind::default();
-    project.selection.compare = true;
+    project.selection.compare = false;
     project.gauge.signal = Signal::default();
     project.candidates.unexplained = 0.5;
     project
@@ -157,71 +157,106 @@ pub fn write(place: &Together, project: &Project, record: &Record) -> Result<(),
     })
 }
 
-/// A row a point; `limits` is what goes into the project's `[budget.limits]`.
+/// A row a point: what it cost and achieved, and its setting. What nothing hears at a setting is left empty.
 #[must_use]
 pub fn csv(project: &Project, record: &Record) -> String {
     let best = front(project, &record.points);
-    let mut text = String::from(
-        "on_front,cpu_seconds,seconds,memory_mb,error_mm,median_mm,p95_mm,workshop_mm,own_error_mm,model_percent,candidates,judge_cpu_seconds,quality,repeat,selector,signal,unexplained,estimator,vertices,touches,point_tip,as_solid,selection_touches,selection_candidates,svr_tolerance_mm,folds,tuning_touches,failed\n",
-    );
+    let mut text = format!("on_front,{},{},failed\n", FIGURES.join(","), KEYS.join(","));
     for point in &record.points {
         let on_front = best.iter().any(|p| std::ptr::eq(*p, point));
-        let s = &point.setting;
-        match &point.outcome {
-            Ok(m) => {
-                let memory = m.memory_mb.map(|mb| format!("{mb:.0}")).unwrap_or_default();
-                let _ = write!(
-                    text,
-                    "{on_front},{:.2},{:.2},{memory},{:.4},{:.4},{:.4},{:.4},{:.4},{:.3},{},{:.2}",
-                    m.cpu_seconds,
-                    m.seconds,
-                    m.error_mm,
-                    m.median_mm,
-                    m.p95_mm,
-                    m.workshop_mm,
-                    m.own_error_mm,
-                    m.model_percent,
-                    m.candidates,
-                    m.judge_cpu_seconds
-                );
-            }
-            Err(_) => text.push_str("false,,,,,,,,,,,"),
-        }
-        let estimator = match s.estimator {
-            crate::trade::Estimator::Regression => "regression",
-            crate::trade::Estimator::Matching => "matching",
-        };
-        let _ = write!(
-            text,
-            ",{},{},{},{},{},{estimator}",
-            s.quality.name(),
-            s.repeat,
-            s.selector.name(),
-            s.signal.name(),
-            s.unexplained
-        );
-        match &s.limits {
-            Some(l) => {
-                let _ = write!(
-                    text,
-                    ",{},{},{},{},{},{},{},{},{}",
-                    l.vertices,
-                    l.touches,
-                    l.point_tip,
-                    l.as_solid,
-                    l.selection_touches,
-                    l.selection_candidates,
-                    l.svr_tolerance_mm,
-                    l.folds,
-                    l.tuning_touches
-                );
-            }
-            None => text.push_str(",,,,,,,,,"),
-        }
+        let figures = point.measured().map_or_else(Default::default, figures);
         let failed = point.outcome.as_ref().err().map_or("", String::as_str);
-        let _ = writeln!(text, ",\"{}\"", failed.replace('"', "'"));
+        let _ = writeln!(
+            text,
+            "{on_front},{},{},\"{}\"",
+            figures.join(","),
+            keys(&point.setting).join(","),
+            failed.replace('"', "'")
+        );
     }
     text
+}
+
+const FIGURES: [&str; 11] = [
+    "cpu_seconds",
+    "seconds",
+    "memory_mb",
+    "error_mm",
+    "median_mm",
+    "p95_mm",
+    "workshop_mm",
+    "own_error_mm",
+    "model_percent",
+    "candidates",
+    "judge_cpu_seconds",
+];
+
+fn figures(m: &Measured) -> [String; FIGURES.len()] {
+    let memory = m.memory_mb.map(|mb| format!("{mb:.0}"));
+    [
+        format!("{:.2}", m.cpu_seconds),
+        format!("{:.2}", m.seconds),
+        memory.unwrap_or_default(),
+        format!("{:.4}", m.error_mm),
+        format!("{:.4}", m.median_mm),
+        format!("{:.4}", m.p95_mm),
+        format!("{:.4}", m.workshop_mm),
+        format!("{:.4}", m.own_error_mm),
+        format!("{:.3}", m.model_percent),
+        m.candidates.to_string(),
+        format!("{:.2}", m.judge_cpu_seconds),
+    ]
+}
+
+const KEYS: [&str; 17] = [
+    "quality",
+    "repeat",
+    "selector",
+    "signal",
+    "estimator",
+    "unexplained",
+    "vertices",
+    "touches",
+    "point_tip",
+    "as_solid",
+    "expected_places",
+    "expected_presses",
+    "selection_touches",
+    "selection_candidates",
+    "svr_tolerance_mm",
+    "folds",
+    "tuning_touches",
+];
+
+fn keys(s: &Setting) -> [String; KEYS.len()] {
+    let unexplained = s
+        .hears(Knob::Unexplained)
+        .then(|| s.unexplained.to_string());
+    let limit = |knob: Knob, value: fn(&Spent) -> String| match &s.limits {
+        Some(spent) if s.hears(knob) => value(spent),
+        _ => String::new(),
+    };
+    [
+        s.quality.name().to_owned(),
+        s.repeat.to_string(),
+        s.selector.name().to_owned(),
+        s.signal.name().to_owned(),
+        s.estimator.name().to_owned(),
+        unexplained.unwrap_or_default(),
+        limit(Knob::Vertices, |l| l.vertices.to_string()),
+        limit(Knob::Touches, |l| l.touches.to_string()),
+        limit(Knob::PointTip, |l| l.point_tip.to_string()),
+        limit(Knob::AsSolid, |l| l.as_solid.to_string()),
+        limit(Knob::ExpectedPlaces, |l| l.expected_places.to_string()),
+        limit(Knob::ExpectedPresses, |l| l.expected_presses.to_string()),
+        limit(Knob::SelectionTouches, |l| l.selection_touches.to_string()),
+        limit(Knob::SelectionCandidates, |l| {
+            l.selection_candidates.to_string()
+        }),
+        limit(Knob::SvrTolerance, |l| l.svr_tolerance_mm.to_string()),
+        limit(Knob::Folds, |l| l.folds.to_string()),
+        limit(Knob::TuningTouches, |l| l.tuning_touches.to_string()),
+    ]
 }
 
 /// The front and the knobs as tables to read.
@@ -233,11 +268,17 @@ pub fn markdown(project: &Project, record: &Record) -> String {
         .filter(|p| p.measured().is_some())
         .count();
     let judge = &record.judge;
+    let by = match project.judging().middle_n() {
+        Some(force_n) => format!(
+            "by model matching on {} touches of {force_n} N",
+            judge.touches
+        ),
+        None => format!("by regression on {} touches", judge.touches),
+    };
     let mut text = format!(
-        "{count} settings of {} gauges on {}, judged on {} touches that none has seen, by elements of {:.2} mm ({} unknowns). Processor seconds are of the whole road with the chosen selector alone, up to the judged answer.\n\n| processor s | by the clock | memory | mean error | median | settings |\n|---|---|---|---|---|---|\n",
+        "{count} settings of {} gauges on {}, judged {by} that none has seen, on elements of {:.2} mm ({} unknowns). Processor seconds are of the whole road with the chosen selector alone, up to the judged answer.\n\n| processor s | by the clock | memory | mean error | median | settings |\n|---|---|---|---|---|---|\n",
         project.selection.sensors,
         project.gauge.signal.name(),
-        judge.touches,
         judge.element_mm,
         judge.unknowns,
     );
@@ -438,5 +479,33 @@ impl Axis {
             .filter(|v| (self.low..=self.high).contains(v))
             .map(|v| (v * 1e4).round() / 1e4)
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_of_another_format_is_named_as_that() {
+        let old = r#"{ "format": 1, "points": [{ "setting": { "estimator": "regression" } }] }"#;
+        let said = Record::parse(old).unwrap_err();
+        assert_eq!(said, "it is of format 1, this version reads 2");
+    }
+
+    #[test]
+    fn tables_have_what_a_setting_hears() {
+        let project = Project::around("a.stl", None);
+        let centre = keys(&Setting::centre(&project));
+        let value = |key: &str| {
+            let at = KEYS.iter().position(|k| *k == key).unwrap();
+            centre[at].as_str()
+        };
+        assert_eq!(
+            (value("estimator"), value("vertices")),
+            ("matching", "2400")
+        );
+        assert_eq!((value("expected_places"), value("folds")), ("320", ""));
+        assert_eq!((value("unexplained"), value("tuning_touches")), ("", ""));
     }
 }

@@ -251,11 +251,23 @@ impl Project {
 
     fn check_limits(&self) -> Result<(), BadValue> {
         const MANY: usize = 1_000_000;
+        // Every press has a filter at every place.
+        const LOOKED_AT: usize = 5000;
         let limits = &self.budget.limits;
         let counts = [
             ("budget.limits.vertices", limits.vertices, 100..=MANY),
             ("budget.limits.touches", limits.touches, 3..=MANY),
             ("budget.limits.candidates", limits.candidates, 2..=100_000),
+            (
+                "budget.limits.expected_places",
+                limits.expected_places,
+                20..=LOOKED_AT,
+            ),
+            (
+                "budget.limits.expected_presses",
+                limits.expected_presses,
+                12..=LOOKED_AT,
+            ),
             (
                 "budget.limits.selection_touches",
                 limits.selection_touches,

@@ -16,7 +16,10 @@ use crate::io::ProcessMeter;
 use crate::io::atomic;
 use crate::io::trade_file::{Judge, Record};
 use crate::job::{Reporter, Stop};
-use crate::trade::{Asked, Measured, Point, Setting, Sweep, answer, clock, front, measure};
+use crate::project::Project;
+use crate::trade::{
+    Asked, Knob, Measured, Point, Setting, Sweep, answer, clock, front, measure, standards,
+};
 
 /// The trade of the bundled limb, measured where this program was made.
 const BUNDLED: &str = include_str!("../../assets/trade/trade.json");
@@ -371,6 +374,15 @@ fn file(home: &Path, inputs: &Inputs) -> PathBuf {
     ))
 }
 
+/// Qualities that are measured by their names: at Standard regressions alone would take a quarter of an hour.
+fn qualities(project: &Project) -> Vec<Quality> {
+    if Setting::centre(project).hears(Knob::Folds) {
+        vec![Quality::Draft]
+    } else {
+        standards()
+    }
+}
+
 /// Measures until so many points are known. What there is when it is ended is kept on disk and in `coming`.
 fn sweep(
     inputs: &Inputs,
@@ -385,7 +397,7 @@ fn sweep(
             *coming = Some(record.clone());
         }
     };
-    let walk = Sweep::new(&inputs.project, vec![Quality::Draft]);
+    let walk = Sweep::new(&inputs.project, qualities(&inputs.project));
     let left = |record: &Record| count.saturating_sub(record.points.len());
     if walk.next(&record.points, left(&record)).is_none() {
         return Err(Stop::Failed(format!(
@@ -430,6 +442,14 @@ fn sweep(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn standard_is_measured_where_no_regression_is_trained() {
+        let mut project = Project::around("a.stl", None);
+        assert_eq!(qualities(&project), standards());
+        project.evaluation.estimator = crate::evaluation::EstimatorKind::Svr;
+        assert_eq!(qualities(&project), [Quality::Draft]);
+    }
 
     #[test]
     fn a_prediction_off_by_more_than_two_is_broken() {

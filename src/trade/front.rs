@@ -71,7 +71,8 @@ pub fn answer<'a>(front: &[&'a Point], asked: Asked, clock: f64) -> Option<&'a P
 mod tests {
     use super::*;
     use crate::budget::Quality;
-    use crate::trade::{Estimator, Setting};
+    use crate::evaluation::EstimatorKind;
+    use crate::trade::Setting;
 
     fn point(repeat: u64, cpu_seconds: f64, error_mm: f64) -> Point {
         let project = Project::around("a.stl", None);
@@ -101,7 +102,7 @@ mod tests {
             ..point(0, 0.1, 0.1)
         });
         let mut other = point(0, 0.1, 0.1);
-        other.setting.estimator = Estimator::Matching;
+        other.setting.estimator = EstimatorKind::Svr;
         points.push(other);
         let kept = front(&project, &points);
         let figures: Vec<f64> = (kept.iter())

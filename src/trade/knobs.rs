@@ -19,8 +19,8 @@ pub enum Bought {
 }
 
 /// One knob over all pairs of measured settings that differ by one step of it alone, each turned the way that is
-/// thought to help: more of everything, from the project's usual signal, estimator and model to another, from
-/// another selector to greedy SVR.
+/// thought to help: more of everything, from strain and a shell to another signal and a solid, from regression to
+/// matching, from another selector to the one that chooses for the estimator in force.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KnobReport {
     pub knob: Knob,
@@ -160,12 +160,14 @@ fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::EstimatorKind;
     use crate::project::Project;
     use crate::trade::Setting;
 
     #[test]
     fn a_knob_that_only_costs_is_named() {
-        let project = Project::around("a.stl", None);
+        let mut project = Project::around("a.stl", None);
+        project.evaluation.estimator = EstimatorKind::Svr;
         let centre = Setting::centre(&project);
         let point = |setting: Setting| {
             let spent = setting.limits.unwrap();

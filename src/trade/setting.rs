@@ -7,19 +7,9 @@ use serde::{Deserialize, Serialize};
 use crate::budget::{Budget, Limits, Quality};
 use crate::dataset::Signal;
 use crate::design::{Inputs, walled};
+use crate::evaluation::EstimatorKind;
 use crate::placement::SelectorKind;
 use crate::project::{BadValue, Project};
-
-/// What turns readings into a place.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Estimator {
-    /// Support vector regression, as a design trains it.
-    #[default]
-    Regression,
-    /// The elastic model matched to the reading, as live touch does.
-    Matching,
-}
 
 /// A point of the trade: everything that says how much is spent.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,7 +22,8 @@ pub struct Setting {
     pub signal: Signal,
     /// Share of the variance that candidates may leave unexplained.
     pub unexplained: f64,
-    pub estimator: Estimator,
+    /// What finds the touches that the setting is judged by.
+    pub estimator: EstimatorKind,
     pub limits: Option<Spent>,
 }
 
@@ -45,12 +36,33 @@ pub struct Spent {
     pub point_tip: bool,
     /// The wall of a shell as the solid that it is.
     pub as_solid: bool,
+    /// What a choice by expected error looks at.
+    pub expected_places: usize,
+    pub expected_presses: usize,
+    /// What greedy SVR scores.
     pub selection_touches: usize,
     pub selection_candidates: usize,
+    /// Of regressions, where any are trained.
     pub svr_tolerance_mm: f64,
     pub folds: usize,
     pub tuning_touches: usize,
 }
+
+/// Where the ladders begin, and where a knob stands that nothing hears.
+const USUAL: Spent = Spent {
+    vertices: 2400,
+    touches: 400,
+    point_tip: false,
+    as_solid: false,
+    expected_places: 320,
+    expected_presses: 96,
+    selection_touches: 200,
+    selection_candidates: 40,
+    svr_tolerance_mm: FIXED_TOLERANCE_MM,
+    folds: FIXED_FOLDS,
+    tuning_touches: FIXED_TUNING,
+};
+const USUAL_UNEXPLAINED: f64 = 0.05;
 
 /// Of what was found to buy nothing beyond and is offered to nobody.
 const FIXED_FOLDS: usize = 3;
@@ -78,6 +90,8 @@ pub enum Knob {
     AsSolid,
     Unexplained,
     Selector,
+    ExpectedPlaces,
+    ExpectedPresses,
     SelectionTouches,
     SelectionCandidates,
     SvrTolerance,
@@ -90,6 +104,8 @@ pub enum Knob {
 const VERTICES: [usize; 7] = [300, 600, 1200, 2400, 4800, 9600, 19_200];
 const TOUCHES: [usize; 6] = [100, 200, 400, 800, 1600, 3200];
 const UNEXPLAINED: [f64; 5] = [0.2, 0.1, 0.05, 0.02, 0.01];
+const EXPECTED_PLACES: [usize; 5] = [80, 160, 320, 640, 1280];
+const EXPECTED_PRESSES: [usize; 5] = [24, 48, 96, 192, 384];
 const SELECTION_TOUCHES: [usize; 5] = [50, 100, 200, 400, 800];
 const SELECTION_CANDIDATES: [usize; 5] = [20, 40, 80, 160, 320];
 const SVR_TOLERANCE_MM: [f64; 4] = [1.0, 0.3, 0.1, 0.02];
@@ -100,18 +116,21 @@ const SIGNALS: [Signal; 3] = [
     Signal::NormalDisplacement,
     Signal::Displacement,
 ];
-const ESTIMATORS: [Estimator; 2] = [Estimator::Regression, Estimator::Matching];
 /// Estimated error of displacements (%) below which no vertices are added, however many are allowed.
 const ELEMENTS_PERCENT: f64 = 0.5;
+/// No fewer candidates than the variance that they are to explain asks for.
+const MOST_CANDIDATES: usize = 100_000;
 
 impl Knob {
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::Vertices,
         Self::Touches,
         Self::PointTip,
         Self::AsSolid,
         Self::Unexplained,
         Self::Selector,
+        Self::ExpectedPlaces,
+        Self::ExpectedPresses,
         Self::SelectionTouches,
         Self::SelectionCandidates,
         Self::SvrTolerance,
@@ -125,11 +144,13 @@ impl Knob {
     pub fn name(self) -> &'static str {
         match self {
             Self::Vertices => "vertices of the model",
-            Self::Touches => "touches learned from",
+            Self::Touches => "touches of the model",
             Self::PointTip => "tip model: a point",
             Self::AsSolid => "shell taken as a solid",
             Self::Unexplained => "variance left unexplained",
-            Self::Selector => "selector: greedy SVR",
+            Self::Selector => "selector: the estimator's own",
+            Self::ExpectedPlaces => "places that expected error compares",
+            Self::ExpectedPresses => "presses that expected error tries",
             Self::SelectionTouches => "touches that greedy SVR scores on",
             Self::SelectionCandidates => "candidates that greedy SVR scores",
             Self::SvrTolerance => "tolerance of regressions",
@@ -142,7 +163,7 @@ impl Knob {
 }
 
 impl Setting {
-    /// A quality by its name, with the project's own selector, signal and variance.
+    /// A quality by its name, with the project's own selector, signal, variance and estimator.
     #[must_use]
     pub fn named(project: &Project, quality: Quality) -> Self {
         Self {
@@ -151,7 +172,7 @@ impl Setting {
             selector: project.selection.selector,
             signal: project.gauge.signal,
             unexplained: project.candidates.unexplained,
-            estimator: Estimator::Regression,
+            estimator: project.judging().estimator(),
             limits: None,
         }
     }
@@ -160,18 +181,8 @@ impl Setting {
     #[must_use]
     pub fn centre(project: &Project) -> Self {
         Self {
-            unexplained: 0.05,
-            limits: Some(Spent {
-                vertices: 2400,
-                touches: 400,
-                point_tip: false,
-                as_solid: false,
-                selection_touches: 200,
-                selection_candidates: 40,
-                svr_tolerance_mm: FIXED_TOLERANCE_MM,
-                folds: FIXED_FOLDS,
-                tuning_touches: FIXED_TUNING,
-            }),
+            unexplained: USUAL_UNEXPLAINED,
+            limits: Some(USUAL),
             ..Self::named(project, Quality::Draft)
         }
         .canonical()
@@ -184,6 +195,8 @@ impl Setting {
         let limits = centre.limits.map(|spent| Spent {
             vertices: 4800,
             touches: 1600,
+            expected_places: 640,
+            expected_presses: 192,
             selection_touches: 400,
             selection_candidates: 80,
             ..spent
@@ -202,7 +215,12 @@ impl Setting {
         if self.signal != Signal::Strain {
             project.gauge.directions = 1;
         }
-        project.candidates.unexplained = self.unexplained;
+        if project.judging().estimator() != self.estimator {
+            project.evaluation.estimator = self.estimator;
+        }
+        if self.hears(Knob::Unexplained) {
+            project.candidates.unexplained = self.unexplained;
+        }
         project.budget.limits = self.budget_limits();
     }
 
@@ -220,15 +238,21 @@ impl Setting {
     }
 
     fn budget_limits(&self) -> Limits {
-        self.limits.map_or_else(Limits::default, |spent| Limits {
+        let Some(spent) = self.limits else {
+            return Limits::default();
+        };
+        let heard = |knob: Knob, count: usize| self.hears(knob).then_some(count);
+        Limits {
             elements_percent: Some(ELEMENTS_PERCENT),
             vertices: Some(spent.vertices),
             touches: Some(spent.touches),
-            candidates: Some(100_000),
-            selection_touches: Some(spent.selection_touches),
-            selection_candidates: Some(spent.selection_candidates),
-            tuning_touches: Some(spent.tuning_touches),
-        })
+            candidates: heard(Knob::Unexplained, MOST_CANDIDATES),
+            expected_places: heard(Knob::ExpectedPlaces, spent.expected_places),
+            expected_presses: heard(Knob::ExpectedPresses, spent.expected_presses),
+            selection_touches: heard(Knob::SelectionTouches, spent.selection_touches),
+            selection_candidates: heard(Knob::SelectionCandidates, spent.selection_candidates),
+            tuning_touches: heard(Knob::TuningTouches, spent.tuning_touches),
+        }
     }
 
     /// The part as this setting takes it.
@@ -274,47 +298,93 @@ impl Setting {
         self.answers(project)
             && (quality, *limits) == (self.quality, self.budget_limits())
             && self.selector == project.selection.selector
-            && self.unexplained == project.candidates.unexplained
+            && (self.unexplained == project.candidates.unexplained
+                || !self.hears(Knob::Unexplained))
     }
 
     /// Whether a project can be computed so, and it answers the project's own question: with its signal and the
-    /// regression that designs state their errors by.
+    /// estimator that it is judged by.
     #[must_use]
     pub fn answers(&self, project: &Project) -> bool {
         self.signal == project.gauge.signal
-            && self.estimator == Estimator::Regression
+            && self.estimator == project.judging().estimator()
             && self.repeat == 0
             && self.limits.is_none_or(|spent| spent.is_offered())
+    }
+
+    /// Whether anything at this setting hears a knob. What greedy SVR scores and regressions are tuned on is nothing to
+    /// expected error and matching; candidates are greedy SVR's, and the baseline of a regression.
+    #[must_use]
+    pub fn hears(&self, knob: Knob) -> bool {
+        let greedy = self.selector == SelectorKind::GreedySvr;
+        let trained = self.estimator == EstimatorKind::Svr;
+        match knob {
+            Knob::Vertices | Knob::Touches | Knob::AsSolid | Knob::Selector | Knob::Signal => true,
+            Knob::Estimator => self.signal == Signal::Strain,
+            Knob::ExpectedPlaces | Knob::ExpectedPresses => {
+                self.selector == SelectorKind::ExpectedError
+            }
+            Knob::SelectionTouches | Knob::SelectionCandidates => greedy,
+            Knob::Unexplained | Knob::SvrTolerance | Knob::Folds => greedy || trained,
+            Knob::PointTip | Knob::TuningTouches => trained,
+        }
     }
 
     /// The same with knobs that nothing hears at their usual places, so that equal work is one setting.
     #[must_use]
     pub fn canonical(mut self) -> Self {
         if self.signal != Signal::Strain {
-            self.estimator = Estimator::Regression;
+            self.estimator = EstimatorKind::Svr;
         }
+        let Some(mut spent) = self.limits else {
+            return self;
+        };
+        let heard = |knob| self.hears(knob);
+        if !heard(Knob::ExpectedPlaces) {
+            spent.expected_places = USUAL.expected_places;
+            spent.expected_presses = USUAL.expected_presses;
+        }
+        if !heard(Knob::SelectionTouches) {
+            spent.selection_touches = USUAL.selection_touches;
+            spent.selection_candidates = USUAL.selection_candidates;
+        }
+        if !heard(Knob::Folds) {
+            spent.folds = USUAL.folds;
+            spent.svr_tolerance_mm = USUAL.svr_tolerance_mm;
+        }
+        if !heard(Knob::TuningTouches) {
+            spent.tuning_touches = USUAL.tuning_touches;
+            spent.point_tip = USUAL.point_tip;
+        }
+        if !heard(Knob::Unexplained) {
+            self.unexplained = USUAL_UNEXPLAINED;
+        }
+        spent.selection_touches = spent.selection_touches.min(spent.touches);
+        spent.tuning_touches = spent.tuning_touches.min(spent.touches);
+        self.limits = Some(spent);
+        self
+    }
+
+    /// What is really looked at: no more places and presses than there are touches.
+    fn looked_at(mut self) -> Self {
         if let Some(spent) = &mut self.limits {
-            if self.selector != SelectorKind::GreedySvr {
-                spent.selection_touches = 200;
-                spent.selection_candidates = 40;
-            }
-            spent.selection_touches = spent.selection_touches.min(spent.touches);
-            spent.tuning_touches = spent.tuning_touches.min(spent.touches);
+            spent.expected_places = spent.expected_places.min(spent.touches);
+            spent.expected_presses = spent.expected_presses.min(spent.touches);
         }
         self
     }
 
-    /// The settings one step away along a knob.
+    /// The settings one step away along a knob: none where nothing hears it.
     #[must_use]
     pub fn neighbours(&self, knob: Knob) -> Vec<Self> {
         let mut found: Vec<Self> = match self.limits {
-            Some(spent) => self.turned(knob, spent),
-            None => Vec::new(),
+            Some(spent) if self.hears(knob) => self.turned(knob, spent),
+            _ => Vec::new(),
         };
         for setting in &mut found {
             *setting = setting.canonical();
         }
-        found.retain(|s| s != self);
+        found.retain(|s| s.looked_at() != self.looked_at());
         found
     }
 
@@ -342,9 +412,21 @@ impl Setting {
                 unexplained,
                 ..*self
             }),
-            Knob::Selector => others(&SelectorKind::PAPER, self.selector, |selector| Self {
+            Knob::Selector => others(&SelectorKind::ALL, self.selector, |selector| Self {
                 selector,
                 ..*self
+            }),
+            Knob::ExpectedPlaces => beside(&EXPECTED_PLACES, spent.expected_places, |places| {
+                with(Spent {
+                    expected_places: places,
+                    ..spent
+                })
+            }),
+            Knob::ExpectedPresses => beside(&EXPECTED_PRESSES, spent.expected_presses, |presses| {
+                with(Spent {
+                    expected_presses: presses,
+                    ..spent
+                })
             }),
             Knob::SelectionTouches => {
                 beside(&SELECTION_TOUCHES, spent.selection_touches, |touches| {
@@ -377,7 +459,7 @@ impl Setting {
                 })
             }),
             Knob::Signal => others(&SIGNALS, self.signal, |signal| Self { signal, ..*self }),
-            Knob::Estimator => others(&ESTIMATORS, self.estimator, |estimator| Self {
+            Knob::Estimator => others(&EstimatorKind::ALL, self.estimator, |estimator| Self {
                 estimator,
                 ..*self
             }),
@@ -394,14 +476,16 @@ impl Setting {
             Knob::PointTip => of(|s| f64::from(u8::from(s.point_tip))),
             Knob::AsSolid => of(|s| f64::from(u8::from(s.as_solid))),
             Knob::Unexplained => -self.unexplained,
-            Knob::Selector => f64::from(u8::from(self.selector == SelectorKind::GreedySvr)),
+            Knob::Selector => f64::from(u8::from(self.selector == own_selector(self.estimator))),
+            Knob::ExpectedPlaces => of(|s| s.expected_places as f64),
+            Knob::ExpectedPresses => of(|s| s.expected_presses as f64),
             Knob::SelectionTouches => of(|s| s.selection_touches as f64),
             Knob::SelectionCandidates => of(|s| s.selection_candidates as f64),
             Knob::SvrTolerance => of(|s| -s.svr_tolerance_mm),
             Knob::Folds => of(|s| s.folds as f64),
             Knob::TuningTouches => of(|s| s.tuning_touches as f64),
             Knob::Signal => f64::from(u8::from(self.signal != Signal::Strain)),
-            Knob::Estimator => f64::from(u8::from(self.estimator == Estimator::Matching)),
+            Knob::Estimator => f64::from(u8::from(self.estimator == EstimatorKind::Matching)),
         }
     }
 
@@ -421,35 +505,44 @@ impl Setting {
         let Some(spent) = &self.limits else {
             return format!("the quality “{}”", self.quality.name());
         };
-        let mut words = format!(
-            "{} vertices, {} touches, {} % unexplained, {}",
-            spent.vertices,
-            spent.touches,
-            (self.unexplained * 1000.0).round() / 10.0,
-            self.selector.title(),
-        );
-        if self.selector == SelectorKind::GreedySvr {
-            let _ = write!(
-                words,
-                " on {} touches × {} candidates",
-                spent.selection_touches, spent.selection_candidates
-            );
+        let mut words = format!("{} vertices, {} touches", spent.vertices, spent.touches);
+        if self.hears(Knob::Unexplained) {
+            let percent = (self.unexplained * 1000.0).round() / 10.0;
+            let _ = write!(words, ", {percent} % unexplained");
         }
-        let _ = write!(
-            words,
-            ", {} folds, tuned on {}, to {} mm",
-            spent.folds, spent.tuning_touches, spent.svr_tolerance_mm
-        );
+        let _ = write!(words, ", {}", self.selector.title());
+        if self.hears(Knob::ExpectedPlaces) {
+            let (places, presses) = (spent.expected_places, spent.expected_presses);
+            let _ = write!(words, " on {places} places × {presses} presses");
+        }
+        if self.hears(Knob::SelectionTouches) {
+            let (touches, candidates) = (spent.selection_touches, spent.selection_candidates);
+            let _ = write!(words, " on {touches} touches × {candidates} candidates");
+        }
+        if self.hears(Knob::Folds) {
+            let _ = write!(words, ", {} folds", spent.folds);
+        }
+        if self.hears(Knob::TuningTouches) {
+            let _ = write!(words, ", tuned on {}", spent.tuning_touches);
+        }
+        if self.hears(Knob::SvrTolerance) {
+            let _ = write!(words, ", to {} mm", spent.svr_tolerance_mm);
+        }
         if spent.as_solid {
             words += ", as a solid";
         }
         if spent.point_tip {
             words += ", point tip";
         }
-        if self.estimator == Estimator::Matching {
-            words += ", matching";
-        }
-        format!("{words}, {}", self.signal.name())
+        format!("{words}, {}, {}", self.signal.name(), self.estimator.name())
+    }
+}
+
+/// The selector that chooses for an estimator.
+fn own_selector(estimator: EstimatorKind) -> SelectorKind {
+    match estimator {
+        EstimatorKind::Matching => SelectorKind::ExpectedError,
+        EstimatorKind::Svr => SelectorKind::GreedySvr,
     }
 }
 
@@ -503,5 +596,82 @@ mod tests {
             answering += 1;
         }
         assert!(answering > 20, "{answering}");
+    }
+
+    #[test]
+    fn knobs_that_nothing_hears_stay_where_they_are() {
+        let project = Project::around("a.stl", None);
+        let centre = Setting::centre(&project);
+        let offered = |s: &Setting| -> Vec<Knob> {
+            let turns = |knob: &Knob| !s.neighbours(*knob).is_empty();
+            Knob::ALL.into_iter().filter(turns).collect()
+        };
+        assert_eq!(
+            offered(&centre),
+            [
+                Knob::Vertices,
+                Knob::Touches,
+                Knob::AsSolid,
+                Knob::Selector,
+                Knob::ExpectedPlaces,
+                Knob::ExpectedPresses,
+                Knob::Signal,
+                Knob::Estimator
+            ]
+        );
+        // The paper's way has the knobs of its regressions, and their way back ends where it began.
+        let mut paper = project.clone();
+        paper.evaluation.estimator = EstimatorKind::Svr;
+        paper.selection.selector = SelectorKind::GreedySvr;
+        let trained = Setting::centre(&paper);
+        for knob in [
+            Knob::Unexplained,
+            Knob::SelectionTouches,
+            Knob::Folds,
+            Knob::TuningTouches,
+        ] {
+            assert!(offered(&trained).contains(&knob), "{knob:?}");
+            let turned = trained.neighbours(knob)[0];
+            let back = Setting {
+                selector: centre.selector,
+                estimator: centre.estimator,
+                ..turned
+            };
+            assert_eq!(back.canonical(), centre, "{knob:?}");
+        }
+        assert!(!centre.in_words().contains("folds") && trained.in_words().contains("folds"));
+        // More places than there are touches are no other setting.
+        let few = Setting {
+            limits: centre.limits.map(|s| Spent { touches: 100, ..s }),
+            ..centre
+        };
+        assert_eq!(few.neighbours(Knob::ExpectedPlaces).len(), 0);
+        assert_eq!(few.neighbours(Knob::Touches).len(), 1);
+    }
+
+    #[test]
+    fn a_setting_is_judged_by_its_own_estimator() {
+        let project = Project::around("a.stl", None);
+        let centre = Setting::centre(&project);
+        assert_eq!(centre.estimator, EstimatorKind::Matching);
+        for setting in [centre, centre.neighbours(Knob::Estimator)[0]] {
+            let mut applied = project.clone();
+            setting.apply(&mut applied);
+            assert_eq!(applied.judging().estimator(), setting.estimator);
+        }
+        // What nobody hears is left as the project has it.
+        let mut applied = project.clone();
+        centre.apply(&mut applied);
+        assert_eq!(applied.candidates, project.candidates);
+        assert_eq!(applied.evaluation, project.evaluation);
+        let limits = applied.budget.limits;
+        assert_eq!(
+            (limits.selection_touches, limits.tuning_touches),
+            (None, None)
+        );
+        // Sites that report displacements are judged by regression, whatever is asked for.
+        let shifted = centre.neighbours(Knob::Signal)[0];
+        shifted.apply(&mut applied);
+        assert_eq!(applied.judging().estimator(), shifted.estimator);
     }
 }

@@ -111,17 +111,20 @@ impl<'a> Sweep<'a> {
     }
 
     /// What is another computation at all: a solid is no shell whose wall could be taken as one, touches beyond the
-    /// project's own are not there, and a part's own triangles are as many as they are.
+    /// project's own are not there to be pressed or looked at, and a part's own triangles are as many as they are.
     fn is_possible(&self, setting: &Setting) -> bool {
         let project = self.project;
         let centre = Setting::centre(project);
         let (Some(spent), Some(usual)) = (setting.limits, centre.limits) else {
             return true;
         };
+        let there = |count: usize, usual: usize| count < 2 * project.touch.count || count <= usual;
         let own = project.part.elements == Elements::AsGiven;
         let counted = project.candidates.count.is_some();
         (project.part.model == PartModel::Shell || !spent.as_solid)
-            && (spent.touches < 2 * project.touch.count || spent.touches <= usual.touches)
+            && there(spent.touches, usual.touches)
+            && there(spent.expected_places, usual.expected_places)
+            && there(spent.expected_presses, usual.expected_presses)
             && (!own || spent.vertices == usual.vertices)
             && (!counted || setting.unexplained == centre.unexplained)
     }

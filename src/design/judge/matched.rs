@@ -44,7 +44,7 @@ const FIRST_DRAW: u64 = 5;
 const DRIFT_SEED: u64 = 0xd21f7;
 
 /// What sets are judged with.
-pub(super) struct Trial<'a> {
+pub(in crate::design) struct ByMatching<'a> {
     pub inputs: &'a Inputs,
     pub simulated: &'a Simulated,
     pub truth: &'a Truth,
@@ -72,7 +72,7 @@ struct Everywhere {
     sized: Option<ResponseMap>,
 }
 
-impl Trial<'_> {
+impl ByMatching<'_> {
     /// Judges sets, each at the force in the middle; the largest of each selector at all forces, after a calibration,
     /// and with gauges lost.
     ///
@@ -93,12 +93,12 @@ impl Trial<'_> {
                 report(watch, "Evaluating", k, sets.len())?;
                 let set = Set::new(self, &everywhere, &sets[k]);
                 if !is_largest(sets, k) {
-                    found.push(set.found(middle, None));
+                    found.push(set.found(middle, &[]));
                     continue;
                 }
                 let calibrated = set.calibrated(&everywhere);
                 let all: Vec<Matched> = (heard.iter())
-                    .map(|heard| set.found(heard, calibrated.as_ref()))
+                    .map(|heard| set.found(heard, &calibrated))
                     .collect();
                 let whole = &all[self.forces.middle()].errors;
                 failures.extend(set.failures(middle, whole, watch)?);
@@ -221,7 +221,7 @@ fn groups(sets: &[Candidate]) -> Vec<Range<usize>> {
 
 /// One set, and the estimators that its gauges are read with.
 struct Set<'a> {
-    trial: &'a Trial<'a>,
+    trial: &'a ByMatching<'a>,
     candidate: &'a Candidate,
     /// Its channels among those that are known everywhere.
     channels: Vec<Vec<(usize, f64)>>,
@@ -229,8 +229,15 @@ struct Set<'a> {
     built: Matching,
 }
 
+/// Touch by touch the mean of the errors (mm) of several estimators; nothing of none.
+fn mean_of(all: impl Iterator<Item = Vec<f64>>) -> Option<Vec<f64>> {
+    let all: Vec<Vec<f64>> = all.collect();
+    let of = |touch: usize| mean(&all.iter().map(|errors| errors[touch]).collect::<Vec<_>>());
+    Some((0..all.first()?.len()).map(of).collect())
+}
+
 impl<'a> Set<'a> {
-    fn new(trial: &'a Trial<'a>, everywhere: &Everywhere, candidate: &'a Candidate) -> Self {
+    fn new(trial: &'a ByMatching<'a>, everywhere: &Everywhere, candidate: &'a Candidate) -> Self {
         let channel = |row: &usize| Some(vec![(everywhere.rows.binary_search(row).ok()?, 1.0)]);
         let channels: Vec<Vec<(usize, f64)>> = candidate.rows.iter().filter_map(channel).collect();
         let map = Arc::new(everywhere.drawn.map.mixed(&channels));
@@ -251,7 +258,7 @@ impl<'a> Set<'a> {
     }
 
     /// What is found of the set at one force.
-    fn found(&self, heard: &Heard, calibrated: Option<&Matching>) -> Matched {
+    fn found(&self, heard: &Heard, calibrated: &[Matching]) -> Matched {
         let rows = &self.candidate.rows;
         let errors = |matching: &Matching, x: &SignalMatrix| {
             errors_mm(matching, &x.select_rows(rows), &self.trial.truth.touches)
@@ -262,35 +269,44 @@ impl<'a> Set<'a> {
             force_n: heard.force_n,
             errors: errors(&self.drawn, &heard.drawn),
             built: errors(&self.built, &heard.built),
-            calibrated: calibrated.map(|matching| errors(matching, &heard.built)),
+            calibrated: mean_of(calibrated.iter().map(|m| errors(m, &heard.built))),
             blind: self.trial.blind(rows, heard.force_n),
         }
     }
 
-    /// The estimator after the known presses, where there are any.
-    fn calibrated(&self, everywhere: &Everywhere) -> Option<Matching> {
+    /// The estimator after the known presses of each round, where there are any.
+    fn calibrated(&self, everywhere: &Everywhere) -> Vec<Matching> {
         let trial = self.trial;
-        let pressed = trial.truth.pressed.as_ref()?;
-        let (drawn, off) = (everywhere.drawn.mixed(&self.channels), trial.off());
+        let Some(pressed) = &trial.truth.pressed else {
+            return Vec::new();
+        };
+        let drawn = everywhere.drawn.mixed(&self.channels);
         let x = noisy(trial.inputs, &pressed.x, PRESS_DRAW, trial.streams);
         let x = trial.drifted(x.into_owned(), PRESS_DRAW);
         let x = x.select_rows(&self.candidate.rows);
-        let known: Vec<Known> = (pressed.presses.iter().enumerate())
-            .map(|(k, press)| Known {
+        let known = |k: usize| {
+            let press = &pressed.presses[k];
+            Known {
                 at: drawn.map.index.nearest(press.asked.position).0,
                 force: press.asked.force,
                 reading: reading(&x, k),
-            })
-            .collect();
-        let before = &self.built.errors;
-        let calibration = calibrate(&drawn, &known, &before.noise, &off);
+            }
+        };
+        (pressed.rounds())
+            .map(|round| self.calibrated_by(&drawn, &round.map(known).collect::<Vec<_>>()))
+            .collect()
+    }
+
+    fn calibrated_by(&self, drawn: &AsDrawn, known: &[Known]) -> Matching {
+        let (before, off) = (&self.built.errors, self.trial.off());
+        let calibration = calibrate(drawn, known, &before.noise, &off);
         let errors = Errors {
             relative: calibration.relative,
             spread: Some(Arc::new(drawn.spread_of(&calibration.doubts, &off))),
             ..before.clone()
         };
         let map = Arc::new(drawn.calibrated(&calibration));
-        Some(Matching::new(map, errors, trial.forces.most_n))
+        Matching::new(map, errors, self.trial.forces.most_n)
     }
 
     /// What is left of the set when gauges are lost, and left out without anything else: none for a single gauge. A
@@ -344,11 +360,7 @@ fn reading(x: &SignalMatrix, touch: usize) -> Vec<f64> {
 }
 
 /// How far from where they were (mm) touches are found by what gauges read of them (channels × touches).
-pub(in crate::design) fn errors_mm(
-    matching: &Matching,
-    x: &SignalMatrix,
-    touches: &[Touch],
-) -> Vec<f64> {
+fn errors_mm(matching: &Matching, x: &SignalMatrix, touches: &[Touch]) -> Vec<f64> {
     let error = |matching: &mut Matching, (t, touch): (usize, &Touch)| {
         let found = matching.find(&reading(x, t));
         found.position.distance(touch.position) * 1e3

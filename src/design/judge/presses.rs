@@ -2,6 +2,7 @@
 //! quite as hard.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,9 +20,13 @@ pub struct Press {
     pub made: Touch,
 }
 
+/// How often somebody calibrates: what once would do depends on how that hand was off.
+pub(super) const ROUNDS: u64 = 3;
+
 /// Presses, and what gauges read of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pressed {
+    /// Round by round, as many in each.
     pub presses: Vec<Press>,
     /// Sites, as a workshop would build them, × presses; without noise.
     pub x: SignalMatrix,
@@ -53,6 +58,14 @@ pub(super) fn by_hand(mesh: &TriMesh, asked: Vec<Touch>, hand: &Pressing, seed: 
         }
     };
     asked.into_iter().map(make).collect()
+}
+
+impl Pressed {
+    /// The numbers of the presses of each round.
+    pub(super) fn rounds(&self) -> impl Iterator<Item = Range<usize>> {
+        let each = self.presses.len() / ROUNDS as usize;
+        (0..ROUNDS as usize).map(move |k| k * each..(k + 1) * each)
+    }
 }
 
 #[cfg(test)]

@@ -265,6 +265,16 @@ fn limits(t: &mut Text, limits: &Limits) {
         "most candidates that the reduction keeps",
     );
     t.maybe(
+        "expected_places",
+        limits.expected_places,
+        "most places that a choice by expected error compares readings with",
+    );
+    t.maybe(
+        "expected_presses",
+        limits.expected_presses,
+        "most presses that it is tried on",
+    );
+    t.maybe(
         "selection_touches",
         limits.selection_touches,
         "most touches that greedy SVR scores on",
