@@ -122,7 +122,7 @@ pub enum DesignError {
         fits_mm: f64,
     },
     #[error(
-        "{needed_gb:.1} GB would be needed for {sites} sites × {touches} touches, more than the {limit_gb:.1} GB that may be taken: lower touch.count, widen sites.spacing_mm, or allow more with --memory-gb"
+        "{needed_gb:.3} GB would be needed for {sites} sites × {touches} touches, more than the {limit_gb:.3} GB that may be taken: lower touch.count, widen sites.spacing_mm, give fewer rows where they come from tables, or allow more with --memory-gb"
     )]
     TooLarge {
         needed_gb: f64,

@@ -2,6 +2,7 @@
 //!
 //! Positions are in metres. Everything after this layer may index without checking again.
 
+pub mod bends;
 mod bodies;
 pub mod canonical;
 pub mod cut;

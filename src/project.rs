@@ -31,8 +31,8 @@ pub use live::{GluedKeys, LiveKeys};
 pub use masks::Masks;
 pub use part::{Elements, MaterialKeys, Part, PartModel, SupportKeys, SupportKind, Unit};
 pub use ranges::{
-    ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCE_OFF, FORCES, GAIN_OFF, GAUGES, PLACE_OFF,
-    TIP_OFF, TOUCHES,
+    ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCE_OFF, FORCES, GAIN_OFF, GAUGES, LENGTH,
+    PLACE_OFF, TIP_OFF, TOUCHES,
 };
 pub use selection::{ChosenSite, CostKeys, GaussianProcessKeys, SelectionKeys};
 

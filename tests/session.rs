@@ -227,15 +227,17 @@ fn by_hand(w: &mut Window) {
         .selection
         .sites
         .clone();
-    let [x, y, z] = sites[2].position_mm;
-    // Along its hoop.
+    // One that lies along a hoop, and along it.
+    let along = sites.iter().position(|s| s.direction[2].abs() < 0.3);
+    let gauge = along.expect("a gauge on a hoop");
+    let [x, y, z] = sites[gauge].position_mm;
     let from = w.flat_place(x, y, z);
     let to = from + egui::vec2(24.0, 0.0);
     let path: Vec<_> = (0..=10).map(|k| from.lerp(to, k as f32 / 10.0)).collect();
     w.drag(&path);
-    let moved = w.harness.state().document.state.project.selection.sites[2].clone();
-    assert_ne!(moved, sites[2], "the gauge follows the pointer");
-    assert_eq!(w.harness.state().picked, [2]);
+    let moved = w.harness.state().document.state.project.selection.sites[gauge].clone();
+    assert_ne!(moved, sites[gauge], "the gauge follows the pointer");
+    assert_eq!(w.harness.state().picked, [gauge]);
     assert_eq!(gauges(w), sites.len());
     // An estimate at once, the exact figure after it.
     let start = Instant::now();
@@ -254,7 +256,7 @@ fn by_hand(w: &mut Window) {
     w.press("Pin");
     assert_eq!(
         w.harness.state().picked,
-        [2],
+        [gauge],
         "the button is over the view, not in it"
     );
     let pins = w

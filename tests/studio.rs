@@ -149,13 +149,8 @@ fn from_the_limb_to_the_report() {
         .len();
     assert_eq!(sites, 3039);
     w.wait("the filters", 10, |s| s.feasibility.is_some());
-    w.harness
-        .state_mut()
-        .document
-        .state
-        .project
-        .selection
-        .sensors = 5;
+    let selection = &mut w.harness.state_mut().document.state.project.selection;
+    (selection.sensors, selection.compare) = (5, true);
     w.harness.run_ok();
     w.press("Select gauges");
     w.wait("the selection", 300, |s| !s.busy());

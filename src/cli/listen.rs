@@ -17,6 +17,7 @@ use crate::io::project_file::LoadedProject;
 use crate::link::{Address, BAUD, Heard, Listener, Pace, Recorder, State};
 use crate::live::{Pipeline, Sample, Update};
 use crate::plain;
+use crate::wire::Hello;
 
 #[derive(Args, Debug, Clone)]
 pub struct ListenArgs {
@@ -137,6 +138,8 @@ struct Output {
     served: Option<(TcpListener, Vec<TcpStream>)>,
     period_us: u64,
     last_us: Option<u64>,
+    /// As it was told last.
+    board: Option<Hello>,
 }
 
 impl Output {
@@ -154,20 +157,14 @@ impl Output {
             stdout: BufWriter::new(std::io::stdout()),
             period_us: args.every.map_or(0, |r| (1e6 / r) as u64),
             last_us: None,
+            board: None,
         })
     }
 
     fn hear(&mut self, heard: &Heard) -> anyhow::Result<()> {
         match heard {
             Heard::State(state) => say(in_words(state)),
-            Heard::Hello(hello) => say(&format!(
-                "{} ({:08x}), {} channels, {} bits, {} Hz",
-                plain::quote(&hello.name),
-                hello.board,
-                hello.channels,
-                hello.bits,
-                hello.rate_hz
-            )),
+            Heard::Hello(hello) => self.greet(hello),
             Heard::Message(text) | Heard::Trouble(text) => say(text),
             // Nobody wants to find out afterwards.
             Heard::Unrecorded(why) => anyhow::bail!("{why}"),
@@ -184,6 +181,22 @@ impl Output {
             Heard::Turn { .. } => self.flush()?,
         }
         Ok(())
+    }
+
+    /// Says which board it is, once: a board repeats itself.
+    fn greet(&mut self, hello: &Hello) {
+        if self.board.as_ref() == Some(hello) {
+            return;
+        }
+        say(&format!(
+            "{} ({:08x}), {} channels, {} bits, {} Hz",
+            plain::quote(&hello.name),
+            hello.board,
+            hello.channels,
+            hello.bits,
+            hello.rate_hz
+        ));
+        self.board = Some(hello.clone());
     }
 
     fn row(&mut self, sample: &Sample, update: &Update) -> anyhow::Result<()> {

@@ -10,7 +10,20 @@ pub fn between(
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
     move |text: &str| match text.parse::<f64>() {
         Ok(value) if (least..=most).contains(&value) => Ok(value),
-        _ => Err(format!("a number from {least} to {most} is needed")),
+        _ => Err(format!(
+            "a number from {} to {} is needed",
+            plain(least),
+            plain(most)
+        )),
+    }
+}
+
+/// A bound in a few characters.
+fn plain(bound: f64) -> String {
+    if bound.abs() >= 1e7 {
+        format!("{bound:e}")
+    } else {
+        bound.to_string()
     }
 }
 
@@ -25,4 +38,15 @@ pub fn whole(least: u64, most: u64) -> RangedU64ValueParser<usize> {
 pub fn misuse(message: &str) -> anyhow::Error {
     let error: clap::Error = clap::Error::raw(ErrorKind::ArgumentConflict, format!("{message}\n"));
     error.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_are_short_whatever_they_are() {
+        let said = between(0.0, 1e100)("nan").unwrap_err();
+        assert_eq!(said, "a number from 0 to 1e100 is needed");
+    }
 }

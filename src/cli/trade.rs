@@ -74,6 +74,11 @@ pub fn run(args: &TradeArgs) -> anyhow::Result<()> {
     if args.common.json {
         return out::line(&serde_json::to_string(&record)?);
     }
+    if record.points.is_empty() {
+        out::say(
+            "hapdef: nothing was measured: the time was over before the first setting. Give more with --seconds",
+        );
+    }
     out::line(trade_file::markdown(&loaded.inputs.project, &record).trim_end())?;
     for name in ["trade.json", "trade.csv", "trade.md", "trade.svg"] {
         out::say(&format!("wrote {}", args.out.join(name).display()));
@@ -135,6 +140,8 @@ fn sweep(
         unknowns: judge.unknowns(),
         touches: judge.touches(),
     };
+    // Time may be over before the first setting: what is known by now is in the folder all the same.
+    trade_file::write(place, project, record)?;
     let meter = ProcessMeter::default();
     while let Some(setting) = next(&record.points) {
         let point = measure(&loaded.inputs, &setting, &judge, &meter, &watch)?;

@@ -228,7 +228,7 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround) -> Advice {
         .filter(|&t| is_face(t))
         .collect();
     let area: f64 = faces.iter().map(|&t| whole.facet_area(t)).sum();
-    let radius = scope::radii(whole, &faces);
+    let radius = scope::radii(whole, &faces, solid.wall());
     let asked = Asked::new(inputs, area / 2.0, radius[0], solid.shape());
     let costs = [asked.shell(), asked.solid()];
     let [shell, cells] = &costs;
@@ -276,7 +276,7 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
     let part = &inputs.part;
     let facets: Vec<u32> = (0..part.triangles().len() as u32).collect();
     let wall = project.part.thickness_mm;
-    let radius = scope::radii(part, &facets);
+    let radius = scope::radii(part, &facets, wall * 1e-3);
     let asked = Asked::new(
         inputs,
         part.area(),

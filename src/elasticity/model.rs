@@ -16,7 +16,7 @@ use crate::mesh::{SurfacePoint, TriMesh};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ElasticError {
     #[error(
-        "no triangle of the part is held by a support: move a support box onto the part (its points lie between {lower:.1} and {upper:.1} mm)"
+        "no triangle of the part is held by a support: move a support box onto the part, or where there is none write a project that has one, as in [[support]] kind = \"clamped\", box_mm = [[x, y, z], [x, y, z]] (the part lies between {lower:.1} and {upper:.1} mm)"
     )]
     NothingHeld { lower: DVec3, upper: DVec3 },
     #[error(

@@ -1,6 +1,7 @@
 //! Where the theory of thin shells itself is off, whatever the mesh: said, not hidden.
 
 use super::Section;
+use crate::mesh::bends::bends;
 use crate::mesh::surface::Surface;
 use crate::mesh::{Edge, TriMesh};
 
@@ -71,52 +72,37 @@ fn is_joint(mesh: &TriMesh, edge: &Edge) -> bool {
     }
 }
 
-/// Share of the area whose radius of curvature across smooth edges is below `radius` (m).
+/// Share of the area whose radius of curvature between feature lines is below `radius` (m).
 fn tightly_curved(surface: &Surface, radius: f64) -> f64 {
+    /// Share of that radius over which it is measured.
+    const REACH: f64 = 0.2;
     let mesh = &surface.mesh;
-    let curvatures = curvatures(mesh, |e| surface.features[e]);
-    let tight = |t: &usize| curvatures[*t] * radius > 1.0;
-    let curved = (0..curvatures.len()).filter(tight);
-    curved.map(|t| mesh.facet_area(t as u32)).sum::<f64>() / mesh.area()
+    let facets: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
+    let bends = bends(mesh, &facets, REACH * radius, |e| surface.features[e]);
+    let tight = bends.iter().filter(|b| b.curvature * radius > 1.0);
+    tight.map(|b| b.area).sum::<f64>() / mesh.area()
 }
 
-/// Largest curvature (1/m) across the edges of each facet but those that are sharp.
-fn curvatures(mesh: &TriMesh, sharp: impl Fn(usize) -> bool) -> Vec<f64> {
-    /// Smaller angles are rounding.
-    const LEAST: f64 = 0.02;
-    let mut curvatures = vec![0.0_f64; mesh.triangles().len()];
-    for (_, edge) in (mesh.edges().iter().enumerate()).filter(|(e, _)| !sharp(*e)) {
-        let [s, t] = edge.triangles[..] else { continue };
-        // The angle between two facets spreads over half of either's height over the edge.
-        let angle = mesh.facet_normal(s).angle_between(mesh.facet_normal(t));
-        let across = (mesh.facet_area(s) + mesh.facet_area(t)) / length(mesh, edge);
-        if angle > LEAST {
-            for facet in [s, t] {
-                let curvature = &mut curvatures[facet as usize];
-                *curvature = curvature.max(angle / across);
-            }
-        }
-    }
-    curvatures
-}
-
-/// Radius of curvature (m) that a tenth and half of the area of these facets are bent tighter than, across
-/// edges that are no creases; infinite where they are flat.
+/// Radius of curvature (m) that a tenth and half of the area of these facets are bent tighter than, between
+/// creases; infinite where they are flat. Walls of this thickness (m) bend over two of them and more.
 #[must_use]
-pub fn radii(mesh: &TriMesh, facets: &[u32]) -> [f64; 2] {
-    let curvatures = curvatures(mesh, |e| is_joint(mesh, &mesh.edges()[e]));
-    let mut bent: Vec<(f64, f64)> = (facets.iter())
-        .map(|&t| (curvatures[t as usize], mesh.facet_area(t)))
-        .collect();
-    bent.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let total: f64 = bent.iter().map(|b| b.1).sum();
+pub fn radii(mesh: &TriMesh, facets: &[u32], wall: f64) -> [f64; 2] {
+    /// Over so many of its own lengths a surface is flat.
+    const FLAT: f64 = 50.0;
+    let (lower, upper) = mesh.bounds();
+    let flat = FLAT * (upper - lower).length();
+    let joint = |e: usize| is_joint(mesh, &mesh.edges()[e]);
+    let mut bends = bends(mesh, facets, 2.0 * wall, joint);
+    bends.sort_by(|a, b| b.curvature.total_cmp(&a.curvature));
+    let total: f64 = bends.iter().map(|b| b.area).sum();
     [0.1, 0.5].map(|share| {
         let mut sum = 0.0;
-        let tight = bent.iter().find(|b| {
-            sum += b.1;
+        let tight = bends.iter().find(|b| {
+            sum += b.area;
             sum >= share * total
         });
-        tight.map_or(f64::INFINITY, |b| 1.0 / b.0)
+        let radius = tight.map_or(f64::INFINITY, |b| b.curvature.recip());
+        if radius > flat { f64::INFINITY } else { radius }
     })
 }
 
@@ -124,17 +110,69 @@ pub fn radii(mesh: &TriMesh, facets: &[u32]) -> [f64; 2] {
 mod tests {
     use std::sync::Arc;
 
+    use glam::DVec3;
+
     use super::*;
     use crate::elasticity::Material;
+    use crate::limb::LimbSpec;
+
+    fn of_all(mesh: &TriMesh) -> [f64; 2] {
+        let facets: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
+        radii(mesh, &facets, 1.5e-3)
+    }
 
     #[test]
     fn the_radius_of_a_limb_is_found() {
         let (mesh, _) = LimbSpec::default().build().unwrap();
-        let facets: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
-        let [_, half] = radii(&mesh, &facets);
-        assert!((half / 31.831e-3 - 1.0).abs() < 0.25, "{half}");
+        let half = of_all(&mesh)[1];
+        assert!((half / 31.831e-3 - 1.0).abs() < 0.1, "{half}");
     }
-    use crate::limb::LimbSpec;
+
+    /// A tube of 30 mm radius and 60 mm length.
+    fn tube(columns: usize, rows: usize) -> TriMesh {
+        let at = |i: usize, j: usize| {
+            let turn = std::f64::consts::TAU * i as f64 / columns as f64;
+            let z = 60e-3 * j as f64 / rows as f64;
+            DVec3::new(30e-3 * turn.cos(), 30e-3 * turn.sin(), z)
+        };
+        let places = (0..=rows).flat_map(|j| (0..columns).map(move |i| (i, j)));
+        let positions: Vec<DVec3> = places.map(|(i, j)| at(i, j)).collect();
+        let corner = |i: usize, j: usize| (j * columns + i % columns) as u32;
+        let cells = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j)));
+        let triangles: Vec<[u32; 3]> = cells
+            .flat_map(|(i, j)| {
+                let [here, beside] = [corner(i, j), corner(i + 1, j)];
+                let [across, above] = [corner(i + 1, j + 1), corner(i, j + 1)];
+                [[here, beside, across], [here, across, above]]
+            })
+            .collect();
+        TriMesh::new(&positions, &triangles, 0).unwrap().0
+    }
+
+    /// The radius is the same whatever the triangles, long ones too.
+    #[test]
+    fn the_radius_does_not_hang_on_the_size_of_triangles() {
+        for (columns, rows) in [(48, 15), (48, 1), (200, 60), (200, 3), (400, 20), (400, 2)] {
+            let tube = tube(columns, rows);
+            for radius in of_all(&tube) {
+                let off = radius / 30e-3 - 1.0;
+                assert!(off.abs() < 0.05, "{columns} × {rows}: {radius}");
+            }
+            let surface = Surface::new(&Arc::new(tube), |_| false, |_| false);
+            assert!(tightly_curved(&surface, 15e-3) < 1e-3, "{columns} × {rows}");
+            assert!(tightly_curved(&surface, 40e-3) > 0.99, "{columns} × {rows}");
+        }
+    }
+
+    #[test]
+    fn what_is_flat_has_no_radius() {
+        let corners = [(0.0, 0.0), (0.1, 0.0), (0.1, 0.1), (0.0, 0.1)];
+        let corners = corners.map(|(x, y)| DVec3::new(x, y, 0.0));
+        let plate = TriMesh::new(&corners, &[[0, 1, 2], [0, 2, 3]], 0)
+            .unwrap()
+            .0;
+        assert!(of_all(&plate).into_iter().all(f64::is_infinite));
+    }
 
     fn notes(thickness: f64, tip: f64) -> Vec<String> {
         let (mesh, _) = LimbSpec::default().build().unwrap();

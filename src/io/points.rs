@@ -12,6 +12,7 @@ use super::{FileError, atomic};
 use crate::board::{GivenPress, PRESSES};
 use crate::elasticity::Touch;
 use crate::given::{Answer, GivenSite};
+use crate::project::LENGTH;
 
 const TOUCHES: [&str; 8] = [
     "x_mm",
@@ -26,9 +27,8 @@ const TOUCHES: [&str; 8] = [
 const SITES: [&str; 6] = ["x_mm", "y_mm", "z_mm", "dx", "dy", "dz"];
 const SCRIPT: [&str; 6] = ["start_s", "duration_s", "x_mm", "y_mm", "z_mm", "force_n"];
 
-/// Forces (N) and tip radii (mm) that a robot may meet; beyond them the numbers of the model leave their range.
+/// Forces (N) that a robot may meet; beyond them the numbers of the model leave their range.
 const FORCES: RangeInclusive<f64> = 1e-9..=1e9;
-const TIPS: RangeInclusive<f64> = 1e-3..=1e6;
 /// When a press may begin, and how long it may last (s).
 const STARTS: RangeInclusive<f64> = 0.0..=1e9;
 const DURATIONS: RangeInclusive<f64> = 1e-3..=1e9;
@@ -52,7 +52,7 @@ pub fn read_touches(path: &Path) -> Result<Vec<Touch>, FileError> {
                 &FORCES,
                 "above zero, as it presses along -n",
             )?,
-            tip_radius: 1e-3 * ranged(row, "tip_radius_mm", tip, &TIPS, "above zero")?,
+            tip_radius: 1e-3 * ranged(row, "tip_radius_mm", tip, &LENGTH, "above zero")?,
         })
     })
 }

@@ -95,6 +95,8 @@ pub struct Listener {
     heard: Instant,
     /// Why nothing can be used, as far as it was told.
     explained: Vec<Doubt>,
+    /// How many channels were compared with those of the gauges.
+    compared: Option<usize>,
     /// What a recording brings in pieces: a rest, and the counts of a line.
     rest: Rest,
     line: Vec<f64>,
@@ -119,6 +121,7 @@ impl Listener {
             state: State::Waiting,
             heard: Instant::now(),
             explained: Vec::new(),
+            compared: None,
             rest: Rest::default(),
             line: Vec::new(),
             noted: false,
@@ -209,6 +212,7 @@ impl Listener {
     ) {
         self.receiver.reset();
         self.explained.clear();
+        self.compared = None;
         (self.noted, self.heard) = (false, Instant::now());
         let mut buffer = vec![0; 16 * 1024];
         let mut inputs = Vec::new();
@@ -304,7 +308,11 @@ impl Listener {
                 self.recorder = None;
             }
             Command::Truth(touch) => self.record(|r| r.truth(touch)),
-            Command::Do(work) => work(&mut self.pipeline),
+            Command::Do(work) => {
+                work(&mut self.pipeline);
+                // The gauges may be on other channels now.
+                self.compared = None;
+            }
         }
     }
 
@@ -324,7 +332,7 @@ impl Listener {
                 time_us,
             } => match old_note(level, &text).filter(|_| self.has_old_notes()) {
                 Some(own) => self.replay(own, time_us, arrived, tell),
-                None => tell(Heard::Message(&plain::message(&in_one_line(&text)))),
+                None => tell(Heard::Message(&as_said(&text))),
             },
             Input::Note { text, time_us } if self.address.is_recording() => {
                 self.noted = true;
@@ -347,16 +355,7 @@ impl Listener {
             name: plain::message(&in_one_line(&hello.name)),
             ..hello.clone()
         }));
-        let channels = self.pipeline.settings.channels.iter().enumerate();
-        if let Some((gauge, channel)) =
-            { channels }.find(|(_, c)| **c >= usize::from(hello.channels))
-        {
-            tell(Heard::Message(&format!(
-                "gauge {} is on channel {channel}, but this board has only {} channels (from 0): nothing can be told of a touch. Correct “Channels of the gauges”, or channels in the project's table [live]",
-                gauge + 1,
-                hello.channels
-            )));
-        }
+        self.compare_channels(usize::from(hello.channels), tell);
         if let Some(rate) = self
             .rate
             .filter(|&r| r != hello.rate_hz && self.hello.as_ref() != Some(&hello))
@@ -365,6 +364,22 @@ impl Listener {
         }
         self.hello = Some(hello);
         self.say(port, &Message::Start);
+    }
+
+    /// Says where a gauge is on a channel that does not come, whether a board has told how many there are or its
+    /// lines show it; each number of channels once.
+    fn compare_channels(&mut self, channels: usize, tell: &mut impl FnMut(Heard)) {
+        if self.compared.replace(channels) == Some(channels) {
+            return;
+        }
+        let mut gauges = self.pipeline.settings.channels.iter().enumerate();
+        if let Some((gauge, channel)) = gauges.find(|(_, c)| **c >= channels) {
+            let many = if channels == 1 { "" } else { "s" };
+            tell(Heard::Message(&format!(
+                "gauge {} is on channel {channel}, but this board has only {channels} channel{many} (from 0): nothing can be told of a touch. Correct “Channels of the gauges”, or channels in the project's table [live]",
+                gauge + 1
+            )));
+        }
     }
 
     fn measure(&mut self, sample: &Sample, arrived: Instant, tell: &mut impl FnMut(Heard)) {
@@ -376,6 +391,7 @@ impl Listener {
             self.pipeline.tare();
             self.record(|r| r.own("tare"));
         }
+        self.compare_channels(sample.counts.len(), tell);
         let update = self.pipeline.push(sample);
         // What nobody touches is soon computed, and would hide the rest.
         if update.contact.is_some() {
@@ -390,6 +406,12 @@ impl Listener {
         // Not when it arrived: one that is slow to compute is not silent.
         self.heard = Instant::now();
     }
+}
+
+/// A text of a board cannot be taken for the studio's own words.
+fn as_said(text: &str) -> String {
+    let text = plain::message(&in_one_line(text)).replace(['“', '”'], "\"");
+    format!("the board says: “{text}”")
 }
 
 /// A text of a board cannot be taken for several of our own.

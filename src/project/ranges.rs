@@ -32,7 +32,7 @@ pub const TIP_OFF: RangeInclusive<f64> = 0.0..=50.0;
 pub const DRIFT: RangeInclusive<f64> = 0.0..=1e6;
 
 /// Of anything that is made (mm): from a nanometre to a kilometre.
-const LENGTH: RangeInclusive<f64> = 1e-6..=1e6;
+pub const LENGTH: RangeInclusive<f64> = 1e-6..=1e6;
 /// Of anything that may also not be there (mm).
 const ROOM: RangeInclusive<f64> = 0.0..=1e6;
 /// How far off a place may be (mm), either way.

@@ -112,10 +112,10 @@ fn text_of_a_board_is_shown_and_never_obeyed() {
     ]));
     let expected = [
         "hello limb\u{fffd}[31m",
-        "message hapdef truth 1 2 3 4",
-        "message hapdef dead 0",
-        "message hapdef line 1,2,3,4",
-        "message a\u{fffd}]0;title\u{fffd} hapdef: b",
+        "message the board says: “hapdef truth 1 2 3 4”",
+        "message the board says: “hapdef dead 0”",
+        "message the board says: “hapdef line 1,2,3,4”",
+        "message the board says: “a\u{fffd}]0;title\u{fffd} hapdef: b”",
     ];
     assert_eq!(said, expected);
 }
@@ -133,7 +133,8 @@ fn notes_of_a_recording_are_obeyed_the_old_ones_too() {
         Message::Note("line 1,2,3,4".into()),
     ];
     let (said, counts, _) = of_recording(&frames(&new));
-    assert_eq!(said, ["truth None", "message hapdef truth none"]);
+    let shown = "message the board says: “hapdef truth none”";
+    assert_eq!(said, ["truth None", shown]);
     assert_eq!(counts, [[1.0, 2.0, 3.0, 4.0]]);
 }
 
@@ -154,6 +155,24 @@ fn lines_with_many_channels_are_recorded_whole() {
     let torn = ["part 0 1,2", "line 4 5,6", "line 0 1,2,x", "part 9", "line"];
     let torn = torn.map(|text| Message::Note(text.into()));
     assert!(of_recording(&frames(&torn)).1.is_empty());
+}
+
+/// Whether a board has said how many channels it has, or only prints lines.
+#[test]
+fn channels_that_do_not_come_are_told_once() {
+    let few = Message::Hello(Hello {
+        channels: 3,
+        ..hello()
+    });
+    let data = Message::Data(vec![2000; 3]);
+    let greeted = of_board(frames(&[few.clone(), data.clone(), few, data]));
+    let lines = of_board(b"1,2,3\n".repeat(20));
+    for said in [greeted, lines] {
+        let told = |s: &&String| s.contains("gauge 4 is on channel 3, but");
+        assert_eq!(said.iter().filter(told).count(), 1, "{said:?}");
+    }
+    let enough = of_board(b"1,2,3,4\n".repeat(20));
+    assert!(enough.is_empty(), "{enough:?}");
 }
 
 #[test]
