@@ -1,5 +1,5 @@
 //! Remakes the trade of speed against accuracy on the bundled limb, `assets/trade` and what README and RESULTS show of it:
-//! `cargo bench --bench trade` (about half an hour on two cores; stopped, it goes on from where it was, and where the
+//! `cargo bench --bench trade` (about a quarter of an hour on two cores; stopped, it goes on from where it was, and where the
 //! record is of another limb, other defaults or another version, it begins anew). With `-- assemble` it measures nothing
 //! and only puts the tables into the pages again.
 
@@ -13,7 +13,7 @@ use hapdef::io::trade_file::{self, Record};
 /// Where the pages show the tables.
 const BEGIN: &str = "<!-- trade: from assets/trade/trade.md, by `cargo bench --bench trade` -->\n";
 const END: &str = "<!-- end of trade -->";
-const POINTS: &str = "130";
+const POINTS: &str = "40";
 
 fn main() {
     let folder = Path::new("assets/trade");

@@ -50,6 +50,7 @@ pub struct Cli {
 }
 
 #[derive(Subcommand, Debug)]
+#[allow(clippy::large_enum_variant, reason = "there is one, parsed once")]
 pub enum Command {
     /// The whole road: simulate, filter, reduce, select, evaluate, report.
     Design(design::DesignArgs),

@@ -52,9 +52,17 @@ fn blueness(picture: &RgbaImage, center: Pos2, radius: i64) -> f64 {
     sum / ((2 * radius + 1).pow(2) as f64)
 }
 
+/// No marker of a gauge, near or far, lies over what is looked at.
+fn without_gauges(w: &mut Window) {
+    let project = &mut w.harness.state_mut().document.state.project;
+    project.selection.sites.clear();
+    w.harness.run_ok();
+}
+
 #[test]
 fn the_limb_is_shown_and_bends_under_a_click() {
     let Some(mut w) = Window::open() else { return };
+    without_gauges(&mut w);
     w.press("Front");
     // On the hoop at the front, between the columns.
     let hoop = w.place(31.83, 0.0, 60.0);
@@ -97,6 +105,7 @@ fn the_limb_is_shown_and_bends_under_a_click() {
 #[test]
 fn painting_erasing_undo_and_redo() {
     let Some(mut w) = Window::open() else { return };
+    without_gauges(&mut w);
     w.press("Front");
     w.press("Paint");
     let path: Vec<Pos2> = (0..8)

@@ -12,7 +12,7 @@ use crate::budget::Progress;
 
 /// A bar, or lines, that follow the stages of a run.
 pub struct Bar {
-    bar: ProgressBar,
+    drawn: ProgressBar,
     stage: Mutex<&'static str>,
     /// Absent on a terminal.
     lines: Option<Mutex<Lines>>,
@@ -33,7 +33,7 @@ impl Default for Bar {
             bar.set_style(style);
         }
         Self {
-            bar,
+            drawn: bar,
             stage: Mutex::new(""),
             lines: (!terminal).then(|| Mutex::new(Lines::default())),
         }
@@ -54,16 +54,16 @@ impl Bar {
             && *stage != progress.stage
         {
             *stage = progress.stage;
-            self.bar.set_message(progress.stage);
+            self.drawn.set_message(progress.stage);
         }
-        self.bar.set_length(progress.total.max(1) as u64);
-        self.bar.set_position(progress.done as u64);
+        self.drawn.set_length(progress.total.max(1) as u64);
+        self.drawn.set_position(progress.done as u64);
         ControlFlow::Continue(())
     }
 
     /// Takes the bar off the terminal.
     pub fn finish(&self) {
-        self.bar.finish_and_clear();
+        self.drawn.finish_and_clear();
     }
 }
 

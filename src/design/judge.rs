@@ -140,7 +140,7 @@ impl Truth {
 pub(super) fn grid(project: &Project) -> Option<[f64; 2]> {
     let keys = &project.gauge;
     let matching = project.judging().estimator() == EstimatorKind::Matching;
-    matching.then(|| [keys.grid_length_mm * 1e-3, keys.grid_width_mm * 1e-3])
+    matching.then_some([keys.grid_length_mm * 1e-3, keys.grid_width_mm * 1e-3])
 }
 
 /// What gauges read under touches (sites × touches), over grids of this length and width (m) or at a point, and how many

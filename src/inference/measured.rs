@@ -139,7 +139,7 @@ mod tests {
     /// A row of places 2 mm apart, three sites that feel what is near them, and forces.
     fn row(force: impl Fn(usize) -> f64) -> (SignalMatrix, Vec<[f64; 3]>) {
         let targets: Vec<[f64; 3]> = (0..30)
-            .map(|t| [2.0 * (t / 3) as f64, 2.0 * (t % 3) as f64, 4.0])
+            .map(|t| [2.0 * f64::from(t / 3), 2.0 * f64::from(t % 3), 4.0])
             .collect();
         let values = [2.0, 9.0, 16.0].into_iter().flat_map(|site| {
             (targets.iter().enumerate())
@@ -176,7 +176,7 @@ mod tests {
 
     #[test]
     fn the_force_is_found_with_the_place() {
-        let forces: Vec<f64> = (0..30).map(|t| 1.0 + 0.1 * (t % 7) as f64).collect();
+        let forces: Vec<f64> = (0..30).map(|t| 1.0 + 0.1 * f64::from(t % 7)).collect();
         let (x, targets) = row(|t| forces[t]);
         let of = Forces {
             touches: &forces,

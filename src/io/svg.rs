@@ -144,7 +144,9 @@ pub struct Series<'a> {
 }
 
 /// Okabe and Ito's colours: told apart by everybody.
-pub const PALETTE: [&str; 5] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#666666"];
+pub const PALETTE: [&str; 6] = [
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#666666",
+];
 
 /// A line plot with axes, ticks and a legend.
 #[must_use]

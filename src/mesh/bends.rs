@@ -1,5 +1,5 @@
 //! How sharply a surface is bent, whatever the size of its triangles: the curvature measure of a neighbourhood
-//! (Cohen-Steiner & Morvan, "Restricted Delaunay triangulations and normal cycle", SoCG 2003).
+//! (Cohen-Steiner & Morvan, "Restricted Delaunay triangulations and normal cycle", Symposium on Computational Geometry 2003).
 //!
 //! Every edge turns the surface by its dihedral angle. The turns of all edges within a reach, over the area there,
 //! are the mean curvature tensor of that place: many small turns of fine triangles weigh as much as the few large

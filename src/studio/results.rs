@@ -58,11 +58,13 @@ impl Tab {
     }
 }
 
-const COLOURS: [Color32; 4] = [
+/// One for each selector; told apart by colour-blind eyes too (Okabe and Ito).
+const COLOURS: [Color32; 5] = [
     Color32::from_rgb(86, 180, 233),
     Color32::from_rgb(230, 159, 0),
     Color32::from_rgb(0, 158, 115),
     Color32::from_rgb(204, 121, 167),
+    Color32::from_rgb(240, 228, 66),
 ];
 
 /// A plot that stays as it is: nothing is dragged or zoomed in it.
@@ -168,7 +170,9 @@ impl Studio {
         let words = set.and_then(SensorSet::certified);
         if let Some(words) = words.filter(|_| self.results.is_of_design() && self.as_designed()) {
             ui.separator();
-            ui.label(words).on_hover_text(ASSUMES);
+            // Cut rather than make the panel wider than the window.
+            let label = egui::Label::new(words).truncate();
+            ui.add(label).on_hover_text(ASSUMES);
         }
     }
 

@@ -343,7 +343,7 @@ impl Studio {
             d.design.chosen().len(),
             d.design.lead.title(),
             if d.design.selections.len() > 1 {
-                " for all four"
+                " for all"
             } else {
                 ""
             }

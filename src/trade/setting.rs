@@ -644,7 +644,8 @@ mod tests {
         let few = Setting {
             limits: centre.limits.map(|s| Spent { touches: 100, ..s }),
             ..centre
-        };
+        }
+        .canonical();
         assert_eq!(few.neighbours(Knob::ExpectedPlaces).len(), 0);
         assert_eq!(few.neighbours(Knob::Touches).len(), 1);
     }
