@@ -275,10 +275,9 @@ fn prediction_error(
     };
     let weights = factor.solve(&cross);
     // Prediction as a linear map of the training signals, the mean included.
-    let map = Mat::from_fn(n, m, |i, j| {
-        let rest: f64 = 1.0 - (0..n).map(|r| weights[(r, j)]).sum::<f64>();
-        weights[(i, j)] + rest / n as f64
-    });
+    let rest = |j: usize| 1.0 - (0..n).map(|r| weights[(r, j)]).sum::<f64>();
+    let rest: Vec<f64> = (0..m).map(rest).collect();
+    let map = Mat::from_fn(n, m, |i, j| weights[(i, j)] + rest[j] / n as f64);
     let inner = Mat::from_fn(n, n, |i, j| gram[(train[i], train[j])]);
     let outer = Mat::from_fn(n, m, |i, j| gram[(train[i], test[j])]);
     let spread = &inner * &map;

@@ -72,6 +72,7 @@ pub fn pressure(
                 t,
                 &WHOLE,
                 (centre, touch.tip_radius, grain),
+                AT_ONCE,
                 &mut shares,
             );
         }
@@ -90,15 +91,19 @@ pub fn pressure(
 /// A part of a facet, by the barycentric coordinates of its corners.
 type Piece = [[f64; 3]; 3];
 const WHOLE: Piece = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-/// A facet is split into this many pieces a side at once; larger ones are quartered first.
+/// A facet is split into this many pieces a side at once; larger ones are quartered first, down to this many: a tip
+/// covers so little of them that most quarters are left out.
 const AT_ONCE: f64 = 64.0;
+const OF_A_QUARTER: f64 = 8.0;
 
-/// Adds the pressure on a piece of a facet, split into equal pieces with the three-point rule on each.
+/// Adds the pressure on a piece of a facet, split into equal pieces with the three-point rule on each: no more of them a
+/// side than are taken at once.
 fn integrate(
     mesh: &TriMesh,
     t: u32,
     piece: &Piece,
     (centre, radius, grain): (DVec3, f64, f64),
+    at_once: f64,
     into: &mut Vec<(SurfacePoint, f64)>,
 ) {
     let corners = mesh.corners(t);
@@ -108,11 +113,18 @@ fn integrate(
         .map(|i| ends[i].distance(ends[(i + 1) % 3]))
         .fold(0.0, f64::max);
     let n = (longest / grain).ceil().max(1.0);
-    if n > AT_ONCE {
+    if n > at_once {
         if ends[0].distance(centre) < radius + longest {
             for quarter in pieces(2) {
                 let quarter = quarter.each_ref().map(|zeta| within(piece, zeta));
-                integrate(mesh, t, &quarter, (centre, radius, grain), into);
+                integrate(
+                    mesh,
+                    t,
+                    &quarter,
+                    (centre, radius, grain),
+                    OF_A_QUARTER,
+                    into,
+                );
             }
         }
         return;

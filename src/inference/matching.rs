@@ -87,16 +87,28 @@ impl Matching {
 
     /// The touch that explains a reading (strain, a channel each) best.
     pub fn find(&mut self, reading: &[f64]) -> Contact {
+        self.find_with_evidence(reading).0
+    }
+
+    /// As [`Self::find`], and the logarithm of the reading's density over all touches there may be, but for a constant
+    /// that depends neither on the reading nor on the channels that are trusted.
+    pub fn find_with_evidence(&mut self, reading: &[f64]) -> (Contact, f64) {
         let measured = Heard::new(reading, &self.errors, &self.used);
         self.score(&measured);
         let mut modes = self.modes(&measured);
         modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         let best = modes[0];
+        let over_best: f64 = (modes.iter().map(|m| m.log_evidence - best.log_evidence))
+            .map(f64::exp)
+            .sum();
+        let evidence = best.log_evidence + over_best.ln() + measured.log_density();
         let broad = BROAD * self.map.spacing();
-        if widest(best.covariance) > broad * broad {
-            return self.mean_of_templates(&measured, &best);
-        }
-        self.mean_of_modes(&measured, &modes)
+        let contact = if widest(best.covariance) > broad * broad {
+            self.mean_of_templates(&measured, &best)
+        } else {
+            self.mean_of_modes(&measured, &modes)
+        };
+        (contact, evidence)
     }
 
     /// As [`Self::find`] for a touch that goes on: from the place where it was, without looking everywhere.

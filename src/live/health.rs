@@ -49,8 +49,9 @@ pub struct Watcher {
     /// Logarithm of the running median of what second differences say the deviation of white noise is. A median, so
     /// that the samples in which a touch begins or ends are no noise, however steep it is.
     tremble: f64,
-    /// Looks in a row in which a touch that it should have felt left no trace.
-    silent: u32,
+    /// How much likelier it is dead than well, as the touches say that it should have felt since it last felt one:
+    /// natural logarithm.
+    silence: f64,
     dead: bool,
 }
 
@@ -78,8 +79,10 @@ const MEDIAN_OF_NORMAL: f64 = 0.6745;
 const TREMBLES: f64 = 0.35;
 /// Times the usual noise.
 const NOISY: f64 = 6.0;
-/// Looks in a row.
-const SILENT: u32 = 6;
+/// A channel is dead from here on: the sum of what single looks say (E. S. Page, Biometrika 41, 1954), of which none
+/// says more than this. However clear one touch is, the model may be off there.
+const SILENT: f64 = 24.0;
+const MOST_OF_A_LOOK: f64 = 4.0;
 
 impl Watcher {
     pub fn push(&mut self, count: f64, expected: &Expected) {
@@ -106,14 +109,17 @@ impl Watcher {
         self.seen += 1;
     }
 
-    /// One look at a touch: whether this channel should have felt it, and whether it did.
-    pub fn look(&mut self, should: bool, did: bool) {
-        match (should, did) {
-            (true, false) => self.silent += 1,
-            (true, true) => (self.silent, self.dead) = (0, false),
-            (false, _) => {}
-        }
-        self.dead |= self.silent >= SILENT;
+    /// One look at a touch that it felt.
+    pub fn felt(&mut self) {
+        (self.silence, self.dead) = (0.0, false);
+    }
+
+    /// One look at a touch that left no trace although it should have: how much likelier that is where the channel is
+    /// dead than where it is well (natural logarithm).
+    pub fn silent(&mut self, likelier: f64) {
+        let likelier = likelier.clamp(-MOST_OF_A_LOOK, MOST_OF_A_LOOK);
+        self.silence = (self.silence + likelier).max(0.0);
+        self.dead |= self.silence >= SILENT;
     }
 
     #[must_use]
@@ -123,7 +129,7 @@ impl Watcher {
 
     /// It is known to be dead.
     pub fn mark_dead(&mut self) {
-        (self.dead, self.silent) = (true, SILENT);
+        (self.dead, self.silence) = (true, SILENT);
     }
 
     #[must_use]
@@ -218,15 +224,19 @@ mod tests {
     #[test]
     fn a_channel_that_feels_nothing_is_dead_until_it_feels_again() {
         let mut watcher = Watcher::default();
-        for _ in 0..10 {
-            watcher.look(false, false);
+        // Touches that it may well have left alone.
+        for _ in 0..40 {
+            watcher.silent(1.0);
+            watcher.silent(-1.5);
         }
         assert!(watcher.health(&EXPECTED).is_good());
-        for _ in 0..6 {
-            watcher.look(true, false);
+        for _ in 0..5 {
+            watcher.silent(1e9);
         }
+        assert!(watcher.health(&EXPECTED).is_good());
+        watcher.silent(1e9);
         assert_eq!(watcher.health(&EXPECTED), Health::Dead);
-        watcher.look(true, true);
+        watcher.felt();
         assert!(watcher.health(&EXPECTED).is_good());
     }
 }

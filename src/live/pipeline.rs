@@ -486,10 +486,10 @@ impl Pipeline {
         /// A reading of less than this share of what it should be is none; one that should be less than this
         /// share of the others' rms proves nothing, nor one that is near the noise.
         const NONE: f64 = 0.2;
-        const CLEAR: f64 = 0.5;
+        const CLEAR: f64 = 0.1;
         const ABOVE_NOISE: f64 = 15.0;
-        /// Weighted squares more than without it: χ² of one degree of freedom in one of a million cases.
-        const CONTRADICTS: f64 = 24.0;
+        /// Deviation of what a dead gauge reads, over its noise: its rest may have moved a little.
+        const AT_REST: f64 = 4.0;
         if (time_us.saturating_sub(self.last_look) as f64) < LOOK_S * 1e6 {
             return;
         }
@@ -516,22 +516,28 @@ impl Pipeline {
                 strain[k].abs() < ABOVE_NOISE * self.matching.errors.noise[k] + 0.1 * rms;
             // Only one that says nothing, or was found dead, is worth asking the others about.
             if !suspicious && used[k] {
-                self.watchers[k].look(true, true);
+                self.watchers[k].felt();
                 continue;
             }
             self.matching.used[k] = false;
-            let others = self.matching.find(strain);
+            let (others, without) = self.matching.find_with_evidence(strain);
             self.matching.used[k] = true;
-            let all = self.matching.find(strain);
+            let (_, with) = self.matching.find_with_evidence(strain);
             self.matching.used.clone_from(&used);
             let (at, _) = self.matching.map.index.nearest(others.position);
             let should = self.matching.map.at(at)[k] * others.force;
             let noise = self.matching.errors.noise[k];
+            if strain[k] / should > NONE {
+                self.watchers[k].felt();
+                continue;
+            }
             let clear = should.abs() > ABOVE_NOISE * noise && should.abs() > CLEAR * rms;
             // Some touch may well leave it alone: only where none explains its silence is it ill.
             let explained = others.unexplained < 2.0 * count as f64 + 10.0;
-            let contradicts = all.unexplained > others.unexplained + CONTRADICTS;
-            self.watchers[k].look(clear && explained && contradicts, strain[k] / should > NONE);
+            if clear && explained {
+                let dead = without + log_normal(strain[k], AT_REST * noise);
+                self.watchers[k].silent(dead - with);
+            }
         }
     }
 
@@ -563,4 +569,9 @@ fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Logarithm of the normal density of a value around zero.
+fn log_normal(value: f64, deviation: f64) -> f64 {
+    -0.5 * ((value / deviation).powi(2) + (std::f64::consts::TAU * deviation * deviation).ln())
 }

@@ -11,6 +11,7 @@
 //! so that every sum stays one pass over the channels. Without a drift κ is zero.
 
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -149,6 +150,13 @@ impl<'a> Heard<'a> {
 
     pub fn reading(&self) -> &[f64] {
         &self.x
+    }
+
+    /// Logarithm of the density of a reading that is just what was expected, without gluing. Channels that are left
+    /// out have none.
+    pub fn log_density(&self) -> f64 {
+        let trusted = self.w.iter().filter(|w| **w > 0.0);
+        trusted.map(|w| 0.5 * (w / TAU).ln()).sum::<f64>() - self.log
     }
 
     /// As it is compared where gluing does not count.
