@@ -27,9 +27,8 @@ use crate::design::Inputs;
 use crate::io::mesh_file::read_mesh;
 use crate::io::project_file::{self, LoadedProject};
 use crate::io::{FileError, atomic, source};
-use crate::mesh::repair::Repair;
 use crate::placement::SelectorKind;
-use crate::project::{Masks, PartModel, Project, Unit};
+use crate::project::{Masks, Project, Unit};
 
 /// Decides where a handful of strain gauges go inside a flexible robot limb.
 ///
@@ -39,7 +38,7 @@ use crate::project::{Masks, PartModel, Project, Unit};
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// Project (NAME.hapdef.toml) or mesh (glb, gltf, inp, msh, obj, ply, stl) to open in the studio.
+    /// Project (NAME.hapdef.toml) or mesh (cdb, dat, glb, gltf, inp, msh, obj, ply, stl) to open in the studio.
     pub file: Option<PathBuf>,
     /// Unit of a mesh file that does not say its own.
     #[arg(long)]
@@ -148,16 +147,18 @@ pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
     if project_file::is_project(path) {
         return Ok(project_file::load(path)?);
     }
-    let loaded = read_mesh(path, unit, 0, Repair::default())?;
     let file_name = path
         .file_name()
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
     let mut project = Project::around(&file_name, unit);
-    if loaded.mesh.volume().is_some() {
-        project.part.model = PartModel::Solid;
-    }
+    let mut loaded = read_mesh(path, unit, project.part.body, project.part.repair())?;
+    let taken = loaded.found.answer(&mut project, |_| false);
+    project
+        .check()
+        .with_context(|| path.display().to_string())?;
+    loaded.repairs.notes.extend(taken);
     Ok(LoadedProject {
         inputs: Inputs {
             project,

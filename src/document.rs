@@ -288,10 +288,11 @@ impl Document {
         let p = &self.state.project;
         let mask = |layer| self.layer(layer).map(|m| self.fingerprints.of(m));
         format!(
-            "{:p} {} {} {:?} {} {:?} {:?}",
+            "{:p} {} {} {} {:?} {} {:?} {:?}",
             Arc::as_ptr(&self.part),
             p.part.thickness_mm,
             p.touch.tip_radius_mm,
+            p.touch.reach_mm,
             (p.budget.quality, p.budget.limits),
             p.touch.count,
             mask(Layer::Inside),

@@ -10,6 +10,8 @@ use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 /// What a gauge needs, lengths in metres, strains as ratios.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeasibleRules {
+    /// Radius of the pad that presses a gauge on while its glue cures.
+    pub pad: f64,
     /// Least distance over the surface from anything held.
     pub support_clearance: f64,
     /// The paper's k: neighbours whose centre of mass is looked at.
@@ -33,6 +35,8 @@ pub struct FeasibleRules {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {
+    NotBehind,
+    OutOfReach,
     SupportClearance,
     Edge,
     Footprint,
@@ -45,7 +49,9 @@ pub enum Filter {
 
 impl Filter {
     /// In the order they are applied.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
+        Self::NotBehind,
+        Self::OutOfReach,
         Self::SupportClearance,
         Self::Edge,
         Self::Footprint,
@@ -59,6 +65,8 @@ impl Filter {
     #[must_use]
     pub fn label(self) -> &'static str {
         match self {
+            Self::NotBehind => "Not behind a wall that is touched",
+            Self::OutOfReach => "Out of a hand's reach",
             Self::SupportClearance => "Too near a support",
             Self::Edge => "At an edge",
             Self::Footprint => "Gauge overhangs",
@@ -100,6 +108,32 @@ impl Feasibility {
     }
 }
 
+/// What lies behind and before sites, one value a site.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surroundings {
+    /// Whether a site is on the back of a wall that touches come to.
+    pub behind: Vec<bool>,
+    /// Radius of the largest pad that can be brought there (m).
+    pub room: Vec<f64>,
+}
+
+impl Surroundings {
+    /// Whether nothing can be brought to any site: what is closed is glued before it is closed.
+    #[must_use]
+    pub fn are_closed(&self) -> bool {
+        self.room.iter().all(|&room| room <= 0.0)
+    }
+
+    /// The same, where what is closed is open for those who glue.
+    #[must_use]
+    pub fn opened(mut self) -> Self {
+        if self.are_closed() {
+            self.room.fill(f64::INFINITY);
+        }
+        self
+    }
+}
+
 /// Everything the filters look at.
 pub struct FeasibleInput<'a> {
     pub mesh: &'a TriMesh,
@@ -108,6 +142,8 @@ pub struct FeasibleInput<'a> {
     pub supported: &'a [u32],
     pub points: &'a [SurfacePoint],
     pub sites: &'a [Site],
+    /// What lies before and behind the sites of a solid; absent for a shell, which is all wall.
+    pub surroundings: Option<&'a Surroundings>,
     /// One value a site: in the painted region or not; absent when nothing was painted.
     pub painted: Option<&'a [bool]>,
     /// One value a site: where no gauge may go; absent when there is no such region.
@@ -186,6 +222,8 @@ impl<'a> Filters<'a> {
         let (input, rules) = (self.input, self.rules);
         let site = &input.sites[i];
         match filter {
+            Filter::NotBehind => input.surroundings.is_none_or(|s| s.behind[i]),
+            Filter::OutOfReach => self.room(i) >= rules.pad,
             Filter::SupportClearance => self.distance(i) >= rules.support_clearance,
             Filter::Edge => self.off_centre[i] <= rules.edge_radius,
             Filter::Footprint => self.footprint(i).on_part,
@@ -208,7 +246,10 @@ impl<'a> Filters<'a> {
         let measured = sites.iter().filter_map(|&i| self.measured(filter, i));
         let mut values: Vec<f64> = measured.collect();
         values.sort_by(f64::total_cmp);
-        if matches!(filter, Filter::SupportClearance | Filter::Noise) {
+        if matches!(
+            filter,
+            Filter::OutOfReach | Filter::SupportClearance | Filter::Noise
+        ) {
             // These want much of what they measure.
             values.reverse();
         }
@@ -219,13 +260,18 @@ impl<'a> Filters<'a> {
     /// What a filter compares with its limit (m, or strain), where it has one.
     fn measured(&self, filter: Filter, i: usize) -> Option<f64> {
         match filter {
+            Filter::OutOfReach => Some(self.room(i)),
             Filter::SupportClearance => Some(self.distance(i)),
             Filter::Edge => Some(self.off_centre[i]),
             Filter::Flatness => Some(self.footprint(i).height),
             Filter::Noise => Some(self.input.sites[i].rms_strain),
             Filter::Range => Some(self.input.sites[i].peak_strain),
-            Filter::Footprint | Filter::Painted | Filter::KeptOut => None,
+            Filter::NotBehind | Filter::Footprint | Filter::Painted | Filter::KeptOut => None,
         }
+    }
+
+    fn room(&self, i: usize) -> f64 {
+        (self.input.surroundings).map_or(f64::INFINITY, |s| s.room[i])
     }
 
     fn distance(&self, i: usize) -> f64 {

@@ -18,6 +18,7 @@ use crate::elasticity::{Material, Section};
 use crate::evaluation::{EstimatorKind, Forces, Judging};
 use crate::feasible::FeasibleRules;
 use crate::limb::BoxMm;
+use crate::mesh::reach::FINGERTIP;
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
 use crate::placement::candidates::Reduction;
@@ -101,6 +102,9 @@ pub struct TouchKeys {
     pub tip_tolerance_mm: f64,
     pub count: usize,
     pub edge_margin_mm: f64,
+    /// Radius of the fingertip or stylus that comes: touches lie only where it gets to from outside.
+    #[serde(skip_serializing_if = "is_usual_reach")]
+    pub reach_mm: f64,
     /// Name of a mask (one value a vertex of the part): touches come only where it is set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region: Option<String>,
@@ -108,6 +112,17 @@ pub struct TouchKeys {
 
 /// The lightest and the hardest touch (N), where nothing else is said.
 const FORCES_N: [f64; 2] = [2.0, 30.0];
+
+/// Of whom touches the part, where nothing else is said: a fingertip.
+const REACH_MM: f64 = FINGERTIP * 1e3;
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes by reference"
+)]
+fn is_usual_reach(reach_mm: &f64) -> bool {
+    *reach_mm == REACH_MM
+}
 
 fn are_usual_forces(forces_n: &[f64; 2]) -> bool {
     *forces_n == FORCES_N
@@ -278,6 +293,7 @@ impl Default for TouchKeys {
             tip_tolerance_mm: 0.0,
             count: 4000,
             edge_margin_mm: 2.4,
+            reach_mm: REACH_MM,
             region: None,
         }
     }
@@ -363,6 +379,7 @@ impl Project {
                 body: 0,
                 weld_mm: 0.0,
                 fill_holes_mm: 0.0,
+                straighten_mm: part::defaults::straighten(),
                 elements: Elements::Graded,
                 model: PartModel::Shell,
                 thickness_mm: part::defaults::thickness(),
@@ -400,6 +417,8 @@ impl Project {
     #[must_use]
     pub fn feasible_rules(&self) -> FeasibleRules {
         FeasibleRules {
+            // Film and tape are about twice as wide as the grid.
+            pad: self.gauge.grid_width_mm * MM,
             support_clearance: self.feasible.support_clearance_mm * MM,
             // Sites at one place are neighbours of each other, which move no centre of mass.
             edge_neighbours: (self.feasible.edge_neighbours + 1) * self.gauge.directions - 1,
@@ -489,6 +508,12 @@ impl Project {
             most_n: self.live.largest_force_n.max(2.0 * hardest),
             judged_n,
         })
+    }
+
+    /// Radius (m) of the ball that touches have to get to the part by.
+    #[must_use]
+    pub fn fingertip(&self) -> f64 {
+        self.touch.reach_mm * MM
     }
 
     /// Force (N) and tip radius (m).

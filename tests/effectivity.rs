@@ -6,10 +6,10 @@ mod bench;
 use bench::hexes::{Bricks, ends};
 use bench::solids::clamp;
 use glam::DVec3;
-use hapdef::budget::{Quality, unwatched};
-use hapdef::elasticity::estimate::under_load;
+use hapdef::budget::{Elements, Quality, unwatched};
+use hapdef::elasticity::estimate::{self, Sample, under_load};
 use hapdef::elasticity::solid::SolidModel;
-use hapdef::elasticity::solid::ground::SolidGround;
+use hapdef::elasticity::solid::ground::{SolidGraded, SolidGround};
 use hapdef::elasticity::{Material, Model as _, Support, Touch};
 use hapdef::mesh::walls::Side;
 
@@ -264,4 +264,91 @@ fn the_slotted_tube_is_as_far_off_as_it_says() {
         honest(quality.name(), off.displacement, said.displacement_percent);
         honest(quality.name(), off.strain, said.strain_percent);
     }
+}
+
+/// The case on tetrahedra of its own, few and long.
+fn own(case: &Case, side_mm: f64) -> SolidGround {
+    let part = case.bricks.filled(DVec3::splat(side_mm * 1e-3));
+    let supports = std::slice::from_ref(&case.support);
+    let told = |_: DVec3| None::<Side>;
+    SolidGround::new(&part, MATERIAL, supports, &told, &unwatched).unwrap()
+}
+
+/// As good a displacement as asked for (%).
+fn asking(percent: f64) -> Elements {
+    Elements {
+        displacement_percent: percent,
+        strain_percent: f64::INFINITY,
+        ..Quality::Draft.budget().elements
+    }
+}
+
+fn read(graded: &SolidGraded, case: &Case) -> Sample {
+    let model = &graded.model;
+    let loads: Vec<_> = case.touches.iter().map(|t| model.load(t)).collect();
+    let solutions = model.system().solve_loads(&loads);
+    Sample::of(model, &case.touches, &solutions, &case.places)
+}
+
+#[test]
+fn given_tetrahedra_are_as_far_off_as_they_say() {
+    for (case, side_mm) in [(cube(), 5.0), (channel(), 12.0), (bracket(), 12.0)] {
+        let ground = own(&case, side_mm);
+        let (touches, places) = (&case.touches, &case.places);
+        let mut order = 1;
+        let mut first = None;
+        for asked in [50.0, 8.0, 1.0] {
+            let aim = asking(asked);
+            let graded = ground.grade(touches, places, &aim, &unwatched).unwrap();
+            let error = off(&under(&graded.model, &case.touches), &case.truth);
+            let said = graded.estimate;
+            println!(
+                "{}, asked {asked} %: order {}, {} unknowns: off {error:.2} %, said {:.2} %",
+                case.name,
+                graded.fineness.order,
+                graded.model.system().dimension(),
+                said.displacement_percent
+            );
+            assert!(graded.fineness.order > order && graded.fineness.halvings == 0);
+            assert!(error < 1.5 * asked, "{}: {error}", case.name);
+            honest(case.name, error, said.displacement_percent);
+            order = graded.fineness.order;
+            // What was foreseen of it: its factor and matrix from the pattern of its nodes alone.
+            let foreseen = ground.foresee(touches, places, touches.len(), &aim, &unwatched);
+            let foreseen = foreseen.unwrap().unwrap();
+            let system = graded.model.system();
+            assert_eq!(foreseen.order, order, "{}", case.name);
+            let memory = foreseen.bytes / system.bytes();
+            let unknowns = foreseen.unknowns / system.dimension() as f64;
+            println!("foreseen: memory {memory:.2}, unknowns {unknowns:.2} of what they are");
+            assert!((0.6..1.8).contains(&memory), "{}: {memory}", case.name);
+            assert!((0.99..1.6).contains(&unknowns), "{}: {unknowns}", case.name);
+            // Strains against those of the highest order.
+            let sample = read(&graded, &case);
+            let Some((given, strain)) = &first else {
+                first = Some((sample, said.strain_percent));
+                continue;
+            };
+            if asked == 1.0 {
+                let apart = estimate::left(given, &sample, touches, places, 1.0);
+                let ratio = strain / apart.strain_percent;
+                println!("{}: strain {ratio:.2} of what it was", case.name);
+                assert!((0.4..2.5).contains(&ratio), "{}: {ratio}", case.name);
+            }
+        }
+    }
+}
+
+/// Where there is no room for another order, pieces of the part are judged.
+#[test]
+fn given_tetrahedra_are_judged_whatever_the_memory() {
+    let case = channel();
+    let (touches, places) = (&case.touches, &case.places);
+    let ground = own(&case, 4.0);
+    let graded = ground.grade(touches, places, &asking(1e6), &unwatched);
+    let whole = graded.unwrap().estimate.displacement_percent;
+    let said = ground.judge_by_pieces(touches, places, &unwatched);
+    let said = said.unwrap().displacement_percent;
+    println!("whole {whole:.2} %, pieces {said:.2} %");
+    assert!((0.4..2.5).contains(&(said / whole)), "{said} {whole}");
 }

@@ -201,6 +201,7 @@ fn the_same_limb_at_a_micrometre_and_at_a_metre() {
         p.touch.force_n *= k * k;
         p.touch.tip_radius_mm *= k;
         p.touch.edge_margin_mm *= k;
+        p.touch.reach_mm *= k;
         p.sites.spacing_mm *= k;
         p.feasible.support_clearance_mm *= k;
         p.feasible.edge_radius_mm *= k;

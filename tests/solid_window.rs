@@ -120,7 +120,7 @@ fn side_at(studio: &Studio, place: DVec3) -> f64 {
     let faces = studio.advice().unwrap().faces.as_ref().unwrap();
     match faces.sides[nearest.unwrap()] {
         Side::Outside => -1.0,
-        Side::Rim => 0.0,
+        Side::Rim | Side::Frame => 0.0,
         Side::Inside => 1.0,
     }
 }

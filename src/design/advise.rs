@@ -2,16 +2,19 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::layout::size_mm;
-use super::{DesignError, Ground, Inputs, ground};
+use super::{DesignError, Ground, Inputs, SLOPE_TOUCHES, ground};
 use crate::budget::{Budget, Watch};
-use crate::elasticity::solid::ground::SolidGround;
+use crate::elasticity::solid::ground::{Foreseen, SolidGround};
+use crate::elasticity::solid::simplex::Simplex;
 use crate::elasticity::solid::sizing::Shape;
-use crate::elasticity::{ElasticError, scope};
+use crate::elasticity::{ElasticError, Touch, scope};
 use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::sample;
 use crate::mesh::walls::Side;
 use crate::project::PartModel;
 
@@ -42,13 +45,16 @@ pub struct Advice {
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Cost {
     pub model: PartModel,
+    /// Order that the tetrahedra of the part's file are raised to, where those are used.
+    pub order: Option<usize>,
     /// Size of its elements (mm).
     pub element_mm: f64,
     pub unknowns: f64,
     /// Processor time of all its stages (s), and memory of the largest (GB).
     pub seconds: f64,
     pub memory_gb: f64,
-    /// Error of the displacement under a touch (%) that finer elements would take away.
+    /// Error of the displacement under a touch (%) that finer elements would take away; no number where it could not
+    /// be computed.
     pub error_percent: f64,
     /// And what no elements take away (%): what the theory leaves out.
     pub theory_percent: f64,
@@ -65,13 +71,23 @@ impl Cost {
         } else {
             String::new()
         };
+        let elements = match self.order {
+            Some(order) => format!(
+                "the file's tetrahedra ({:.1} mm) at order {order}",
+                self.element_mm
+            ),
+            None => format!("elements of {:.1} mm", self.element_mm),
+        };
+        let error = if self.error_percent.is_nan() {
+            "an error that could not be computed".into()
+        } else {
+            format!("{:.1} % error of elements", self.error_percent)
+        };
         format!(
-            "elements of {:.1} mm, about {:.0} thousand unknowns, {:.0} s of processor time, {:.1} GB, {:.1} % error of elements{theory} under a touch",
-            self.element_mm,
+            "{elements}, about {:.0} thousand unknowns, {:.0} s of processor time, {:.1} GB, {error}{theory} under a touch",
             self.unknowns / 1e3,
             self.seconds.max(1.0),
             self.memory_gb.max(0.1),
-            self.error_percent
         )
     }
 }
@@ -92,7 +108,7 @@ pub fn advise(inputs: &Inputs, watch: Watch) -> Result<Advice, DesignError> {
     let mut as_solid = inputs.clone();
     as_solid.project.part.model = PartModel::Solid;
     match ground(&as_solid, watch) {
-        Ok(Ground::Solid(solid)) => Ok(of_closed(inputs, &solid)),
+        Ok(Ground::Solid(solid)) => of_closed(inputs, &solid, watch),
         Ok(Ground::Shell(_)) => unreachable!("a solid was asked for"),
         Err(DesignError::Elastic(ElasticError::Open { rims })) => Ok(of_open(inputs, rims, watch)),
         Err(error) => Err(error),
@@ -140,6 +156,7 @@ impl Asked {
         let unknowns = 6.0 * vertices;
         Cost {
             model: PartModel::Shell,
+            order: None,
             element_mm: size * 1e3,
             unknowns,
             seconds: SHELL.seconds(elements.passes as f64 * unknowns, unknowns, self.touches),
@@ -162,6 +179,7 @@ impl Asked {
         let last = unknowns(&size);
         Cost {
             model: PartModel::Solid,
+            order: None,
             element_mm: size * 1e3,
             unknowns: last,
             seconds: SOLID.seconds(sizes.iter().map(unknowns).sum(), last, self.touches),
@@ -170,7 +188,32 @@ impl Asked {
             theory_percent: 0.0,
         }
     }
+
+    /// Of the tetrahedra of the part's file, read at so many sites.
+    fn own(&self, foreseen: &Foreseen, sites: f64) -> Cost {
+        let solves = (self.touches + self.touches.min(SLOPE_TOUCHES)) as f64;
+        let nodes = Simplex::count(foreseen.order) as f64;
+        let built = ASSEMBLE * foreseen.assembled + FACTOR * foreseen.multiplications;
+        let read = READ * 9.0 * nodes * sites;
+        Cost {
+            model: PartModel::Solid,
+            order: Some(foreseen.order),
+            element_mm: foreseen.edge * 1e3,
+            unknowns: foreseen.unknowns,
+            seconds: SOLID.once + built + solves * (SOLVE * foreseen.entries + read),
+            memory_gb: foreseen.bytes / 1e9,
+            error_percent: foreseen.estimate.displacement_percent,
+            theory_percent: 0.0,
+        }
+    }
 }
+
+/// Processor time (s) of each entry of an element's matrix, each multiplication of a factorization, each entry of a
+/// factor that a touch is solved with, and each weight that a site is read with: as on a limb with tetrahedra.
+const ASSEMBLE: f64 = 4e-8;
+const FACTOR: f64 = 5e-11;
+const SOLVE: f64 = 1.2e-10;
+const READ: f64 = 3e-9;
 
 /// Error of the displacement under a touch (%) with triangles as large as the tip's radius, which falls with the
 /// square of their size; area of such triangles' vertices over their squared edge. As on the bundled limb.
@@ -220,7 +263,43 @@ impl Measured {
     }
 }
 
-fn of_closed(inputs: &Inputs, solid: &SolidGround) -> Advice {
+/// The tetrahedra that came with the part, where there are any: what they would cost, and why they could not be
+/// computed where that is so.
+fn of_own(
+    asked: &Asked,
+    inputs: &Inputs,
+    solid: &SolidGround,
+    watch: Watch,
+) -> Result<Option<(Cost, Option<String>)>, DesignError> {
+    /// Touches and places that the error is looked at with.
+    const TOUCHES: usize = 24;
+    const PLACES: usize = 120;
+    let (force, tip_radius) = inputs.project.tip();
+    let (outside, inside) = (&solid.outside, &solid.inside);
+    let touch = |at| Touch {
+        position: outside.point(at),
+        normal: outside.normal(at),
+        force,
+        tip_radius,
+    };
+    let on_outside = sample::random(outside, TOUCHES, 1, |_| true);
+    let touches: Vec<Touch> = on_outside.into_iter().map(touch).collect();
+    let on_inside = sample::random(inside, PLACES, 2, |_| true);
+    let places: Vec<DVec3> = on_inside.into_iter().map(|at| inside.point(at)).collect();
+    let spacing = inputs.project.sites.spacing_mm * 1e-3;
+    let sites = inside.area() / (spacing * spacing);
+    let aim = &asked.budget.elements;
+    match solid.foresee(&touches, &places, asked.touches, aim, watch) {
+        Ok(foreseen) => Ok(foreseen.map(|foreseen| (asked.own(&foreseen, sites), None))),
+        Err(stop @ ElasticError::Cancelled(_)) => Err(stop.into()),
+        Err(why) => {
+            let cost = solid.as_they_are().map(|own| asked.own(&own, sites));
+            Ok(cost.map(|cost| (cost, Some(why.to_string()))))
+        }
+    }
+}
+
+fn of_closed(inputs: &Inputs, solid: &SolidGround, watch: Watch) -> Result<Advice, DesignError> {
     let whole = &solid.whole;
     let wall_mm = [0.1, 0.5, 0.9].map(|s| 1e3 * solid.walls.thinner_than(whole, s));
     let is_face = |t: u32| solid.walls.sides[t as usize] != Side::Rim;
@@ -230,14 +309,16 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround) -> Advice {
     let area: f64 = faces.iter().map(|&t| whole.facet_area(t)).sum();
     let radius = scope::radii(whole, &faces, solid.wall());
     let asked = Asked::new(inputs, area / 2.0, radius[0], solid.shape());
-    let costs = [asked.shell(), asked.solid()];
+    let (own, why) = of_own(&asked, inputs, solid, watch)?.unzip();
+    let costs = [asked.shell(), own.unwrap_or_else(|| asked.solid())];
     let [shell, cells] = &costs;
-    let fits = if cells.total() > MUCH * shell.total() {
+    // The user's own tetrahedra follow the walls, whatever those are.
+    let fits = if own.is_none() && cells.total() > MUCH * shell.total() {
         PartModel::Shell
     } else {
         PartModel::Solid
     };
-    let words = vec![
+    let mut words = vec![
         format!(
             "The mesh is closed, with walls {:.2} mm thick (a tenth thinner than {:.2} mm, a tenth thicker than {:.2} mm){} on a part {:.0} mm across.",
             wall_mm[1],
@@ -258,7 +339,10 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround) -> Advice {
             "As it is a solid fits: taken as a shell, both faces of each wall would be walls of their own.".into()
         },
     ];
-    Advice {
+    if let Some(why) = why.flatten() {
+        words.push(format!("Its tetrahedra could not be computed yet: {why}."));
+    }
+    Ok(Advice {
         closed: true,
         wall_mm,
         radius_mm: radius.map(|r| r * 1e3),
@@ -268,7 +352,7 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround) -> Advice {
         costs,
         words,
         faces: Some(carried(&inputs.part, solid)),
-    }
+    })
 }
 
 fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {

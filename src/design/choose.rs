@@ -82,6 +82,7 @@ impl LookedAt {
             supported: &self.supported,
             points: &simulated.points,
             sites: &simulated.dataset.sites,
+            surroundings: simulated.surroundings.as_ref(),
             painted: self.painted.as_deref(),
             kept_out: self.kept_out.as_deref(),
         }
@@ -207,8 +208,8 @@ fn enough_touches(
         )
     } else {
         format!(
-            "hardly any place that was tried may be touched. Widen touch.region if there is one, or lower touch.edge_margin_mm ({} mm)",
-            asked.edge_margin_mm
+            "hardly any place that was tried may be touched. Widen touch.region if there is one, or lower touch.edge_margin_mm ({} mm) or touch.reach_mm ({} mm)",
+            asked.edge_margin_mm, asked.reach_mm
         )
     };
     Err(DesignError::TooFewTouches {

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::layout::{check_shape, size_mm};
 use super::{DesignError, Inputs, LAYOUT};
-use crate::budget::{Elements, Watch};
+use crate::budget::{Cancelled, Elements, Watch};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::grade::{self, Graded};
 use crate::elasticity::linearity::Linearity;
@@ -15,10 +15,11 @@ use crate::elasticity::shell::check_section;
 use crate::elasticity::solid::ground::SolidGround;
 use crate::elasticity::solid::immersed::Fineness;
 use crate::elasticity::{Freedoms, Model, Touch};
-use crate::mesh::TriMesh;
+use crate::feasible::Surroundings;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::remesh::Remeshed;
 use crate::mesh::walls::Side;
+use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::{Elements as ElementKind, PartModel, Project};
 
 /// A part with its supports, ready to have elements laid on it or cells around it.
@@ -59,7 +60,14 @@ pub fn ground(inputs: &Inputs, watch: Watch) -> Result<Ground, DesignError> {
         let told = told(inputs)?;
         let material = project.section().material;
         material.check()?;
-        let solid = SolidGround::new(&inputs.part, material, &supports, &told, watch)?;
+        let solid = SolidGround::touched_by(
+            project.fingertip(),
+            &inputs.part,
+            material,
+            &supports,
+            &told,
+            watch,
+        )?;
         return Ok(Ground::Solid(Box::new(solid)));
     }
     if project.part.thickness_mm > size_mm(&inputs.part) {
@@ -148,6 +156,39 @@ impl Ground {
             (Self::Solid(solid), _) => (Arc::clone(&solid.inside), solid.inside_held.clone()),
             (Self::Shell(_), Laid::Solid(_)) => unreachable!("cells are of solids"),
         }
+    }
+
+    /// What lies before and behind points of the surface that gauges are glued to; a shell is all wall.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn surroundings(
+        &self,
+        points: &[SurfacePoint],
+        watch: Watch,
+    ) -> Result<Option<Surroundings>, Cancelled> {
+        let Self::Solid(solid) = self else {
+            return Ok(None);
+        };
+        Ok(Some(Surroundings {
+            behind: solid.behind(points),
+            room: solid.room(points, watch)?,
+        }))
+    }
+
+    /// What of the part is neither touched nor glued to, in plain words.
+    #[must_use]
+    pub fn left_out(&self, surroundings: Option<&Surroundings>) -> Vec<String> {
+        let Self::Solid(solid) = self else {
+            return Vec::new();
+        };
+        let mut words = solid.reach.words(solid.fingertip);
+        if surroundings.is_some_and(Surroundings::are_closed) {
+            words.push(
+                "No pad can be brought to the inside from outside: it is taken that gauges are glued before the part is closed.".into(),
+            );
+        }
+        words
     }
 
     /// The surface that touches press on, on these elements.
@@ -265,7 +306,8 @@ impl Ground {
         }
     }
 
-    /// Finer elements, for the truth: half as large for a shell, two thirds for a solid.
+    /// Finer elements, for the truth: half as large for a shell, two thirds for a solid, its own tetrahedra one order
+    /// higher.
     fn finer(&self, laid: &Laid) -> Laid {
         match (self, laid) {
             (Self::Shell(shell), Laid::Shell(laid)) => Laid::Shell(shell.halved(laid)),

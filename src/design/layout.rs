@@ -2,6 +2,7 @@
 //! anything is begun.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::{DesignError, Inputs, LAYOUT, MOST_SITES};
 use crate::budget::Budget;
@@ -9,6 +10,7 @@ use crate::dataset::{self, GluingSlopes, Signal, TouchRegion};
 use crate::elasticity::load::Touch;
 use crate::memory;
 use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::reach::Finger;
 use crate::mesh::unroll::Unrolling;
 use crate::mesh::{Edge, SurfacePoint, TriMesh, sample};
 use crate::project::{Lattice, PartModel, Project};
@@ -175,21 +177,69 @@ pub(super) fn touches_on(
 ) -> Result<Vec<Touch>, DesignError> {
     let project = &inputs.project;
     let margin = project.touch.edge_margin_mm * 1e-3;
-    let region = Project::mask("touch.region", project.touch.region.as_ref(), &inputs.masks)?;
-    let index = region.map(|mask| (SurfaceIndex::new(&inputs.part), mask));
+    let mask = Project::mask("touch.region", project.touch.region.as_ref(), &inputs.masks)?;
+    let index = SurfaceIndex::new(&inputs.part);
+    let reached = reached_places(inputs, &index)?;
     let contains = |p: DVec3| {
-        (index.as_ref()).is_none_or(|(index, mask)| inputs.part.mostly_in(mask, index.nearest(p).0))
+        mask.is_none_or(|mask| inputs.part.mostly_in(mask, index.nearest(p).0)) && reached(p)
     };
-    let region = index.as_ref().map(|(index, mask)| TouchRegion {
-        triangles: near_mask(mesh, &inputs.part, index, mask),
+    let mut triangles = match mask {
+        Some(mask) => near_mask(mesh, &inputs.part, &index, mask),
+        None => vec![true; mesh.triangles().len()],
+    };
+    if project.part.model == PartModel::Shell {
+        // The outside of a solid is of reached facets already.
+        keep_reached(mesh, &reached, &mut triangles);
+    }
+    let region = TouchRegion {
+        triangles,
         contains: &contains,
-    });
+    };
     let tip = project.tip();
-    let touches = dataset::spread_touches(mesh, count, seed, margin, even, tip, region.as_ref());
+    let touches = dataset::spread_touches(mesh, count, seed, margin, even, tip, Some(&region));
     if touches.is_empty() {
         return Err(no_touches(mesh, inputs));
     }
     Ok(touches)
+}
+
+/// Whether the fingertip of a project gets to a place (m) of its part, or the user has said that it does.
+///
+/// # Errors
+/// [`DesignError`] for a mask that is not there.
+fn reached_places<'a>(
+    inputs: &'a Inputs,
+    index: &'a SurfaceIndex,
+) -> Result<impl Fn(DVec3) -> bool + Sync + 'a, DesignError> {
+    let (project, part) = (&inputs.project, &*inputs.part);
+    let solid = project.part.model == PartModel::Solid;
+    let outside = project.part.outside.as_ref().filter(|_| solid);
+    let told = Project::mask("part.outside", outside, &inputs.masks)?;
+    let finger = Finger::new(part, index, project.fingertip());
+    Ok(move |place: DVec3| {
+        let at = index.nearest(place).0;
+        let (point, normal) = (part.point(at), part.facet_normal(at.triangle));
+        told.is_some_and(|mask| part.mostly_in(mask, at))
+            || finger.reaches(point, normal)
+            // An open mid-surface faces as its file says: either side of it may be the outside.
+            || !solid && finger.reaches(point, -normal)
+    })
+}
+
+/// Leaves out the triangles that are out of reach in their middle and near all of their corners.
+fn keep_reached(mesh: &TriMesh, reached: &(impl Fn(DVec3) -> bool + Sync), triangles: &mut [bool]) {
+    /// How near to the corner.
+    const NEAR: f64 = 0.9;
+    let any_reached = |t: u32| {
+        let corners = mesh.corners(t);
+        let middle = corners.iter().sum::<DVec3>() / 3.0;
+        reached(middle) || corners.iter().any(|&c| reached(middle.lerp(c, NEAR)))
+    };
+    triangles
+        .par_iter_mut()
+        .enumerate()
+        .filter(|(_, kept)| **kept)
+        .for_each(|(t, kept)| *kept = any_reached(t as u32));
 }
 
 /// What keeps all touches away: the region that they are asked for, or the margin.
@@ -217,6 +267,11 @@ fn no_touches(mesh: &TriMesh, inputs: &Inputs) -> DesignError {
     } else if region.is_some() && !anywhere().is_empty() {
         format!(
             "the region that touches come to (touch.region) has no place farther than {margin_mm} mm (touch.edge_margin_mm) from a free edge, or lies where touches do not land. Widen it, or lower the margin"
+        )
+    } else if !anywhere().is_empty() {
+        format!(
+            "a fingertip of {} mm (touch.reach_mm) gets to none of its places from outside. Lower it, or see that the faces of the mesh look outward",
+            project.touch.reach_mm
         )
     } else {
         format!(

@@ -75,6 +75,15 @@ fn remedy(inputs: &Inputs, blame: &Blame) -> String {
     let (gauge, room) = (&project.gauge, &project.feasible);
     let limit = |by: f64| blame.limit.unwrap_or(f64::NAN) * by;
     let change = match blame.filter {
+        Filter::NotBehind => {
+            "paint the inside (part.inside) where walls that can be touched have their back, or lower touch.reach_mm: few places lie behind what a fingertip reaches".to_owned()
+        }
+        Filter::OutOfReach => format!(
+            "take a narrower gauge (gauge.grid_width_mm is {}): a pad twice as wide as its grid, {} mm, cannot be brought to the wall; one for {} mm can",
+            gauge.grid_width_mm,
+            2.0 * gauge.grid_width_mm,
+            down(limit(MM))
+        ),
         Filter::SupportClearance => format!(
             "lower feasible.support_clearance_mm from {} to {}, or make the supports smaller",
             room.support_clearance_mm,

@@ -14,6 +14,7 @@ use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::support::Region;
 use crate::elasticity::{Freedoms, Model, Support, Touch};
+use crate::feasible::Surroundings;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::Project;
@@ -34,6 +35,8 @@ pub struct Simulated {
     pub carried: Vec<SurfacePoint>,
     pub discretization: Discretization,
     pub points: Vec<SurfacePoint>,
+    /// What lies before and behind the sites of a solid.
+    pub surroundings: Option<Surroundings>,
     pub dataset: Dataset,
     pub unknowns: usize,
     /// Of a shell.
@@ -176,7 +179,7 @@ fn read(
     let mut dataset =
         dataset::simulate(model, touches, &points, signal, directions, &slopes, watch)?;
     dataset.work += before;
-    let notes = if dataset.touches.len() < project.touch.count {
+    let mut notes = if dataset.touches.len() < project.touch.count {
         vec![format!(
             "{} touches instead of the project's {}: the budget of this quality.",
             dataset.touches.len(),
@@ -192,7 +195,10 @@ fn read(
     cautious.extend(on_supports(inputs, &dataset.touches)?);
     let (mesh, held) = ground.gauge_surface(&laid);
     let index = SurfaceIndex::new(&mesh);
-    let points = places.iter().map(|&p| index.nearest(p).0).collect();
+    let points: Vec<SurfacePoint> = places.iter().map(|&p| index.nearest(p).0).collect();
+    let surroundings = ground.surroundings(&points, watch)?;
+    notes.extend(ground.left_out(surroundings.as_ref()));
+    let surroundings = surroundings.map(Surroundings::opened);
     let carried = carry(&index, &inputs.part);
     Ok(Simulated {
         achieved: Achieved {
@@ -215,6 +221,7 @@ fn read(
         carried,
         discretization: estimate,
         points,
+        surroundings,
         dataset,
         unknowns,
         linearity,
@@ -299,8 +306,7 @@ pub fn cautions(
     }
     if discretization.displacement_percent.is_nan() {
         notes.push(
-            "The error of the mesh could not be judged: its elements, halved, would be too many."
-                .into(),
+            "The error of the mesh could not be judged: finer elements would be too many.".into(),
         );
     } else if !discretization.meets(aim) {
         notes.push(format!(

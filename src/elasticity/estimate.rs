@@ -42,11 +42,38 @@ impl Discretization {
     /// The error of the coarser of the two meshes: what changed, and what was left after that.
     #[must_use]
     pub fn of_the_coarser(self) -> Self {
+        self.scaled(1.0 + DISPLACEMENT, 1.0 + STRAIN)
+    }
+
+    /// Errors that are so many times as large.
+    #[must_use]
+    pub fn scaled(self, displacement: f64, strain: f64) -> Self {
         Self {
-            displacement_mm: self.displacement_mm * (1.0 + DISPLACEMENT),
-            displacement_percent: self.displacement_percent * (1.0 + DISPLACEMENT),
-            strain_percent: self.strain_percent * (1.0 + STRAIN),
+            displacement_mm: self.displacement_mm * displacement,
+            displacement_percent: self.displacement_percent * displacement,
+            strain_percent: self.strain_percent * strain,
             ..self
+        }
+    }
+
+    /// Of the loads and places of all, which have as many loads each. Strains count where there are any.
+    #[must_use]
+    pub fn of_all(all: &[Self]) -> Self {
+        let rms = |value: fn(&Self) -> f64| {
+            let values = all.iter().map(value).filter(|v| !v.is_nan());
+            let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+            if count > 0.0 {
+                f64::sqrt(sum / count)
+            } else {
+                f64::NAN
+            }
+        };
+        Self {
+            displacement_mm: rms(|d| d.displacement_mm),
+            displacement_percent: rms(|d| d.displacement_percent),
+            strain_percent: rms(|d| d.strain_percent),
+            loads: all.iter().map(|d| d.loads).sum(),
+            places: all.iter().map(|d| d.places).sum(),
         }
     }
 

@@ -12,7 +12,9 @@ pub mod grip;
 pub mod ground;
 pub mod immersed;
 pub mod lagrange;
+pub mod orders;
 pub mod series;
+pub mod simplex;
 pub mod sizing;
 pub mod tetrahedra;
 pub mod tip;
@@ -308,8 +310,8 @@ fn in_unknowns(nodes: &[u32], unknowns: &[u32]) -> Vec<usize> {
     all.filter(|&&u| u != HELD).map(|&u| u as usize).collect()
 }
 
-/// The lower triangle's pattern: nodes that share an element are coupled.
-fn pattern(elements: &dyn Elements, unknowns: &[u32]) -> Result<SymmetricMatrix, FactorError> {
+/// The nodes that each node shares an element with, in rising order, itself among them.
+fn neighbours(elements: &dyn Elements) -> Vec<Vec<u32>> {
     let mut coupled: Vec<Vec<u32>> = vec![Vec::new(); elements.nodes().len()];
     for element in 0..elements.count() {
         let nodes = elements.nodes_of(element);
@@ -322,6 +324,12 @@ fn pattern(elements: &dyn Elements, unknowns: &[u32]) -> Result<SymmetricMatrix,
         list.dedup();
         list.shrink_to_fit();
     }
+    coupled
+}
+
+/// The lower triangle's pattern: nodes that share an element are coupled.
+fn pattern(elements: &dyn Elements, unknowns: &[u32]) -> Result<SymmetricMatrix, FactorError> {
+    let mut coupled = neighbours(elements);
     let couples: f64 = coupled.iter().map(|list| list.len() as f64).sum();
     check_bytes(bytes(couples * 9.0 / 2.0))?;
     let mut columns = vec![0];

@@ -9,12 +9,12 @@ use faer::linalg::triangular_solve::{
 use faer::perm::Perm;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
+use faer::sparse::linalg::{SupernodalThreshold, SymbolicSupernodalParams};
 use faer::{Accum, MatMut, MatRef, Par, Side};
 
 use crate::budget::Watch;
@@ -126,7 +126,7 @@ impl Factor {
             return Err(FactorError::NotPositive { row });
         }
         let scale: Vec<f64> = (0..n).map(|c| matrix.diagonal(c).sqrt().recip()).collect();
-        let symbolic = symbolic(matrix, order)?;
+        let symbolic = symbolic(matrix, order, 1)?;
         let factor_bytes = symbolic.len_val() as f64 * size_of::<f64>() as f64;
         check_bytes(factor_bytes + bytes(matrix.rows.len() as f64))?;
         let mut values = Vec::new();
@@ -186,6 +186,11 @@ impl Factor {
 
     pub fn dimension(&self) -> usize {
         self.scale.len()
+    }
+
+    /// Memory that it takes (bytes).
+    pub fn bytes(&self) -> f64 {
+        size_of_val(self.values.as_slice()) as f64
     }
 
     /// An empty block; each thread has its own.
@@ -291,14 +296,73 @@ pub fn check_bytes(bytes: f64) -> Result<(), FactorError> {
     Ok(())
 }
 
-/// The pattern of the factor.
+/// What a factor will be, found on nodes that have several unknowns each: much quicker than on the unknowns, and as
+/// good an order.
+pub struct Plan {
+    /// Nodes in the order of elimination: by approximate minimum degree.
+    pub order: Vec<u32>,
+    /// Entries of the factor and of the lower triangle of the matrix.
+    pub entries: f64,
+    pub of_matrix: f64,
+    /// Multiplications of the factorization, about.
+    pub multiplications: f64,
+}
+
+impl Plan {
+    /// Of nodes coupled with those in their lists (rising, themselves among them), with `each` unknowns.
+    ///
+    /// # Errors
+    /// [`FactorError::OutOfMemory`].
+    pub fn new(coupled: &[Vec<u32>], each: usize) -> Result<Self, FactorError> {
+        let (mut columns, mut rows) = (vec![0], Vec::new());
+        for (node, list) in coupled.iter().enumerate() {
+            let below = list.iter().map(|&n| n as usize).filter(|&n| n >= node);
+            rows.extend(below);
+            columns.push(rows.len());
+        }
+        let matrix = SymmetricMatrix {
+            columns,
+            rows,
+            values: Vec::new(),
+        };
+        let symbolic = symbolic(&matrix, None, each)?;
+        let order = symbolic.perm().map_or_else(
+            || (0..coupled.len() as u32).collect(),
+            |p| p.arrays().0.iter().map(|&i| i as u32).collect(),
+        );
+        let each = each as f64;
+        Ok(Self {
+            order,
+            entries: each.powi(2) * symbolic.len_val() as f64,
+            of_matrix: each.powi(2) * matrix.rows.len() as f64,
+            multiplications: each.powi(3) * numeric::multiplications(nodes(&symbolic)),
+        })
+    }
+
+    /// Memory that the matrix and its factor take (bytes).
+    #[must_use]
+    pub fn bytes(&self) -> f64 {
+        self.entries * size_of::<f64>() as f64 + bytes(self.of_matrix)
+    }
+}
+
+/// Two supernodes of together at most so many columns become one where less than such a share of its entries is zero
+/// then (the library's own values).
+const MERGED: [(usize, f64); 4] = [(4, 1.0), (16, 0.8), (48, 0.1), (usize::MAX, 0.05)];
+
+/// The pattern of the factor of a matrix whose rows stand for `each` unknowns.
 fn symbolic(
     matrix: &SymmetricMatrix,
     order: Option<Vec<usize>>,
+    each: usize,
 ) -> Result<SymbolicCholesky<usize>, FactorError> {
     let n = matrix.dimension();
+    let merged = MERGED.map(|(columns, zeros)| (columns.div_ceil(each), zeros));
     let params = CholeskySymbolicParams {
         supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+        supernodal_params: SymbolicSupernodalParams {
+            relax: Some(&merged),
+        },
         ..Default::default()
     };
     let order = order.map(|forward| {

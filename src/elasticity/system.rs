@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::rows::Rows;
-use super::solver::{BLOCK, Block, Factor, FactorError, SymmetricMatrix};
+use super::solver::{BLOCK, Block, Factor, FactorError, SymmetricMatrix, bytes};
 use crate::budget::{Cancelled, Watch, Work, report};
 use crate::tally::{self, Done};
 
@@ -63,6 +63,12 @@ impl System {
     #[must_use]
     pub fn dimension(&self) -> usize {
         self.factor.dimension()
+    }
+
+    /// Memory that the matrix and its factor take while it is factored (bytes).
+    #[must_use]
+    pub fn bytes(&self) -> f64 {
+        self.factor.bytes() + bytes(self.stiffness.rows.len() as f64)
     }
 
     /// Freedoms, held ones too.

@@ -1,16 +1,23 @@
-//! Meshes from files: glTF and GLB, OBJ, STL (both kinds), PLY; tetrahedra from Gmsh, Abaqus and `CalculiX`.
+//! Meshes from files: glTF and GLB, OBJ, STL (both kinds), PLY; tetrahedra and mid-surfaces from Gmsh, Abaqus,
+//! `CalculiX` and Ansys.
 //!
 //! What parses them may panic on hostile bytes, so it runs behind a boundary; what it returns is checked by
 //! [`TriMesh::taken_in`] like anything from outside. What a reader does not know, or leaves out, it notes.
 
+mod ansys;
 mod boundary;
+mod found;
 mod gltf;
+mod held;
 mod inp;
 mod msh;
 mod obj;
+mod place;
 mod ply;
+mod sets;
 mod stl;
 mod tetrahedra;
+mod unread;
 mod words;
 
 use std::collections::{BTreeSet, HashSet};
@@ -20,12 +27,18 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use self::boundary::quietly;
+use self::found::Said;
+use self::held::NodeSet;
+use self::place::Origin;
 use super::{FileError, source};
 use crate::memory;
 use crate::mesh::repair::Repair;
 use crate::mesh::volume::VolumeMesh;
 use crate::mesh::{MeshError, RepairReport, TriMesh};
+use crate::plain;
 use crate::project::{Masks, Unit};
+
+pub use self::found::Found;
 
 /// A mesh from a file with what was changed on the way in.
 pub struct LoadedMesh {
@@ -33,6 +46,8 @@ pub struct LoadedMesh {
     pub repairs: RepairReport,
     /// Vertices of each named group of the file that lie on the body.
     pub groups: Masks,
+    /// What the file says beside its mesh.
+    pub found: Found,
 }
 
 /// What a file holds, unchecked, in its own unit.
@@ -46,10 +61,12 @@ struct Soup {
     notes: Vec<String>,
     /// Tetrahedra on the positions: their surface is the mesh, whatever triangles there are.
     volume: Option<VolumeMesh>,
-    /// Line of the file that each of the tetrahedra stands in.
-    tetrahedron_lines: Vec<usize>,
-    /// Names and positions.
-    node_sets: Vec<(String, Vec<u32>)>,
+    /// Where each of the tetrahedra stands in the file.
+    origins: Vec<Origin>,
+    /// Positions by name.
+    node_sets: Vec<NodeSet>,
+    /// What it says of the part beside its mesh.
+    said: Said,
 }
 
 impl Soup {
@@ -65,7 +82,9 @@ impl Soup {
     /// so many.
     fn masks(&mut self, numbers: &[Option<u32>], vertices: usize) -> Masks {
         let mut masks = Masks::new();
-        let names: BTreeSet<&str> = self.groups.iter().map(|(name, ..)| name.as_str()).collect();
+        let of_triangles = self.groups.iter().map(|(name, ..)| name.as_str());
+        let of_nodes = self.node_sets.iter().map(|(name, _)| name.as_str());
+        let names: BTreeSet<&str> = of_triangles.chain(of_nodes).collect();
         if (names.len() as f64) * (vertices as f64) > memory::allowed() / 4.0 {
             let said = format!(
                 "the {} named groups of the file are too many to be kept as masks",
@@ -74,16 +93,21 @@ impl Soup {
             self.notes.push(said);
             return masks;
         }
-        for (name, first, last) in &self.groups {
+        let mut set = |name: &str, members: &mut dyn Iterator<Item = u32>| {
             let mask = masks
-                .entry(name.clone())
+                .entry(name.to_owned())
                 .or_insert_with(|| Arc::new(vec![false; vertices]));
             let mask = Arc::make_mut(mask);
-            for &v in self.triangles[*first..*last].iter().flatten() {
-                if let Some(number) = numbers[v as usize] {
-                    mask[number as usize] = true;
-                }
+            for number in members.filter_map(|v| numbers[v as usize]) {
+                mask[number as usize] = true;
             }
+        };
+        for (name, first, last) in &self.groups {
+            let corners = self.triangles[*first..*last].iter().flatten();
+            set(name, &mut corners.copied());
+        }
+        for (name, nodes) in &self.node_sets {
+            set(name, &mut nodes.iter().copied());
         }
         masks.retain(|_, mask| mask.iter().any(|&m| m));
         masks
@@ -93,7 +117,13 @@ impl Soup {
 /// Whether a mesh of this name does not say its unit.
 #[must_use]
 pub fn needs_unit(path: &Path) -> bool {
-    !ending(path).starts_with("gl")
+    !ending(path).starts_with("gl") && !may_say_unit(path)
+}
+
+/// Whether a mesh of this name may say its unit, or leave it out.
+#[must_use]
+pub fn may_say_unit(path: &Path) -> bool {
+    DECKS.contains(&ending(path).as_str())
 }
 
 fn ending(path: &Path) -> String {
@@ -103,7 +133,13 @@ fn ending(path: &Path) -> String {
 }
 
 /// File endings that can be read.
-pub const ENDINGS: [&str; 7] = ["glb", "gltf", "inp", "msh", "obj", "ply", "stl"];
+pub const ENDINGS: [&str; 9] = [
+    "cdb", "dat", "glb", "gltf", "inp", "msh", "obj", "ply", "stl",
+];
+/// Of Ansys.
+const DECKS: [&str; 2] = ["cdb", "dat"];
+/// The longest part of a file that says its own unit (m): what is larger was not meant so.
+const LONGEST: f64 = 10.0;
 
 /// Reads one body of a mesh file. `unit` is that of the file's numbers; glTF needs none.
 ///
@@ -129,9 +165,15 @@ pub fn read_mesh(
             "the file is empty. Export the mesh again",
         ));
     }
-    let scale = scale(path, unit)?;
-    parse_mesh(&bytes, &ending, path.parent(), scale, body, &repair)
-        .map_err(|m| FileError::broken(path, m))
+    if unit.is_none() && needs_unit(path) {
+        return Err(FileError::broken(path, NO_UNIT));
+    }
+    let read = || {
+        let mut soup = parsed(&bytes, &ending, path.parent())?;
+        let scale = scale(&mut soup, unit, may_say_unit(path))?;
+        taken_in(soup, scale, body, &repair)
+    };
+    read().map_err(|m| FileError::broken(path, m))
 }
 
 /// Reads one body of a mesh from the bytes of a file with this ending; `folder` is where other files
@@ -147,42 +189,67 @@ pub fn parse_mesh(
     body: usize,
     repair: &Repair,
 ) -> Result<LoadedMesh, String> {
+    taken_in(parsed(bytes, ending, folder)?, scale, body, repair)
+}
+
+fn parsed(bytes: &[u8], ending: &str, folder: Option<&Path>) -> Result<Soup, String> {
     let parse = || match ending {
         "obj" => obj::read(bytes),
         "ply" => ply::read(bytes),
         "stl" => stl::read(bytes),
         "msh" => msh::read(bytes),
         "inp" => inp::read(bytes),
+        "cdb" | "dat" => ansys::read(bytes),
         _ => gltf::read(bytes, folder),
     };
-    let mut soup = quietly(parse)
+    quietly(parse)
         .unwrap_or_else(|| Err("the file is damaged".into()))
-        .map_err(|m| format!("{m}. Export the mesh again"))?;
+        .map_err(|m| format!("{m}. Export the mesh again"))
+}
+
+/// One body of what a file holds, in a unit of so many metres.
+fn taken_in(
+    mut soup: Soup,
+    scale: f64,
+    body: usize,
+    repair: &Repair,
+) -> Result<LoadedMesh, String> {
     for p in &mut soup.positions {
         *p *= scale;
     }
-    if let Some(volume) = soup.volume.take() {
-        return tetrahedral(&soup, volume, scale, body);
-    }
+    let mut loaded = match soup.volume.take() {
+        Some(volume) => tetrahedral(&mut soup, volume, scale, body, repair.straighten)?,
+        None => surface(&mut soup, body, repair)?,
+    };
+    loaded.found = soup.said.found(
+        scale,
+        &loaded.groups,
+        loaded.mesh.volume().is_some(),
+        &mut soup.notes,
+    );
+    loaded.repairs.notes = soup.notes;
+    Ok(loaded)
+}
+
+/// A body of a mesh of triangles.
+fn surface(soup: &mut Soup, body: usize, repair: &Repair) -> Result<LoadedMesh, String> {
     let taken = TriMesh::taken_in(&soup.positions, &soup.triangles, body, repair);
     let taken = taken.map_err(|e: MeshError| e.to_string())?;
-    let groups = soup.masks(&taken.vertices, taken.mesh.positions().len());
     Ok(LoadedMesh {
-        groups,
+        groups: soup.masks(&taken.vertices, taken.mesh.positions().len()),
         mesh: taken.mesh,
-        repairs: RepairReport {
-            notes: soup.notes,
-            ..taken.repairs
-        },
+        repairs: taken.repairs,
+        found: Found::default(),
     })
 }
 
-/// A piece of a mesh of tetrahedra, its surface as the mesh.
+/// A piece of a mesh of tetrahedra, its surface as the mesh; nodes on bent edges move by `straighten` (m) at most.
 fn tetrahedral(
-    soup: &Soup,
+    soup: &mut Soup,
     mut volume: VolumeMesh,
     scale: f64,
     body: usize,
+    straighten: f64,
 ) -> Result<LoadedMesh, String> {
     for p in &mut volume.nodes {
         *p *= scale;
@@ -192,7 +259,10 @@ fn tetrahedral(
         return Err(format!("node {node} is not a finite point"));
     }
     let whole = volume.checked();
-    let whole = whole.map_err(|e| tetrahedra::in_line(&e, &soup.tetrahedron_lines))?;
+    let mut whole = whole.map_err(|e| tetrahedra::at_origin(&e, &soup.origins))?;
+    let mended = whole.straighten(straighten);
+    let mended = mended.map_err(|e| tetrahedra::at_origin(&e, &soup.origins))?;
+    soup.notes.extend(mended.in_words());
     let (piece, mesh, bodies) = whole.body(body).map_err(|e| e.to_string())?;
     let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
     let groups = (soup.node_sets.iter())
@@ -210,10 +280,10 @@ fn tetrahedral(
         groups: groups.collect(),
         repairs: RepairReport {
             bodies,
-            notes: soup.notes.clone(),
             ..RepairReport::default()
         },
         mesh: mesh.around(piece),
+        found: Found::default(),
     })
 }
 
@@ -225,15 +295,49 @@ pub fn parse_glb(bytes: &[u8]) -> Result<LoadedMesh, String> {
     parse_mesh(bytes, "glb", None, 1.0, 0, &Repair::default())
 }
 
-fn scale(path: &Path, unit: Option<Unit>) -> Result<f64, FileError> {
-    match unit {
-        Some(unit) => Ok(unit.metres()),
-        None if !needs_unit(path) => Ok(1.0),
-        None => Err(FileError::broken(
-            path,
-            "this format does not say its unit. Give it: --unit mm, cm, m or in (part.unit in a project)",
-        )),
+const NO_UNIT: &str =
+    "this format does not say its unit. Give it: --unit mm, cm, m or in (part.unit in a project)";
+
+/// The unit (m) of what a file holds: what the user says comes before what the file says. Only decks may say it.
+fn scale(soup: &mut Soup, given: Option<Unit>, deck: bool) -> Result<f64, String> {
+    let own = soup.said.system;
+    match (given, own) {
+        (Some(given), own) => {
+            if let Some(own) = own
+                && own.length != given
+            {
+                soup.notes.push(format!(
+                    "the file has its lengths in {} (line {}), and they are taken in {}, as was asked for",
+                    own.length.name(),
+                    own.line,
+                    given.name()
+                ));
+            }
+            Ok(given.metres())
+        }
+        (None, Some(own)) => {
+            let metres = own.length.metres();
+            let long = extent(&soup.positions) * metres;
+            if long > LONGEST {
+                return Err(format!(
+                    "the part is {} long in the unit that line {} names ({}): its coordinates are in another one. Say which: --unit mm, cm, m or in (part.unit in a project)",
+                    plain::mm(long * 1e3),
+                    own.line,
+                    own.length.name()
+                ));
+            }
+            Ok(metres)
+        }
+        (None, None) if deck => Err(NO_UNIT.replace("this format", "this file")),
+        (None, None) => Ok(1.0),
     }
+}
+
+/// The longest side of the box around points, in their unit.
+fn extent(points: &[DVec3]) -> f64 {
+    let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = (points.iter()).fold(none, |(low, high), &p| (low.min(p), high.max(p)));
+    (high - low).max_element()
 }
 
 #[cfg(test)]

@@ -46,14 +46,21 @@ pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
         .join(&project.part.mesh);
     let LoadedMesh {
         mesh,
-        repairs,
+        mut repairs,
         groups,
+        found,
     } = read_mesh(
         &mesh_path,
         project.part.unit,
         project.part.body,
         project.part.repair(),
     )?;
+    let keys: toml::Table = toml::from_str(&text).unwrap_or_default();
+    let taken = found.answer(&mut project, |key| is_given(&keys, key));
+    project
+        .check()
+        .map_err(|e| FileError::broken(&mesh_path, e))?;
+    repairs.notes.extend(taken);
     let vertices = mesh.positions().len();
     let masks = masks::read(path, &mut project, groups, vertices)?;
     let painted = masks::read_painted(path, &project, vertices)?;
@@ -72,6 +79,15 @@ pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
         mesh_path,
         bundled: false,
     })
+}
+
+/// Whether a project gives a key, as `table.key`.
+fn is_given(table: &toml::Table, key: &str) -> bool {
+    let Some((name, key)) = key.split_once('.') else {
+        return table.contains_key(key);
+    };
+    let inner = table.get(name).and_then(toml::Value::as_table);
+    inner.is_some_and(|inner| inner.contains_key(key))
 }
 
 /// The name without its fingerprint.
@@ -307,6 +323,7 @@ mod tests {
         };
         p.gauge.drift_microstrain = 1.0 / 3.0;
         p.touch.tip_tolerance_mm = 0.75;
+        p.touch.reach_mm = 1.25;
         p.calibration = crate::project::CalibrationKeys {
             place_mm: 0.0,
             force_percent: 7.5,
@@ -379,12 +396,14 @@ mod tests {
             .split_inclusive('\n')
             .filter(|line| {
                 let new = [
+                    "straighten_mm",
                     "forces_n",
                     "[gauge.tolerance]",
                     "place_mm",
                     "angle_deg",
                     "gain_percent",
                     "tip_tolerance_mm",
+                    "reach_mm",
                     "drift_microstrain",
                     "[calibration]",
                     "force_percent",

@@ -8,12 +8,24 @@ use super::numbers::NumberMap;
 use super::report::RepairReport;
 
 /// Repairs that are asked for; without them only what must be is done.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Repair {
     /// Vertices nearer to each other than this are joined (m); zero joins equal ones only.
     pub weld: f64,
     /// Holes up to this far across are filled (m).
     pub fill_holes: f64,
+    /// The farthest that the node of an edge may be moved where a bent edge turns a tetrahedron inside out (m).
+    pub straighten: f64,
+}
+
+impl Default for Repair {
+    fn default() -> Self {
+        Self {
+            weld: 0.0,
+            fill_holes: 0.0,
+            straighten: f64::INFINITY,
+        }
+    }
 }
 
 /// For each point the first of the points kept that it is joined with, and those kept. Points within

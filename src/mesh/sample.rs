@@ -48,6 +48,9 @@ pub fn random_among(
         })
         .collect();
     let total = cumulative.last().copied().unwrap_or(0.0);
+    if total <= 0.0 {
+        return Vec::new();
+    }
     let mut points = Vec::with_capacity(count);
     let mut attempts = count.saturating_mul(ATTEMPTS);
     while points.len() < count && attempts > 0 {

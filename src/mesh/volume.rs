@@ -1,10 +1,15 @@
 //! Tetrahedra that the user has: nodes, quadratic elements, and the surface around them.
 
+mod straighten;
+
 use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
 use super::{MeshError, TriMesh};
+use crate::plain;
+
+pub use straighten::Straightened;
 
 /// Edges of a tetrahedron that nodes 4 to 9 lie on, as Abaqus counts them.
 pub const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
@@ -27,8 +32,8 @@ pub struct VolumeMesh {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tetrahedron {
     pub corners: [u32; 4],
-    /// The nodes on [`EDGES`] of a quadratic one.
-    pub middles: Option<[u32; 6]>,
+    /// The nodes on [`EDGES`], where it has some.
+    pub middles: [Option<u32>; 6],
 }
 
 /// The tetrahedron behind a triangle of the surface, and where the triangle's corners are in it.
@@ -42,9 +47,21 @@ pub enum VolumeError {
     )]
     Flat { element: usize, place: DVec3 },
     #[error(
-        "the tetrahedron is turned inside out at one of its nodes (near {place:.2} mm): straighten its edges in the mesher"
+        "an edge of the tetrahedron is bent so far that it is turned inside out there (near {place:.2} mm), and straightening that edge would move its node by {}, more than the {} that are allowed: raise part.straighten_mm, or straighten it in the mesher",
+        plain::mm(.shift * 1e3),
+        plain::mm(.most * 1e3)
     )]
-    Folded { element: usize, place: DVec3 },
+    Folded {
+        element: usize,
+        place: DVec3,
+        /// How far the node in the middle of the edge would move, and how far it may (m).
+        shift: f64,
+        most: f64,
+    },
+    #[error(
+        "one of its nodes lies in the middle of two edges, or is a corner elsewhere: write the mesh anew"
+    )]
+    Astray { element: usize },
     #[error(
         "the tetrahedron overlaps another one that it shares a face with (near {place:.2} mm): mesh the part anew"
     )]
@@ -64,6 +81,7 @@ impl VolumeError {
         match *self {
             Self::Flat { element, .. }
             | Self::Folded { element, .. }
+            | Self::Astray { element }
             | Self::Overlapping { element, .. }
             | Self::Torn { element } => Some(element),
             Self::Surface(_) => None,
@@ -74,25 +92,40 @@ impl VolumeError {
 /// Nodes at the middles of edges, by their ends, the smaller one first.
 type Middles = HashMap<(u32, u32), u32>;
 
+/// An edge by its ends, the smaller one first.
+fn edge(tet: &[u32], ends: [usize; 2]) -> (u32, u32) {
+    let [a, b] = ends.map(|i| tet[i]);
+    (a.min(b), a.max(b))
+}
+
 impl VolumeMesh {
-    /// Of linear and quadratic tetrahedra; a linear one shares the node on an edge with a quadratic neighbour.
+    /// Of linear and quadratic tetrahedra; an edge without a node of its own shares that of its neighbour.
     ///
     /// # Errors
-    /// [`VolumeError::Torn`] where quadratic ones have different nodes on the same edge: they would move apart.
+    /// [`VolumeError::Torn`] where two have different nodes on the same edge, which would move apart;
+    /// [`VolumeError::Astray`] for a node that is on one edge and somewhere else too.
     pub fn of(nodes: Vec<DVec3>, tetrahedra: &[Tetrahedron]) -> Result<Self, VolumeError> {
         let mut middles = Middles::new();
+        let mut owners: HashMap<u32, (u32, u32)> = HashMap::new();
+        let corners: Vec<[u32; 4]> = tetrahedra.iter().map(|tet| tet.corners).collect();
+        let mut is_corner = vec![false; nodes.len()];
+        for &corner in corners.iter().flatten() {
+            is_corner[corner as usize] = true;
+        }
         for (element, tet) in tetrahedra.iter().enumerate() {
-            let Some(own) = tet.middles else { continue };
-            for (ends, middle) in EDGES.iter().zip(own) {
-                let [a, b] = ends.map(|i| tet.corners[i]);
-                let known = middles.entry((a.min(b), a.max(b))).or_insert(middle);
-                if *known != middle {
+            for (&ends, middle) in EDGES.iter().zip(tet.middles) {
+                let Some(middle) = middle else { continue };
+                let edge = edge(&tet.corners, ends);
+                if *middles.entry(edge).or_insert(middle) != middle {
                     return Err(VolumeError::Torn { element });
+                }
+                let astray = *owners.entry(middle).or_insert(edge) != edge;
+                if astray || is_corner[middle as usize] {
+                    return Err(VolumeError::Astray { element });
                 }
             }
         }
-        let from_linear = tetrahedra.iter().any(|tet| tet.middles.is_none());
-        let corners: Vec<[u32; 4]> = tetrahedra.iter().map(|tet| tet.corners).collect();
+        let from_linear = (tetrahedra.iter()).any(|tet| tet.middles.iter().any(Option::is_none));
         Ok(Self {
             from_linear,
             ..Self::completed(nodes, &corners, middles)
@@ -114,8 +147,8 @@ impl VolumeMesh {
                     if k < 4 {
                         return tet[k];
                     }
-                    let [a, b] = EDGES[k - 4].map(|i| tet[i]);
-                    *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                    let (a, b) = edge(tet, EDGES[k - 4]);
+                    *middles.entry((a, b)).or_insert_with(|| {
                         nodes.push((nodes[a as usize] + nodes[b as usize]) / 2.0);
                         nodes.len() as u32 - 1
                     })
@@ -129,7 +162,8 @@ impl VolumeMesh {
         }
     }
 
-    /// Turns elements to positive volumes and checks them.
+    /// Turns elements to positive volumes and checks them with straight edges: what bent ones do is
+    /// [`Self::straighten`]'s.
     ///
     /// # Errors
     /// [`VolumeError`] naming the element that is none.
@@ -150,13 +184,6 @@ impl VolumeMesh {
                 // The nodes on the edges 01 and 02, and on 13 and 23, change places with them.
                 tet.swap(4, 6);
                 tet.swap(8, 9);
-            }
-            let p = tet.map(|n| self.nodes[n as usize]);
-            for corner in 0..10 {
-                let at = node_place(corner);
-                if jacobian(&p, at).determinant() <= 0.0 {
-                    return Err(VolumeError::Folded { element, place });
-                }
             }
         }
         match self.overlapping() {
@@ -464,9 +491,6 @@ mod tests {
             mesh.checked(),
             Err(VolumeError::Flat { element: 0, .. })
         ));
-        let mut folded = cube();
-        folded.nodes[folded.tetrahedra[2][4] as usize] = DVec3::splat(5.0);
-        assert!(matches!(folded.checked(), Err(VolumeError::Folded { .. })));
     }
 
     #[test]
@@ -493,19 +517,23 @@ mod tests {
         let mut mixed = [
             Tetrahedron {
                 corners: [0, 1, 2, 3],
-                middles: Some(std::array::from_fn(|k| own[4 + k])),
+                middles: std::array::from_fn(|k| Some(own[4 + k])),
             },
             Tetrahedron {
                 corners: [1, 2, 3, 4],
-                middles: None,
+                middles: [None; 6],
             },
         ];
         // The nodes of the first, the far corner, and those on the three edges to it.
         let mesh = VolumeMesh::of(quadratic.nodes.clone(), &mixed).unwrap();
         assert_eq!(mesh.nodes.len(), 11 + 3);
         // Another node on the edge 1, 2 would let them move apart.
-        mixed[1].middles = Some([own[4], own[8], own[9], own[6], own[6], own[7]]);
-        let torn = VolumeMesh::of(quadratic.nodes, &mixed).unwrap_err();
+        mixed[1].middles = [own[4], own[8], own[9], own[6], own[6], own[7]].map(Some);
+        let torn = VolumeMesh::of(quadratic.nodes.clone(), &mixed).unwrap_err();
         assert_eq!(torn, VolumeError::Torn { element: 1 });
+        // A node on two edges could not be moved for one of them.
+        mixed[1].middles = [Some(own[5]), None, None, Some(own[4]), None, None];
+        let astray = VolumeMesh::of(quadratic.nodes, &mixed).unwrap_err();
+        assert_eq!(astray, VolumeError::Astray { element: 1 });
     }
 }

@@ -19,6 +19,8 @@ pub enum Side {
     Inside,
     /// The end of a wall.
     Rim,
+    /// A face that no touch comes to, and that is not the back of one that touches come to.
+    Frame,
 }
 
 /// What is known of a part's walls, one value a facet.
@@ -29,6 +31,8 @@ pub struct Walls {
     pub thickness: Vec<f64>,
     /// Through the open to a facing surface (m); infinite where there is none.
     pub gaps: Vec<f64>,
+    /// The facet on the other face of the wall, where there is one.
+    pub facing: Vec<Option<u32>>,
 }
 
 /// Directions that a facet looks in.
@@ -64,10 +68,12 @@ impl Walls {
             .map(|(t, facet)| facet.side(mesh, t, typical))
             .collect();
         let gaps = facets.iter().map(|f| f.gap).collect();
+        let facing = facets.iter().map(|f| f.facing).collect();
         let mut walls = Self {
             sides,
             thickness,
             gaps,
+            facing,
         };
         for _ in 0..ROUNDS {
             walls.ask_neighbours(mesh);
@@ -126,6 +132,8 @@ struct Facet {
     beside: f64,
     /// m.
     gap: f64,
+    /// The facet behind its wall.
+    facing: Option<u32>,
 }
 
 impl Facet {
@@ -163,6 +171,7 @@ impl Facet {
             thickness: facing.map_or(f64::NAN, |(_, distance)| distance + off),
             gap: ahead.map_or(f64::INFINITY, |(_, distance)| distance + off),
             beside,
+            facing: facing.map(|(hit, _)| hit.triangle),
         }
     }
 
@@ -199,7 +208,7 @@ impl Facet {
 }
 
 /// Axes with the third along a normal.
-fn frame(normal: DVec3) -> DMat3 {
+pub(super) fn frame(normal: DVec3) -> DMat3 {
     let x = normal.any_orthonormal_vector();
     DMat3::from_cols(x, normal.cross(x), normal)
 }
@@ -225,7 +234,7 @@ fn openness(index: &SurfaceIndex, at: DVec3, frame: &DMat3, looks: &[DVec3]) -> 
 }
 
 /// Of the thicknesses, weighted by area, the middle one.
-fn middle(thickness: &[f64], mesh: &TriMesh) -> f64 {
+pub(super) fn middle(thickness: &[f64], mesh: &TriMesh) -> f64 {
     share_of(thickness, mesh, 0.5)
 }
 

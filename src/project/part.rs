@@ -60,6 +60,13 @@ pub struct Part {
     /// Holes up to this far across are filled.
     #[serde(default)]
     pub fill_holes_mm: f64,
+    // What is usual is not serialized: the fingerprints of trades that were measured before this key still hold.
+    /// The farthest that a node of a tetrahedron is moved where its bent edge turns it inside out.
+    #[serde(
+        default = "defaults::straighten",
+        skip_serializing_if = "defaults::is_usual_straighten"
+    )]
+    pub straighten_mm: f64,
     /// What the elastic model is computed on.
     #[serde(default)]
     pub elements: Elements,
@@ -85,6 +92,7 @@ impl Part {
         Repair {
             weld: self.weld_mm * MM,
             fill_holes: self.fill_holes_mm * MM,
+            straighten: self.straighten_mm * MM,
         }
     }
 }
@@ -159,5 +167,18 @@ pub struct SupportKeys {
 pub(super) mod defaults {
     pub fn thickness() -> f64 {
         1.5
+    }
+
+    /// More than edges of a sound mesh of a limb are bent.
+    pub fn straighten() -> f64 {
+        10.0
+    }
+
+    #[allow(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "serde asks with a reference"
+    )]
+    pub fn is_usual_straighten(millimetres: &f64) -> bool {
+        *millimetres == straighten()
     }
 }

@@ -62,6 +62,7 @@ impl Project {
             ("part.thickness_mm", part.thickness_mm, LENGTH),
             ("part.weld_mm", part.weld_mm, ROOM),
             ("part.fill_holes_mm", part.fill_holes_mm, ROOM),
+            ("part.straighten_mm", part.straighten_mm, ROOM),
             (
                 "material.youngs_modulus_gpa",
                 self.material.youngs_modulus_gpa,
@@ -126,6 +127,7 @@ impl Project {
         let (tolerance, hand) = (&gauge.tolerance, &self.calibration);
         all_bounded([
             ("touch.edge_margin_mm", self.touch.edge_margin_mm, ROOM),
+            ("touch.reach_mm", self.touch.reach_mm, ROOM),
             (
                 "touch.tip_tolerance_mm",
                 self.touch.tip_tolerance_mm,
@@ -434,10 +436,11 @@ mod tests {
     type Place = fn(&mut Project) -> &mut f64;
 
     /// Every number of a project that may not be just any.
-    const NUMBERS: [(&str, Place); 37] = [
+    const NUMBERS: [(&str, Place); 39] = [
         ("part.thickness_mm", |p| &mut p.part.thickness_mm),
         ("part.weld_mm", |p| &mut p.part.weld_mm),
         ("part.fill_holes_mm", |p| &mut p.part.fill_holes_mm),
+        ("part.straighten_mm", |p| &mut p.part.straighten_mm),
         ("material.youngs_modulus_gpa", |p| {
             &mut p.material.youngs_modulus_gpa
         }),
@@ -447,6 +450,7 @@ mod tests {
         ("touch.force_n", |p| &mut p.touch.force_n),
         ("touch.tip_radius_mm", |p| &mut p.touch.tip_radius_mm),
         ("touch.edge_margin_mm", |p| &mut p.touch.edge_margin_mm),
+        ("touch.reach_mm", |p| &mut p.touch.reach_mm),
         ("touch.tip_tolerance_mm", |p| &mut p.touch.tip_tolerance_mm),
         ("gauge.drift_microstrain", |p| {
             &mut p.gauge.drift_microstrain

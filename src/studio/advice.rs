@@ -53,7 +53,7 @@ impl Studio {
         }
         let of_side = |side: &Side| match side {
             Side::Outside => -1.0,
-            Side::Rim => 0.0,
+            Side::Rim | Side::Frame => 0.0,
             Side::Inside => 1.0,
         };
         Some(if sides {

@@ -7,7 +7,7 @@ use egui::Context;
 
 use super::Studio;
 use crate::document::Document;
-use crate::io::mesh_file::{ENDINGS, needs_unit};
+use crate::io::mesh_file::{ENDINGS, may_say_unit, needs_unit};
 use crate::io::project_file;
 use crate::project::Unit;
 
@@ -24,6 +24,8 @@ pub(super) struct Dialog {
     purpose: Purpose,
     path: String,
     unit: Unit,
+    /// The file says its unit, where it may.
+    own_unit: bool,
     /// Of a picture: width and height in pixels, and whether what is behind the limb is left out.
     size: [u32; 2],
     transparent: bool,
@@ -38,6 +40,7 @@ impl Dialog {
             purpose,
             path,
             unit: Unit::Millimetre,
+            own_unit: true,
             size: [1920, 1080],
             transparent: false,
             browsing: None,
@@ -112,7 +115,9 @@ impl Dialog {
 
     fn hint(&self) -> &'static str {
         match self.purpose {
-            Purpose::Open => "NAME.hapdef.toml, or a mesh: glb, gltf, obj, ply, stl",
+            Purpose::Open => {
+                "NAME.hapdef.toml, or a mesh: cdb, dat, glb, gltf, inp, msh, obj, ply, stl"
+            }
             Purpose::SaveAs => "NAME.hapdef.toml",
             Purpose::Picture => "NAME.png",
             Purpose::Export => "A folder for report.html, sites.csv, design.json, dataset.npz",
@@ -126,6 +131,38 @@ impl Dialog {
             && path.extension().is_some()
             && !project_file::is_project(path)
             && needs_unit(path)
+    }
+
+    /// Whether it is a mesh that may say its unit.
+    fn may_say_unit(&self) -> bool {
+        self.purpose == Purpose::Open && may_say_unit(Path::new(self.path.trim()))
+    }
+
+    /// The unit that was chosen, where one is to be.
+    fn chosen_unit(&self) -> Option<Unit> {
+        let asked = self.needs_unit() || (self.may_say_unit() && !self.own_unit);
+        asked.then_some(self.unit)
+    }
+
+    /// The choice of the file's unit, where there is one.
+    fn unit_row(&mut self, ui: &mut egui::Ui) {
+        let own = self.may_say_unit();
+        if !own && !self.needs_unit() {
+            return;
+        }
+        ui.horizontal(|ui| {
+            ui.label("Unit of the file");
+            if own {
+                ui.selectable_value(&mut self.own_unit, true, "as it says");
+            }
+            for unit in Unit::ALL {
+                let chosen = self.unit == unit && !(own && self.own_unit);
+                if ui.selectable_label(chosen, unit.name()).clicked() {
+                    self.unit = unit;
+                    self.own_unit = false;
+                }
+            }
+        });
     }
 
     fn browse(&mut self, ctx: &Context) {
@@ -187,14 +224,7 @@ impl Studio {
             }
             confirmed |= field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
             ui.weak(hint);
-            if dialog.needs_unit() {
-                ui.horizontal(|ui| {
-                    ui.label("Unit of the file");
-                    for unit in Unit::ALL {
-                        ui.selectable_value(&mut dialog.unit, unit, unit.name());
-                    }
-                });
-            }
+            dialog.unit_row(ui);
             if dialog.purpose == Purpose::Picture {
                 ui.horizontal(|ui| {
                     let names = ["Width in pixels", "Height in pixels"];
@@ -247,8 +277,7 @@ impl Studio {
         let path = PathBuf::from(dialog.path.trim());
         match dialog.purpose {
             Purpose::Open => {
-                let unit = dialog.needs_unit().then_some(dialog.unit);
-                self.open_path(ctx, &path, unit);
+                self.open_path(ctx, &path, dialog.chosen_unit());
             }
             Purpose::SaveAs => self.save_to(ctx, &path),
             Purpose::Export => self.export(ctx, path),

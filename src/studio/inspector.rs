@@ -172,6 +172,15 @@ fn taking_in(ui: &mut Ui, project: &mut Project, bodies: usize, again: bool) -> 
         " mm",
         "Holes up to this far across are filled",
     );
+    number(
+        ui,
+        "Straighten",
+        &mut project.part.straighten_mm,
+        0.0..=1e3,
+        0.1,
+        " mm",
+        "A bent edge that turns a tetrahedron inside out is straightened where its node moves no farther than this",
+    );
     if !again {
         return false;
     }
@@ -455,6 +464,15 @@ fn touch(ui: &mut Ui, project: &mut Project) {
         0.1,
         " mm",
         "Least distance of a touch from a free edge",
+    );
+    number(
+        ui,
+        "Fingertip",
+        &mut touch.reach_mm,
+        0.0..=1e3,
+        0.5,
+        " mm",
+        "Radius of the ball that comes from outside: touches lie only where it gets to, not on what stands behind windows it does not fit through. The field “Faces” shows where",
     );
 }
 

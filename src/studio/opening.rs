@@ -284,6 +284,7 @@ mod tests {
     fn advice() -> Advice {
         let cost = Cost {
             model: PartModel::Shell,
+            order: None,
             element_mm: 2.0,
             unknowns: 1e4,
             seconds: 1.0,

@@ -33,6 +33,7 @@ pub enum Reader {
     Glb,
     Msh,
     Inp,
+    Dat,
     /// A project's text.
     Project,
     /// A dataset as the archive that it is.
@@ -80,7 +81,7 @@ pub const TABLE: &str =
 pub const PLACES: &str = "x_mm,y_mm,z_mm\n0,0,1\n10,0,1\n20.5,-3,1e1\n";
 
 impl Reader {
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Stl,
         Self::Obj,
         Self::Ply,
@@ -88,6 +89,7 @@ impl Reader {
         Self::Glb,
         Self::Msh,
         Self::Inp,
+        Self::Dat,
         Self::Project,
         Self::Npz,
         Self::Arrays,
@@ -113,6 +115,7 @@ impl Reader {
             Self::Glb => "glb",
             Self::Msh => "msh",
             Self::Inp => "inp",
+            Self::Dat => "dat",
             Self::Project => "project",
             Self::Npz => "npz",
             Self::Arrays => "arrays",
@@ -201,6 +204,7 @@ impl Reader {
         let repair = Repair {
             weld: if draw.is_multiple_of(3) { 1e-5 } else { 0.0 },
             fill_holes: if draw.is_multiple_of(5) { 5e-2 } else { 0.0 },
+            straighten: if draw.is_multiple_of(2) { 1e-2 } else { 0.0 },
         };
         let body = usize::from(draw.is_multiple_of(7));
         match parse_mesh(bytes, self.ending(), Some(folder), 1e-3, body, &repair) {

@@ -32,8 +32,9 @@ pub fn of(reader: Reader) -> Vec<Vec<u8>> {
             .to_vec(),
         Reader::Gltf => vec![gltf()],
         Reader::Glb => vec![write_glb(&small()).expect("a sound mesh")],
-        Reader::Msh => vec![msh_second(), msh_fourth()],
+        Reader::Msh => vec![msh_second(), msh_fourth(), msh_binary()],
         Reader::Inp => vec![inp()],
+        Reader::Dat => vec![deck(), shells()],
         Reader::Project => vec![BUNDLED_PROJECT.into(), PROJECT.into()],
         Reader::Npz => vec![npz()],
         Reader::Arrays => vec![arrays(), counts()],
@@ -218,7 +219,85 @@ fn inp() -> Vec<u8> {
     for ([a, b, c, d], k) in tetrahedra.iter().zip(1..) {
         text += &format!("{k}, {a}, {b}, {c}, {d}\n");
     }
-    (text + "*NSET, NSET=foot\n1, 2, 3, 4\n*NSET, NSET=top, GENERATE\n5, 8, 1\n").into_bytes()
+    text += "*NSET, NSET=foot\n1, 2, 3, 4\n*NSET, NSET=top, GENERATE\n5, 8, 1\n";
+    text += "*MATERIAL, NAME=pa\n*ELASTIC\n1700., 0.39\n*BOUNDARY\nfoot, 1, 3\n8, 2\n";
+    text.into_bytes()
+}
+
+/// The block in a binary file of Gmsh, with a physical group.
+fn msh_binary() -> Vec<u8> {
+    let (corners, tetrahedra) = block();
+    let mut bytes = b"$MeshFormat\n4.1 1 8\n".to_vec();
+    bytes.extend(1_i32.to_le_bytes());
+    bytes.extend(
+        b"\n$EndMeshFormat\n$PhysicalNames\n1\n3 4 \"body\"\n$EndPhysicalNames\n$Entities\n",
+    );
+    let sizes = |bytes: &mut Vec<u8>, all: &[u64]| {
+        bytes.extend(all.iter().flat_map(|n| n.to_le_bytes()));
+    };
+    let ints = |bytes: &mut Vec<u8>, all: &[i32]| {
+        bytes.extend(all.iter().flat_map(|n| n.to_le_bytes()));
+    };
+    let floats = |bytes: &mut Vec<u8>, all: &[f64]| {
+        bytes.extend(all.iter().flat_map(|x| x.to_le_bytes()));
+    };
+    sizes(&mut bytes, &[0, 0, 0, 1]);
+    ints(&mut bytes, &[1]);
+    floats(&mut bytes, &[0.0; 6]);
+    sizes(&mut bytes, &[1]);
+    ints(&mut bytes, &[4]);
+    sizes(&mut bytes, &[0]);
+    bytes.extend(b"\n$EndEntities\n$Nodes\n");
+    sizes(&mut bytes, &[1, 8, 1, 8]);
+    ints(&mut bytes, &[3, 1, 0]);
+    sizes(&mut bytes, &[8]);
+    sizes(&mut bytes, &[1, 2, 3, 4, 5, 6, 7, 8]);
+    for corner in corners {
+        floats(&mut bytes, &corner);
+    }
+    bytes.extend(b"\n$EndNodes\n$Elements\n");
+    sizes(&mut bytes, &[1, 6, 1, 6]);
+    ints(&mut bytes, &[3, 1, 4]);
+    sizes(&mut bytes, &[6]);
+    for (k, nodes) in (1..).zip(tetrahedra) {
+        sizes(&mut bytes, &[k]);
+        sizes(&mut bytes, &nodes.map(|n| n as u64));
+    }
+    bytes.extend(b"\n$EndElements\n");
+    bytes
+}
+
+/// The block as Mechanical writes it, with material, component and what is held.
+fn deck() -> Vec<u8> {
+    let (corners, tetrahedra) = block();
+    let mut text = String::from(
+        "/com, Data in consistent NMM units.\n/units,MPA\n*set,tid,3\n/prep7\nnblock,3,,8\n(1i9,3e20.9e3)\n",
+    );
+    for (k, [x, y, z]) in (1..).zip(corners) {
+        text += &format!("{k:9}{x:20.9}{y:20.9}{z:20.9}\n");
+    }
+    text += "-1\net,tid,285\net,2,174\neblock,19,solid,,6\n(19i9)\n";
+    for (k, [a, b, c, d]) in (1..).zip(tetrahedra) {
+        let head = [1, 3, 1, 1, 0, 0, 0, 0, 4, 0, k];
+        text += &head.map(|n| format!("{n:9}")).concat();
+        text += &format!("{a:9}{b:9}{c:9}{d:9}\n");
+    }
+    text += "-1\ntype,2\neblock,10,,,1\n(15i9)\n        9        2        2        2        0        1        2        4\n-1\n";
+    text += "MPTEMP,R5.0, 1, 1,  22.0    ,\nMPDATA,R5.0, 1,EX  ,       1, 1,  1700.0    ,\nMP,NUXY,1,0.39\nMP,DENS,1,9e-10\n";
+    text += "CMBLOCK,FOOT,NODE,        2\n(8i10)\n         1        -4\ncmsel,s,FOOT\nd,all,all\nnsel,all\n";
+    text += "*if,x,eq,1,then\n/eof\n*endif\nd,8,uy\nsolve\nfini\n";
+    text.into_bytes()
+}
+
+/// A sheet of two shells, by single commands.
+fn shells() -> Vec<u8> {
+    let mut text = String::from("/UNITS,SI\nET,1,SHELL181\nSECTYPE,1,SHELL\nSECDATA,2,1\n");
+    for (k, [x, y]) in (1..).zip([[0, 0], [1, 0], [1, 1], [0, 1], [2, 0], [2, 1]]) {
+        text += &format!("N,{k},{x}0,{y}0\n");
+    }
+    text +=
+        "MP,EX,1,2e9\nE,1,2,3,4\nEN,7,2,5,6,3\nNSEL,S,LOC,X,0\nCM,rim,NODE\nD,ALL,ALL,0\nALLSEL\n";
+    text.into_bytes()
 }
 
 /// With every kind of key that the bundled one has not.

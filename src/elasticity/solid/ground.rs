@@ -1,5 +1,11 @@
 //! A closed part ready to be computed as a solid: its faces told apart, and cells sized for its walls.
 
+mod own;
+mod piece;
+
+pub use self::own::Foreseen;
+pub(super) use self::piece::Piece;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -9,20 +15,22 @@ use rayon::prelude::*;
 use super::SolidModel;
 use super::immersed::{Fineness, Immersed};
 use super::series::Series;
+use super::simplex::HIGHEST;
 use super::sizing::{self, FINER, LEAST_GRIDS, Shape};
 use super::tip;
-use crate::budget::{Elements, Watch, report};
+use crate::budget::{Cancelled, Elements, Watch, report};
 use crate::elasticity::estimate::{self, Discretization, Sample};
 use crate::elasticity::grade::{CHECKED, PLACES, even_size, sample, spread};
 use crate::elasticity::load::Touch;
 use crate::elasticity::model::{ElasticError, LoadCheck, Model as _};
 use crate::elasticity::{Freedoms, Material, Support};
 use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::reach::{FINGERTIP, Reach};
 use crate::mesh::remesh::remesh;
+use crate::mesh::room::Room;
 use crate::mesh::surface::Surface;
-use crate::mesh::volume::VolumeMesh;
 use crate::mesh::walls::{Side, Walls};
-use crate::mesh::{TriMesh, components};
+use crate::mesh::{SurfacePoint, TriMesh, components};
 
 /// A closed part with its faces.
 pub struct SolidGround {
@@ -31,11 +39,16 @@ pub struct SolidGround {
     /// Even triangles all over the part: what is pressed on and read.
     pub whole: Arc<TriMesh>,
     pub walls: Walls,
-    /// Its faces: where gauges go and where touches land.
+    /// What a fingertip of this radius (m) reaches of it.
+    pub reach: Reach,
+    pub fingertip: f64,
+    /// Its faces: what faces inward, and where touches land.
     pub inside: Arc<TriMesh>,
     pub outside: Arc<TriMesh>,
     /// What is held at the vertices of the inside.
     pub inside_held: Vec<Freedoms>,
+    /// Whether its facets are the back of a wall that touches come to.
+    inside_backs: Vec<bool>,
     /// Places of the surface that are held (m).
     held: Vec<DVec3>,
 }
@@ -59,17 +72,30 @@ const ORDER: f64 = 1.75;
 const STRAIN_ORDER: f64 = 1.5;
 /// Of the distances between touches and what is held, this share may be left unresolved.
 const NEAREST: f64 = 0.1;
-/// Own tetrahedra of fewer unknowns are halved to judge them.
-const MOST_TO_HALVE: usize = 60_000;
 /// The error is an estimate: stop at this share of the tolerance.
 const SAFETY: f64 = 0.8;
 
 impl SolidGround {
-    /// Tells the faces of a part apart; `told` says what the user has said of a place.
+    /// Tells the faces of a part apart that fingertips touch; `told` says what the user has said of a place.
     ///
     /// # Errors
     /// [`ElasticError::Open`] for a surface that encloses nothing, [`ElasticError::Cancelled`].
     pub fn new(
+        part: &Arc<TriMesh>,
+        material: Material,
+        supports: &[Support],
+        told: &dyn Fn(DVec3) -> Option<Side>,
+        watch: Watch,
+    ) -> Result<Self, ElasticError> {
+        Self::touched_by(FINGERTIP, part, material, supports, told, watch)
+    }
+
+    /// As [`Self::new`], for tips of another radius (m).
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn touched_by(
+        fingertip: f64,
         part: &Arc<TriMesh>,
         material: Material,
         supports: &[Support],
@@ -84,15 +110,26 @@ impl SolidGround {
         let size = even_size(held.mesh.area(), 0.0, VERTICES);
         let laid = remesh(&surface, &|_| size);
         let whole = laid.mesh;
-        let mut walls = Walls::of(&whole, &SurfaceIndex::new(&whole), watch)?;
-        for (t, side) in (0u32..).zip(&mut walls.sides) {
+        let index = SurfaceIndex::new(&whole);
+        let mut walls = Walls::of(&whole, &index, watch)?;
+        let mut reach = Reach::of(&whole, &index, &walls, fingertip, watch)?;
+        for t in 0..whole.triangles().len() as u32 {
             let middle = whole.corners(t).iter().sum::<DVec3>() / 3.0;
-            *side = told(middle).unwrap_or(*side);
+            if let Some(side) = told(middle) {
+                walls.sides[t as usize] = side;
+                reach.tell(t, side);
+            }
         }
-        let face = |side: Side| whole.part_of(|t| walls.sides[t as usize] == side);
-        let (inside, vertices) =
-            face(Side::Inside).ok_or(ElasticError::NoFace { face: "inside" })?;
-        let (outside, _) = face(Side::Outside).ok_or(ElasticError::NoFace { face: "outside" })?;
+        let inward: Vec<bool> = walls.sides.iter().map(|&s| s == Side::Inside).collect();
+        let (inside, vertices) = whole
+            .part_of(|t| inward[t as usize])
+            .ok_or(ElasticError::NoFace { face: "inside" })?;
+        let (outside, _) = whole
+            .part_of(|t| reach.touched[t as usize])
+            .ok_or(ElasticError::NoFace { face: "outside" })?;
+        let facets = inward.iter().zip(&reach.backs);
+        let inside_backs = facets.filter(|(i, _)| **i).map(|(_, &back)| back).collect();
+        walls.sides = reach.sides(&walls.sides);
         let at = |&v: &u32| held.held_at(laid.places[v as usize]);
         let is_held = |v: &u32| at(v).0 != 0;
         let all = 0..whole.positions().len() as u32;
@@ -102,12 +139,35 @@ impl SolidGround {
                 .collect(),
             inside_held: vertices.iter().map(at).collect(),
             inside: Arc::new(inside),
+            inside_backs,
             outside: Arc::new(outside),
+            reach,
+            fingertip,
             walls,
             whole,
             surface,
             immersed,
         })
+    }
+
+    /// Whether points of the inside lie on the back of a wall that touches come to.
+    #[must_use]
+    pub fn behind(&self, points: &[SurfacePoint]) -> Vec<bool> {
+        let is_back = |at: &SurfacePoint| self.inside_backs[at.triangle as usize];
+        points.iter().map(is_back).collect()
+    }
+
+    /// How large a pad (m) can be brought to points of the inside, as [`Room::at`] says.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn room(&self, points: &[SurfacePoint], watch: Watch) -> Result<Vec<f64>, Cancelled> {
+        let index = SurfaceIndex::new(&self.whole);
+        let room = Room::of(&self.whole, &index, watch)?;
+        let at = |&at: &SurfacePoint| {
+            room.at(self.inside.point(at), self.inside.facet_normal(at.triangle))
+        };
+        Ok(points.par_iter().map(at).collect())
     }
 
     /// Thickness that cells are sized by (m): thinner than three quarters of the walls; of a part without
@@ -142,13 +202,20 @@ impl SolidGround {
         self.immersed.model(&self.whole, fineness, watch)
     }
 
-    /// Finer cells, to judge coarser ones by.
+    /// Finer cells or tetrahedra of a higher order, to judge others by.
     #[must_use]
     pub fn finer(&self, fineness: &Fineness) -> Fineness {
-        let own = self.immersed.own().is_some();
+        if self.immersed.own().is_none() {
+            return Fineness {
+                size: fineness.size * FINER,
+                ..*fineness
+            };
+        }
+        // A part's own tetrahedra gain most by their order.
+        let raised = fineness.order < HIGHEST;
         Fineness {
-            size: fineness.size * if own { 1.0 } else { FINER },
-            halvings: fineness.halvings + u32::from(own),
+            order: fineness.order + usize::from(raised),
+            halvings: fineness.halvings + u32::from(!raised),
             ..*fineness
         }
     }
@@ -234,8 +301,8 @@ impl SolidGround {
         aim: &Elements,
         watch: Watch,
     ) -> Result<SolidGraded, ElasticError> {
-        if let Some(own) = self.immersed.own() {
-            return self.as_given(own, touches, places, watch);
+        if self.immersed.own().is_some() {
+            return self.raise(touches, places, aim, watch);
         }
         let shape = self.shape();
         let least = shape.least(aim, touches.len());
@@ -259,21 +326,11 @@ impl SolidGround {
                 _ => break left,
             }
         };
-        let (models, solves) = (grids.sizes.len() as u64, touches.len() as u64);
+        let models = grids.sizes.len() as u64;
         let Some(last) = grids.last else {
             unreachable!("there is a first grid");
         };
-        Ok(SolidGraded {
-            balance: last.model.check_all(
-                &spread(&touches, CHECKED),
-                &spread(&last.solutions, CHECKED),
-            ),
-            fineness: last.fineness,
-            model: last.model,
-            estimate,
-            models,
-            solves: models * solves,
-        })
+        Ok(last.graded(&touches, estimate, models))
     }
 
     /// What the last of several grids is off by; unknown where there is one only.
@@ -300,50 +357,6 @@ impl SolidGround {
             std::array::from_fn(|k| {
                 of_strains.error(|grid| grids.samples[grid].strains[load][place][k])
             })
-        })
-    }
-
-    /// The part's own tetrahedra, judged by their halves where those fit into memory.
-    fn as_given(
-        &self,
-        own: &VolumeMesh,
-        touches: &[Touch],
-        places: &[DVec3],
-        watch: Watch,
-    ) -> Result<SolidGraded, ElasticError> {
-        /// Errors of quadratic elements fall with the square of their size and better.
-        const CHANGE: f64 = 3.0;
-        let touches = sample(touches);
-        let places: Vec<DVec3> = spread(places, PLACES);
-        let size = own.mean_edge();
-        let given = Solved::new(self, size, &touches, &places, watch)?;
-        let fine = Fineness {
-            halvings: 1,
-            ..given.fineness
-        };
-        let small = given.model.system().dimension() < MOST_TO_HALVE;
-        let halved = small
-            .then(|| Solved::with(self, fine, &touches, &places, watch))
-            .transpose();
-        let halved = match halved {
-            Err(error) if error.is_memory() => None,
-            other => other?,
-        };
-        let unknown = estimate::unknown(touches.len(), places.len());
-        let estimate = halved.as_ref().map_or(unknown, |halved| {
-            let (given, halved) = (&given.sample, &halved.sample);
-            estimate::left(given, halved, &touches, &places, CHANGE / (1.0 + CHANGE))
-        });
-        Ok(SolidGraded {
-            balance: given.model.check_all(
-                &spread(&touches, CHECKED),
-                &spread(&given.solutions, CHECKED),
-            ),
-            fineness: given.fineness,
-            model: given.model,
-            estimate,
-            models: 1 + u64::from(halved.is_some()),
-            solves: touches.len() as u64 * (1 + u64::from(halved.is_some())),
         })
     }
 
@@ -402,25 +415,33 @@ impl Solved {
         places: &[DVec3],
         watch: Watch,
     ) -> Result<Self, ElasticError> {
-        Self::with(ground, ground.fineness(size), touches, places, watch)
+        let fineness = ground.fineness(size);
+        let model = ground.model(&fineness, watch)?;
+        Ok(Self::of(fineness, model, touches, places))
     }
 
-    fn with(
-        ground: &SolidGround,
-        fineness: Fineness,
-        touches: &[Touch],
-        places: &[DVec3],
-        watch: Watch,
-    ) -> Result<Self, ElasticError> {
-        let model = ground.model(&fineness, watch)?;
+    fn of(fineness: Fineness, model: SolidModel, touches: &[Touch], places: &[DVec3]) -> Self {
         let loads: Vec<_> = touches.iter().map(|t| model.load(t)).collect();
         let solutions = model.system().solve_loads(&loads);
-        Ok(Self {
+        Self {
             sample: Sample::of(&model, touches, &solutions, places),
             fineness,
             model,
             solutions,
-        })
+        }
+    }
+
+    /// As the one that is taken, after so many models.
+    fn graded(self, touches: &[Touch], estimate: Discretization, models: u64) -> SolidGraded {
+        SolidGraded {
+            balance: (self.model)
+                .check_all(&spread(touches, CHECKED), &spread(&self.solutions, CHECKED)),
+            fineness: self.fineness,
+            model: self.model,
+            estimate,
+            models,
+            solves: models * touches.len() as u64,
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use super::cells::FiniteCells;
 use super::cut::Cutting;
 use super::grid::Grid;
 use super::grip::Grip;
+use super::ground::Piece;
 use super::tetrahedra::Tetrahedra;
 use super::{Elements, SolidModel};
 use crate::budget::Watch;
@@ -33,7 +34,7 @@ pub struct Immersed {
 pub struct Fineness {
     /// Largest side of a cell (m).
     pub size: f64,
-    /// Order of the shape functions, 1 to 4.
+    /// Order of the shape functions, 1 to 4; of a part's own tetrahedra to 5.
     pub order: usize,
     /// How far the surface may be from where it is taken to be, in cells.
     pub tolerance: f64,
@@ -127,8 +128,8 @@ impl Immersed {
         fineness: &Fineness,
         watch: Watch,
     ) -> Result<SolidModel, ElasticError> {
-        if let Some(own) = self.part.volume() {
-            return self.on_own(surface, own, fineness, watch);
+        if let Some(elements) = self.tetrahedra(fineness) {
+            return self.on_own(surface, elements, fineness, watch);
         }
         let cells = self.cells(fineness, watch)?;
         if cells.count() == 0 {
@@ -140,32 +141,55 @@ impl Immersed {
         SolidModel::new(surface, Box::new(cells), self.material, grip, watch)
     }
 
-    /// The model on the part's own tetrahedra, halved as often as `fineness` says.
-    fn on_own(
-        &self,
-        surface: &Arc<TriMesh>,
-        own: &Arc<VolumeMesh>,
-        fineness: &Fineness,
-        watch: Watch,
-    ) -> Result<SolidModel, ElasticError> {
-        let mut mesh = Arc::clone(own);
+    /// The part's own tetrahedra, halved as often as `fineness` says, with displacements of its order.
+    #[must_use]
+    pub fn tetrahedra(&self, fineness: &Fineness) -> Option<Tetrahedra> {
+        let mut mesh = Arc::clone(self.part.volume()?);
         for _ in 0..fineness.halvings {
             mesh = Arc::new(mesh.refined());
         }
-        let elements = Tetrahedra::new(&mesh);
+        Some(Tetrahedra::new(&mesh, fineness.order))
+    }
+
+    /// The model on the part's own tetrahedra.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for what cannot be computed.
+    pub fn on_own(
+        &self,
+        surface: &Arc<TriMesh>,
+        elements: Tetrahedra,
+        fineness: &Fineness,
+        watch: Watch,
+    ) -> Result<SolidModel, ElasticError> {
         let mut grip = Grip::new(&elements);
         for (number, support) in self.supports.iter().enumerate() {
-            let held = Freedoms(support.held.0 & Freedoms::DISPLACEMENTS.0);
-            let slack = 1e-9 * fineness.size;
-            let any = match support.region {
-                Region::Box { lower, upper } => grip.hold_nodes(&elements, held, |p| {
-                    p.cmpge(lower - slack).all() && p.cmple(upper + slack).all()
-                }),
-                Region::Vertices(_) => false,
-            };
-            if !any {
+            if !hold_box(&mut grip, &elements, support, fineness) {
+                let held = displacements(support);
                 self.spring(&mut grip, &elements, number, held, fineness.size);
             }
+        }
+        SolidModel::new(surface, Box::new(elements), self.material, grip, watch)
+    }
+
+    /// The model on a piece of the part's own tetrahedra, held where it was cut out and by boxes.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for what cannot be computed.
+    pub fn on_piece(
+        &self,
+        surface: &Arc<TriMesh>,
+        piece: &Piece,
+        fineness: &Fineness,
+        watch: Watch,
+    ) -> Result<SolidModel, ElasticError> {
+        let elements = Tetrahedra::new(&piece.mesh, fineness.order);
+        let mut grip = Grip::new(&elements);
+        for node in elements.nodes_on(&piece.cut) {
+            grip.nodes[node as usize].0 |= Freedoms::DISPLACEMENTS.0;
+        }
+        for support in &self.supports {
+            hold_box(&mut grip, &elements, support, fineness);
         }
         SolidModel::new(surface, Box::new(elements), self.material, grip, watch)
     }
@@ -183,7 +207,7 @@ impl Immersed {
     fn grip(&self, cells: &FiniteCells, size: f64) -> Grip {
         let mut grip = Grip::new(cells);
         for (number, support) in self.supports.iter().enumerate() {
-            let held = Freedoms(support.held.0 & Freedoms::DISPLACEMENTS.0);
+            let held = displacements(support);
             let is_volume = held == Freedoms::DISPLACEMENTS && {
                 let inside = |p: DVec3| match support.region {
                     Region::Box { lower, upper }
@@ -206,4 +230,25 @@ impl Immersed {
         }
         grip
     }
+}
+
+/// What a support holds of displacements.
+fn displacements(support: &Support) -> Freedoms {
+    Freedoms(support.held.0 & Freedoms::DISPLACEMENTS.0)
+}
+
+/// Holds the nodes in a support's box; whether there are any.
+fn hold_box(
+    grip: &mut Grip,
+    elements: &Tetrahedra,
+    support: &Support,
+    fineness: &Fineness,
+) -> bool {
+    let Region::Box { lower, upper } = support.region else {
+        return false;
+    };
+    let slack = 1e-9 * fineness.size;
+    grip.hold_nodes(elements, displacements(support), |p| {
+        p.cmpge(lower - slack).all() && p.cmple(upper + slack).all()
+    })
 }

@@ -1,74 +1,177 @@
-//! Quadratic tetrahedra of a mesh that the user has.
+//! Tetrahedra of a mesh that the user has, with displacements of any order on them.
+//!
+//! Their shape stays the quadratic one of the file. Quadratic displacements bend a wall that is one long tetrahedron
+//! thick far too little, and halves of them have as many unknowns as order 4 on the same tetrahedra: on a limb with
+//! walls of 0.9 mm and edges of 4 mm the displacement under a touch was 55 % too small as given, 35 % halved, and
+//! 18, 6 and 2 % too small at orders 3, 4 and 5. So their order is raised.
 
-use std::sync::Arc;
+use std::collections::{HashMap, HashSet};
+use std::sync::{Arc, OnceLock};
 
-use faer::Mat;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par};
 use glam::DVec3;
 
-use super::{Elements, Shape};
+use super::simplex::Simplex;
+use super::{Elements, Shape, neighbours};
 use crate::elasticity::Material;
+use crate::elasticity::solver::Plan;
 use crate::mesh::SurfacePoint;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::volume::{FacePlace, VolumeMesh, jacobian, shapes};
 
-/// Elements on the user's nodes.
+/// Elements of one order on the user's tetrahedra.
 pub struct Tetrahedra {
     mesh: Arc<VolumeMesh>,
+    simplex: Simplex,
+    /// Where the nodes of the displacements lie (m), and which ones every tetrahedron has, one after the other.
+    nodes: Vec<DVec3>,
+    numbers: Vec<u32>,
+    rule: Vec<Point>,
     /// Finds the triangle of the surface that a point lies on.
     index: SurfaceIndex,
     /// For each of those its element and the places of its corners in it.
     places: Vec<FacePlace>,
+    plan: OnceLock<Option<Plan>>,
 }
 
-/// Points and weights exact for degree 5 over the unit tetrahedron (P. Keast 1986, fifteen points): what curved
-/// sides need; straight ones need less.
-fn rule() -> Vec<(DVec3, f64)> {
-    let a = [
-        (0.25, 0.030_283_678_097_089_183),
-        (1.0 / 3.0, 0.006_026_785_714_285_717),
-        (1.0 / 11.0, 0.011_645_249_086_028_967),
-    ];
-    let (b, w) = (0.066_550_153_573_664_28, 0.010_949_141_561_386_45);
-    let mut points = vec![(DVec3::splat(a[0].0), a[0].1)];
-    for &(x, weight) in &a[1..] {
-        let y = 1.0 - 3.0 * x;
-        for p in [[x, x, x], [y, x, x], [x, y, x], [x, x, y]] {
-            points.push((DVec3::from_array(p), weight));
+/// A point of the rule, with the gradients of the displacements' shape functions there.
+struct Point {
+    at: DVec3,
+    weight: f64,
+    gradients: Vec<DVec3>,
+}
+
+/// A node by the corners it lies between and how many steps of the lattice it is towards each, in the order of the
+/// corners: the same in every tetrahedron that has it.
+type NodeKey = [(u32, u8); 4];
+
+fn key(corners: &[u32], steps: &[usize; 4]) -> NodeKey {
+    /// Stands where there are less than four corners.
+    const NONE: (u32, u8) = (u32::MAX, 0);
+    let mut key: NodeKey = std::array::from_fn(|c| match steps[c] {
+        0 => NONE,
+        steps => (corners[c], steps as u8),
+    });
+    key.sort_unstable();
+    key
+}
+
+/// The nodes of a mesh's displacements (m), and every tetrahedron's numbers of them.
+fn numbered(mesh: &VolumeMesh, simplex: &Simplex) -> (Vec<DVec3>, Vec<u32>) {
+    let count = simplex.lattice().len();
+    // Where the nodes lie in a tetrahedron is the same in all.
+    let weights: Vec<_> = (0..count).map(|n| shapes(simplex.place(n))).collect();
+    let mut known: HashMap<NodeKey, u32> = HashMap::new();
+    let mut nodes: Vec<DVec3> = Vec::new();
+    let mut numbers = Vec::new();
+    for tet in &mesh.tetrahedra {
+        let p = tet.map(|n| mesh.nodes[n as usize]);
+        for (steps, weights) in simplex.lattice().iter().zip(&weights) {
+            let number = known.entry(key(&tet[..4], steps)).or_insert_with(|| {
+                nodes.push(weights.iter().zip(&p).map(|((n, _), p)| *p * *n).sum());
+                nodes.len() as u32 - 1
+            });
+            numbers.push(*number);
         }
     }
-    let c = 0.5 - b;
-    for p in [
-        [c, b, b],
-        [b, c, b],
-        [b, b, c],
-        [c, c, b],
-        [c, b, c],
-        [b, c, c],
-    ] {
-        points.push((DVec3::from_array(p), w));
-    }
-    points
+    (nodes, numbers)
 }
 
 impl Tetrahedra {
+    /// Of an order between 1 and [`super::simplex::HIGHEST`].
     #[must_use]
-    pub fn new(mesh: &Arc<VolumeMesh>) -> Self {
+    pub fn new(mesh: &Arc<VolumeMesh>, order: usize) -> Self {
         let (triangles, places) = mesh.surface_places();
+        let simplex = Simplex::new(order);
+        let (nodes, numbers) = numbered(mesh, &simplex);
+        let point = |(at, weight)| Point {
+            at,
+            weight,
+            gradients: simplex.at(at).into_iter().map(|(_, g)| g).collect(),
+        };
         Self {
             index: SurfaceIndex::of(mesh.nodes.clone(), &triangles),
+            rule: simplex.rule().into_iter().map(point).collect(),
             mesh: Arc::clone(mesh),
+            nodes,
+            numbers,
+            simplex,
             places,
+            plan: OnceLock::new(),
         }
+    }
+
+    /// What the factor of their stiffness will be; nothing where not even that fits into memory.
+    #[must_use]
+    pub fn plan(&self) -> Option<&Plan> {
+        let found = || Plan::new(&neighbours(self), 3).ok();
+        self.plan.get_or_init(found).as_ref()
+    }
+
+    /// Nodes on faces that are named by their corners in rising order.
+    #[must_use]
+    pub fn nodes_on(&self, faces: &HashSet<[u32; 3]>) -> Vec<u32> {
+        let mut found = Vec::new();
+        for (element, tet) in self.mesh.tetrahedra.iter().enumerate() {
+            for opposite in 0..4 {
+                let mut face = [1, 2, 3].map(|step| tet[(opposite + step) % 4]);
+                face.sort_unstable();
+                if faces.contains(&face) {
+                    let nodes = self.nodes_of(element).iter().zip(self.simplex.lattice());
+                    let on = nodes.filter(|(_, steps)| steps[opposite] == 0);
+                    found.extend(on.map(|(&node, _)| node));
+                }
+            }
+        }
+        found
+    }
+
+    /// Entries of all elements' matrices: what assembling costs.
+    #[must_use]
+    pub fn entries(&self) -> f64 {
+        let each = 3.0 * self.simplex.lattice().len() as f64;
+        each * each * self.count() as f64
     }
 
     fn corners(&self, element: usize) -> [DVec3; 10] {
         self.mesh.tetrahedra[element].map(|n| self.mesh.nodes[n as usize])
     }
+
+    /// Σ weight ∂a/∂xᵢ ∂b/∂xⱼ at (3 a + i, 3 b + j), over the element.
+    fn products(&self, element: usize) -> Mat<f64> {
+        let nodes = self.corners(element);
+        let rows = 3 * self.simplex.lattice().len();
+        let mut gradients = Mat::<f64>::zeros(rows, self.rule.len());
+        let mut weighted = Mat::<f64>::zeros(rows, self.rule.len());
+        for (q, point) in self.rule.iter().enumerate() {
+            let jacobian = jacobian(&nodes, point.at);
+            let inverse = jacobian.inverse().transpose();
+            let weight = point.weight * jacobian.determinant();
+            for (a, gradient) in point.gradients.iter().enumerate() {
+                let gradient = inverse * *gradient;
+                for i in 0..3 {
+                    gradients[(3 * a + i, q)] = gradient[i];
+                    weighted[(3 * a + i, q)] = weight * gradient[i];
+                }
+            }
+        }
+        let mut products = Mat::<f64>::zeros(rows, rows);
+        matmul(
+            products.as_mut(),
+            Accum::Replace,
+            weighted.as_ref(),
+            gradients.as_ref().transpose(),
+            1.0,
+            Par::Seq,
+        );
+        products
+    }
 }
 
 impl Elements for Tetrahedra {
     fn nodes(&self) -> &[DVec3] {
-        &self.mesh.nodes
+        &self.nodes
     }
 
     fn count(&self) -> usize {
@@ -76,11 +179,12 @@ impl Elements for Tetrahedra {
     }
 
     fn nodes_of(&self, element: usize) -> &[u32] {
-        &self.mesh.tetrahedra[element]
+        let count = self.simplex.lattice().len();
+        &self.numbers[element * count..][..count]
     }
 
     fn grain(&self) -> f64 {
-        self.mesh.mean_edge() / 2.0
+        self.mesh.mean_edge() / self.simplex.order() as f64
     }
 
     fn centre(&self, element: usize) -> DVec3 {
@@ -89,22 +193,18 @@ impl Elements for Tetrahedra {
 
     fn stiffness(&self, element: usize, material: &Material) -> Mat<f64> {
         let (lambda, mu) = material.lame();
-        let nodes = self.corners(element);
-        let mut k = Mat::zeros(30, 30);
-        for (at, weight) in rule() {
-            let jacobian = jacobian(&nodes, at);
-            let inverse = jacobian.inverse().transpose();
-            let gradients = shapes(at).map(|(_, g)| inverse * g);
-            let weight = weight * jacobian.determinant();
-            for (b, h) in gradients.iter().enumerate() {
-                for (a, g) in gradients.iter().enumerate() {
-                    let dot = g.dot(*h);
-                    for j in 0..3 {
-                        for i in 0..3 {
-                            let own = if i == j { mu * dot } else { 0.0 };
-                            k[(3 * a + i, 3 * b + j)] +=
-                                weight * (lambda * g[i] * h[j] + mu * g[j] * h[i] + own);
-                        }
+        let products = self.products(element);
+        let count = self.simplex.lattice().len();
+        let mut k = Mat::<f64>::zeros(3 * count, 3 * count);
+        for b in 0..count {
+            for a in 0..count {
+                let product = |i: usize, j: usize| products[(3 * a + i, 3 * b + j)];
+                let dot = product(0, 0) + product(1, 1) + product(2, 2);
+                for j in 0..3 {
+                    for i in 0..3 {
+                        let own = if i == j { mu * dot } else { 0.0 };
+                        k[(3 * a + i, 3 * b + j)] =
+                            lambda * product(i, j) + mu * product(j, i) + own;
                     }
                 }
             }
@@ -118,15 +218,16 @@ impl Elements for Tetrahedra {
         let place: DVec3 = (0..3).map(|i| corners[i] * at.barycentric[i]).sum();
         let nodes = self.corners(*element as usize);
         let inverse = jacobian(&nodes, place).inverse().transpose();
+        let values = self.simplex.at(place).into_iter();
         Shape {
             element: *element,
-            nodes: self.mesh.tetrahedra[*element as usize].to_vec(),
-            values: shapes(place).map(|(n, g)| (n, inverse * g)).to_vec(),
+            nodes: self.nodes_of(*element as usize).to_vec(),
+            values: values.map(|(n, g)| (n, inverse * g)).collect(),
         }
     }
 
     fn elimination(&self) -> Option<Vec<u32>> {
-        None
+        self.plan().map(|plan| plan.order.clone())
     }
 }
 
@@ -134,19 +235,74 @@ impl Elements for Tetrahedra {
 mod tests {
     use super::*;
 
+    /// Two tetrahedra with a face in common, one edge of it curved.
+    fn pair() -> Arc<VolumeMesh> {
+        let corners = [
+            DVec3::ZERO,
+            DVec3::X,
+            DVec3::Y,
+            DVec3::Z,
+            DVec3::new(1.0, 1.0, 1.0),
+        ];
+        let mut mesh = VolumeMesh::of_linear(corners.to_vec(), &[[0, 1, 2, 3], [1, 2, 3, 4]])
+            .checked()
+            .unwrap();
+        let middle = mesh.tetrahedra[0][5];
+        mesh.nodes[middle as usize] += DVec3::new(0.05, 0.05, -0.03);
+        Arc::new(mesh.checked().unwrap())
+    }
+
     #[test]
-    fn the_rule_is_exact_for_degree_five() {
-        for i in 0..=5 {
-            for j in 0..=5 - i {
-                for k in 0..=5 - i - j {
-                    let f = |p: DVec3| p.x.powi(i) * p.y.powi(j) * p.z.powi(k);
-                    let sum: f64 = rule().iter().map(|(p, w)| w * f(*p)).sum();
-                    let factorial = |n: i32| (1..=n).map(f64::from).product::<f64>();
-                    let exact =
-                        factorial(i) * factorial(j) * factorial(k) / factorial(i + j + k + 3);
-                    assert!((sum - exact).abs() < 1e-15, "{i} {j} {k}: {sum} {exact}");
+    fn neighbours_share_the_nodes_between_them_at_any_order() {
+        for order in 1..=5 {
+            let elements = Tetrahedra::new(&pair(), order);
+            let each = Simplex::count(order);
+            let shared = (order + 1) * (order + 2) / 2;
+            assert_eq!(elements.nodes().len(), 2 * each - shared, "{order}");
+        }
+        // Of order 2 they are the mesh's own.
+        let mesh = pair();
+        let elements = Tetrahedra::new(&mesh, 2);
+        let known = |p: &DVec3| mesh.nodes.iter().any(|q| q.distance(*p) < 1e-15);
+        assert!(elements.nodes().iter().all(known));
+        assert_eq!(elements.nodes_of(0).len(), 10);
+    }
+
+    #[test]
+    fn rigid_motions_cost_nothing_and_a_stretch_what_it_should() {
+        let material = Material {
+            youngs_modulus: 2.0,
+            poissons_ratio: 0.3,
+        };
+        let (lambda, mu) = material.lame();
+        for order in 2..=5 {
+            let elements = Tetrahedra::new(&pair(), order);
+            let energy = |field: &dyn Fn(DVec3) -> DVec3| -> (f64, f64) {
+                let mut energy = 0.0;
+                let mut volume = 0.0;
+                for element in 0..elements.count() {
+                    let k = elements.stiffness(element, &material);
+                    let nodes = elements.nodes_of(element);
+                    let u: Vec<f64> = (nodes.iter())
+                        .flat_map(|&n| field(elements.nodes()[n as usize]).to_array())
+                        .collect();
+                    for i in 0..u.len() {
+                        for j in 0..u.len() {
+                            energy += 0.5 * u[i] * k[(i, j)] * u[j];
+                        }
+                    }
+                    let p = elements.corners(element);
+                    volume += (elements.rule.iter())
+                        .map(|q| q.weight * jacobian(&p, q.at).determinant())
+                        .sum::<f64>();
                 }
-            }
+                (energy, volume)
+            };
+            let (turned, _) = energy(&|p: DVec3| DVec3::new(1.0 - p.y, 2.0 + p.x, 0.0));
+            assert!(turned.abs() < 1e-10, "{order}: {turned}");
+            let (stretched, volume) = energy(&|p: DVec3| DVec3::new(p.x, 0.0, 0.0));
+            let exact = 0.5 * (lambda + 2.0 * mu) * volume;
+            assert!((stretched / exact - 1.0).abs() < 1e-10, "{order}");
         }
     }
 }

@@ -316,6 +316,16 @@ fn each_rows(
     }
 }
 
+/// Multiplications that a factor takes, about.
+pub(super) fn multiplications(symbolic: &SymbolicSupernodalCholesky<usize>) -> f64 {
+    let cost = |s: usize| {
+        let node = symbolic.supernode(s);
+        let width = symbolic.supernode_end()[s] - node.start();
+        Meter::cost(width + node.pattern().len(), width)
+    };
+    (0..symbolic.n_supernodes()).map(cost).sum()
+}
+
 /// How far the factor is, by its multiplications.
 struct Meter<'a> {
     watch: Watch<'a>,
@@ -326,14 +336,9 @@ struct Meter<'a> {
 
 impl<'a> Meter<'a> {
     fn new(symbolic: &SymbolicSupernodalCholesky<usize>, watch: Watch<'a>) -> Self {
-        let cost = |s: usize| {
-            let node = symbolic.supernode(s);
-            let width = symbolic.supernode_end()[s] - node.start();
-            Self::cost(width + node.pattern().len(), width)
-        };
         Self {
             watch,
-            total: (0..symbolic.n_supernodes()).map(cost).sum(),
+            total: multiplications(symbolic),
             done: 0.0,
             said: 0,
         }

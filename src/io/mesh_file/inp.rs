@@ -2,20 +2,22 @@
 //! would place nodes elsewhere, is refused with its line, and what is not computed on is noted.
 
 mod keyword;
-mod sets;
+mod said;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 use glam::DVec3;
 
 use super::Soup;
-use super::tetrahedra::Tetrahedra;
-use super::words::{fortran, listed, whole};
-use crate::memory;
+use super::place::{Origin, Place};
+use super::sets::{Numbered, Range, Sets, check_count};
+use super::tetrahedra::{Tetrahedra, bounded};
+use super::unread::Unread;
+use super::words::{fortran, whole};
 use crate::mesh::volume::Tetrahedron;
 use crate::plain::quote;
 use keyword::{Keyword, statements};
-use sets::{Numbered, Range, Sets};
+use said::{Boundaries, Elastic};
 
 /// What the lines after a keyword are.
 #[derive(Default)]
@@ -31,6 +33,10 @@ enum Reading {
     /// Nodes of a set, or ranges of them.
     NodeSet(usize, bool),
     ElementSet(usize, bool),
+    /// Constants of an elastic material.
+    Elastic,
+    /// What is held.
+    Boundary,
     /// What would place nodes elsewhere than their coordinates say.
     Moved(&'static str),
 }
@@ -38,13 +44,15 @@ enum Reading {
 /// An element of 4 or 10 nodes as its lines have it.
 struct Element {
     line: usize,
+    number: u64,
     /// The file's numbers of its nodes.
     nodes: Vec<u64>,
 }
 
 /// Keywords that change nothing about the mesh.
-const SILENT: [&str; 8] = [
+const SILENT: [&str; 9] = [
     "HEADING",
+    "MATERIAL",
     "PREPRINT",
     "PART",
     "END PART",
@@ -53,8 +61,6 @@ const SILENT: [&str; 8] = [
     "END INSTANCE",
     "END STEP",
 ];
-/// Most sets of nodes, and of elements.
-const MOST_SETS: usize = 10_000;
 
 /// Reads nodes, tetrahedra and sets of nodes.
 ///
@@ -85,10 +91,12 @@ struct Reader {
     elements: Vec<Element>,
     node_sets: Sets,
     element_sets: Sets,
-    /// Types of elements that are left out, with the line of the first.
-    left_out: BTreeMap<String, usize>,
+    elastic: Elastic,
+    boundaries: Boundaries,
+    /// Types of elements that are left out.
+    left_out: Unread,
     /// Keywords that are not read.
-    unread: BTreeMap<String, usize>,
+    unread: Unread,
 }
 
 impl Reader {
@@ -102,6 +110,12 @@ impl Reader {
             "ELSET" => {
                 let set = self.element_sets.open(keyword.required("ELSET")?);
                 Reading::ElementSet(set, keyword.option("GENERATE").is_some())
+            }
+            "ELASTIC" if Elastic::is_read(keyword) => Reading::Elastic,
+            "BOUNDARY" if self.boundaries.begin(keyword) => Reading::Boundary,
+            "STEP" => {
+                self.boundaries.begin_step();
+                Reading::Nothing
             }
             "SYSTEM" => Reading::Moved("*SYSTEM gives nodes in a system of its own"),
             "INSTANCE" => Reading::Moved("*INSTANCE moves the part"),
@@ -118,7 +132,7 @@ impl Reader {
             }
             name => {
                 if !SILENT.contains(&name) {
-                    self.unread.entry(name.to_owned()).or_insert(line);
+                    self.unread.add(name, line);
                 }
                 Reading::Nothing
             }
@@ -154,7 +168,7 @@ impl Reader {
                 quote(&kind)
             ));
         }
-        self.left_out.entry(kind).or_insert(line);
+        self.left_out.add(&kind, line);
         Ok(Reading::Nothing)
     }
 
@@ -180,6 +194,8 @@ impl Reader {
             )),
             Reading::Nodes(set) => self.node(words, line, set),
             Reading::Elements(nodes, set) => self.element(words, line, nodes, set),
+            Reading::Elastic => self.elastic.take(words, line),
+            Reading::Boundary => self.boundaries.take(words, line),
             Reading::NodeSet(set, ranges) => add_to(&mut self.node_sets, set, ranges, words, line),
             Reading::ElementSet(set, ranges) => {
                 add_to(&mut self.element_sets, set, ranges, words, line)
@@ -197,6 +213,7 @@ impl Reader {
         };
         let tag = whole(tag, line)?;
         let position = DVec3::new(fortran(x, line)?, fortran(y, line)?, fortran(z, line)?);
+        bounded(self.soup.positions.len() as u64 + 1, Place::Line(line))?;
         let place = self.soup.positions.len() as u32;
         if self.node_places.insert(tag, place).is_some() {
             return Err(format!(
@@ -240,6 +257,7 @@ impl Reader {
         }
         self.elements.push(Element {
             line: begun,
+            number: tag,
             nodes: numbers,
         });
         if let Some(set) = set {
@@ -261,34 +279,36 @@ impl Reader {
 
     fn finish(mut self) -> Result<Soup, String> {
         self.element_is_whole()?;
-        let left_out: Vec<&str> = self.left_out.keys().map(String::as_str).collect();
         if self.elements.is_empty() {
-            let others = if left_out.is_empty() {
+            let others = if self.left_out.is_empty() {
                 String::new()
             } else {
-                format!(", but elements of type {}", listed(&left_out))
+                format!(", but elements of type {}", self.left_out.listed())
             };
             return Err(format!(
                 "it has no tetrahedra (C3D4 or C3D10){others}: mesh the part with tetrahedra"
             ));
         }
-        if !left_out.is_empty() {
+        if !self.left_out.is_empty() {
             self.soup.notes.push(format!(
-                "elements of type {} are left out (the first in line {}): only the tetrahedra are computed on",
-                listed(&left_out),
-                first(&self.left_out)
+                "elements of other types are left out: {}; only the tetrahedra are computed on",
+                self.left_out.listed()
             ));
         }
         if !self.unread.is_empty() {
-            let unread: Vec<&str> = self.unread.keys().map(String::as_str).collect();
             self.soup.notes.push(format!(
-                "keywords of the file that are not read: {} (the first in line {}; material, supports and touches are the project's)",
-                listed(&unread),
-                first(&self.unread)
+                "keywords of the file that are not read: {}",
+                self.unread.listed()
             ));
         }
         self.tetrahedra()?.hand_to(&mut self.soup)?;
         self.take_sets()?;
+        self.soup.said.material = self.elastic.material(&mut self.soup.notes);
+        self.soup.said.supports = self.boundaries.supports(
+            &self.node_places,
+            &mut self.soup.node_sets,
+            &mut self.soup.notes,
+        );
         Ok(self.soup)
     }
 
@@ -297,19 +317,17 @@ impl Reader {
         let mut tetrahedra = Tetrahedra::default();
         for element in &self.elements {
             let place = |k: usize| self.place_of(element.nodes[k], element.line);
-            let corners = [place(0)?, place(1)?, place(2)?, place(3)?];
-            let middles = match element.nodes.len() {
-                10 => Some([
-                    place(4)?,
-                    place(5)?,
-                    place(6)?,
-                    place(7)?,
-                    place(8)?,
-                    place(9)?,
-                ]),
-                _ => None,
+            let mut tetrahedron = Tetrahedron {
+                corners: [place(0)?, place(1)?, place(2)?, place(3)?],
+                middles: [None; 6],
             };
-            tetrahedra.push(Tetrahedron { corners, middles }, element.line)?;
+            if element.nodes.len() == 10 {
+                for (k, middle) in (4..).zip(&mut tetrahedron.middles) {
+                    *middle = Some(place(k)?);
+                }
+            }
+            let origin = Origin::in_line(element.number, element.line);
+            tetrahedra.push(tetrahedron, origin)?;
         }
         Ok(tetrahedra)
     }
@@ -324,7 +342,7 @@ impl Reader {
     /// Looks up what the sets of nodes name.
     fn take_sets(&mut self) -> Result<(), String> {
         let sets = self.node_sets.len();
-        check_sets(sets.max(self.element_sets.len()), self.node_places.len())?;
+        check_count(sets.max(self.element_sets.len()), self.node_places.len())?;
         let nodes = Numbered::of(&self.node_places);
         let elements = Numbered::of(&self.element_places);
         for set in 0..sets {
@@ -351,24 +369,6 @@ impl Reader {
         }
         Ok(())
     }
-}
-
-/// The first line of all.
-fn first(lines: &BTreeMap<String, usize>) -> usize {
-    lines.values().copied().min().unwrap_or_default()
-}
-
-/// Refuses more sets than there is memory for, each taken for all nodes.
-fn check_sets(sets: usize, nodes: usize) -> Result<(), String> {
-    /// Bytes for a node in a set: its number, and its place in the mask.
-    const A_NODE: f64 = 5.0;
-    let bytes = A_NODE * sets as f64 * nodes as f64;
-    if sets <= MOST_SETS && bytes <= memory::allowed() {
-        return Ok(());
-    }
-    Err(format!(
-        "it has {sets} sets on {nodes} nodes: keep only the sets that the project names, no more than {MOST_SETS}"
-    ))
 }
 
 /// Refuses what stands in another file.

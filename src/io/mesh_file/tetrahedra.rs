@@ -1,21 +1,41 @@
-//! Tetrahedra as they come out of a file, each with the line it stands in.
+//! Tetrahedra as they come out of a file, each with where it stands there.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use super::Soup;
+use super::place::{Origin, Place};
+use crate::memory;
 use crate::mesh::volume::{Tetrahedron, VolumeError, VolumeMesh};
+
+/// Refuses more nodes than a model could be made of, before any is taken in.
+///
+/// # Errors
+/// A message naming the place where so many are announced or reached.
+pub fn bounded(nodes: u64, place: Place) -> Result<(), String> {
+    /// Bytes that the stiffness of a node takes beside its neighbours, before anything is factored.
+    const A_NODE: f64 = 1500.0;
+    let most = memory::allowed() / A_NODE;
+    if nodes as f64 <= most {
+        return Ok(());
+    }
+    Err(format!(
+        "{place}: {nodes} nodes are more than {:.0}, which is what {:.1} GB of memory bear: mesh the part with larger elements, or allow more with --memory-gb",
+        most.floor(),
+        memory::allowed_gb()
+    ))
+}
 
 /// Tetrahedra on the nodes of a file, none of them twice.
 #[derive(Default)]
 pub struct Tetrahedra {
     all: Vec<Tetrahedron>,
-    lines: Vec<usize>,
+    origins: Vec<Origin>,
     /// Which of them has these corners, in rising order.
     known: HashMap<[u32; 4], usize>,
-    /// How many were there before, and the line of the first of those.
+    /// How many were there before, and the place of the first of those.
     repeats: usize,
-    repeated: usize,
+    repeated: Option<Place>,
 }
 
 impl Tetrahedra {
@@ -27,27 +47,25 @@ impl Tetrahedra {
     /// Takes one in. One that is there already, on the same nodes, is counted and left out.
     ///
     /// # Errors
-    /// A message naming the line of one with the corners of another, but other nodes between them.
-    pub fn push(&mut self, tetrahedron: Tetrahedron, line: usize) -> Result<(), String> {
+    /// A message naming the place of one with the corners of another, but other nodes between them.
+    pub fn push(&mut self, tetrahedron: Tetrahedron, origin: Origin) -> Result<(), String> {
         let mut corners = tetrahedron.corners;
         corners.sort_unstable();
         match self.known.entry(corners) {
             Entry::Vacant(free) => {
                 free.insert(self.all.len());
                 self.all.push(tetrahedron);
-                self.lines.push(line);
+                self.origins.push(origin);
             }
             Entry::Occupied(known) => {
                 let first = *known.get();
                 if middles(&self.all[first]) != middles(&tetrahedron) {
                     return Err(format!(
-                        "line {line}: this tetrahedron has the corners of the one in line {}, but other nodes between them",
-                        self.lines[first]
+                        "{origin}: this tetrahedron has the corners of the one in {}, but other nodes between them",
+                        self.origins[first].place
                     ));
                 }
-                if self.repeats == 0 {
-                    self.repeated = line;
-                }
+                self.repeated.get_or_insert(origin.place);
                 self.repeats += 1;
             }
         }
@@ -68,36 +86,36 @@ impl Tetrahedra {
     /// Hands them over as the volume of what the file holds.
     ///
     /// # Errors
-    /// A message naming the line of one that does not fit its neighbours.
+    /// A message naming the place of one that does not fit its neighbours.
     pub fn hand_to(self, soup: &mut Soup) -> Result<(), String> {
         if self.is_empty() {
             return Ok(());
         }
-        if self.repeats > 0 {
+        if let Some(place) = self.repeated {
             soup.notes.push(format!(
-                "{} tetrahedra are there a second time (the first in line {}) and were taken once",
-                self.repeats, self.repeated
+                "{} tetrahedra are there a second time (the first in {place}) and were taken once",
+                self.repeats
             ));
         }
         let volume = VolumeMesh::of(soup.positions.clone(), &self.all);
-        soup.volume = Some(volume.map_err(|e| in_line(&e, &self.lines))?);
-        soup.tetrahedron_lines = self.lines;
+        soup.volume = Some(volume.map_err(|e| at_origin(&e, &self.origins))?);
+        soup.origins = self.origins;
         Ok(())
     }
 }
 
 /// The nodes between the corners, in rising order.
-fn middles(tetrahedron: &Tetrahedron) -> Option<[u32; 6]> {
-    let mut middles = tetrahedron.middles?;
+fn middles(tetrahedron: &Tetrahedron) -> [Option<u32>; 6] {
+    let mut middles = tetrahedron.middles;
     middles.sort_unstable();
-    Some(middles)
+    middles
 }
 
-/// What is wrong with a tetrahedron, and the line of the file that it stands in.
+/// What is wrong with a tetrahedron, and where in the file that one stands.
 #[must_use]
-pub fn in_line(error: &VolumeError, lines: &[usize]) -> String {
-    match error.element().and_then(|element| lines.get(element)) {
-        Some(line) => format!("line {line}: {error}"),
+pub fn at_origin(error: &VolumeError, origins: &[Origin]) -> String {
+    match error.element().and_then(|element| origins.get(element)) {
+        Some(origin) => format!("{origin}: {error}"),
         None => error.to_string(),
     }
 }

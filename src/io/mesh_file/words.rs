@@ -23,6 +23,12 @@ pub fn whole(word: &str, line: usize) -> Result<u64, String> {
         .map_err(|_| refused(word, line, "whole number"))
 }
 
+/// A whole number of either sign.
+pub fn signed(word: &str, line: usize) -> Result<i64, String> {
+    word.parse()
+        .map_err(|_| refused(word, line, "whole number"))
+}
+
 fn finite(plain: &str, word: &str, line: usize) -> Result<f64, String> {
     match plain.parse::<f64>() {
         Ok(number) if number.is_finite() => Ok(number),

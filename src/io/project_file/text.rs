@@ -30,12 +30,12 @@ fn part(t: &mut Text, project: &Project) {
     t.key(
         "mesh",
         quoted(&part.mesh),
-        "glTF/GLB, OBJ, STL, PLY, Gmsh or Abaqus",
+        "glTF/GLB, OBJ, STL, PLY, Gmsh, Abaqus or Ansys",
     );
     t.maybe(
         "unit",
         part.unit.map(|u| quoted(u.name())),
-        "unit of the mesh file: \"mm\", \"cm\", \"m\" or \"in\"; glTF is in metres and needs none",
+        "unit of the mesh file: \"mm\", \"cm\", \"m\" or \"in\"; glTF is in metres and needs none, Ansys may say its own",
     );
     t.key(
         "body",
@@ -51,6 +51,11 @@ fn part(t: &mut Text, project: &Project) {
         "fill_holes_mm",
         float(part.fill_holes_mm),
         "holes up to this far across are filled",
+    );
+    t.key(
+        "straighten_mm",
+        float(part.straighten_mm),
+        "a bent edge that turns a tetrahedron inside out is straightened where its node moves no farther",
     );
     t.key(
         "elements",
@@ -148,6 +153,11 @@ fn touch(t: &mut Text, project: &Project) {
         "edge_margin_mm",
         float(project.touch.edge_margin_mm),
         "least distance of a touch from a free edge",
+    );
+    t.key(
+        "reach_mm",
+        float(project.touch.reach_mm),
+        "radius of the fingertip that comes from outside: touches lie only where it gets to",
     );
     t.maybe(
         "region",

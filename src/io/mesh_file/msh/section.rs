@@ -4,7 +4,7 @@ use std::str::SplitWhitespace;
 
 use glam::DVec3;
 
-use crate::io::mesh_file::words::{number, whole};
+use crate::io::mesh_file::words::{number, signed, whole};
 use crate::plain::quote;
 
 /// The lines between `$Name` and `$EndName`.
@@ -40,14 +40,11 @@ impl<'t> Section<'t> {
     }
 
     /// The next line that is not empty, with its number.
-    fn following(&mut self) -> Option<Record<'t>> {
+    pub fn following(&mut self) -> Option<Record<'t>> {
         while let Some(&line) = self.lines.get(self.read) {
             self.read += 1;
             if !line.trim().is_empty() {
-                return Some(Record {
-                    line: self.begins + self.read,
-                    words: line.split_whitespace(),
-                });
+                return Some(Record::of(line, self.begins + self.read));
             }
         }
         None
@@ -105,6 +102,15 @@ pub struct Record<'t> {
 }
 
 impl<'t> Record<'t> {
+    /// Of a line and its number.
+    #[must_use]
+    pub fn of(text: &'t str, line: usize) -> Self {
+        Self {
+            line,
+            words: text.split_whitespace(),
+        }
+    }
+
     fn word(&mut self) -> Result<&'t str, String> {
         let line = self.line;
         let short =
@@ -120,6 +126,10 @@ impl<'t> Record<'t> {
         whole(self.word()?, self.line)
     }
 
+    pub fn signed(&mut self) -> Result<i64, String> {
+        signed(self.word()?, self.line)
+    }
+
     pub fn number(&mut self) -> Result<f64, String> {
         number(self.word()?, self.line)
     }
@@ -131,6 +141,12 @@ impl<'t> Record<'t> {
     /// Passes over numbers that are not needed.
     pub fn skip(&mut self, count: u64) -> Result<(), String> {
         (0..count).try_for_each(|_| self.number().map(drop))
+    }
+
+    /// What is left of the line, one blank between words.
+    #[must_use]
+    pub fn rest(self) -> String {
+        self.words.collect::<Vec<_>>().join(" ")
     }
 
     /// Whether the line holds more.
@@ -187,6 +203,17 @@ impl<'t> Sections<'t> {
             }
         }
         Ok(Self { all })
+    }
+
+    /// Takes out the one section of a name, where there is one.
+    ///
+    /// # Errors
+    /// A message where there is a second one.
+    pub fn take_any(&mut self, name: &str) -> Result<Option<Section<'t>>, String> {
+        if self.all.iter().any(|section| section.name == name) {
+            return self.take(name).map(Some);
+        }
+        Ok(None)
     }
 
     /// Takes out the one section of a name.

@@ -3,6 +3,8 @@
 
 use std::collections::{BTreeSet, HashMap};
 
+use crate::memory;
+
 /// Numbers from one to another in steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
@@ -66,16 +68,18 @@ impl Numbered {
         Self { sorted }
     }
 
-    fn get(&self, number: u64) -> Option<u32> {
+    #[must_use]
+    pub fn get(&self, number: u64) -> Option<u32> {
         let found = self.sorted.binary_search_by_key(&number, |thing| thing.0);
         found.ok().map(|at| self.sorted[at].1)
     }
 
-    /// Those from one number to another, which is no smaller.
-    fn between(&self, first: u64, last: u64) -> &[(u64, u32)] {
+    /// Those from one number to another, by number and place; none where the other is smaller.
+    #[must_use]
+    pub fn between(&self, first: u64, last: u64) -> &[(u64, u32)] {
         let from = self.sorted.partition_point(|thing| thing.0 < first);
         let to = self.sorted.partition_point(|thing| thing.0 <= last);
-        &self.sorted[from..to]
+        self.sorted.get(from..to).unwrap_or_default()
     }
 }
 
@@ -100,6 +104,25 @@ pub struct Members {
     pub missing: u64,
     /// Sets of elements whose nodes belong to it.
     pub of_elements: BTreeSet<usize>,
+}
+
+/// Most sets of nodes, and of elements, of a file.
+const MOST: usize = 10_000;
+
+/// Refuses more sets than there is memory for, each taken for all nodes.
+///
+/// # Errors
+/// A message with what to do.
+pub fn check_count(sets: usize, nodes: usize) -> Result<(), String> {
+    /// Bytes for a node in a set: its number, and its place in the mask.
+    const A_NODE: f64 = 5.0;
+    let bytes = A_NODE * sets as f64 * nodes as f64;
+    if sets <= MOST && bytes <= memory::allowed() {
+        return Ok(());
+    }
+    Err(format!(
+        "it has {sets} sets on {nodes} nodes: keep only the sets that the project names, no more than {MOST}"
+    ))
 }
 
 /// Sets by name; capitals make no difference.

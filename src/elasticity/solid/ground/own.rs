@@ -1,0 +1,352 @@
+//! The tetrahedra that a part came with: to which order they are raised, how far off they are then, and what it takes.
+
+use glam::DVec3;
+
+use super::piece::Piece;
+use super::{SAFETY, SolidGraded, SolidGround, Solved};
+use crate::budget::{Elements, Watch};
+use crate::elasticity::estimate::{self, Discretization};
+use crate::elasticity::grade::{PLACES, sample, spread};
+use crate::elasticity::load::Touch;
+use crate::elasticity::model::ElasticError;
+use crate::elasticity::solid::immersed::Fineness;
+use crate::elasticity::solid::orders::{self, FIRST};
+use crate::elasticity::solid::simplex::{HIGHEST, Simplex};
+use crate::elasticity::solid::tetrahedra::Tetrahedra;
+use crate::memory;
+use crate::mesh::volume::VolumeMesh;
+
+/// Entries of the factor × touches, and multiplications of the factorization, for each vertex × touch of an effort: at
+/// standard quality about two minutes of processor time, and a quarter of one.
+const ENTRIES: f64 = 70_000.0;
+const MULTIPLICATIONS: f64 = 25_000.0;
+/// Pieces that are judged where the whole, one order higher, does not fit into memory.
+const PIECES: usize = 6;
+
+/// What the part's own tetrahedra will be raised to, and what that takes.
+#[derive(Clone, Copy, Debug)]
+pub struct Foreseen {
+    pub order: usize,
+    /// Mean distance between their corners (m).
+    pub edge: f64,
+    pub unknowns: f64,
+    /// Entries of the last factor, and memory that it and its matrix take (bytes).
+    pub entries: f64,
+    pub bytes: f64,
+    /// Entries of the elements' matrices and multiplications of the factorizations, of all orders on the way.
+    pub assembled: f64,
+    pub multiplications: f64,
+    /// What is left at that order.
+    pub estimate: Discretization,
+}
+
+/// The orders that were solved for a sample of the touches: what each changed.
+struct Climb {
+    touches: Vec<Touch>,
+    places: Vec<DVec3>,
+    changes: Vec<Discretization>,
+}
+
+impl Climb {
+    fn new(touches: &[Touch], places: &[DVec3]) -> Self {
+        Self {
+            touches: sample(touches),
+            places: spread(places, PLACES),
+            changes: Vec::new(),
+        }
+    }
+
+    fn step(&mut self, from: &Solved, to: &Solved) {
+        let (touches, places) = (&self.touches, &self.places);
+        self.changes
+            .push(change(&from.sample, &to.sample, touches, places));
+    }
+
+    /// What is left at the last order, or at the one before it.
+    fn left(&self, before_last: bool) -> Discretization {
+        left(&self.changes, before_last)
+    }
+}
+
+/// What changes from one order to the next.
+fn change(
+    from: &estimate::Sample,
+    to: &estimate::Sample,
+    touches: &[Touch],
+    places: &[DVec3],
+) -> Discretization {
+    estimate::left(from, to, touches, places, 1.0)
+}
+
+/// What is left after some changes, or was before the last of them.
+fn left(changes: &[Discretization], before_last: bool) -> Discretization {
+    let Some(&last) = changes.last() else {
+        return estimate::unknown(0, 0);
+    };
+    let over = |value: fn(&Discretization) -> f64, usual: f64| {
+        let sizes: Vec<f64> = changes.iter().map(value).collect();
+        orders::left(&sizes, usual) + if before_last { 1.0 } else { 0.0 }
+    };
+    last.scaled(
+        over(|c| c.displacement_percent, orders::DISPLACEMENT),
+        over(|c| c.strain_percent, orders::STRAIN),
+    )
+}
+
+impl SolidGround {
+    /// The part's own tetrahedra at an order, up to [`HIGHEST`] and as far as memory holds who is whose neighbour.
+    fn own_at(&self, order: usize) -> Option<(Fineness, Tetrahedra)> {
+        let own = self.immersed.own()?;
+        let each = Simplex::count(order).pow(2) * size_of::<u32>();
+        let bytes = own.tetrahedra.len() as f64 * each as f64;
+        if order > HIGHEST || (order > FIRST && bytes > memory::allowed()) {
+            return None;
+        }
+        let fineness = Fineness {
+            order,
+            ..self.fineness(own.mean_edge())
+        };
+        let elements = self.immersed.tetrahedra(&fineness)?;
+        Some((fineness, elements))
+    }
+
+    /// As [`Self::own_at`] where so many touches can be afforded at that order.
+    fn affordable(
+        &self,
+        order: usize,
+        touches: usize,
+        aim: &Elements,
+    ) -> Option<(Fineness, Tetrahedra)> {
+        let own = self.own_at(order);
+        own.filter(|own| affords(Some(own), touches, aim))
+    }
+
+    fn solve_own(
+        &self,
+        (fineness, elements): (Fineness, Tetrahedra),
+        climb: &Climb,
+        watch: Watch,
+    ) -> Result<Solved, ElasticError> {
+        let model = self
+            .immersed
+            .on_own(&self.whole, elements, &fineness, watch)?;
+        Ok(Solved::of(fineness, model, &climb.touches, &climb.places))
+    }
+
+    /// As [`Self::solve_own`]; nothing where memory does not hold it.
+    fn try_own(
+        &self,
+        own: Option<(Fineness, Tetrahedra)>,
+        climb: &Climb,
+        watch: Watch,
+    ) -> Result<Option<Solved>, ElasticError> {
+        let Some(own) = own else { return Ok(None) };
+        match self.solve_own(own, climb, watch) {
+            Err(error) if error.is_memory() => Ok(None),
+            solved => solved.map(Some),
+        }
+    }
+
+    /// The part's own tetrahedra, their order raised until the error under these touches is small enough or the
+    /// effort spent. The second order is solved in any case: it judges the first.
+    pub(super) fn raise(
+        &self,
+        touches: &[Touch],
+        places: &[DVec3],
+        aim: &Elements,
+        watch: Watch,
+    ) -> Result<SolidGraded, ElasticError> {
+        let mut climb = Climb::new(touches, places);
+        let Some(first) = self.own_at(FIRST) else {
+            unreachable!("only parts that have tetrahedra are raised");
+        };
+        let given = self.solve_own(first, &climb, watch)?;
+        let second = self.own_at(FIRST + 1);
+        let affordable = affords(second.as_ref(), touches.len(), aim);
+        let Some(mut last) = self.try_own(second, &climb, watch)? else {
+            let estimate = self.by_pieces(&climb, watch)?;
+            return Ok(given.graded(&climb.touches, estimate, 1));
+        };
+        climb.step(&given, &last);
+        let estimate = climb.left(true);
+        if !affordable || estimate.excess(aim) <= SAFETY {
+            return Ok(given.graded(&climb.touches, estimate, 2));
+        }
+        drop(given);
+        while climb.left(false).excess(aim) > SAFETY {
+            let next = self.affordable(last.fineness.order + 1, touches.len(), aim);
+            let Some(next) = self.try_own(next, &climb, watch)? else {
+                break;
+            };
+            climb.step(&last, &next);
+            last = next;
+        }
+        let models = 1 + climb.changes.len() as u64;
+        Ok(last.graded(&climb.touches, climb.left(false), models))
+    }
+
+    /// The part's own tetrahedra as they are, nothing solved; nothing for a part without.
+    #[must_use]
+    pub fn as_they_are(&self) -> Option<Foreseen> {
+        let (_, elements) = self.own_at(FIRST)?;
+        let mut foreseen = Foreseen::new(self.immersed.own()?.mean_edge());
+        foreseen.add(FIRST, &elements);
+        Some(foreseen)
+    }
+
+    /// What [`Self::raise`] would come to for `count` touches like these, from the first two orders, those that are
+    /// quick, and the pattern of the others; nothing for a part without tetrahedra.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for what cannot be computed.
+    pub fn foresee(
+        &self,
+        touches: &[Touch],
+        places: &[DVec3],
+        count: usize,
+        aim: &Elements,
+        watch: Watch,
+    ) -> Result<Option<Foreseen>, ElasticError> {
+        let mut climb = Climb::new(touches, places);
+        let Some(first) = self.own_at(FIRST) else {
+            return Ok(None);
+        };
+        let mut foreseen = Foreseen::new(self.immersed.own().map_or(0.0, VolumeMesh::mean_edge));
+        foreseen.add(FIRST, &first.1);
+        let given = self.solve_own(first, &climb, watch)?;
+        let second = self.own_at(FIRST + 1);
+        let affordable = affords(second.as_ref(), count, aim);
+        let mut cubic = foreseen;
+        if let Some((_, elements)) = &second {
+            cubic.add(FIRST + 1, elements);
+        }
+        let Some(solved) = self.try_own(second, &climb, watch)? else {
+            foreseen.estimate = self.by_pieces(&climb, watch)?;
+            return Ok(Some(foreseen));
+        };
+        climb.step(&given, &solved);
+        foreseen.estimate = climb.left(true);
+        if !affordable || foreseen.estimate.excess(aim) <= SAFETY {
+            // The next order judges this one, and is built for that.
+            foreseen.assembled = cubic.assembled;
+            foreseen.multiplications = cubic.multiplications;
+            return Ok(Some(foreseen));
+        }
+        foreseen = cubic;
+        foreseen.estimate = climb.left(false);
+        let mut last = Some(solved);
+        while foreseen.estimate.excess(aim) > SAFETY
+            && let Some(next) = self.affordable(foreseen.order + 1, count, aim)
+        {
+            let order = foreseen.order;
+            foreseen.add(order + 1, &next.1);
+            last = match last {
+                Some(before) if is_quick(&next.1) => {
+                    let solved = self.solve_own(next, &climb, watch)?;
+                    climb.step(&before, &solved);
+                    foreseen.estimate = climb.left(false);
+                    Some(solved)
+                }
+                _ => {
+                    let falls = |usual| orders::falls(order, usual);
+                    let displacement = falls(orders::DISPLACEMENT);
+                    let strain = falls(orders::STRAIN);
+                    foreseen.estimate = foreseen.estimate.scaled(displacement, strain);
+                    None
+                }
+            };
+        }
+        Ok(Some(foreseen))
+    }
+
+    /// What is left of the part's own tetrahedra as they are, judged by the next order on pieces around some touches:
+    /// the way that takes little memory.
+    ///
+    /// # Errors
+    /// [`ElasticError::Cancelled`].
+    pub fn judge_by_pieces(
+        &self,
+        touches: &[Touch],
+        places: &[DVec3],
+        watch: Watch,
+    ) -> Result<Discretization, ElasticError> {
+        self.by_pieces(&Climb::new(touches, places), watch)
+    }
+
+    fn by_pieces(&self, climb: &Climb, watch: Watch) -> Result<Discretization, ElasticError> {
+        let Some(own) = self.immersed.own() else {
+            return Ok(estimate::unknown(0, 0));
+        };
+        let mut found = Vec::new();
+        for touch in spread(&climb.touches, PIECES) {
+            let piece = Piece::around(own, touch.position);
+            let near: Vec<DVec3> = piece.within(&climb.places);
+            let solved = |order| -> Result<Solved, ElasticError> {
+                let fineness = Fineness {
+                    order,
+                    ..self.fineness(own.mean_edge())
+                };
+                let model = self
+                    .immersed
+                    .on_piece(&self.whole, &piece, &fineness, watch)?;
+                Ok(Solved::of(fineness, model, &[touch], &near))
+            };
+            match (solved(FIRST), solved(FIRST + 1)) {
+                (Ok(from), Ok(to)) => {
+                    found.push(change(&from.sample, &to.sample, &[touch], &near));
+                }
+                (Err(ElasticError::Cancelled(stop)), _)
+                | (_, Err(ElasticError::Cancelled(stop))) => {
+                    return Err(ElasticError::Cancelled(stop));
+                }
+                // A piece that cannot be computed by itself says nothing.
+                _ => {}
+            }
+        }
+        Ok(left(&[Discretization::of_all(&found)], true))
+    }
+}
+
+impl Foreseen {
+    fn new(edge: f64) -> Self {
+        Self {
+            order: FIRST,
+            edge,
+            unknowns: 0.0,
+            entries: 0.0,
+            bytes: 0.0,
+            assembled: 0.0,
+            multiplications: 0.0,
+            estimate: estimate::unknown(0, 0),
+        }
+    }
+
+    /// The next order, which takes the place of the last.
+    fn add(&mut self, order: usize, elements: &Tetrahedra) {
+        self.order = order;
+        self.assembled += elements.entries();
+        let Some(plan) = elements.plan() else { return };
+        self.unknowns = 3.0 * plan.order.len() as f64;
+        self.entries = plan.entries;
+        self.bytes = plan.bytes();
+        self.multiplications += plan.multiplications;
+    }
+}
+
+/// Whether a factor fits into memory, and its solutions into the effort.
+fn affords(own: Option<&(Fineness, Tetrahedra)>, touches: usize, aim: &Elements) -> bool {
+    let plan = own.and_then(|(_, elements)| elements.plan());
+    plan.is_some_and(|plan| {
+        let effort = aim.effort as f64;
+        plan.entries * touches as f64 <= ENTRIES * effort
+            && plan.multiplications <= MULTIPLICATIONS * effort
+            && plan.bytes() <= memory::allowed()
+    })
+}
+
+/// Whether a factorization is a matter of seconds.
+fn is_quick(elements: &Tetrahedra) -> bool {
+    const QUICK: f64 = 2e10;
+    let plan = elements.plan();
+    plan.is_some_and(|plan| plan.multiplications < QUICK)
+}
