@@ -12,6 +12,7 @@ use hapdef::dataset::{self, Signal};
 use hapdef::design::{self, Design, Inputs};
 use hapdef::elasticity::grade::Ground;
 use hapdef::elasticity::load::Touch;
+use hapdef::feasible::Filter;
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::remesh::Remeshed;
 use hapdef::placement::SelectorKind;
@@ -164,7 +165,9 @@ fn limb(text: &mut String) {
         .expect("the limb simulates");
     let filters = design::filter(&inputs, &quiet);
     let taken = filters.taken();
-    let paper = sites.len() - taken[0].1 - taken[1].1;
+    let by_paper = [Filter::SupportClearance, Filter::Edge];
+    let own = taken.iter().filter(|(filter, _)| by_paper.contains(filter));
+    let paper = sites.len() - own.map(|(_, taken)| taken).sum::<usize>();
     let _ = writeln!(
         text,
         "## The bundled limb\n\n| what | here | reference (`limb.md`) |\n|---|---|---|"

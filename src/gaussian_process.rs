@@ -191,8 +191,54 @@ pub const POWERS: [f64; 6] = [0.8, 1.0, 1.3, 1.6, 1.9, 2.0];
 /// Most sites that the search uses.
 const SEARCHED: usize = 500;
 
-/// Cross-validated grid search: parts of the sites are left out and predicted from the others under every
-/// touch (signals standardized over all). Returns the map, by rising length and power.
+/// Signals that kernels are tried on: parts of the sites are left out and predicted from the others under every
+/// touch (signals standardized over all).
+struct Tried<'a> {
+    distances: &'a Distances,
+    used: Vec<usize>,
+    gram: Mat<f64>,
+}
+
+impl<'a> Tried<'a> {
+    fn new(x: &SignalMatrix, distances: &'a Distances) -> Self {
+        let used: Vec<usize> = crate::regression::folds::evenly(x.rows(), SEARCHED);
+        let scale = x.values().iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let signals = x.select_rows(&used);
+        let gram = gram(&signals.scaled(if scale > 0.0 { scale.recip() } else { 1.0 }));
+        Self {
+            distances,
+            used,
+            gram,
+        }
+    }
+
+    fn with(&self, kernel: &GpKernel) -> GpTrial {
+        /// Every how manyth site is left out at once.
+        const FOLDS: usize = 5;
+        let (mut wrong, mut all) = (0.0, 0.0);
+        for fold in 0..FOLDS {
+            let (test, train): (Vec<usize>, Vec<usize>) =
+                (0..self.used.len()).partition(|i| i % FOLDS == fold);
+            let (gram, used) = (&self.gram, &self.used);
+            let (w, a) = prediction_error(gram, self.distances, used, kernel, &train, &test);
+            wrong += w;
+            all += a;
+        }
+        GpTrial {
+            kernel: *kernel,
+            error: (wrong / all).sqrt(),
+        }
+    }
+}
+
+/// One kernel tried as [`search`] tries those of its grid. Of a kernel that is no covariance between the sites the
+/// error is no number.
+#[must_use]
+pub fn trial(x: &SignalMatrix, distances: &Distances, kernel: &GpKernel) -> GpTrial {
+    Tried::new(x, distances).with(kernel)
+}
+
+/// Cross-validated grid search. Returns the map, by rising length and power.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
@@ -202,12 +248,7 @@ pub fn search(
     noise: f64,
     watch: Watch,
 ) -> Result<Vec<GpTrial>, Cancelled> {
-    /// Every how manyth site is left out at once.
-    const FOLDS: usize = 5;
-    let used: Vec<usize> = crate::regression::folds::evenly(x.rows(), SEARCHED);
-    let scale = x.values().iter().fold(0.0f64, |m, v| m.max(v.abs()));
-    let signals = x.select_rows(&used);
-    let gram = gram(&signals.scaled(if scale > 0.0 { scale.recip() } else { 1.0 }));
+    let tried = Tried::new(x, distances);
     let grid: Vec<GpKernel> = LENGTHS_M
         .iter()
         .flat_map(|&length_m| {
@@ -221,18 +262,7 @@ pub fn search(
     grid.par_iter()
         .map(|kernel| {
             report(watch, "Fitting the Gaussian process", 0, 1)?;
-            let (mut wrong, mut all) = (0.0, 0.0);
-            for fold in 0..FOLDS {
-                let (test, train): (Vec<usize>, Vec<usize>) =
-                    (0..used.len()).partition(|i| i % FOLDS == fold);
-                let (w, a) = prediction_error(&gram, distances, &used, kernel, &train, &test);
-                wrong += w;
-                all += a;
-            }
-            Ok(GpTrial {
-                kernel: *kernel,
-                error: (wrong / all).sqrt(),
-            })
+            Ok(tried.with(kernel))
         })
         .collect()
 }
@@ -372,5 +402,15 @@ mod tests {
                 .error
         };
         assert!(error(0.004) > 1.5 * error(found.length_m));
+        // One kernel alone is tried as in the grid.
+        let alone = |kernel: &GpKernel| trial(&x, &line(n, 0.004), kernel);
+        assert_eq!(alone(&map[3].kernel), map[3]);
+        let bare = GpKernel {
+            length_m: 0.0175,
+            power: 2.0,
+            noise: 0.0,
+        };
+        let tried = alone(&bare).error;
+        assert!(tried.is_nan() || tried >= 0.0, "{tried}");
     }
 }

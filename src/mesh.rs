@@ -11,6 +11,7 @@ pub mod geodesic;
 pub mod inside;
 mod intake;
 pub mod locate;
+pub mod mount;
 mod numbers;
 mod orientation;
 pub mod reach;

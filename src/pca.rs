@@ -27,7 +27,7 @@ pub enum PcaError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Standardized signals and their products: what components are computed from, as many as are asked for.
+/// Signals about their means and their products: what components are computed from, as many as are asked for.
 pub struct Spectrum {
     signals: SignalMatrix,
     /// Sites × sites or touches × touches, whichever is smaller: the two share their eigenvalues.
@@ -40,8 +40,23 @@ impl Spectrum {
     /// # Errors
     /// [`PcaError`] for signals without variance.
     pub fn new(x: &SignalMatrix, watch: Watch) -> Result<Self, PcaError> {
+        Self::of(Standardizer::of(x).apply(x), watch)
+    }
+
+    /// Of signals (sites × touches) that keep their size: a site that moves more counts for more.
+    ///
+    /// # Errors
+    /// [`PcaError`] for signals without variance.
+    pub fn unscaled(x: &SignalMatrix, watch: Watch) -> Result<Self, PcaError> {
+        let centred = Standardizer {
+            deviation: vec![1.0; x.rows()],
+            ..Standardizer::of(x)
+        };
+        Self::of(centred.apply(x), watch)
+    }
+
+    fn of(signals: SignalMatrix, watch: Watch) -> Result<Self, PcaError> {
         report(watch, "Principal components", 0, 2)?;
-        let signals = Standardizer::of(x).apply(x);
         let (sites, touches) = (signals.rows(), signals.columns());
         let matrix = MatRef::from_row_major_slice(signals.values(), sites, touches);
         let gram = if sites <= touches {
@@ -85,11 +100,11 @@ impl Spectrum {
     }
 }
 
-/// Principal components of standardized signals.
+/// Principal components of the signals of a [`Spectrum`].
 pub struct Pca {
     /// Sites × components, by falling variance.
     modes: Mat<f64>,
-    /// Variance of each component, in units of one site's.
+    /// Variance of each component: of standardized signals in units of one site's.
     pub variances: Vec<f64>,
     /// The same of all components together, known or not.
     pub total: f64,
@@ -128,6 +143,31 @@ impl Pca {
             }
         }
         chosen
+    }
+
+    /// What signals (sites × touches) rebuilt from `count` pivots by as many components lack, as the paper's authors
+    /// measure it: Σ‖r - x‖ / Σ‖x‖ over the touches, r the rebuilt x. Nothing there is centred or squared, so that this
+    /// is no share of variance, and far larger than one; nor does it fall with every site more.
+    #[must_use]
+    pub fn norms_missed(&self, x: &SignalMatrix, count: usize) -> f64 {
+        let kept = self.pivots(count);
+        let modes = self.modes.subcols(0, kept.len());
+        let inner = Mat::from_fn(kept.len(), kept.len(), |i, c| modes[(kept[i], c)]);
+        let known = Mat::from_fn(kept.len(), x.columns(), |i, t| x.row(kept[i])[t]);
+        let shares = inner.partial_piv_lu().solve(&known);
+        let rebuilt = modes * &shares;
+        let (mut missed, mut all) = (0.0, 0.0);
+        for t in 0..x.columns() {
+            let (mut off, mut size) = (0.0, 0.0);
+            for i in 0..x.rows() {
+                let value = x.row(i)[t];
+                off += (rebuilt[(i, t)] - value).powi(2);
+                size += value * value;
+            }
+            missed += f64::sqrt(off);
+            all += f64::sqrt(size);
+        }
+        missed / all
     }
 
     /// A QR with column pivoting in the first `count` components, step by step.
@@ -454,6 +494,34 @@ mod tests {
         assert!(curve[0] > 0.3 && curve[0] < 0.9, "{curve:?}");
         assert!(curve[2] < 1e-12 && curve[1] > curve[2], "{curve:?}");
         assert!(judge.unexplained(&[0, 3]).is_none_or(|u| u > 0.3));
+    }
+
+    #[test]
+    fn the_authors_measure_is_of_norms_and_not_of_variance() {
+        // Two sites: one moves by 3 either way, the other by 1 about a rest of its own.
+        let signals = |rest: f64| {
+            let second = [0.0, 0.0, 1.0, -1.0].map(|v| v + rest);
+            SignalMatrix::new(4, [[3.0, -3.0, 0.0, 0.0], second].concat())
+        };
+        let missed = |x: &SignalMatrix, count: usize| {
+            let spectrum = Spectrum::unscaled(x, &unwatched).unwrap();
+            spectrum
+                .components(2, &unwatched)
+                .unwrap()
+                .norms_missed(x, count)
+        };
+        // A tenth of the variance, a quarter of the norms.
+        let about_zero = signals(0.0);
+        assert!((missed(&about_zero, 1) - 2.0 / 8.0).abs() < 1e-12);
+        // The rest counts too.
+        let off_centre = signals(5.0);
+        let all = 2.0 * 34f64.sqrt() + 10.0;
+        assert!((missed(&off_centre, 1) - 20.0 / all).abs() < 1e-12);
+        assert!(missed(&off_centre, 2) < 1e-12);
+        // Standardized, both sites move alike.
+        let standard = Spectrum::new(&about_zero, &unwatched).unwrap();
+        let variances = standard.components(2, &unwatched).unwrap().variances;
+        assert!((variances[0] - variances[1]).abs() < 1e-12);
     }
 
     #[test]

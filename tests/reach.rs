@@ -5,18 +5,18 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
-use hapdef::budget::unwatched;
+use hapdef::budget::{Budget, Quality, unwatched};
+use hapdef::cli;
+use hapdef::design;
 use hapdef::elasticity::Material;
 use hapdef::elasticity::solid::ground::SolidGround;
 use hapdef::feasible::Surroundings;
-use hapdef::io::mesh_file::read_mesh;
 use hapdef::mesh::locate::SurfaceIndex;
+use hapdef::mesh::mount::Mount;
 use hapdef::mesh::reach::{FINGERTIP, Finger};
-use hapdef::mesh::repair::Repair;
 use hapdef::mesh::room::Room;
 use hapdef::mesh::walls::Side;
 use hapdef::mesh::{SurfacePoint, TriMesh};
-use hapdef::project::Unit;
 
 /// Side of a voxel (m).
 const CELL: f64 = 2e-3;
@@ -207,6 +207,32 @@ fn what_the_user_says_of_a_face_holds() {
     assert!(on_rod > 0.15, "{on_rod}");
 }
 
+/// What a part is fastened to keeps fingers off what it surrounds, and off nothing beside it.
+#[test]
+fn nothing_comes_through_what_a_part_is_fastened_to() {
+    // A cup upside down: its floor, 4 mm above the rim that it stands on, could be touched from below.
+    let cup = voxels([20, 20, 20], |[i, j, k]| {
+        let wall = ![i, j].iter().all(|c| (1..19).contains(c));
+        (wall && k < 20) || k == 2
+    });
+    let rim: Vec<u32> = (0u32..cup.triangles().len() as u32)
+        .filter(|&t| cup.corners(t).iter().all(|p| p.z == 0.0))
+        .collect();
+    let mount = Mount::behind(&cup, &rim).unwrap();
+    assert!(mount.normal.distance(DVec3::NEG_Z) < 1e-12);
+    let index = SurfaceIndex::new(&cup);
+    let reaches = |mounts: &[Mount], at_mm: [f64; 3], normal: DVec3| {
+        let finger = Finger::new(&cup, &index, 1e-3).around(mounts);
+        finger.reaches(DVec3::from_array(at_mm) * 1e-3, normal)
+    };
+    let floor = ([21.0, 17.0, 4.0], DVec3::NEG_Z);
+    assert!(reaches(&[], floor.0, floor.1) && !reaches(&[mount], floor.0, floor.1));
+    let side = ([0.0, 17.0, 3.0], DVec3::NEG_X);
+    assert!(reaches(&[mount], side.0, side.1));
+    let all: Vec<u32> = (0..cup.triangles().len() as u32).collect();
+    assert_eq!(Mount::behind(&cup, &all), None);
+}
+
 #[test]
 fn a_block_without_walls_keeps_its_faces() {
     let block = voxels([12, 12, 12], |_| true);
@@ -218,14 +244,14 @@ fn a_block_without_walls_keeps_its_faces() {
 /// The limb of the paper is nobody's to give: it lies beside this repository or not at all.
 #[test]
 fn the_papers_limb_is_touched_on_its_shell_and_glued_to_behind_it() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/paper-limb/limb.inp");
-    let Ok(loaded) = read_mesh(&path, Some(Unit::Metre), 0, Repair::default()) else {
-        println!("skipped: the limb is absent, or its curved elements are not mended");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/paper-limb/ds.dat");
+    if !path.exists() {
+        println!("skipped: {} is not there", path.display());
         return;
-    };
-    let part = Arc::new(loaded.mesh);
+    }
+    let inputs = cli::open(&path, None).unwrap().inputs;
     // The radius of the shell's outside at each height, by the outermost vertices of the file.
-    let places = || part.positions().iter().map(|p| *p * 1e3);
+    let places = || inputs.part.positions().iter().map(|p| *p * 1e3);
     let radius = |height: f64| {
         let level = places().filter(|p| (p.y - height).abs() < 2.5);
         level.map(|p| p.x.hypot(p.z)).fold(0.0, f64::max)
@@ -233,19 +259,29 @@ fn the_papers_limb_is_touched_on_its_shell_and_glued_to_behind_it() {
     let levels: Vec<f64> = (38..=162).map(|y| radius(f64::from(y))).collect();
     let depth =
         |p: DVec3| levels[((p.y - 38.0).round().max(0.0) as usize).min(124)] - p.x.hypot(p.z);
-    let radial = |p: DVec3, n: DVec3| n.dot(p.with_y(0.0).normalize());
-    let ground = SolidGround::new(&part, NYLON, &[], &|_| None, &unwatched).unwrap();
-    let outside = share(
-        &ground.outside,
-        |_| true,
-        |p, n| radial(p, n) > 0.7 && depth(p) < 1.0,
-    );
-    let backs = behind(&ground);
-    let inside = share(
-        &ground.inside,
-        |t| backs[t as usize],
-        |p, n| radial(p, n) < -0.7 && (0.3..2.2).contains(&depth(p)),
-    );
-    println!("{outside:.4} of touches on the shell, {inside:.4} of sites behind it");
-    assert!(outside > 0.97 && inside > 0.97, "{outside} {inside}");
+    let budget = Budget {
+        touches: 400,
+        test_touches: 40,
+        ..Quality::Draft.budget()
+    };
+    let simulated = design::simulate(&inputs, &budget, &unwatched).unwrap();
+    let part = |of: &[DVec3], is: &dyn Fn(f64) -> bool| {
+        let there = of.iter().filter(|&&p| is(depth(p * 1e3))).count();
+        there as f64 / of.len() as f64
+    };
+    let touches: Vec<DVec3> = simulated
+        .dataset
+        .touches
+        .iter()
+        .map(|t| t.position)
+        .collect();
+    let feasible = design::filter(&inputs, &simulated).sites();
+    let sites: Vec<DVec3> = (feasible.iter())
+        .map(|&s| simulated.dataset.sites[s].position)
+        .collect();
+    assert!(sites.len() > 1000, "{}", sites.len());
+    let outside = part(&touches, &|depth| depth < 1.0);
+    let behind = part(&sites, &|depth| (0.3..2.2).contains(&depth));
+    println!("{outside:.4} of touches on the shell, {behind:.4} of feasible sites behind it");
+    assert!(outside > 0.97 && behind > 0.97, "{outside} {behind}");
 }

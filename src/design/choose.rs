@@ -125,7 +125,13 @@ impl Reduced {
     /// The Gaussian process, where a selector asked for it.
     #[must_use]
     pub fn geometry(&self) -> Option<&Geometry> {
-        self.geometry.get().map(|g| &g.geometry)
+        self.located().map(|g| &g.geometry)
+    }
+
+    /// The same with where its locations are.
+    #[must_use]
+    pub fn located(&self) -> Option<&Located> {
+        self.geometry.get()
     }
 
     /// What the Gaussian process leaves uncertain (σ², 1 where nothing is known) at each of its locations

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use crate::mesh::canonical::Canonical;
 use crate::mesh::cut::{ON_PLANE, cut_by_boxes};
+use crate::mesh::mount::Mount;
 use crate::mesh::{Edge, SurfacePoint, TriMesh};
 
 /// The held ones among the six freedoms of a node: displacement x, y, z, rotation x, y, z.
@@ -149,6 +150,17 @@ impl HeldPart {
         let tri = self.mesh.triangles()[facet as usize];
         tri.iter()
             .all(|&v| self.members[v as usize] >> support & 1 == 1)
+    }
+
+    /// What so many supports fasten the (cut) part to by a flat face.
+    #[must_use]
+    pub fn mounts(&self, supports: usize) -> Vec<Mount> {
+        let facets = |support: usize| -> Vec<u32> {
+            let all = 0..self.mesh.triangles().len() as u32;
+            all.filter(|&t| self.facet_belongs(t, support)).collect()
+        };
+        let mount = |support| Mount::behind(&self.mesh, &facets(support));
+        (0..supports).filter_map(mount).collect()
     }
 
     /// Whether an edge is the border of a support: it belongs to one that a facet beside it does not.

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use super::TriMesh;
 use super::locate::SurfaceIndex;
+use super::mount::Mount;
 use super::walls::{Side, Walls, frame, middle};
 use crate::budget::{Cancelled, Watch, report};
 
@@ -48,6 +49,7 @@ pub struct Finger<'a> {
     /// The box that holds the part (m), and how large it is.
     bounds: (DVec3, DVec3),
     size: f64,
+    mounts: &'a [Mount],
 }
 
 impl<'a> Finger<'a> {
@@ -60,7 +62,14 @@ impl<'a> Finger<'a> {
             radius,
             bounds: (lower, upper),
             size: (upper - lower).length(),
+            mounts: &[],
         }
+    }
+
+    /// With what the part is fastened to.
+    #[must_use]
+    pub fn around(self, mounts: &'a [Mount]) -> Self {
+        Self { mounts, ..self }
     }
 
     /// Whether its tip can come to rest on a point of the part (m) that looks in a direction.
@@ -69,8 +78,11 @@ impl<'a> Finger<'a> {
         if !normal.is_normalized() {
             return false;
         }
-        let ball = at + normal * (self.radius + OFF * self.size);
-        self.room(ball) >= 0.0 && ways(normal).any(|way| self.is_free(ball, way))
+        let off = at + normal * (OFF * self.size);
+        let ball = off + normal * self.radius;
+        // A large ball gives way by more than a thin part is thick: nothing may lie between it and the place.
+        let between = || (self.index.ray(off, normal)).is_some_and(|(_, far)| far < self.radius);
+        self.room(ball) >= 0.0 && !between() && ways(normal).any(|way| self.is_free(ball, way))
     }
 
     /// How much farther off the surface is than the tip needs it to be (m).
@@ -80,7 +92,10 @@ impl<'a> Finger<'a> {
 
     /// Whether nothing stands in the way from a place of the ball straight out.
     fn is_free(&self, ball: DVec3, way: DVec3) -> bool {
-        if self.index.ray(ball, way).is_some() {
+        let give = (1.0 - GIVES) * self.radius;
+        if self.index.ray(ball, way).is_some()
+            || (self.mounts.iter()).any(|mount| mount.stops(ball, give, way))
+        {
             return false;
         }
         if self.radius <= 0.0 {
@@ -134,7 +149,8 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// Looks at every facet of a closed surface whose walls are known; `radius` (m) is the fingertip's.
+    /// Looks at every facet of a closed surface whose walls are known; `radius` (m) is the fingertip's, and the part is
+    /// fastened to `mounts`.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -143,9 +159,11 @@ impl Reach {
         index: &SurfaceIndex,
         walls: &Walls,
         radius: f64,
+        mounts: &[Mount],
         watch: Watch,
     ) -> Result<Self, Cancelled> {
-        let mut touched = reached(mesh, &Finger::new(mesh, index, radius), walls, watch)?;
+        let finger = Finger::new(mesh, index, radius).around(mounts);
+        let mut touched = reached(mesh, &finger, walls, watch)?;
         fill(mesh, walls, &mut touched);
         let area = |of: &dyn Fn(usize) -> bool| -> f64 {
             let facets = (0u32..mesh.triangles().len() as u32).filter(|&t| of(t as usize));

@@ -401,6 +401,7 @@ fn kind_name(kind: SupportKind) -> &'static str {
 }
 
 fn touch(ui: &mut Ui, project: &mut Project) {
+    let solid = project.part.model == PartModel::Solid;
     let touch = &mut project.touch;
     number(
         ui,
@@ -465,15 +466,17 @@ fn touch(ui: &mut Ui, project: &mut Project) {
         " mm",
         "Least distance of a touch from a free edge",
     );
-    number(
-        ui,
-        "Fingertip",
-        &mut touch.reach_mm,
-        0.0..=1e3,
-        0.5,
-        " mm",
-        "Radius of the ball that comes from outside: touches lie only where it gets to, not on what stands behind windows it does not fit through. The field “Faces” shows where",
-    );
+    if solid {
+        number(
+            ui,
+            "Fingertip",
+            &mut touch.reach_mm,
+            0.0..=1e3,
+            0.5,
+            " mm",
+            "Radius of the ball that comes from outside: touches lie only where it gets to, not on what stands behind windows it does not fit through. The field “Faces” shows where",
+        );
+    }
 }
 
 fn sites(ui: &mut Ui, project: &mut Project) {

@@ -112,7 +112,8 @@ impl SolidGround {
         let whole = laid.mesh;
         let index = SurfaceIndex::new(&whole);
         let mut walls = Walls::of(&whole, &index, watch)?;
-        let mut reach = Reach::of(&whole, &index, &walls, fingertip, watch)?;
+        let mounts = held.mounts(supports.len());
+        let mut reach = Reach::of(&whole, &index, &walls, fingertip, &mounts, watch)?;
         for t in 0..whole.triangles().len() as u32 {
             let middle = whole.corners(t).iter().sum::<DVec3>() / 3.0;
             if let Some(side) = told(middle) {

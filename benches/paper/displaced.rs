@@ -1,0 +1,205 @@
+//! Displacements, as in the paper: four selectors, sets of one gauge to thirty, read by regression.
+
+use std::fmt::Write as _;
+
+use hapdef::budget::{Budget, unwatched};
+use hapdef::design::{self, DesignError, Inputs, Reduced, Simulated, Truth};
+use hapdef::evaluation::{BASELINE, EVERYWHERE, EstimatorKind, Evaluation, EvaluationRow};
+use hapdef::feasible::Feasibility;
+use hapdef::placement::{Selection, SelectorKind};
+
+use crate::kernels::Kernel;
+use crate::{MANY, SIZES, Stages};
+
+/// The limb with what was chosen on it by displacements.
+pub struct Displaced {
+    pub inputs: Inputs,
+    pub budget: Budget,
+    pub simulated: Simulated,
+    pub feasibility: Feasibility,
+    pub reduced: Reduced,
+    /// By the paper's selectors: sets of `SIZES`.
+    pub selections: Vec<Selection>,
+}
+
+/// What was found of all sets by the same judge.
+pub struct Judged {
+    /// Unseen touches.
+    pub touches: usize,
+    /// Of the four selectors.
+    pub evaluation: Evaluation,
+    /// Of what each of the authors' kernels chose.
+    pub theirs: Vec<Evaluation>,
+}
+
+impl Displaced {
+    pub fn of(inputs: Inputs, budget: Budget, stages: &mut Stages) -> Result<Self, DesignError> {
+        let simulated = design::simulate(&inputs, &budget, &unwatched)?;
+        stages.end("simulating displacements");
+        let feasibility = design::filter(&inputs, &simulated);
+        let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, &budget, &unwatched)?;
+        stages.end("filtering and reducing sites");
+        let mut selections = Vec::new();
+        for kind in SelectorKind::PAPER {
+            let chosen = design::select(&inputs, &simulated, &reduced, kind, &budget, &unwatched)?;
+            selections.push(of_sizes(&chosen, &SIZES));
+            stages.end(&format!("choosing by {}", kind.name()));
+        }
+        Ok(Self {
+            inputs,
+            budget,
+            simulated,
+            feasibility,
+            reduced,
+            selections,
+        })
+    }
+
+    /// All sets judged on the same touches: those of the four selectors, and those by the authors' kernels.
+    pub fn judged(&self, theirs: &[Kernel], stages: &mut Stages) -> Result<Judged, DesignError> {
+        let mut all = self.selections.clone();
+        all.extend(theirs.iter().flat_map(|k| k.selections.iter().cloned()));
+        let sites = design::sites_to_judge(EstimatorKind::Svr, &self.reduced, &all);
+        let truth = design::truth(
+            &self.inputs,
+            &self.simulated,
+            &sites,
+            &self.budget,
+            &unwatched,
+        )?;
+        stages.end("measuring on a finer model");
+        let evaluation = self.judge(&self.selections, &truth, &self.budget)?;
+        stages.end("judging by regression");
+        let whole = Budget {
+            failure_subsets: 0,
+            ..self.budget
+        };
+        let theirs: Result<Vec<Evaluation>, DesignError> = (theirs.iter())
+            .map(|kernel| self.judge(&kernel.selections, &truth, &whole))
+            .collect();
+        let theirs = theirs?;
+        stages.end("judging their kernel");
+        Ok(Judged {
+            touches: truth.touches.len(),
+            evaluation,
+            theirs,
+        })
+    }
+
+    fn judge(
+        &self,
+        selections: &[Selection],
+        truth: &Truth,
+        budget: &Budget,
+    ) -> Result<Evaluation, DesignError> {
+        design::evaluate(
+            &self.inputs,
+            &self.simulated,
+            &self.reduced,
+            selections,
+            truth,
+            budget,
+            &unwatched,
+        )
+    }
+}
+
+/// A selection with its sets of some sizes only, in this order.
+pub fn of_sizes(selection: &Selection, sizes: &[usize]) -> Selection {
+    let of_size = |&size: &usize| selection.sets.iter().find(|s| s.sites.len() == size);
+    Selection {
+        sets: sizes.iter().filter_map(of_size).cloned().collect(),
+        ..selection.clone()
+    }
+}
+
+/// What was found of a selector's set of so many gauges.
+pub fn row(found: &Evaluation, kind: SelectorKind, gauges: usize) -> Option<&EvaluationRow> {
+    let is_it = |r: &&EvaluationRow| r.selector == kind.name() && r.sensors == gauges;
+    let mut rows = found.rows.iter().filter(|r| r.region == EVERYWHERE);
+    rows.find(is_it)
+}
+
+/// What was found of all candidates together.
+pub fn baseline(found: &Evaluation) -> Option<&EvaluationRow> {
+    let mut rows = found.rows.iter().filter(|r| r.region == EVERYWHERE);
+    rows.find(|r| r.selector == BASELINE)
+}
+
+/// What is left of a selector's largest set when so many of its gauges fail: mean error and the worst one (mm).
+pub fn with_failed(
+    found: &Evaluation,
+    kind: SelectorKind,
+    failed: usize,
+    retrained: bool,
+) -> Option<(f64, f64)> {
+    let set = found.failures.iter().find(|f| f.selector == kind.name())?;
+    let mut rows = set.rows.iter().filter(|r| r.failed == failed);
+    let row = rows.find(|r| failed == 0 || r.retrained == retrained)?;
+    Some((row.error_mm, row.worst_mm))
+}
+
+pub fn write(text: &mut String, found: &Evaluation) {
+    errors(text, found);
+    failures(text, found);
+}
+
+fn errors(text: &mut String, found: &Evaluation) {
+    let titles = SelectorKind::PAPER.map(SelectorKind::title);
+    let _ = writeln!(
+        text,
+        "### Displacement by regression\n\nMean / median / 95 % (mm) of unseen touches, then the mean with every gauge glued off its place. No noise, as in the paper; the regression is tuned for each set.\n\n| gauges | {} |\n|---|{}",
+        titles.join(" | "),
+        "---|".repeat(titles.len())
+    );
+    let told = |row: Option<&EvaluationRow>| {
+        row.map_or("–".to_owned(), |r| {
+            format!(
+                "{:.2} / {:.2} / {:.2}; {:.1}",
+                r.error_mm, r.median_mm, r.p95_mm, r.workshop_mm
+            )
+        })
+    };
+    let mut sizes = SIZES;
+    sizes.sort_unstable();
+    for gauges in sizes {
+        let cells = SelectorKind::PAPER.map(|kind| told(row(found, kind, gauges)));
+        let _ = writeln!(text, "| {gauges} | {} |", cells.join(" | "));
+    }
+    if let Some(all) = baseline(found) {
+        let _ = writeln!(
+            text,
+            "\nAll {} candidates together: {}.",
+            all.sensors,
+            told(Some(all))
+        );
+    }
+    text.push('\n');
+}
+
+fn failures(text: &mut String, found: &Evaluation) {
+    let _ = writeln!(
+        text,
+        "### Failed gauges\n\nMean error (mm) with so many of {MANY} failed, in brackets the worst of the losses tried; trained anew without them on a part of the touches, and not (a failed gauge then reports its mean).\n\n| selector | trained anew | 0 | 1 | 2 | 3 | 4 | 5 |\n|---|---|---|---|---|---|---|---|"
+    );
+    for kind in SelectorKind::PAPER {
+        for retrained in [true, false] {
+            let cells: Vec<String> = (0..=5)
+                .map(|failed| {
+                    let left = with_failed(found, kind, failed, retrained);
+                    left.map_or("–".into(), |(mean, worst)| {
+                        format!("{mean:.1} ({worst:.1})")
+                    })
+                })
+                .collect();
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} |",
+                kind.name(),
+                if retrained { "yes" } else { "no" },
+                cells.join(" | ")
+            );
+        }
+    }
+    text.push('\n');
+}
