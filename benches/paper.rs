@@ -29,7 +29,7 @@ use hapdef::evaluation::EstimatorKind;
 use hapdef::io::project_file::LoadedProject;
 
 use self::displaced::Displaced;
-use self::kernels::Kernel;
+use self::kernels::Chosen;
 use self::reduction::Measured;
 use timing::cpu_seconds;
 
@@ -92,7 +92,7 @@ fn main() -> anyhow::Result<()> {
     reduction::write(&mut text, &displaced.feasibility, &measured);
     displaced::write(&mut text, &judged.evaluation);
     let ours = kernels::ours(&displaced);
-    let kernels: Vec<&Kernel> = ours.iter().chain(&theirs).collect();
+    let kernels: Vec<&Chosen> = ours.iter().chain(&theirs).collect();
     kernels::write(&mut text, &kernels, &judged);
     matched::write(&mut text, &matched);
     println!("{text}");

@@ -5,6 +5,7 @@ pub mod board;
 pub mod data;
 pub mod design;
 pub mod evaluate;
+pub mod examples;
 pub mod limb;
 pub mod listen;
 pub mod out;
@@ -21,14 +22,16 @@ use std::sync::Arc;
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use self::examples::{Example, write_bundled_mesh};
 use crate::budget::Quality;
 use crate::dataset::Signal;
 use crate::design::Inputs;
 use crate::io::mesh_file::read_mesh;
 use crate::io::project_file::{self, LoadedProject};
-use crate::io::{FileError, atomic, source};
+use crate::io::source;
 use crate::placement::SelectorKind;
-use crate::project::{Masks, Project, Unit};
+use crate::plain;
+use crate::project::{Project, Unit};
 
 /// Decides where a handful of strain gauges go inside a flexible robot limb.
 ///
@@ -69,7 +72,7 @@ pub enum Command {
     Board(board::BoardArgs),
     /// Where a board's part is touched, one JSON object a line.
     Listen(listen::ListenArgs),
-    /// Writes the bundled limb, or another of its family.
+    /// Writes a bundled limb, or another of its family.
     Limb(limb::LimbArgs),
 }
 
@@ -112,31 +115,12 @@ named!(SignalArg, Signal, Displacement => Signal::Displacement, NormalDisplaceme
 named!(SelectorArg, SelectorKind, GreedySvr => SelectorKind::GreedySvr, PcaQr => SelectorKind::PcaQr, Entropy => SelectorKind::Entropy, MutualInformation => SelectorKind::MutualInformation, ExpectedError => SelectorKind::ExpectedError);
 named!(UnitArg, Unit, Mm => Unit::Millimetre, Cm => Unit::Centimetre, M => Unit::Metre, In => Unit::Inch);
 
-/// The bundled project and mesh, inside the program.
-pub const BUNDLED_PROJECT: &str = include_str!("../assets/limb.hapdef.toml");
-pub const BUNDLED_MESH: &[u8] = include_bytes!("../assets/limb.glb");
-
-/// The bundled limb as a loaded project.
+/// The limb that opens where nothing else is named, as a loaded project.
 ///
 /// # Errors
 /// None for the files this program was built with.
 pub fn bundled() -> anyhow::Result<LoadedProject> {
-    let project =
-        project_file::parse(BUNDLED_PROJECT).map_err(|m| anyhow::anyhow!("bundled limb: {m}"))?;
-    let mesh = crate::io::mesh_file::parse_glb(BUNDLED_MESH)
-        .map_err(|m| anyhow::anyhow!("bundled limb: {m}"))?;
-    Ok(LoadedProject {
-        inputs: Inputs {
-            project,
-            part: Arc::new(mesh.mesh),
-            painted: None,
-            masks: Masks::new(),
-        },
-        repairs: mesh.repairs,
-        path: PathBuf::from("limb.hapdef.toml"),
-        mesh_path: PathBuf::from("limb.glb"),
-        bundled: true,
-    })
+    Example::Tube.open()
 }
 
 /// Opens a project or a mesh, by the file's ending.
@@ -244,7 +228,8 @@ impl Common {
 /// What was changed or left out while the mesh was taken in, on stderr.
 fn say_repairs(loaded: &LoadedProject) {
     if let Some(said) = loaded.repairs.in_words(loaded.inputs.project.part.body) {
-        out::say(&format!("{}: {said}", loaded.mesh_path.display()));
+        let mesh = plain::path(&loaded.mesh_path);
+        out::say(&plain::message(&format!("{mesh}: {said}")));
     }
 }
 
@@ -261,25 +246,7 @@ pub fn prepare_folder(loaded: &mut LoadedProject, folder: &Path) -> anyhow::Resu
         )
     })?;
     if loaded.bundled {
-        loaded.mesh_path = write_bundled_mesh(folder)?;
+        loaded.mesh_path = write_bundled_mesh(folder, &loaded.mesh_path)?;
     }
     Ok(())
-}
-
-/// Writes the bundled mesh into a folder, never over another one.
-///
-/// # Errors
-/// As [`prepare_folder`].
-pub fn write_bundled_mesh(folder: &Path) -> anyhow::Result<PathBuf> {
-    let path = folder.join("limb.glb");
-    match source::read(&path) {
-        Ok(bytes) if bytes == BUNDLED_MESH => {}
-        Err(FileError::Missing { .. }) => atomic::write(&path, BUNDLED_MESH)?,
-        // Also what cannot be read, or is no file: it is not ours to write over.
-        _ => anyhow::bail!(
-            "{}: something else of this name is there already. Choose another folder",
-            path.display()
-        ),
-    }
-    Ok(path)
 }

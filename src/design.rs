@@ -122,13 +122,17 @@ pub enum DesignError {
         fits_mm: f64,
     },
     #[error(
-        "{needed_gb:.3} GB would be needed for {sites} sites × {touches} touches, more than the {limit_gb:.3} GB that may be taken: lower touch.count, widen sites.spacing_mm, give fewer rows where they come from tables, or allow more with --memory-gb"
+        "{} would be needed for {sites} sites × {touches} touches, more than the {} that may be taken: {}, or allow more with --memory-gb",
+        plain::needed_gb(*needed_gb),
+        plain::allowed_gb(*limit_gb),
+        said_by.remedy()
     )]
     TooLarge {
         needed_gb: f64,
         limit_gb: f64,
         sites: usize,
         touches: usize,
+        said_by: SaidBy,
     },
     #[error(
         "the project has no gauges yet: place them in the studio, or with `hapdef design`, whose design.hapdef.toml has them"
@@ -151,6 +155,24 @@ impl DesignError {
                         | PlacementError::Signals(crate::pca::PcaError::Cancelled(_))
                 )
         )
+    }
+}
+
+/// Who says how many sites and touches there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SaidBy {
+    /// The keys of the project.
+    Project,
+    /// Tables with a row each.
+    Tables,
+}
+
+impl SaidBy {
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::Project => "lower touch.count, widen sites.spacing_mm",
+            Self::Tables => "give fewer touches or sites at a time",
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Weak};
 
 use crate::budget::Quality;
-use crate::design::Inputs;
+use crate::design::{Inputs, check_shape};
 use crate::io::project_file::LoadedProject;
 use crate::mesh::geodesic::{March, Scratch};
 use crate::mesh::repair::Repair;
@@ -44,6 +44,8 @@ pub struct Document {
     scratch: Scratch,
     /// Body and repairs that the part was taken in with.
     taken_in: (usize, Repair),
+    /// Why nothing can be computed on the part, whatever its project, where that is so.
+    misshapen: Option<String>,
     fingerprints: Fingerprints,
     saved: State,
     /// The state at the last finished gesture.
@@ -70,6 +72,7 @@ impl Document {
         let part = &state.project.part;
         Self {
             taken_in: (part.body, part.repair()),
+            misshapen: (check_shape(&loaded.inputs.part).err()).map(|e| e.to_string()),
             march: March::over(&loaded.inputs.part),
             scratch: Scratch::default(),
             part: loaded.inputs.part,
@@ -91,6 +94,12 @@ impl Document {
     pub fn asks_for_another_part(&self) -> bool {
         let part = &self.state.project.part;
         self.taken_in != (part.body, part.repair())
+    }
+
+    /// Why nothing can be computed on the part, whatever its project says; nothing of most parts.
+    #[must_use]
+    pub fn misshapen(&self) -> Option<&str> {
+        self.misshapen.as_deref()
     }
 
     /// A snapshot for a job.

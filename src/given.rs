@@ -98,7 +98,8 @@ pub fn answer(
     notes.extend(design::cautions(
         &estimate,
         linearity.as_ref(),
-        &budget.elements,
+        &inputs.project,
+        budget,
     ));
     let smallest = touches
         .iter()

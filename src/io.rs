@@ -100,9 +100,9 @@ impl crate::trade::Meter for ProcessMeter {
 /// A file that could not be read or written, in the user's terms.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    #[error("{}: there is no such file. Check the path", path.display())]
+    #[error("{}: there is no such file. Check the path", crate::plain::path(path))]
     Missing { path: PathBuf },
-    #[error("{}: {message}", path.display())]
+    #[error("{}: {message}", crate::plain::path(path))]
     Broken { path: PathBuf, message: String },
 }
 
@@ -123,6 +123,10 @@ impl FileError {
             std::io::ErrorKind::PermissionDenied => Self::broken(
                 path,
                 "permission denied. Check who may read and write there",
+            ),
+            std::io::ErrorKind::InvalidFilename => Self::broken(
+                path,
+                "a name in it is none for a file, or too long. Check the path",
             ),
             _ => Self::broken(path, error),
         }

@@ -1,11 +1,17 @@
-//! The family of limbs that the bundled one belongs to: a lattice tube of columns and hoops.
+//! The families of limbs that the bundled ones belong to: a lattice tube of columns and hoops, and a barrel of
+//! triangles with a frame inside ([`barrel`]).
 //!
-//! Written in unrolled coordinates (s around, z up, in mm here, as a designer would state them) and
+//! The tube is written in unrolled coordinates (s around, z up, in mm here, as a designer would state them) and
 //! bent into a tube. The bundled limb was chosen by measurement among thirty of these.
 
 use glam::{DVec2, DVec3};
 
 use crate::mesh::TriMesh;
+
+pub mod barrel;
+mod body;
+mod frame;
+mod lattice;
 
 /// Parameters of a lattice limb. Lengths in millimetres.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,6 +94,15 @@ impl Default for LimbSpec {
     }
 }
 
+/// A rule of one parameter.
+fn range(what: &'static str, rule: &'static str, value: f64, holds: bool) -> Result<(), LimbError> {
+    if holds && value.is_finite() {
+        Ok(())
+    } else {
+        Err(LimbError::Range { what, rule, value })
+    }
+}
+
 /// A supported patch, in mm: the box that holds exactly its part of the surface.
 pub type BoxMm = [[f64; 3]; 2];
 
@@ -137,13 +152,6 @@ impl LimbSpec {
     }
 
     fn check(&self) -> Result<(), LimbError> {
-        let range = |what, rule, value: f64, ok: bool| {
-            if ok && value.is_finite() {
-                Ok(())
-            } else {
-                Err(LimbError::Range { what, rule, value })
-            }
-        };
         let positive = "above zero";
         range(
             "the circumference",

@@ -1,6 +1,8 @@
 //! Maps arguments to commands and errors to exit codes: 0 done, 1 failed with a message, 2 wrong usage.
 
 mod allocation;
+#[cfg(feature = "studio")]
+mod parting;
 
 use std::process::ExitCode;
 
@@ -55,6 +57,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
 
 #[cfg(feature = "studio")]
 fn open_studio(cli: &Cli) -> anyhow::Result<()> {
+    parting::explain_at_exit();
     hapdef::studio::run(cli.file.as_deref(), cli.unit.map(Into::into))
 }
 

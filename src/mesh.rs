@@ -87,6 +87,8 @@ pub struct TriMesh {
     mean_edge: f64,
     /// The tetrahedra that it is the surface of, where it came with them.
     volume: Option<Arc<VolumeMesh>>,
+    /// It is open, and closes where vertices of its file within so much (m) of each other are joined.
+    closes_within: Option<f64>,
 }
 
 impl TriMesh {
@@ -101,7 +103,12 @@ impl TriMesh {
             edges,
             of_triangles: triangle_edges,
         } = sides;
-        let mut vertex_triangles = vec![Vec::new(); positions.len()];
+        let mut around = vec![0; positions.len()];
+        for &v in triangles.iter().flatten() {
+            around[v as usize] += 1;
+        }
+        let mut vertex_triangles: Vec<Vec<u32>> =
+            around.into_iter().map(Vec::with_capacity).collect();
         for (t, tri) in triangles.iter().enumerate() {
             for &v in tri {
                 vertex_triangles[v as usize].push(t as u32);
@@ -129,6 +136,7 @@ impl TriMesh {
             vertex_triangles,
             vertex_normals,
             volume: None,
+            closes_within: None,
         }
     }
 
@@ -145,6 +153,12 @@ impl TriMesh {
     #[must_use]
     pub fn volume(&self) -> Option<&Arc<VolumeMesh>> {
         self.volume.as_ref()
+    }
+
+    /// The surface is open, and closes where vertices of its file within so much (m) of each other are joined.
+    #[must_use]
+    pub fn closes_within(&self) -> Option<f64> {
+        self.closes_within
     }
 
     #[must_use]

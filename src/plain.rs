@@ -1,10 +1,15 @@
 //! Text and numbers from outside (files, boards) made safe to show: no control characters, and not without
-//! an end.
+//! an end. And numbers with as many digits as are read.
+
+use std::path::Path;
 
 /// Longest word that is quoted in a message, in characters.
 const WORD: usize = 60;
 /// Longest message: what one screen holds, in characters.
 const MESSAGE: usize = 1600;
+/// Longest part of a message that a library wrote, and longest path, in characters.
+const PART: usize = 300;
+const PATH: usize = 160;
 
 /// One word of a file or a board, to stand in a message between quotation marks.
 #[must_use]
@@ -25,6 +30,44 @@ pub fn message(text: &str) -> String {
     shown(text, MESSAGE)
 }
 
+/// What a library says of a text from outside. The piece of it that this may carry is of any length and stands between
+/// what it is and what was expected: of a long one both ends are kept.
+#[must_use]
+pub fn ends(text: &str) -> String {
+    both_ends(text, PART)
+}
+
+/// A path, which may come from a file too: of a long one its beginning and the end of its name.
+#[must_use]
+pub fn path(path: &Path) -> String {
+    both_ends(&path.display().to_string(), PATH).replace('\n', "\u{fffd}")
+}
+
+/// So many things: `1 gauge`, `3 gauges`.
+#[must_use]
+pub fn count(number: usize, thing: &str) -> String {
+    let many = if number == 1 { "" } else { "s" };
+    format!("{number} {thing}{many}")
+}
+
+/// A number with three significant digits, and no zeros behind them.
+#[must_use]
+pub fn digits(number: f64) -> String {
+    three_digits(number, f64::round)
+}
+
+/// Memory that something needs (GB): rounded up, so that what is too much reads so.
+#[must_use]
+pub fn needed_gb(gigabytes: f64) -> String {
+    format!("{} GB", three_digits(gigabytes, f64::ceil))
+}
+
+/// Memory that may be taken (GB): rounded down.
+#[must_use]
+pub fn allowed_gb(gigabytes: f64) -> String {
+    format!("{} GB", three_digits(gigabytes, f64::floor))
+}
+
 /// A length (mm) of any size, in a few characters.
 #[must_use]
 pub fn mm(length: f64) -> String {
@@ -40,6 +83,42 @@ pub fn mm(length: f64) -> String {
 #[must_use]
 pub fn lines_before(text: &[u8], byte: usize) -> usize {
     text[..byte.min(text.len())].split(|&b| b == b'\n').count() - 1
+}
+
+/// The first three digits of a number, the third one rounded.
+fn three_digits(number: f64, rounded: impl Fn(f64) -> f64) -> String {
+    /// Powers of ten between which a number is written out.
+    const WRITTEN: std::ops::Range<i32> = -6..9;
+    let power = number.abs().log10().floor();
+    if number == 0.0 {
+        return "0".to_owned();
+    }
+    if !WRITTEN.contains(&(power as i32)) {
+        return format!("{number:.1e}");
+    }
+    let behind = 2 - power as i32;
+    if behind <= 0 {
+        let unit = 10f64.powi(-behind);
+        return format!("{:.0}", rounded(number / unit) * unit);
+    }
+    let unit = 10f64.powi(behind);
+    let places = behind as usize;
+    let written = format!("{:.places$}", rounded(number * unit) / unit);
+    written
+        .trim_end_matches('0')
+        .trim_end_matches('.')
+        .to_owned()
+}
+
+/// At most so many characters: of a longer text its beginning and its end.
+fn both_ends(text: &str, most: usize) -> String {
+    let long = text.chars().count();
+    if long <= most {
+        return shown(text, most);
+    }
+    let half = most / 2;
+    let end: String = text.chars().skip(long - half).collect();
+    format!("{}{}", shown(text, half), shown(&end, half))
 }
 
 /// At most so many characters, those that a terminal would obey replaced; a line break stays.
@@ -86,6 +165,49 @@ mod tests {
         ] {
             assert_eq!(mm(length), said);
         }
+    }
+
+    #[test]
+    fn numbers_have_three_digits() {
+        for (number, said) in [
+            (0.0, "0"),
+            (8.0, "8"),
+            (0.1, "0.1"),
+            (13.94, "13.9"),
+            (1.0 / 3.0, "0.333"),
+            (0.000_123_4, "0.000123"),
+            (3053.2, "3050"),
+            (99.96, "100"),
+            (-2.5, "-2.5"),
+            (2.5e12, "2.5e12"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(digits(number), said);
+        }
+        // What is too much by a hair reads so.
+        assert_eq!(needed_gb(8.000_001), "8.01 GB");
+        assert_eq!(allowed_gb(8.009), "8 GB");
+        assert_eq!(count(1, "gauge"), "1 gauge");
+        assert_eq!(count(0, "gauge"), "0 gauges");
+    }
+
+    #[test]
+    fn of_what_is_long_both_ends_are_kept() {
+        let name = format!("a/{}.stl", "é".repeat(200_000));
+        let shown = path(Path::new(&name));
+        assert!(
+            shown.starts_with("a/é") && shown.ends_with("é.stl"),
+            "{shown}"
+        );
+        assert_eq!(shown.chars().count(), PATH + 1);
+        assert_eq!(
+            path(Path::new("a\u{1b}[2J\nb.stl")),
+            "a\u{fffd}[2J\u{fffd}b.stl"
+        );
+        let said = ends(&format!("found {}, expected a number", "x".repeat(9000)));
+        assert!(said.starts_with("found x") && said.ends_with("x, expected a number"));
+        assert!(said.chars().count() <= PART + 1);
+        assert_eq!(ends("short"), "short");
     }
 
     #[test]

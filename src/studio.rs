@@ -52,6 +52,7 @@ use crate::feasible::Feasibility;
 use crate::io::project_file::{self, LoadedProject};
 
 pub use commands::Command;
+pub use display::last_words;
 pub use fields::Field;
 pub use gauges::Way;
 pub use stages::{Stage, Standing};
@@ -103,6 +104,8 @@ pub struct Studio {
     pub view: viewport::Viewport,
     touching: touching::Touching,
     dialog: Option<dialogs::Dialog>,
+    /// The example to open once its user has said that changes may go.
+    ask_example: Option<cli::examples::Example>,
     palette: Option<palette::Palette>,
     recovery: Option<recovery::Recovery>,
     recent: recent::Recent,
@@ -313,6 +316,7 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
     let open = |cc: &eframe::CreationContext<'_>| -> Result<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>> {
         let mut studio = Studio::new(cc, loaded, path)?;
         opened.set(true);
+        display.opened();
         display.clone().end_with_it();
         if let Some(home) = eframe::storage_dir("hapdef-studio") {
             studio.keep_unsaved_in(&home.join("unsaved"));
@@ -324,7 +328,9 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
         }
         Ok(Box::new(studio))
     };
-    eframe::run_native("hapdef-studio", options, Box::new(open)).map_err(|error| {
+    let ended = eframe::run_native("hapdef-studio", options, Box::new(open));
+    display::Display::closed();
+    ended.map_err(|error| {
         anyhow::Error::msg(if opened.get() {
             display.ending(&error)
         } else {

@@ -368,6 +368,31 @@ fn positions_in_millimetres_are_not_taken_for_metres() {
     refused(&path, None, &["one.npz", "one touch only"]);
 }
 
+/// A part of 10 mm, all of it written in millimetres, is a part of 10 m to whoever reads metres.
+#[test]
+fn places_that_agree_on_a_part_of_ten_metres_are_doubted() {
+    let folder = Folder::new();
+    let read = |size: f64, with_sites: bool| {
+        let places = [0.0, 0.0, 0.0, 0.6, 0.0, 0.0, 0.0, 1.0, 0.2].map(|x| x * size);
+        let mut arrays = vec![("X", signals()), ("p_m", floats("(3, 3)", &places))];
+        if with_sites {
+            arrays.push(("site_m", floats("(2, 3)", &places[3..])));
+        }
+        let arrays: Vec<(&str, &[u8])> = arrays.iter().map(|(n, b)| (*n, &b[..])).collect();
+        let read = dataset_file::read(&folder.npz("d.npz", &arrays), None);
+        read.unwrap().notes
+    };
+    for with_sites in [true, false] {
+        let notes = read(10.0, with_sites);
+        assert_eq!(notes.len(), 1, "{notes:?}");
+        says(&notes[0], &["10000 mm", "p_m is in metres", "by 1000"]);
+        assert_eq!(notes[0].contains("site_m is in"), with_sites, "{notes:?}");
+        // An arm, and a fingertip.
+        assert_eq!(read(1.2, with_sites), Vec::<String>::new());
+        assert_eq!(read(0.01, with_sites), Vec::<String>::new());
+    }
+}
+
 #[test]
 fn what_is_wrong_in_a_table_is_named_with_its_cause() {
     let folder = Folder::new();

@@ -252,8 +252,11 @@ fn an_x_server_that_ends_is_a_message() {
     let ended = wait("the end", 30, || studio.0.try_wait().unwrap());
     let said = std::fs::read_to_string(said).unwrap();
     assert_eq!(ended.code(), Some(1), "{said}");
+    assert!(!said.contains("panicked"), "{said}");
+    // Whoever noticed it first, and whatever that one said.
     assert!(
-        !said.trim().is_empty() && !said.contains("panicked"),
+        said.contains("has gone, and the window with it") && said.contains("not saved"),
         "{said}"
     );
+    assert!(said.contains(&format!("DISPLAY={display}")), "{said}");
 }

@@ -313,7 +313,7 @@ fn memory_that_ends_before_the_work() {
 #[cfg(target_os = "linux")]
 #[test]
 fn what_is_no_file_is_neither_read_nor_written_over() {
-    use hapdef::cli::write_bundled_mesh;
+    use hapdef::cli::examples::write_bundled_mesh;
     use hapdef::io::trade_file;
     use rustix::fs::{CWD, Mode, mkfifoat};
 
@@ -321,7 +321,9 @@ fn what_is_no_file_is_neither_read_nor_written_over() {
     let at = |name: &str| folder.path().join(name);
     let (mesh, trade) = (at("limb.glb"), at("trade.json"));
     let refused = |word: &str| {
-        let said = write_bundled_mesh(folder.path()).unwrap_err().to_string();
+        let said = write_bundled_mesh(folder.path(), Path::new("limb.glb"))
+            .unwrap_err()
+            .to_string();
         assert!(
             said.contains("limb.glb") && said.contains("another folder"),
             "{said}"
@@ -343,6 +345,9 @@ fn what_is_no_file_is_neither_read_nor_written_over() {
     }
     assert!(trade_file::read(folder.path()).unwrap().is_none());
     for _ in 0..2 {
-        assert_eq!(write_bundled_mesh(folder.path()).unwrap(), mesh);
+        assert_eq!(
+            write_bundled_mesh(folder.path(), Path::new("limb.glb")).unwrap(),
+            mesh
+        );
     }
 }

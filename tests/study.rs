@@ -319,6 +319,42 @@ fn what_cannot_be_done_is_said() {
     );
 }
 
+#[test]
+fn what_the_data_do_not_bear_is_said_with_their_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = dataset(folder.path(), true);
+    let bare = dataset(folder.path(), false);
+    let (data, bare) = (data.to_str().unwrap(), bare.to_str().unwrap());
+    let out = folder.path().join("sites.csv");
+    let cases: [(&str, &str, &[&str]); 8] = [
+        ("select", bare, &["--selector", "entropy"]),
+        ("select", bare, &["--spacing-mm", "5"]),
+        ("select", bare, &["--inside", "0,0,0,1,1,1"]),
+        ("select", bare, &["--out", out.to_str().unwrap()]),
+        ("select", data, &["--sensors", "25"]),
+        ("select", data, &["--require", "99"]),
+        ("evaluate", data, &["--sites", "77"]),
+        ("evaluate", data, &["--sites", "1,1"]),
+    ];
+    for (command, data, more) in cases {
+        let arguments = [&[command, "--data", data][..], more].concat();
+        refused(&arguments, &format!("{data}: "));
+    }
+    assert!(!out.exists());
+    let one = hapdef(&[
+        "select",
+        "--data",
+        data,
+        "--selector",
+        "pca-qr",
+        "--sensors",
+        "1",
+    ]);
+    let said = String::from_utf8(one.stdout).unwrap();
+    assert!(said.starts_with("1 gauge"), "{said}");
+    assert!(!said.contains("1 gauges"), "{said}");
+}
+
 /// The same plate with other places of touches (m) and signals, in a file of its own.
 fn saved(folder: &Path, name: &str, x: &[f64], p: &[f64]) -> String {
     saved_with(folder, name, x, p, &signals().2)

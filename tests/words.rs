@@ -9,11 +9,14 @@ use std::sync::{Arc, OnceLock};
 use coarse::limb;
 use glam::DVec3;
 use hapdef::budget::{Budget, Quality, unwatched};
-use hapdef::design::{self, DesignError, Inputs, Simulated};
+use hapdef::design::{self, DesignError, Inputs, SaidBy, Simulated};
+use hapdef::elasticity::ElasticError;
+use hapdef::elasticity::estimate::Discretization;
+use hapdef::elasticity::linearity::Linearity;
 use hapdef::feasible::Filter;
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::unroll::Axis;
-use hapdef::project::{Masks, Project, SupportKeys, SupportKind, Unit};
+use hapdef::project::{Masks, PartModel, Project, SupportKeys, SupportKind, Unit};
 
 fn budget() -> Budget {
     Budget {
@@ -260,5 +263,152 @@ fn numbers_that_nobody_means_are_refused_by_their_key() {
             "{said}"
         );
         assert!(said.len() < 400, "{said}");
+    }
+}
+
+#[test]
+fn what_bounds_the_elements_is_what_is_to_be_changed() {
+    let left = Discretization {
+        displacement_mm: 0.1,
+        displacement_percent: 9.0,
+        strain_percent: 20.0,
+        loads: 20,
+        places: 100,
+    };
+    let of_shell = Linearity {
+        largest_percent: 0.1,
+        median_percent: 0.1,
+        beyond: 0,
+        loads: 20,
+        force_n: 10.0,
+    };
+    let said = |quality: Quality, change: &dyn Fn(&mut Project)| {
+        let mut project = limb().project;
+        project.budget.quality = quality;
+        change(&mut project);
+        let budget = project.budget.budget();
+        design::cautions(&left, Some(&of_shell), &project, &budget).remove(0)
+    };
+    let standard = said(Quality::Standard, &|_| ());
+    assert!(standard.contains("a higher quality"), "{standard}");
+    // Elements are graded already, and there is no quality above this one.
+    let reference = said(Quality::Reference, &|_| ());
+    for said in [&standard, &reference] {
+        assert!(!said.contains("part.elements"), "{said}");
+        assert!(said.contains("budget.limits.vertices"), "{said}");
+    }
+    assert!(!reference.contains("higher quality"), "{reference}");
+    let limited = said(Quality::Draft, &|p| {
+        p.budget.limits.vertices = Some(1500);
+    });
+    assert!(
+        limited.contains("budget.limits.vertices from 1500"),
+        "{limited}"
+    );
+    let as_given = said(Quality::Draft, &|p| {
+        p.part.elements = hapdef::project::Elements::AsGiven;
+    });
+    assert!(
+        as_given.contains("part.elements = \"graded\""),
+        "{as_given}"
+    );
+}
+
+/// Two faces of a box a hair apart are no solid, until they are joined.
+#[test]
+fn an_open_solid_that_welding_closes_is_told_the_key() {
+    let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
+    let faces = [
+        [0, 2, 3, 1],
+        [0, 1, 5, 4],
+        [1, 3, 7, 5],
+        [3, 2, 6, 7],
+        [2, 0, 4, 6],
+        [4, 5, 7, 6],
+    ];
+    let block = |gap: f64| {
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        for (k, face) in (0_u32..).zip(faces) {
+            let first = 4 * k;
+            let apart = DVec3::splat(gap * f64::from(k));
+            positions.extend(face.map(|v| 0.02 * corner(v) + apart));
+            triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        }
+        TriMesh::new(&positions, &triangles, 0).unwrap().0
+    };
+    let inputs = |part: TriMesh| {
+        let mut project = Project::around("block.stl", Some(Unit::Millimetre));
+        project.part.model = PartModel::Solid;
+        project.supports.push(SupportKeys {
+            kind: SupportKind::Clamped,
+            box_mm: Some([[-1.0, -1.0, -1.0], [21.0, 21.0, 1.0]]),
+            vertices: None,
+            normal: Axis::Z,
+        });
+        Inputs {
+            project,
+            part: Arc::new(part),
+            painted: None,
+            masks: Masks::new(),
+        }
+    };
+    let torn = inputs(block(2e-6));
+    let refused = design::ground(&torn, &unwatched).err().unwrap().to_string();
+    assert!(refused.contains("part.weld_mm = 0.02)"), "{refused}");
+    let advice = design::advise(&torn, &unwatched).unwrap().words.join(" ");
+    assert!(advice.contains("part.weld_mm = 0.02)"), "{advice}");
+    // Where there is nothing to join, nothing is said of it.
+    let open = block(0.0).part_of(|t| t > 1).unwrap().0;
+    let refused = design::ground(&inputs(open), &unwatched).err().unwrap();
+    let refused = refused.to_string();
+    assert!(refused.contains("encloses nothing"), "{refused}");
+    assert!(!refused.contains("weld"), "{refused}");
+}
+
+/// Memory in words: digits that are read, and what is too much reads so.
+#[test]
+fn memory_is_said_in_digits_that_are_read() {
+    let said = ElasticError::TooLarge {
+        needed_gb: 8.000_3,
+        limit_gb: 8.0,
+    };
+    let said = said.to_string();
+    assert!(
+        said.contains("8.01 GB") && said.contains("the 8 GB"),
+        "{said}"
+    );
+    assert!(said.contains("budget.limits.vertices"), "{said}");
+    let said = DesignError::TooLarge {
+        needed_gb: 3_053.123,
+        limit_gb: 0.1,
+        sites: 10,
+        touches: 20,
+        said_by: SaidBy::Tables,
+    };
+    let said = said.to_string();
+    assert!(
+        said.contains("3060 GB") && said.contains("the 0.1 GB"),
+        "{said}"
+    );
+}
+
+#[test]
+fn advice_has_digits_that_are_read() {
+    let mut inputs = limb();
+    inputs.project.part.thickness_mm = 1.0 / 0.6;
+    let words = design::advise(&inputs, &unwatched).unwrap().words;
+    assert!(words[0].contains("1.67 mm thick"), "{words:?}");
+    // Counts are whole; of everything measured three digits.
+    let digits = |word: &str| word.chars().filter(char::is_ascii_digit).count();
+    let numbers = words
+        .iter()
+        .take(3)
+        .flat_map(|w| w.split([' ', '(', ')', ',']));
+    let measured = numbers.filter(|w| w.contains('.') && w.parse::<f64>().is_ok());
+    for number in measured {
+        assert!(
+            digits(number.trim_start_matches(['0', '.'])) <= 3,
+            "{number}"
+        );
     }
 }

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use hapdef::cli::{BUNDLED_MESH, BUNDLED_PROJECT};
+use hapdef::cli::examples::Example;
 use hapdef::io::dataset_file;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -129,7 +129,8 @@ fn drawn(rng: &mut ChaCha8Rng) -> Trial {
 
 /// The bundled project, with little to compute.
 fn small_project() -> String {
-    BUNDLED_PROJECT
+    Example::Tube
+        .project()
         .replace("quality = \"standard\"", "quality = \"draft\"")
         .replace("\n[live]", &format!("{LIMITS}\n[live]"))
 }
@@ -158,7 +159,7 @@ fn prepared(
         ))
     };
     let put = |name: &str, bytes: &[u8]| write(&folder.join(name), bytes);
-    put("limb.glb", BUNDLED_MESH)?;
+    put("limb.glb", Example::Tube.mesh())?;
     put("p.hapdef.toml", small_project().as_bytes())?;
     let line = match trial {
         Trial::Mesh(reader) => {

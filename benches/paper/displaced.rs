@@ -8,7 +8,7 @@ use hapdef::evaluation::{BASELINE, EVERYWHERE, EstimatorKind, Evaluation, Evalua
 use hapdef::feasible::Feasibility;
 use hapdef::placement::{Selection, SelectorKind};
 
-use crate::kernels::Kernel;
+use crate::kernels::Chosen;
 use crate::{MANY, SIZES, Stages};
 
 /// The limb with what was chosen on it by displacements.
@@ -56,7 +56,7 @@ impl Displaced {
     }
 
     /// All sets judged on the same touches: those of the four selectors, and those by the authors' kernels.
-    pub fn judged(&self, theirs: &[Kernel], stages: &mut Stages) -> Result<Judged, DesignError> {
+    pub fn judged(&self, theirs: &[Chosen], stages: &mut Stages) -> Result<Judged, DesignError> {
         let mut all = self.selections.clone();
         all.extend(theirs.iter().flat_map(|k| k.selections.iter().cloned()));
         let sites = design::sites_to_judge(EstimatorKind::Svr, &self.reduced, &all);

@@ -27,7 +27,7 @@ const THEIRS: GpKernel = GpKernel {
 const SIDE: f64 = 0.4292;
 
 /// A kernel, and what is chosen by it.
-pub struct Kernel {
+pub struct Chosen {
     whose: &'static str,
     kernel: GpKernel,
     distance: &'static str,
@@ -40,10 +40,10 @@ pub struct Kernel {
 }
 
 /// The one that the selectors have used.
-pub fn ours(displaced: &Displaced) -> Option<Kernel> {
+pub fn ours(displaced: &Displaced) -> Option<Chosen> {
     let geometry = displaced.reduced.geometry()?;
     let tried = geometry.map.iter().find(|t| t.kernel == geometry.kernel);
-    Some(Kernel {
+    Some(Chosen {
         whose: "ours, searched",
         kernel: geometry.kernel,
         distance: geometry.distance,
@@ -54,7 +54,7 @@ pub fn ours(displaced: &Displaced) -> Option<Kernel> {
 }
 
 /// The authors' over the same locations, as it is and with the noise of ours.
-pub fn theirs(displaced: &Displaced) -> Result<Vec<Kernel>, DesignError> {
+pub fn theirs(displaced: &Displaced) -> Result<Vec<Chosen>, DesignError> {
     let Some(located) = displaced.reduced.located() else {
         return Ok(Vec::new());
     };
@@ -90,7 +90,7 @@ pub fn theirs(displaced: &Displaced) -> Result<Vec<Kernel>, DesignError> {
             coinciding: 0,
             map: Vec::new(),
         };
-        kernels.push(Kernel {
+        kernels.push(Chosen {
             whose,
             kernel,
             distance: distances.kind,
@@ -136,7 +136,7 @@ fn chosen(geometry: &Geometry, pool: &Pool) -> Result<Vec<Selection>, PlacementE
 }
 
 /// All kernels, ours first where there is one.
-pub fn write(text: &mut String, kernels: &[&Kernel], judged: &Judged) {
+pub fn write(text: &mut String, kernels: &[&Chosen], judged: &Judged) {
     let _ = writeln!(
         text,
         "### Kernels\n\nk = exp(-(d / l)^p), β⁻¹ on the diagonal. Negative: the share of the spectrum that no covariance has, which is set to zero. Sites left out: error of predicting them from the others, as a share of the signals' own rms; – where the kernel is no covariance. Mean errors (mm) at {FEW} / {MANY} gauges by regression; – where nothing is defined to be chosen by.\n\n| kernel | distance | l (mm) | p | β⁻¹ | negative | sites left out | entropy | mutual information |\n|---|---|---|---|---|---|---|---|---|"

@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::ranges::{between, misuse, whole};
 use crate::io::dataset_file::{self, GivenData};
 use crate::placement::greedy_svr::{GreedySvr, TOLERANCE};
+use crate::plain;
 use crate::regression::tune::Effort;
 use crate::regression::{Grouping, Hyper, scale};
 use crate::study::Data;
@@ -37,6 +39,17 @@ impl DataArgs {
             super::out::say(&format!("note: {note}"));
         }
         Ok((data, notes))
+    }
+
+    /// What came of the data: an error with their file before it.
+    ///
+    /// # Errors
+    /// The error that it is.
+    pub fn named<T, E>(&self, result: Result<T, E>) -> anyhow::Result<T>
+    where
+        Result<T, E>: Context<T, E>,
+    {
+        result.with_context(|| plain::path(&self.data))
     }
 }
 

@@ -78,17 +78,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     args.check()?;
     let (data, mut notes) = args.data.load()?;
     let (svr, groups) = args.divided(&data)?;
-    for (k, &site) in args.sites.iter().enumerate() {
-        anyhow::ensure!(
-            site < data.x.rows(),
-            "--sites {site}: there are only {} sites",
-            data.x.rows()
-        );
-        anyhow::ensure!(
-            !args.sites[..k].contains(&site),
-            "--sites {site} stands twice: every gauge has a site of its own"
-        );
-    }
+    args.data.named(args.check_sites(&data))?;
     let question = study::Question {
         sites: &args.sites,
         estimator: args.estimator.into(),
@@ -105,7 +95,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let before = cpu_seconds();
     let result = args.criterion.in_pool(|| {
         let watch = |p| bar.show(p);
-        Ok(study::evaluate(&data, &question, &watch)?)
+        args.data.named(study::evaluate(&data, &question, &watch))
     });
     bar.finish();
     let verdict: Verdict = result?;
@@ -174,6 +164,21 @@ impl EvaluateArgs {
             }
             None => Ok(()),
         }
+    }
+
+    fn check_sites(&self, data: &Data) -> anyhow::Result<()> {
+        let count = data.x.rows();
+        for (k, &site) in self.sites.iter().enumerate() {
+            anyhow::ensure!(
+                site < count,
+                "--sites {site}: there are only {count} sites, counted from 0"
+            );
+            anyhow::ensure!(
+                !self.sites[..k].contains(&site),
+                "--sites {site} stands twice: every gauge has a site of its own"
+            );
+        }
+        Ok(())
     }
 
     /// The regression with what it keeps together, and the groups that the user gave instead.

@@ -1,26 +1,39 @@
-//! `hapdef limb`: the generator of the bundled limb and its family.
+//! `hapdef limb`: the generator of the bundled limbs and their families.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::Context;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::out;
 use crate::design::Inputs;
 use crate::io::{atomic, glb, project_file};
-use crate::limb::{LimbSpec, LimbSupport};
+use crate::limb::barrel::BarrelSpec;
+use crate::limb::{BoxMm, LimbSpec, LimbSupport};
+use crate::mesh::TriMesh;
 use crate::mesh::unroll::Axis;
 use crate::project::{Lattice, Masks, PartModel, Project, RegionKeys, SupportKeys, SupportKind};
 
-/// Lengths in millimetres. Without options it writes the bundled limb.
+/// What a limb's wall is made of.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pattern {
+    /// A tube of columns and hoops: the middle of a wall.
+    Columns,
+    /// A barrel of triangles about y, a thin-walled solid with a frame of rods inside.
+    Triangles,
+}
+
+/// Lengths in millimetres. Without options it writes the bundled limb, with `--pattern triangles` the other one.
 #[derive(Args, Debug, Clone)]
 pub struct LimbArgs {
-    /// Folder for limb.glb and limb.hapdef.toml.
+    /// Folder for limb.glb and limb.hapdef.toml, or barrel.glb and barrel.hapdef.toml of triangles.
     #[arg(long)]
     pub out: PathBuf,
-    /// Unrolled length around.
+    #[arg(long, value_enum, default_value = "columns")]
+    pub pattern: Pattern,
+    /// Unrolled length around, of a barrel where it is widest.
     #[arg(long)]
     pub circumference: Option<f64>,
     /// Angle covered, in degrees; 360 is a closed tube.
@@ -31,18 +44,18 @@ pub struct LimbArgs {
     /// Radius at the top over radius at the bottom.
     #[arg(long)]
     pub taper: Option<f64>,
-    /// A regular grid of this many columns …
+    /// A regular grid of this many columns (of triangles: so many stand around) …
     #[arg(long, requires = "hoops")]
     pub columns: Option<usize>,
     /// … and hoops, rims included.
     #[arg(long, requires = "columns")]
     pub hoops: Option<usize>,
-    /// Width of columns.
+    /// Width of columns, or of the bars between triangles.
     #[arg(long)]
     pub column_width: Option<f64>,
-    /// Width of hoops in a regular grid.
-    #[arg(long, default_value_t = 10.0)]
-    pub hoop_width: f64,
+    /// Width of hoops in a regular grid (10 when left out), or of a barrel's rims.
+    #[arg(long)]
+    pub hoop_width: Option<f64>,
     /// Radius of the windows' corners.
     #[arg(long)]
     pub corner_radius: Option<f64>,
@@ -69,11 +82,6 @@ pub struct LimbArgs {
 impl LimbArgs {
     fn spec(&self) -> LimbSpec {
         let mut spec = LimbSpec::default();
-        let set = |value: &mut f64, arg: Option<f64>| {
-            if let Some(arg) = arg {
-                *value = arg;
-            }
-        };
         set(&mut spec.circumference, self.circumference);
         set(&mut spec.arc_degrees, self.arc);
         set(&mut spec.height, self.height);
@@ -82,7 +90,7 @@ impl LimbArgs {
         set(&mut spec.corner_radius, self.corner_radius);
         set(&mut spec.element, self.element);
         if let (Some(columns), Some(hoops)) = (self.columns, self.hoops) {
-            spec = spec.grid(columns, hoops, self.hoop_width);
+            spec = spec.grid(columns, hoops, self.hoop_width.unwrap_or(10.0));
             // The bosses sit on two opposite columns of the new grid.
             let centres = vec![spec.columns[0], spec.columns[columns / 2]];
             spec.support = LimbSupport::Bosses {
@@ -96,6 +104,53 @@ impl LimbArgs {
         }
         spec
     }
+
+    /// The barrel that is asked for.
+    ///
+    /// # Errors
+    /// Which option a barrel does not have.
+    fn barrel(&self) -> anyhow::Result<BarrelSpec> {
+        let foreign = [
+            ("--arc", self.arc),
+            ("--taper", self.taper),
+            ("--clamp-rims", self.clamp_rims),
+        ];
+        if let Some((name, _)) = foreign.iter().find(|(_, given)| given.is_some()) {
+            anyhow::bail!("{name} is for limbs of columns: leave it out, or leave out --pattern");
+        }
+        let mut spec = BarrelSpec::default();
+        set(
+            &mut spec.radius,
+            self.circumference.map(|c| c / std::f64::consts::TAU),
+        );
+        set(&mut spec.height, self.height);
+        set(&mut spec.bar, self.column_width);
+        set(&mut spec.rim, self.hoop_width);
+        set(&mut spec.corner_radius, self.corner_radius);
+        set(&mut spec.wall, self.thickness);
+        set(&mut spec.element, self.element);
+        if let (Some(columns), Some(hoops)) = (self.columns, self.hoops) {
+            spec.around = columns;
+            // The rims are hoops too.
+            spec.rows = hoops - 1;
+        }
+        Ok(spec)
+    }
+}
+
+fn set(value: &mut f64, given: Option<f64>) {
+    if let Some(given) = given {
+        *value = given;
+    }
+}
+
+/// A limb before it is written.
+struct Made {
+    /// Of its files, without their endings.
+    name: &'static str,
+    mesh: TriMesh,
+    project: Project,
+    radius_mm: f64,
 }
 
 /// Runs the command.
@@ -107,19 +162,18 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
         args.columns != Some(0) && args.hoops.is_none_or(|h| h >= 2),
         "a limb has at least one column and two hoops"
     );
-    let spec = args.spec();
-    let (mut mesh, boxes) = spec.build()?;
-    let mut project = project(&spec, &boxes);
-    if let Some(thickness) = args.thickness {
-        project.part.thickness_mm = thickness;
-    }
-    if args.solid {
-        mesh = mesh.thickened(project.part.thickness_mm * 1e-3);
-        thicken(&mut project);
-    }
+    let Made {
+        name,
+        mesh,
+        mut project,
+        radius_mm,
+    } = match args.pattern {
+        Pattern::Columns => tube(args)?,
+        Pattern::Triangles => barrel(args)?,
+    };
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{}: the folder cannot be created", args.out.display()))?;
-    let mesh_path = args.out.join("limb.glb");
+    let mesh_path = args.out.join(format!("{name}.glb"));
     let bytes = glb::write_glb(&mesh)?;
     atomic::write(&mesh_path, &bytes)?;
     if !args.no_sites {
@@ -130,7 +184,7 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
         project.selection.sites = choose_sites(&project, stored)?;
     }
     project_file::save(
-        &args.out.join("limb.hapdef.toml"),
+        &args.out.join(format!("{name}.hapdef.toml")),
         &project,
         None,
         &Masks::new(),
@@ -139,7 +193,7 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
         "vertices": mesh.positions().len(),
         "triangles": mesh.triangles().len(),
         "mean_edge_mm": mesh.mean_edge() * 1000.0,
-        "radius_mm": spec.radius(),
+        "radius_mm": radius_mm,
         "area_mm2": mesh.area() * 1e6,
         "sites": project.selection.sites.len(),
     });
@@ -150,25 +204,65 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
     }
 }
 
-/// The project of a limb of the family.
-fn project(spec: &LimbSpec, boxes: &[[[f64; 3]; 2]]) -> Project {
+fn tube(args: &LimbArgs) -> anyhow::Result<Made> {
+    let spec = args.spec();
+    let (mut mesh, boxes) = spec.build()?;
     let mut project = Project::around("limb.glb", None);
-    project.supports = boxes
-        .iter()
+    project.supports = clamped(&boxes);
+    project.sites.lattice = Lattice::Unrolled;
+    let wide = (2.0 * spec.radius() * spec.taper.max(1.0)).ceil().max(80.0);
+    let top = spec.height - 12.0;
+    project.evaluation.regions = vec![away([-wide, -wide, 12.0], [wide, wide, top])];
+    set(&mut project.part.thickness_mm, args.thickness);
+    if args.solid {
+        mesh = mesh.thickened(project.part.thickness_mm * 1e-3);
+        thicken(&mut project);
+    }
+    Ok(Made {
+        name: "limb",
+        mesh,
+        project,
+        radius_mm: spec.radius(),
+    })
+}
+
+/// A barrel is a solid as it is.
+fn barrel(args: &LimbArgs) -> anyhow::Result<Made> {
+    let spec = args.barrel()?;
+    let (mesh, boxes) = spec.build()?;
+    let mut project = Project::around("barrel.glb", None);
+    project.part.model = PartModel::Solid;
+    project.part.thickness_mm = spec.wall;
+    project.part.axis = Axis::Y;
+    project.supports = clamped(&boxes);
+    let wide = (2.0 * spec.radius).ceil();
+    let top = spec.height - spec.rim;
+    project.evaluation.regions = vec![away([-wide, spec.rim, -wide], [wide, top, wide])];
+    Ok(Made {
+        name: "barrel",
+        mesh,
+        project,
+        radius_mm: spec.radius,
+    })
+}
+
+fn clamped(boxes: &[BoxMm]) -> Vec<SupportKeys> {
+    (boxes.iter())
         .map(|&box_mm| SupportKeys {
             kind: SupportKind::Clamped,
             box_mm: Some(box_mm),
             vertices: None,
             normal: Axis::default(),
         })
-        .collect();
-    project.sites.lattice = Lattice::Unrolled;
-    let wide = (2.0 * spec.radius() * spec.taper.max(1.0)).ceil().max(80.0);
-    project.evaluation.regions = vec![RegionKeys {
+        .collect()
+}
+
+/// Where errors are quoted for beside all touches.
+fn away(low: [f64; 3], high: [f64; 3]) -> RegionKeys {
+    RegionKeys {
         name: "away from the boundaries".into(),
-        box_mm: [[-wide, -wide, 12.0], [wide, wide, spec.height - 12.0]],
-    }];
-    project
+        box_mm: [low, high],
+    }
 }
 
 /// Supports that hold the wall of a solid where they held its middle: their boxes reach through it, across and not

@@ -16,6 +16,7 @@ use crate::placement::expected_error::Detail;
 use crate::placement::greedy_svr::{Audit, Comparison};
 use crate::placement::wishes::{Loss, LostBy, Thorough};
 use crate::placement::{SelectorKind, SensorSet, Wishes};
+use crate::plain;
 use crate::study::{self, Choice, Data, Settings};
 
 #[derive(Args, Debug, Clone)]
@@ -119,30 +120,15 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
     args.check()?;
     let (data, mut notes) = args.data.load()?;
     let settings = args.settings(&data)?;
-    let wishes = args.wishes(&data)?;
-    let kept_out = args.kept_out(&data)?;
+    let of_data = &args.data;
+    of_data.named(args.check_out(&data))?;
+    let wishes = of_data.named(args.wishes(&data))?;
+    let kept_out = of_data.named(args.kept_out(&data))?;
     let bar = Bar::default();
-    let result = args.criterion.in_pool(|| {
-        let watch = |p| bar.show(p);
-        let found = |set: &SensorSet| say(set);
-        let mut choice = study::select(
-            &data,
-            &kept_out,
-            &wishes,
-            &settings,
-            &cpu_seconds,
-            &watch,
-            &found,
-        )?;
-        let before = cpu_seconds();
-        if !args.no_criterion {
-            study::add_criteria(&data, &mut choice.selection, &wishes, &settings, &watch)
-                .context("the criterion in mm (left out with --no-criterion)")?;
-        }
-        let criterion_seconds = cpu_seconds() - before;
-        let audit = args.audited(&data, &kept_out, &choice, &settings, &watch)?;
-        Ok((choice, criterion_seconds, audit))
-    });
+    let watch = |p| bar.show(p);
+    let result = args
+        .criterion
+        .in_pool(|| of_data.named(args.chosen(&data, &kept_out, &wishes, &settings, &watch)));
     bar.finish();
     let (choice, criterion_seconds, audit) = result?;
     for step in &audit {
@@ -193,6 +179,36 @@ fn say(set: &SensorSet) {
 }
 
 impl SelectArgs {
+    /// The choice, the processor time (s) of its criterion, and what was asked beside it.
+    fn chosen(
+        &self,
+        data: &Data,
+        kept_out: &[usize],
+        wishes: &Wishes,
+        settings: &Settings,
+        watch: Watch,
+    ) -> anyhow::Result<(Choice, f64, Vec<Comparison>)> {
+        let mut choice =
+            study::select(data, kept_out, wishes, settings, &cpu_seconds, watch, &say)?;
+        let before = cpu_seconds();
+        if !self.no_criterion {
+            study::add_criteria(data, &mut choice.selection, wishes, settings, watch)
+                .context("the criterion in mm (left out with --no-criterion)")?;
+        }
+        let criterion_seconds = cpu_seconds() - before;
+        let audit = self.audited(data, kept_out, &choice, settings, watch)?;
+        Ok((choice, criterion_seconds, audit))
+    }
+
+    /// That the sites can be written where that is asked for, before anything is chosen.
+    fn check_out(&self, data: &Data) -> anyhow::Result<()> {
+        ensure!(
+            self.out.is_none() || !data.positions.is_empty(),
+            "--out writes the positions of the sites (site_m), and the dataset has none"
+        );
+        Ok(())
+    }
+
     fn audited(
         &self,
         data: &Data,
@@ -446,10 +462,10 @@ fn summary(
 fn print_table(choice: &Choice) -> anyhow::Result<()> {
     for set in &choice.selection.sets {
         let sites: Vec<String> = set.sites.iter().map(ToString::to_string).collect();
-        let (count, sites) = (sites.len(), sites.join(","));
+        let (gauges, sites) = (plain::count(sites.len(), "gauge"), sites.join(","));
         out::line(&match set.criterion_mm {
-            Some(mm) => format!("{count} gauges, {mm:.3} mm: {sites}"),
-            None => format!("{count} gauges: {sites}"),
+            Some(mm) => format!("{gauges}, {mm:.3} mm: {sites}"),
+            None => format!("{gauges}: {sites}"),
         })?;
     }
     Ok(())
@@ -457,11 +473,6 @@ fn print_table(choice: &Choice) -> anyhow::Result<()> {
 
 fn write_sites(path: &std::path::Path, data: &Data, choice: &Choice) -> anyhow::Result<()> {
     use std::fmt::Write as _;
-    ensure!(
-        !data.positions.is_empty(),
-        "{}: the dataset has no positions of sites (site_m) to write",
-        path.display()
-    );
     let mut text = String::from("x_mm,y_mm,z_mm,index\n");
     for &s in choice.selection.sets.last().iter().flat_map(|s| &s.sites) {
         let p = data.positions[s] * 1e3;

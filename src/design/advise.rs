@@ -16,6 +16,7 @@ use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::sample;
 use crate::mesh::walls::Side;
+use crate::plain::{self, digits};
 use crate::project::PartModel;
 
 /// What was measured of a part, and what follows.
@@ -67,27 +68,25 @@ impl Cost {
 
     fn words(&self) -> String {
         let theory = if self.theory_percent > 0.0 {
-            format!(" and {:.1} % of theory", self.theory_percent)
+            format!(" and {} % of theory", digits(self.theory_percent))
         } else {
             String::new()
         };
+        let size = digits(self.element_mm);
         let elements = match self.order {
-            Some(order) => format!(
-                "the file's tetrahedra ({:.1} mm) at order {order}",
-                self.element_mm
-            ),
-            None => format!("elements of {:.1} mm", self.element_mm),
+            Some(order) => format!("the file's tetrahedra ({size} mm) at order {order}"),
+            None => format!("elements of {size} mm"),
         };
         let error = if self.error_percent.is_nan() {
             "an error that could not be computed".into()
         } else {
-            format!("{:.1} % error of elements", self.error_percent)
+            format!("{} % error of elements", digits(self.error_percent))
         };
         format!(
-            "{elements}, about {:.0} thousand unknowns, {:.0} s of processor time, {:.1} GB, {error}{theory} under a touch",
-            self.unknowns / 1e3,
-            self.seconds.max(1.0),
-            self.memory_gb.max(0.1),
+            "{elements}, about {} thousand unknowns, {} s of processor time, {} GB, {error}{theory} under a touch",
+            digits(self.unknowns / 1e3),
+            digits(self.seconds.round().max(1.0)),
+            digits(self.memory_gb.max(0.1)),
         )
     }
 }
@@ -110,7 +109,9 @@ pub fn advise(inputs: &Inputs, watch: Watch) -> Result<Advice, DesignError> {
     match ground(&as_solid, watch) {
         Ok(Ground::Solid(solid)) => of_closed(inputs, &solid, watch),
         Ok(Ground::Shell(_)) => unreachable!("a solid was asked for"),
-        Err(DesignError::Elastic(ElasticError::Open { rims })) => Ok(of_open(inputs, rims, watch)),
+        Err(DesignError::Elastic(ElasticError::Open { rims, .. })) => {
+            Ok(of_open(inputs, rims, watch))
+        }
         Err(error) => Err(error),
     }
 }
@@ -320,12 +321,12 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround, watch: Watch) -> Result<Advic
     };
     let mut words = vec![
         format!(
-            "The mesh is closed, with walls {:.2} mm thick (a tenth thinner than {:.2} mm, a tenth thicker than {:.2} mm){} on a part {:.0} mm across.",
-            wall_mm[1],
-            wall_mm[0],
-            wall_mm[2],
+            "The mesh is closed, with walls {} mm thick (a tenth thinner than {} mm, a tenth thicker than {} mm){} on a part {} mm across.",
+            digits(wall_mm[1]),
+            digits(wall_mm[0]),
+            digits(wall_mm[2]),
             bent(radius),
-            size_mm(&inputs.part)
+            digits(size_mm(&inputs.part))
         ),
         format!(
             "As a solid at {} quality: {}.",
@@ -376,9 +377,11 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
     };
     let mut words = vec![
         format!(
-            "The mesh is open ({rims} free edges): it is the middle of a wall, {wall} mm thick{}, on a part {:.0} mm across.",
+            "The mesh is open ({}): it is the middle of a wall, {} mm thick{}, on a part {} mm across.",
+            plain::count(rims, "free edge"),
+            digits(wall),
             bent(radius),
-            size_mm(part)
+            digits(size_mm(part))
         ),
         format!(
             "As a shell at {} quality: {}.",
@@ -392,6 +395,12 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
             "A shell fits.".into()
         },
     ];
+    if let Some(within) = part.closes_within() {
+        let mm = digits(within * 1e3);
+        words.push(format!(
+            "If it is meant to be closed: it is when vertices within {mm} mm are joined (part.weld_mm = {mm})."
+        ));
+    }
     let mut as_shell = inputs.clone();
     as_shell.project.part.model = PartModel::Shell;
     if let Ok(Ground::Shell(shell)) = ground(&as_shell, watch) {
@@ -413,8 +422,8 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
 fn bent(radius: [f64; 2]) -> String {
     if radius[0].is_finite() {
         format!(
-            ", a tenth of them bent to less than {:.0} mm",
-            radius[0] * 1e3
+            ", a tenth of them bent to less than {} mm",
+            digits(radius[0] * 1e3)
         )
     } else {
         ", flat".into()

@@ -4,7 +4,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{DesignError, Inputs, LAYOUT, MOST_SITES};
+use super::{DesignError, Inputs, LAYOUT, MOST_SITES, SaidBy};
 use crate::budget::Budget;
 use crate::dataset::{self, GluingSlopes, Signal, TouchRegion};
 use crate::elasticity::load::Touch;
@@ -28,7 +28,7 @@ pub(super) fn size_mm(mesh: &TriMesh) -> f64 {
 ///
 /// # Errors
 /// [`DesignError::FarVertex`], [`DesignError::Slender`].
-pub(super) fn check_shape(part: &TriMesh) -> Result<(), DesignError> {
+pub fn check_shape(part: &TriMesh) -> Result<(), DesignError> {
     /// Elements along all edges of the part, each one counted for itself.
     const MOST_ALONG: f64 = 5e6;
     if let Some((place, distance, size)) = far_vertex(part) {
@@ -307,7 +307,7 @@ pub(super) fn check_memory(
     // Then the kernel of the evaluation and its distances, on every thread.
     let kernels = 2.0 * (touches as f64).powi(2) * rayon::current_num_threads() as f64;
     let most = simulation_numbers(sites, touches, signal).max(kernels);
-    check_numbers(most, sites, touches)
+    check_numbers(most, sites, touches, SaidBy::Project)
 }
 
 /// Numbers in double precision that a simulation holds at its largest.
@@ -343,15 +343,22 @@ pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
     (sites, touches, gigabytes(numbers))
 }
 
-/// Refuses a result of `each` numbers for every site and touch that cannot be held, before it is allocated.
+/// Refuses a result of `each` numbers for every site and touch of two tables that cannot be held, before it is
+/// allocated.
 ///
 /// # Errors
 /// [`DesignError::TooLarge`].
 pub fn check_room(sites: usize, touches: usize, each: usize) -> Result<(), DesignError> {
-    check_numbers(sites as f64 * touches as f64 * each as f64, sites, touches)
+    let numbers = sites as f64 * touches as f64 * each as f64;
+    check_numbers(numbers, sites, touches, SaidBy::Tables)
 }
 
-fn check_numbers(numbers: f64, sites: usize, touches: usize) -> Result<(), DesignError> {
+fn check_numbers(
+    numbers: f64,
+    sites: usize,
+    touches: usize,
+    said_by: SaidBy,
+) -> Result<(), DesignError> {
     let (needed_gb, limit_gb) = (gigabytes(numbers), memory::allowed_gb());
     if needed_gb > limit_gb {
         return Err(DesignError::TooLarge {
@@ -359,6 +366,7 @@ fn check_numbers(numbers: f64, sites: usize, touches: usize) -> Result<(), Desig
             limit_gb,
             sites,
             touches,
+            said_by,
         });
     }
     Ok(())
@@ -391,6 +399,13 @@ mod tests {
             panic!("{refused}");
         };
         assert_eq!((sites, touches), (10_000_000, 4000));
+        // What applies to tables, and not the keys that lay sites and touches out.
+        let said = refused.to_string();
+        assert!(said.contains("7680 GB"), "{said}");
+        assert!(!said.contains("touch.count"), "{said}");
+        assert!(said.contains("fewer touches or sites"), "{said}");
+        let said = check_memory(40_000, 40_000_000, Signal::Strain).unwrap_err();
+        assert!(said.to_string().contains("touch.count"), "{said}");
         assert!(check_room(10, 10, 24).is_ok());
     }
 

@@ -17,7 +17,8 @@ use crate::elasticity::{Freedoms, Model, Support, Touch};
 use crate::feasible::Surroundings;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
-use crate::project::Project;
+use crate::plain::digits;
+use crate::project::{Elements as ElementKind, PartModel, Project};
 use crate::regression::folds::evenly;
 
 /// The elastic stage: the mesh that was computed on, the sites on it and the dataset.
@@ -189,7 +190,7 @@ fn read(
         Vec::new()
     };
     let mut cautious = checks.distrust();
-    cautious.extend(cautions(&estimate, linearity.as_ref(), &budget.elements));
+    cautious.extend(cautions(&estimate, linearity.as_ref(), project, budget));
     cautious.extend(ground.cautions(&laid, project.tip().1));
     cautious.extend(open_solid(inputs));
     cautious.extend(on_supports(inputs, &dataset.touches)?);
@@ -294,10 +295,12 @@ impl Checks {
 pub fn cautions(
     discretization: &Discretization,
     linearity: Option<&Linearity>,
-    aim: &crate::budget::Elements,
+    project: &Project,
+    budget: &Budget,
 ) -> Vec<String> {
     /// Beyond this change a linear answer is the wrong kind of answer (%).
     const NONLINEAR: f64 = 10.0;
+    let aim = &budget.elements;
     let mut notes = Vec::new();
     if discretization.strain_percent.is_nan() {
         notes.push(
@@ -310,19 +313,12 @@ pub fn cautions(
         );
     } else if !discretization.meets(aim) {
         notes.push(format!(
-            "The mesh leaves about {:.1} % error in displacement (asked: {:.0} %) and {:.1} % in strain (asked: {:.0} %): {}.",
+            "The mesh leaves about {:.1} % error in displacement (asked: {} %) and {:.1} % in strain (asked: {} %): {}.",
             discretization.displacement_percent,
-            aim.displacement_percent,
+            digits(aim.displacement_percent),
             discretization.strain_percent,
-            aim.strain_percent,
-            match (linearity, *aim == Quality::Reference.budget().elements) {
-                (None, true) => "more cells than are allowed for so many touches would be needed",
-                (None, false) => "choose a higher quality or fewer touches",
-                (Some(_), true) =>
-                    "more vertices than this quality allows for so many touches would be needed",
-                (Some(_), false) =>
-                    "choose a higher quality, fewer touches, or part.elements = \"graded\"",
-            }
+            digits(aim.strain_percent),
+            finer(project, budget)
         ));
     }
     let Some(linearity) = linearity else {
@@ -343,6 +339,21 @@ pub fn cautions(
         ));
     }
     notes
+}
+
+/// What makes the error of the elements smaller: whatever it is that bounds their number.
+fn finer(project: &Project, budget: &Budget) -> String {
+    let part = &project.part;
+    if part.model == PartModel::Shell && part.elements == ElementKind::AsGiven {
+        return "let elements be laid where they are wanted (part.elements = \"graded\"), or refine the mesh in the program that wrote it".into();
+    }
+    match project.budget.limits_at(budget.quality).vertices {
+        Some(vertices) => format!("raise budget.limits.vertices from {vertices}, or leave it out"),
+        None if budget.quality == Quality::Reference => {
+            "give fewer touches, or say how many vertices there may be (budget.limits.vertices)".into()
+        }
+        None => "choose a higher quality or fewer touches, or say how many vertices there may be (budget.limits.vertices)".into(),
+    }
 }
 
 /// Where the vertices of the part that is shown lie on the mesh that was computed on.

@@ -11,6 +11,7 @@ use super::system::System;
 use crate::budget::Cancelled;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
+use crate::plain;
 
 /// Why a model cannot be built or solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -42,9 +43,15 @@ pub enum ElasticError {
     )]
     NoArea { place: DVec3 },
     #[error(
-        "the mesh encloses nothing (it has {rims} free edges), so it is no solid: close it in the program that wrote it, fill its holes (part.fill_holes_mm), or take it as a shell (part.model = \"shell\")"
+        "the mesh encloses nothing (it has {}), so it is no solid: {} in the program that wrote it, fill its holes (part.fill_holes_mm), or take it as a shell (part.model = \"shell\")",
+        plain::count(*rims, "free edge"),
+        closing(*closes_within)
     )]
-    Open { rims: usize },
+    Open {
+        rims: usize,
+        /// Distance (m) within which its vertices would have to be joined to close it, where that does.
+        closes_within: Option<f64>,
+    },
     #[error(
         "no material was found in cells of {size_mm:.3} mm: the walls are thinner than a thousandth of that. Check the unit of the mesh, or take its middle as a shell (part.model = \"shell\")"
     )]
@@ -54,10 +61,14 @@ pub enum ElasticError {
     )]
     NoFace { face: &'static str },
     #[error(
-        "the factored model would take {needed_gb:.1} GB, more than the {limit_gb:.1} GB that may be taken: choose a lower quality or larger cells, or allow more with --memory-gb"
+        "the factored model would take {}, more than the {} that may be taken: choose a lower quality, lower budget.limits.vertices, mesh the part coarser where the file's own elements are taken, or allow more with --memory-gb",
+        plain::needed_gb(*needed_gb),
+        plain::allowed_gb(*limit_gb)
     )]
     TooLarge { needed_gb: f64, limit_gb: f64 },
-    #[error("the model does not fit into memory: use a coarser mesh")]
+    #[error(
+        "the model does not fit into memory: choose a lower quality, lower budget.limits.vertices, or end other programs"
+    )]
     OutOfMemory,
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -69,6 +80,17 @@ impl ElasticError {
     pub fn is_memory(&self) -> bool {
         matches!(self, Self::TooLarge { .. } | Self::OutOfMemory)
     }
+}
+
+/// How an open mesh is closed.
+fn closing(within: Option<f64>) -> String {
+    let join = |metres: f64| {
+        let mm = plain::digits(metres * 1e3);
+        format!(
+            "it closes when vertices within {mm} mm are joined (part.weld_mm = {mm}). Or close it"
+        )
+    };
+    within.map_or_else(|| "close it".to_owned(), join)
 }
 
 /// Results of the checks that a solved load is put through.

@@ -6,7 +6,7 @@
 use std::io::{self, Read};
 
 use crate::memory;
-use crate::plain::quote;
+use crate::plain::{self, quote};
 
 /// Every number becomes one of eight bytes, and a computation holds a few copies of them.
 const BYTES: f64 = 4.0 * 8.0;
@@ -33,8 +33,8 @@ pub enum NpyError {
     #[error("it holds {0}, and numbers are needed. Save it as float64")]
     Kind(String),
     #[error(
-        "it announces {count} numbers, and at most {most:.0} are read with {:.1} GB of memory. Make it smaller, or allow more with --memory-gb",
-        memory::allowed_gb()
+        "it announces {count} numbers, and at most {most:.0} are read with {} of memory. Make it smaller, or allow more with --memory-gb",
+        plain::allowed_gb(memory::allowed_gb())
     )]
     TooLarge { count: String, most: f64 },
     #[error("it ends after {found} of its {count} numbers. Write it again")]

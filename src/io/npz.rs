@@ -12,7 +12,7 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 use super::npy::{self, Array};
 use super::{FileError, atomic, source};
 use crate::memory;
-use crate::plain::quote;
+use crate::plain::{self, quote};
 
 /// An NPZ file being put together.
 pub struct NpzFile {
@@ -114,9 +114,9 @@ impl Arrays {
             return Err(FileError::broken(
                 path,
                 format!(
-                    "the file has {:.1} GB, and {:.1} GB of memory may be used. Save fewer arrays in it, or allow more with --memory-gb",
-                    length as f64 / 1e9,
-                    memory::allowed_gb()
+                    "the file has {}, and {} of memory may be used. Save fewer arrays in it, or allow more with --memory-gb",
+                    plain::needed_gb(length as f64 / 1e9),
+                    plain::allowed_gb(memory::allowed_gb())
                 ),
             ));
         }

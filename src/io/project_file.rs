@@ -12,6 +12,7 @@ use super::npz::{NpzFile, read_mask};
 use super::{FileError, atomic, source};
 use crate::design::Inputs;
 use crate::mesh::RepairReport;
+use crate::plain::{ends, lines_before};
 use crate::project::{FORMAT, Masks, Project};
 
 pub use text::to_text;
@@ -143,8 +144,7 @@ pub fn parse(text: &str) -> Result<Project, String> {
     struct Versioned {
         format: Option<i64>,
     }
-    let readable = |e: toml::de::Error| format!("this is not a readable project file. {e}");
-    let version: Versioned = toml::from_str(text).map_err(readable)?;
+    let version: Versioned = toml::from_str(text).map_err(|e| unreadable(text, &e))?;
     match version.format {
         Some(v) if v == i64::from(FORMAT) => {}
         Some(v) if v > i64::from(FORMAT) => {
@@ -163,9 +163,27 @@ pub fn parse(text: &str) -> Result<Project, String> {
             ));
         }
     }
-    let project: Project = toml::from_str(text).map_err(readable)?;
+    let project: Project = toml::from_str(text).map_err(|e| unreadable(text, &e))?;
     project.check().map_err(|e| e.to_string())?;
     Ok(project)
+}
+
+/// What is wrong in a project's text and where; not the line itself, which may be of any length.
+fn unreadable(text: &str, error: &toml::de::Error) -> String {
+    let place = error.span().map_or_else(String::new, |span| {
+        let before = &text.as_bytes()[..span.start.min(text.len())];
+        let line = 1 + lines_before(before, before.len());
+        let start = before
+            .iter()
+            .rposition(|&b| b == b'\n')
+            .map_or(0, |at| at + 1);
+        let column = 1 + String::from_utf8_lossy(&before[start..]).chars().count();
+        format!(", line {line}, column {column}")
+    });
+    format!(
+        "this is not a readable project file{place}: {}",
+        ends(error.message())
+    )
 }
 
 /// Saves a project atomically, one backup kept, its masks beside it. Paths in it are taken as they are:
@@ -475,6 +493,46 @@ mod tests {
         let masks = [("keep-out", mask(1)), ("support-1", mask(2))];
         let masks = masks.map(|(name, mask)| (name.to_owned(), Arc::new(mask)));
         (project, mask(0), masks.into_iter().collect())
+    }
+
+    /// A project of one part, with lines of its own.
+    fn small(lines: &str) -> String {
+        format!("format = 1\n[part]\nmesh = \"a.stl\"\nunit = \"mm\"\n{lines}\n")
+    }
+
+    #[test]
+    fn what_is_wrong_in_a_long_line_is_said_without_the_line() {
+        let long = "x".repeat(200_000);
+        let said = parse(&small(&format!("model = \"{long}\" nonsense"))).unwrap_err();
+        assert!(said.contains("line 5, column 200012: "), "{said}");
+        assert!(said.len() < 400, "{said}");
+        // What it is, and what it should be.
+        let said = parse(&small(&format!("model = \"{long}\""))).unwrap_err();
+        assert!(
+            said.contains("unknown variant") && said.contains("solid"),
+            "{said}"
+        );
+        assert!(said.len() < 500, "{said}");
+        let said = parse(&small("thickness_mm = \"é\" é")).unwrap_err();
+        assert!(said.contains("line 5, column 20"), "{said}");
+    }
+
+    #[test]
+    fn a_mesh_of_a_name_without_an_end_is_refused_with_the_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.hapdef.toml");
+        for name in [
+            format!("{}.stl", "x".repeat(200_000)),
+            format!("{}gone.stl", "x/".repeat(700)),
+            "\\u001b[31mred.stl".to_owned(),
+        ] {
+            std::fs::write(&path, small("").replace("a.stl", &name)).unwrap();
+            let said = load(&path).err().unwrap().to_string();
+            let reason = ["too long. Check the path", "there is no such file"];
+            assert!(reason.iter().any(|r| said.contains(r)), "{said}");
+            assert!(said.contains(".stl: ") && said.len() < 400, "{said}");
+            assert!(!said.contains('\u{1b}'), "{said}");
+        }
     }
 
     /// What the program that is killed does; nothing in an ordinary run of the tests.

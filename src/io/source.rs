@@ -22,10 +22,10 @@ pub fn read(path: &Path) -> Result<Vec<u8>, FileError> {
         FileError::broken(
             path,
             format!(
-                "the file has {:.1} GB, and at most {:.1} GB are read with {:.1} GB of memory. Make it smaller, or allow more with --memory-gb",
-                length as f64 / 1e9,
-                most as f64 / 1e9,
-                memory::allowed_gb()
+                "the file has {}, and at most {} are read with {} of memory. Make it smaller, or allow more with --memory-gb",
+                plain::needed_gb(length as f64 / 1e9),
+                plain::allowed_gb(most as f64 / 1e9),
+                plain::allowed_gb(memory::allowed_gb())
             ),
         )
     };

@@ -67,10 +67,11 @@ impl TriMesh {
         let renumbered = triangles.iter().map(|t| t.map(|v| numbers[v as usize]));
         let whole = drop_degenerate(&points, renumbered, &mut report)?;
         let kept = keep_body(&points, &whole, body, &mut report)?;
-        let mesh = Self::of_body(kept.positions, kept.triangles, repair, &mut report);
+        let mut mesh = Self::of_body(kept.positions, kept.triangles, repair, &mut report);
         if report.boundary_edges > 0 {
             // Of the whole file: what is torn lies apart.
             report.closes_within = repair::closing_weld(&points, &whole, mesh.mean_edge);
+            mesh.closes_within = report.closes_within;
         }
         Ok(TakenIn {
             mesh,
@@ -174,16 +175,17 @@ fn drop_degenerate(
     triangles: impl ExactSizeIterator<Item = [u32; 3]>,
     report: &mut RepairReport,
 ) -> Result<Vec<[u32; 3]>, MeshError> {
-    let mut seen: NumberSet<[u32; 3]> = NumberSet::default();
+    let mut seen: NumberSet<(u32, u32, u32)> = NumberSet::default();
+    seen.reserve(triangles.len());
     let mut kept = Vec::with_capacity(triangles.len());
     for tri in triangles {
         if has_no_area(positions, tri) {
             report.degenerate_triangles += 1;
             continue;
         }
-        let mut key = tri;
-        key.sort_unstable();
-        if seen.insert(key) {
+        let mut corners = tri;
+        corners.sort_unstable();
+        if seen.insert(corners.into()) {
             kept.push(tri);
         } else {
             report.duplicate_triangles += 1;

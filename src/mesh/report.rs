@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::plain;
+
 /// What was changed while a mesh was taken in; all zero for a clean one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RepairReport {
@@ -57,7 +59,7 @@ impl RepairReport {
         );
         count(self.slivers, "slivers");
         if let Some(within) = self.closes_within {
-            let mm = significant(within * 1e3);
+            let mm = plain::digits(within * 1e3);
             parts.push(format!(
                 "{} edges are open, and the mesh closes when vertices within {mm} mm are joined (part.weld_mm = {mm})",
                 self.boundary_edges
@@ -67,10 +69,4 @@ impl RepairReport {
         let said: Vec<String> = changed.into_iter().chain(self.notes.clone()).collect();
         (!said.is_empty()).then(|| said.join("; "))
     }
-}
-
-/// A positive number of one significant digit, without the zeros that binary fractions trail.
-fn significant(x: f64) -> String {
-    let decimals = (-x.log10().floor()).max(0.0) as usize;
-    format!("{x:.decimals$}")
 }

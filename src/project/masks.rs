@@ -9,6 +9,7 @@ use super::{BadValue, MM, Project, SupportKeys, SupportKind};
 use crate::elasticity::support::Region;
 use crate::elasticity::{Freedoms, Support};
 use crate::mesh::unroll::Axis;
+use crate::plain::quote;
 
 /// Masks of the part's vertices by name: arrays beside the project file, and groups of the mesh file.
 pub type Masks = BTreeMap<String, Arc<Vec<bool>>>;
@@ -50,7 +51,7 @@ impl Project {
             key: key.into(),
             rule: "the name of an array beside the project file or of a group of the mesh file"
                 .into(),
-            value: format!("\"{name}\" (there is {})", names(masks)),
+            value: format!("{} (there is {})", quote(name), names(masks)),
         })?;
         Ok(Some(found))
     }
@@ -79,11 +80,14 @@ impl Project {
 }
 
 fn names(masks: &Masks) -> String {
+    /// Names that are listed.
+    const MOST: usize = 8;
     if masks.is_empty() {
-        "none".into()
-    } else {
-        masks.keys().cloned().collect::<Vec<_>>().join(", ")
+        return "none".into();
     }
+    let listed: Vec<String> = masks.keys().take(MOST).map(|name| quote(name)).collect();
+    let more = if masks.len() > MOST { ", …" } else { "" };
+    format!("{}{more}", listed.join(", "))
 }
 
 fn region(support: &SupportKeys, masks: &Masks) -> Result<Region, BadValue> {

@@ -8,6 +8,7 @@ use super::palette::Palette;
 use super::tools::Tool;
 use super::viewport::Section;
 use super::{Stage, Studio};
+use crate::cli::examples::Example;
 use crate::document::Layer;
 use crate::mesh::unroll::Axis;
 use crate::render::camera::Preset;
@@ -25,6 +26,7 @@ fn zoom(ctx: &Context, by: f32) {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     Open,
+    Example(Example),
     Save,
     SaveAs,
     Export,
@@ -76,6 +78,7 @@ impl Command {
     pub fn name(self) -> &'static str {
         match self {
             Self::Open => "Open…",
+            Self::Example(example) => example.name(),
             Self::Save => "Save",
             Self::SaveAs => "Save as…",
             Self::Export => "Export report…",
@@ -161,6 +164,7 @@ impl Command {
     pub fn tooltip(self) -> &'static str {
         match self {
             Self::Open => "Open a project or a mesh",
+            Self::Example(_) => "Open a limb of the program's own",
             Self::Save => "Save the project",
             Self::SaveAs => "Save the project under another name",
             Self::Export => {
@@ -285,6 +289,7 @@ impl Command {
             | Self::FillPaint
             | Self::GrowPaint
             | Self::ShrinkPaint
+            | Self::Example(_)
             | Self::Follow
             | Self::Disconnect
             | Self::DarkLight
@@ -337,6 +342,7 @@ impl Command {
             Self::LargerText,
             Self::SmallerText,
         ];
+        all.extend(Example::ALL.map(Self::Example));
         all.extend(Way::ALL.map(Self::Nudge));
         all.extend(Preset::ALL.map(Self::Look));
         all.extend(Tool::ALL.map(Self::Tool));
@@ -399,6 +405,7 @@ impl Studio {
         }
         match command {
             Command::Open => self.dialog = Some(Dialog::open(&self.document)),
+            Command::Example(example) => self.open_example_or_ask(ctx, example),
             Command::Save => match self.document.path.clone() {
                 Some(path) => self.save_to(ctx, &path),
                 None => self.dialog = Some(Dialog::save_as(&self.document)),
@@ -501,6 +508,7 @@ impl Studio {
     pub(super) fn shortcuts(&mut self, ctx: &Context) {
         if self.dialog.is_some()
             || self.ask_quit
+            || self.ask_example.is_some()
             || self.palette.is_some()
             || self.offers_recovery()
         {
@@ -583,6 +591,11 @@ impl Studio {
             ui.menu_button("File", |ui| {
                 self.button(ui, Command::Open);
                 self.recent_menu(ui);
+                ui.menu_button("Examples", |ui| {
+                    for example in Example::ALL {
+                        self.button(ui, Command::Example(example));
+                    }
+                });
                 ui.separator();
                 for command in [Command::Save, Command::SaveAs] {
                     self.button(ui, command);

@@ -6,6 +6,7 @@ use std::sync::mpsc::{Receiver, channel};
 use egui::Context;
 
 use super::Studio;
+use crate::cli::examples::Example;
 use crate::document::Document;
 use crate::io::mesh_file::{ENDINGS, may_say_unit, needs_unit};
 use crate::io::project_file;
@@ -194,7 +195,43 @@ impl Dialog {
 impl Studio {
     pub(super) fn dialogs(&mut self, ctx: &Context) {
         self.path_dialog(ctx);
+        self.example_dialog(ctx);
         self.quit_dialog(ctx);
+    }
+
+    /// Opens an example, or asks where changes would be lost.
+    pub(super) fn open_example_or_ask(&mut self, ctx: &Context, example: Example) {
+        if self.document.is_dirty() {
+            self.ask_example = Some(example);
+        } else {
+            self.open_example(ctx, example);
+        }
+    }
+
+    fn example_dialog(&mut self, ctx: &Context) {
+        let Some(example) = self.ask_example else {
+            return;
+        };
+        let modal = egui::Modal::new(egui::Id::unique("example dialog")).show(ctx, |ui| {
+            ui.heading(example.name());
+            let text = format!(
+                "{} has changes that are not saved; opening an example discards them",
+                self.document.name()
+            );
+            ui.colored_label(super::theme::ERROR, text);
+            ui.horizontal(|ui| {
+                if ui.button("Discard and open").clicked() {
+                    self.ask_example = None;
+                    self.open_example(ctx, example);
+                }
+                if ui.button("Go back").clicked() {
+                    self.ask_example = None;
+                }
+            });
+        });
+        if modal.should_close() {
+            self.ask_example = None;
+        }
     }
 
     fn path_dialog(&mut self, ctx: &Context) {

@@ -1,6 +1,7 @@
 //! The display that the window is on: which it is, whether it still answers, and what to say where it does not.
 
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use crate::cli::out;
@@ -11,6 +12,30 @@ const NEEDS: &str =
 const HEADLESS: &str = "run `hapdef design --out DIR`, which needs no display";
 /// How long a server elsewhere may take to answer.
 const PATIENCE: Duration = Duration::from_secs(2);
+
+/// The display of a window that is open, for the last words.
+static OPEN: Mutex<Option<Display>> = Mutex::new(None);
+
+/// Says why the window is gone, where the program ends while one is open on a display that has gone: Xlib ends it on
+/// the spot, with words of its own. To be called at the program's end, whoever ends it.
+pub fn last_words() {
+    /// A server that ends lets go of its windows a little before it stops to answer.
+    const LOOKS: u32 = 10;
+    const PAUSE: Duration = Duration::from_millis(20);
+    let Some(display) = taken() else { return };
+    for _ in 0..LOOKS {
+        if !display.answers() {
+            out::say(&format!("hapdef: {}", display.farewell()));
+            return;
+        }
+        std::thread::sleep(PAUSE);
+    }
+}
+
+/// The display of the window that was open; from now on none is.
+fn taken() -> Option<Display> {
+    OPEN.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
 
 /// Where windows go.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -117,6 +142,17 @@ impl Display {
         )
     }
 
+    /// A window is open on it: from now on its end is told.
+    pub fn opened(&self) {
+        let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+        *open = Some(self.clone());
+    }
+
+    /// The window was closed: there is nothing to tell.
+    pub fn closed() {
+        drop(taken());
+    }
+
     /// Why an open window ended by itself.
     pub fn ending(&self, error: &eframe::Error) -> String {
         if self.answers() {
@@ -135,6 +171,7 @@ impl Display {
             if self.answers() {
                 others(panic);
             } else {
+                Self::closed();
                 out::say(&format!("hapdef: {}", self.farewell()));
                 std::process::exit(1);
             }
@@ -198,6 +235,15 @@ mod tests {
             said.contains("WAYLAND_DISPLAY=w") && said.contains("not saved"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn a_window_that_was_closed_leaves_no_last_words() {
+        Display::System.opened();
+        assert_eq!(taken(), Some(Display::System));
+        Display::System.opened();
+        Display::closed();
+        assert_eq!(taken(), None);
     }
 
     #[test]

@@ -596,11 +596,12 @@ impl Studio {
             );
         };
         let inputs = result.inputs.clone();
-        let own_mesh = (!self.document.bundled).then(|| self.document.mesh_path.clone());
+        let (bundled, mesh) = (self.document.bundled, self.document.mesh_path.clone());
         self.jobs.start(ctx, Task::Export, String::new(), move |_| {
-            let mesh_path = match own_mesh {
-                Some(mesh) => mesh,
-                None => saving::bundled_mesh_in(&folder).map_err(Stop::Failed)?,
+            let mesh_path = if bundled {
+                saving::bundled_mesh_in(&folder, &mesh).map_err(Stop::Failed)?
+            } else {
+                mesh
             };
             let provenance = artifacts::Provenance {
                 mesh_path: &mesh_path,

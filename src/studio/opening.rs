@@ -15,6 +15,7 @@ use super::{
     trade,
 };
 use crate::cli;
+use crate::cli::examples::Example;
 use crate::design::Inputs;
 use crate::document::{Document, State};
 use crate::io::mesh_file::read_mesh;
@@ -67,6 +68,16 @@ impl Studio {
                 recent: Some(path),
                 ..Opened::new(loaded, own, before)
             };
+            Ok(Finished::Opened(Box::new(opened)))
+        });
+    }
+
+    /// Opens a limb of the program's own.
+    pub(super) fn open_example(&mut self, ctx: &Context, example: Example) {
+        let before = self.document.state.clone();
+        self.jobs.start(ctx, Task::Open, String::new(), move |_| {
+            let loaded = example.open().map_err(|e| Stop::Failed(format!("{e:#}")))?;
+            let opened = Opened::new(loaded, None, before);
             Ok(Finished::Opened(Box::new(opened)))
         });
     }
@@ -147,8 +158,9 @@ impl Studio {
             // The mesh lies where it lay; only the bundled one lies in the folder that goes.
             loaded.bundled = loaded.mesh_path.parent() == Some(folder.as_path());
             if loaded.bundled {
-                loaded.mesh_path = "limb.glb".into();
-                loaded.inputs.project.part.mesh = "limb.glb".into();
+                let name = loaded.mesh_path.file_name().unwrap_or_default().to_owned();
+                loaded.inputs.project.part.mesh = name.to_string_lossy().into_owned();
+                loaded.mesh_path = name.into();
             } else if let Some(path) = &path {
                 loaded.inputs.project.part.mesh =
                     project_file::relative_to(path, &loaded.mesh_path);
@@ -222,6 +234,7 @@ impl Studio {
             messages: Vec::new(),
             touching: touching::Touching::default(),
             dialog: None,
+            ask_example: None,
             palette: None,
             recovery: None,
             recent: recent::Recent::default(),

@@ -13,6 +13,7 @@ use egui::{Context, Id, Modal};
 use serde::{Deserialize, Serialize};
 
 use super::Studio;
+use crate::cli::examples::write_bundled_mesh;
 use crate::document::{Document, State};
 use crate::io::{atomic, project_file};
 
@@ -98,12 +99,17 @@ impl Recovery {
             name: document.name(),
             path: document.path.as_deref().map(absolute),
         };
-        let mesh = (!document.bundled).then(|| absolute(&document.mesh_path));
+        let bundled = document.bundled;
+        let mesh = if bundled {
+            document.mesh_path.clone()
+        } else {
+            absolute(&document.mesh_path)
+        };
         self.kept = Some(state.clone());
         self.written = Instant::now();
         let (sender, receiver) = channel();
         std::thread::spawn(move || {
-            let _ = sender.send(keep(&folder, state, &origin, mesh));
+            let _ = sender.send(keep(&folder, state, &origin, mesh, bundled));
         });
         self.writing = Some(receiver);
     }
@@ -117,12 +123,12 @@ fn keep(
     folder: &Path,
     mut state: State,
     origin: &Origin,
-    mesh: Option<PathBuf>,
+    mut mesh: PathBuf,
+    bundled: bool,
 ) -> Result<(), String> {
-    let mesh = match mesh {
-        Some(mesh) => mesh,
-        None => crate::cli::write_bundled_mesh(folder).map_err(|e| format!("{e:#}"))?,
-    };
+    if bundled {
+        mesh = write_bundled_mesh(folder, &mesh).map_err(|e| format!("{e:#}"))?;
+    }
     let path = folder.join(PROJECT);
     state.project.part.mesh = project_file::relative_to(&path, &mesh);
     let painted = state.painted.as_ref().map(|m| m.as_slice());

@@ -8,7 +8,7 @@ use egui::Context;
 use super::Studio;
 use super::drive::Finished;
 use super::jobs::Task;
-use crate::cli;
+use crate::cli::examples::write_bundled_mesh;
 use crate::document::State;
 use crate::io::project_file;
 use crate::job::Stop;
@@ -34,12 +34,13 @@ impl Studio {
         }
         let mut state = self.document.state.clone();
         let part = Arc::clone(&self.document.part);
-        let own_mesh = (!self.document.bundled).then(|| self.document.mesh_path.clone());
+        let (bundled, mesh) = (self.document.bundled, self.document.mesh_path.clone());
         self.jobs.start(ctx, Task::Save, String::new(), move |_| {
             let folder = path.parent().unwrap_or(Path::new(""));
-            let mesh = match own_mesh {
-                Some(mesh) => mesh,
-                None => bundled_mesh_in(folder).map_err(Stop::Failed)?,
+            let mesh = if bundled {
+                bundled_mesh_in(folder, &mesh).map_err(Stop::Failed)?
+            } else {
+                mesh
             };
             state.project.part.mesh = project_file::relative_to(&path, &mesh);
             let painted = state.painted.as_ref().map(|m| m.as_slice());
@@ -62,10 +63,10 @@ impl Studio {
     }
 }
 
-/// Writes the bundled limb into a folder, which is made where it is missing.
-pub(super) fn bundled_mesh_in(folder: &Path) -> Result<PathBuf, String> {
+/// Writes a bundled mesh into a folder, which is made where it is missing.
+pub(super) fn bundled_mesh_in(folder: &Path, mesh: &Path) -> Result<PathBuf, String> {
     if !folder.as_os_str().is_empty() {
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     }
-    cli::write_bundled_mesh(folder).map_err(|e| format!("{e:#}"))
+    write_bundled_mesh(folder, mesh).map_err(|e| format!("{e:#}"))
 }

@@ -150,9 +150,9 @@ impl Studio {
     #[must_use]
     pub fn standing(&self, stage: Stage) -> Standing {
         match stage {
-            Stage::Part if self.document.asks_for_another_part() => Standing::Stale,
+            Stage::Part => self.part_standing(),
             Stage::Supports if self.document.state.project.supports.is_empty() => Standing::Open,
-            Stage::Part | Stage::Supports => Standing::Current,
+            Stage::Supports => Standing::Current,
             Stage::Simulation => {
                 let held = (self.simulation.as_ref()).map(|s| s.quality);
                 self.standing_of(&Task::Simulate, self.simulation_holds(), held, None)
@@ -167,6 +167,14 @@ impl Studio {
                 Standing::Failed(_) | Standing::Running => Standing::Stale,
                 other => other,
             },
+        }
+    }
+
+    fn part_standing(&self) -> Standing {
+        match self.document.misshapen() {
+            _ if self.document.asks_for_another_part() => Standing::Stale,
+            Some(why) => Standing::Failed(why.to_owned()),
+            None => Standing::Current,
         }
     }
 
@@ -304,6 +312,10 @@ impl Studio {
 
     fn simulation_lines(&self) -> Vec<String> {
         let Some(s) = &self.simulation else {
+            if self.document.misshapen().is_some() {
+                // What will be refused has no size to foresee.
+                return Vec::new();
+            }
             let budget = self.budget();
             let (sites, touches, gigabytes) =
                 crate::design::expected_size(&self.document.inputs(), &budget);
@@ -497,5 +509,38 @@ fn memory(gigabytes: f64) -> String {
         format!("{:.0} MB", (gigabytes * 1e3).max(1.0))
     } else {
         format!("{gigabytes:.1} GB")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::cli;
+    use crate::design;
+    use crate::document::Document;
+    use crate::mesh::TriMesh;
+
+    #[test]
+    fn a_vertex_far_away_is_named_at_the_part_and_nothing_is_foreseen() {
+        let usual = cli::bundled().unwrap();
+        let mut loaded = cli::bundled().unwrap();
+        let mut positions = loaded.inputs.part.positions().to_vec();
+        positions[0].x = 1e4;
+        let triangles = loaded.inputs.part.triangles();
+        let (part, _) = TriMesh::new(&positions, triangles, 0).unwrap();
+        loaded.inputs.part = Arc::new(part);
+        let refused = design::check_shape(&loaded.inputs.part).unwrap_err();
+
+        let studio = Studio::around(Document::new(loaded, None));
+        let said = refused.to_string();
+        assert!(said.contains("one vertex of the part"), "{said}");
+        assert_eq!(studio.standing(Stage::Part), Standing::Failed(said));
+        assert_eq!(studio.simulation_lines(), Vec::<String>::new());
+
+        let studio = Studio::around(Document::new(usual, None));
+        assert_eq!(studio.standing(Stage::Part), Standing::Current);
+        assert!(studio.simulation_lines()[0].contains("sites"));
     }
 }

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use hapdef::cli::BUNDLED_PROJECT;
+use hapdef::cli::examples::Example;
 use hapdef::io::glb::write_glb;
 use hapdef::io::trade_file::Record;
 use hapdef::mesh::TriMesh;
@@ -35,7 +35,7 @@ pub fn of(reader: Reader) -> Vec<Vec<u8>> {
         Reader::Msh => vec![msh_second(), msh_fourth(), msh_binary()],
         Reader::Inp => vec![inp()],
         Reader::Dat => vec![deck(), shells()],
-        Reader::Project => vec![BUNDLED_PROJECT.into(), PROJECT.into()],
+        Reader::Project => vec![Example::Tube.project().into(), PROJECT.into()],
         Reader::Npz => vec![npz()],
         Reader::Arrays => vec![arrays(), counts()],
         Reader::Mask => vec![npy("|b1", "(5,)", &[1, 0, 1, 1, 0])],

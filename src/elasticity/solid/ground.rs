@@ -467,23 +467,42 @@ fn encloses(part: &TriMesh, immersed: &Immersed) -> Result<(), ElasticError> {
     /// Share of the area with material behind it, and of the area that holes may have.
     const MOST: f64 = 0.9;
     const HOLES: f64 = 0.02;
-    let (lower, upper) = part.bounds();
-    let off = 1e-5 * (upper - lower).length();
-    let count = part.triangles().len() as u32;
-    let has_behind = |t: u32| {
-        let middle = part.corners(t).iter().sum::<DVec3>() / 3.0;
-        immersed.is_inside(middle - part.facet_normal(t) * off)
-    };
-    let has: Vec<bool> = (0..count).into_par_iter().map(has_behind).collect();
-    let areas = (0..count)
-        .filter(|&t| has[t as usize])
-        .map(|t| part.facet_area(t));
-    let behind: f64 = areas.sum();
-    if behind < MOST * part.area() || hole_area(part) > HOLES * part.area() {
-        let rims = part.boundary_edges().count();
-        return Err(ElasticError::Open { rims });
+    let behind = share_behind(part, |place| immersed.is_inside(place));
+    if behind < MOST || hole_area(part) > HOLES * part.area() {
+        return Err(ElasticError::Open {
+            rims: part.boundary_edges().count(),
+            closes_within: part.closes_within(),
+        });
     }
     Ok(())
+}
+
+/// Share of a surface's area with material just behind it, looked at behind so many facets at most, evenly over the
+/// area: of a million facets each one costs as much as all the rest of what is asked of them.
+fn share_behind(part: &TriMesh, is_inside: impl Fn(DVec3) -> bool + Sync) -> f64 {
+    /// The share is right to a hundredth.
+    const LOOKS: f64 = 20_000.0;
+    let (lower, upper) = part.bounds();
+    let off = 1e-5 * (upper - lower).length();
+    let each = part.area() / LOOKS;
+    let mut before = 0.0_f64;
+    let mut looks = Vec::new();
+    for t in 0..part.triangles().len() as u32 {
+        let after = before + part.facet_area(t) / each;
+        let steps = after.floor() - before.floor();
+        if steps > 0.0 {
+            looks.push((t, steps));
+        }
+        before = after;
+    }
+    let behind = |&(t, steps): &(u32, f64)| {
+        let middle = part.corners(t).iter().sum::<DVec3>() / 3.0;
+        let inside = is_inside(middle - part.facet_normal(t) * off);
+        if inside { steps } else { 0.0 }
+    };
+    // Whole numbers: the order of their sum does not matter.
+    let found: f64 = looks.par_iter().map(behind).sum();
+    found / looks.iter().map(|(_, steps)| steps).sum::<f64>()
 }
 
 /// Area of the holes in a surface (m²): that of the flattest film across each of its rims.
@@ -506,4 +525,37 @@ fn hole_area(part: &TriMesh) -> f64 {
         *films.entry(label).or_default() += film;
     }
     films.values().map(|film| film.length()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn behind_many_facets_is_looked_as_often_as_behind_fewer() {
+        const SIDE: u32 = 150;
+        // Columns that grow wider from left to right.
+        let at = |i: u32, j: u32| {
+            let across = |k: u32| f64::from(k) / f64::from(SIDE);
+            DVec3::new(across(i).powi(2), across(j), 0.0)
+        };
+        let places = (0..=SIDE).flat_map(|j| (0..=SIDE).map(move |i| (i, j)));
+        let positions = places.map(|(i, j)| at(i, j)).collect();
+        let squares = (0..SIDE).flat_map(|j| (0..SIDE).map(move |i| j * (SIDE + 1) + i));
+        let halves = |a: u32| {
+            let c = a + SIDE + 2;
+            [[a, a + 1, c], [a, c, c - 1]]
+        };
+        let part = TriMesh::from_checked(positions, squares.flat_map(halves).collect());
+        let asked = AtomicUsize::new(0);
+        let share = share_behind(&part, |place| {
+            asked.fetch_add(1, Ordering::Relaxed);
+            place.x < 0.25
+        });
+        assert!((share - 0.25).abs() < 0.01, "{share}");
+        let asked = asked.into_inner();
+        assert!((10_000..=20_000).contains(&asked), "{asked}");
+    }
 }

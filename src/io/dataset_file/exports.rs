@@ -9,7 +9,7 @@ use super::plausible::{Origin, spread};
 use super::{FileError, Found, Touches};
 use crate::io::source;
 use crate::memory;
-use crate::plain::{mm, quote};
+use crate::plain::{self, mm, quote};
 
 /// Text may become so many times as large in memory while it is taken apart.
 const GROWTH: f64 = 16.0;
@@ -86,10 +86,10 @@ fn check_room(folder: &Path, files: &[PathBuf]) -> Result<(), FileError> {
     Err(FileError::broken(
         folder,
         format!(
-            "the exports have {:.1} GB together, and at most {:.1} GB are read with {:.1} GB of memory. Give fewer, or allow more with --memory-gb",
-            bytes / 1e9,
-            memory::allowed_gb() / GROWTH,
-            memory::allowed_gb()
+            "the exports have {} together, and at most {} are read with {} of memory. Give fewer, or allow more with --memory-gb",
+            plain::needed_gb(bytes / 1e9),
+            plain::allowed_gb(memory::allowed_gb() / GROWTH),
+            plain::allowed_gb(memory::allowed_gb())
         ),
     ))
 }

@@ -12,7 +12,7 @@ use crate::plain::mm;
 const WIDEST: f64 = 20_000.0;
 /// Touches and sites lie on one part; spreads as different as this are worth a word.
 const UNLIKE: f64 = 100.0;
-/// A spread that is wide, and so much wider than the other, is in another unit (mm).
+/// A spread that is wide may be in another unit, and is where it is so much wider than the other (mm).
 const WIDE: f64 = 2_000.0;
 /// Places nearer than this are one (mm).
 const ONE: f64 = 1e-6;
@@ -166,7 +166,8 @@ pub fn check(touches: &Places, sites: &Places) -> Result<Vec<String>, FileError>
     let (pressed, read) = (touches.spread(), sites.spread());
     let (narrow, wide) = (pressed.min(read), pressed.max(read));
     if sites.points.len() < 2 || wide <= UNLIKE * narrow {
-        return Ok(Vec::new());
+        let doubt = || in_doubt(wide, touches, sites);
+        return Ok((wide > WIDE).then(doubt).into_iter().collect());
     }
     let unlike = format!(
         "the sites are spread over {} and the touches over {}, though both lie on one part",
@@ -178,6 +179,20 @@ pub fn check(touches: &Places, sites: &Places) -> Result<Vec<String>, FileError>
         return Err(odd.origin.wrong(format!("{unlike}. {}", odd.origin.unit())));
     }
     Ok(vec![format!("Check the units: {unlike}.")])
+}
+
+/// What is said where touches and sites agree on a part (mm) that is larger than what a hand presses.
+fn in_doubt(size: f64, touches: &Places, sites: &Places) -> String {
+    let mut units = vec![touches.origin.unit()];
+    if !sites.points.is_empty() {
+        units.push(sites.origin.unit());
+    }
+    units.dedup();
+    format!(
+        "Check the unit: these places are of a part of {}. {}.",
+        mm(size),
+        units.join("; ")
+    )
 }
 
 /// The longest side of the box around some points, in their unit; zero of none. No square is taken: it may leave

@@ -11,7 +11,7 @@ use self::data::Buffers;
 use super::Soup;
 use super::boundary::quietly;
 use super::words::no_surface;
-use crate::memory;
+use crate::{memory, plain};
 
 /// Reads all meshes of the scene; `folder` is where buffers that it names are looked for.
 pub fn read(bytes: &[u8], folder: Option<&Path>) -> Result<Soup, String> {
@@ -182,9 +182,9 @@ impl Walk<'_> {
             return Ok(());
         }
         Err(format!(
-            "would take {:.1} GB with all that comes before it, and {:.1} GB may be taken: decimate the mesh, or allow more with --memory-gb",
-            needed / 1e9,
-            memory::allowed_gb()
+            "would take {} with all that comes before it, and {} may be taken: decimate the mesh, or allow more with --memory-gb",
+            plain::needed_gb(needed / 1e9),
+            plain::allowed_gb(memory::allowed_gb())
         ))
     }
 

@@ -7,6 +7,7 @@ use super::Soup;
 use super::place::{Origin, Place};
 use crate::memory;
 use crate::mesh::volume::{Tetrahedron, VolumeError, VolumeMesh};
+use crate::plain;
 
 /// Refuses more nodes than a model could be made of, before any is taken in.
 ///
@@ -20,9 +21,9 @@ pub fn bounded(nodes: u64, place: Place) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "{place}: {nodes} nodes are more than {:.0}, which is what {:.1} GB of memory bear: mesh the part with larger elements, or allow more with --memory-gb",
+        "{place}: {nodes} nodes are more than {:.0}, which is what {} of memory bear: mesh the part with larger elements, or allow more with --memory-gb",
         most.floor(),
-        memory::allowed_gb()
+        plain::allowed_gb(memory::allowed_gb())
     ))
 }
 

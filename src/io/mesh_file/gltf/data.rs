@@ -7,7 +7,7 @@ use gltf::buffer::{Data, Source, View};
 
 use crate::io::source;
 use crate::memory;
-use crate::plain::quote;
+use crate::plain::{self, quote};
 
 /// The bytes of each buffer.
 pub struct Buffers(Vec<Vec<u8>>);
@@ -41,8 +41,8 @@ impl Buffers {
             total += held;
             if total as f64 > memory::allowed() / 4.0 {
                 return Err(format!(
-                    "the buffers of the glTF file have more than a quarter of the {:.1} GB that may be taken: make them smaller, or allow more with --memory-gb",
-                    memory::allowed_gb()
+                    "the buffers of the glTF file have more than a quarter of the {} that may be taken: make them smaller, or allow more with --memory-gb",
+                    plain::allowed_gb(memory::allowed_gb())
                 ));
             }
             loaded.push(bytes);
