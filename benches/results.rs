@@ -131,7 +131,7 @@ fn run(quality: Quality, signal: Signal) -> Design {
 fn limb(text: &mut String) {
     let inputs = inputs(Signal::Strain);
     let part = &inputs.part;
-    let sites = design::lay_out_sites(part, &inputs.project).expect("sites fit");
+    let sites = design::lay_out_sites(part, &inputs).expect("sites fit");
     let touches = touches(part, &inputs, 1000);
     // The generator's own triangles, and those halved: what the reference was measured on.
     let supports = inputs.project.supports(&inputs.masks).expect("boxes");

@@ -7,6 +7,7 @@ struct Scene {
     deform: vec4f,     // x: exaggeration, y: 1 when a field is shown, z: 1 when the region is shown
     section: vec4f,    // what lies on the positive side of this plane is cut away, relative units
     look: vec4f,       // x: how much a wall in front covers, y: 1 when the first layer marks what is blind
+    up: vec4f,         // xyz: up, w: the stretch above which lengths are marked as off, 0 for none
 };
 
 @group(0) @binding(0) var<uniform> scene: Scene;
@@ -19,6 +20,7 @@ struct Vertex {
     @location(2) displacement: vec3f,
     @location(3) value: f32,
     @location(4) region: vec4f,
+    @location(5) stretch: f32,
 };
 
 struct Fragment {
@@ -27,13 +29,14 @@ struct Fragment {
     @location(1) normal: vec3f,
     @location(2) value: f32,
     @location(3) region: vec4f,
+    @location(4) stretch: f32,
 };
 
 @vertex
 fn vs(v: Vertex) -> Fragment {
     let p = v.position + v.displacement * scene.deform.x;
     let local = (p - scene.target_scale.xyz) * scene.target_scale.w;
-    return Fragment(scene.matrix * vec4f(local, 1.0), local, v.normal, v.value, v.region);
+    return Fragment(scene.matrix * vec4f(local, 1.0), local, v.normal, v.value, v.region, v.stretch);
 }
 
 fn colour(f: Fragment, front: bool) -> vec3f {
@@ -41,7 +44,7 @@ fn colour(f: Fragment, front: bool) -> vec3f {
     var n = normalize(f.normal);
     if (dot(n, to_eye) < 0.0) { n = -n; }
     let headlight = max(dot(n, to_eye), 0.0);
-    let sky = 0.5 + 0.5 * n.z;
+    let sky = 0.5 + 0.5 * dot(n, scene.up.xyz);
     let light = 0.34 + 0.50 * headlight + 0.16 * sky;
 
     var base = select(vec3f(0.62, 0.59, 0.55), vec3f(0.86, 0.87, 0.89), front);
@@ -62,6 +65,11 @@ fn colour(f: Fragment, front: bool) -> vec3f {
         let stripe = step(0.5, fract((f.world.x + f.world.y + f.world.z) * 36.0));
         let grey = mix(vec3f(0.48), vec3f(0.70), stripe);
         base = mix(base, select(grey * 0.72, grey, front), smoothstep(0.35, 0.65, f.region.x));
+    }
+    if (scene.up.w > 0.0 && f.stretch > scene.up.w) {
+        // Thin dark lines the other way: what colours the place stays to be seen.
+        let line = step(0.82, fract((f.world.x - f.world.y) * 24.0));
+        base = mix(base, vec3f(0.12), 0.55 * line);
     }
     let shine = select(0.0, 0.06 * pow(headlight, 40.0), front);
     return base * light + shine;

@@ -24,6 +24,7 @@ use glam::DVec3;
 use crate::budget::Cancelled;
 use crate::elasticity::ElasticError;
 use crate::mesh::TriMesh;
+use crate::mesh::stance::Stance;
 use crate::placement::PlacementError;
 use crate::plain;
 use crate::project::{BadValue, Masks, Project};
@@ -83,9 +84,13 @@ pub enum DesignError {
         size_mm: f64,
     },
     #[error(
-        "the direction of site {number} points out of the surface: a gauge lies in it, give dx, dy, dz along it"
+        "the direction of site {number} points {angle_deg:.0}° out of the surface: a gauge lies in it, give dx, dy, dz along it"
     )]
-    AcrossTheWall { number: usize },
+    AcrossTheWall { number: usize, angle_deg: f64 },
+    #[error(
+        "none of the {count} {what} can be answered: each is off the part or points out of its surface. Check the unit of the mesh and of the points (mm), and the directions"
+    )]
+    NothingLeft { what: &'static str, count: usize },
     #[error(
         "the part is {size_mm:.3} mm across and its wall {thickness_mm:.3} mm thick: this is no shell. Check the unit of the mesh and part.thickness_mm"
     )]
@@ -197,4 +202,12 @@ pub struct Inputs {
     pub painted: Option<Arc<Vec<bool>>>,
     /// Masks of the part's vertices that supports may name.
     pub masks: Masks,
+}
+
+impl Inputs {
+    /// Which way the part stands.
+    #[must_use]
+    pub fn stance(&self) -> Stance {
+        self.project.part.axis.stance(&self.part)
+    }
 }

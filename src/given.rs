@@ -1,5 +1,7 @@
 //! The elastic model asked at given points: touches and gauges that somebody else chose.
 
+mod sift;
+
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -8,11 +10,13 @@ use crate::budget::{Budget, Watch};
 use crate::design::{self, Built, Checks, DesignError, Inputs};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
-use crate::elasticity::observe::{Face, Observer};
+use crate::elasticity::observe::{Face, Observer, SiteFrame};
 use crate::elasticity::respond::{Reading, Responses, respond};
 use crate::elasticity::{Model, Touch};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
+
+pub use sift::{LeftOut, Sifted, Table, check_reach, sift};
 
 /// A gauge at a given place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,11 +31,8 @@ pub struct GivenSite {
 pub struct Answer {
     pub model: Box<dyn Model>,
     responses: Responses,
-    sites: usize,
-    touches: usize,
-    /// How far the given points lay from the part (m).
-    pub touch_distances: Vec<f64>,
-    pub site_distances: Vec<f64>,
+    /// The rows that were answered and those that were not, and how far each was off.
+    pub rows: Sifted,
     pub discretization: Discretization,
     /// Of a shell.
     pub linearity: Option<Linearity>,
@@ -43,6 +44,7 @@ pub struct Answer {
 /// One touch read at one site, on the inside face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair {
+    /// Rows of what was given.
     pub touch: usize,
     pub site: usize,
     /// m.
@@ -56,7 +58,7 @@ const ASKEW: f64 = 0.707;
 /// Answers for every touch at every site.
 ///
 /// # Errors
-/// [`DesignError`] for what cannot be computed, and for points that cannot be meant for this part.
+/// [`DesignError`] for what cannot be computed, and for the first point that cannot be meant for this part.
 pub fn answer(
     inputs: &Inputs,
     touches: &[Touch],
@@ -65,26 +67,40 @@ pub fn answer(
     watch: Watch,
 ) -> Result<Answer, DesignError> {
     inputs.project.check()?;
-    let index = SurfaceIndex::new(&inputs.part);
-    let reach = Reach::of(&inputs.part, &index);
-    reach.check("touch", touches.iter().map(|t| t.position))?;
-    reach.check("site", sites.iter().map(|s| s.position))?;
+    let mut rows = sift(&inputs.part, touches, sites);
+    rows.refuse_any()?;
+    let mut answer = answer_sifted(inputs, touches, sites, rows, budget, watch)?;
+    answer.rows.refuse_any()?;
+    Ok(answer)
+}
+
+/// Answers for the touches and sites that are left of those that were given; where the elements that are laid on the
+/// part turn a gauge out of their surface, that one is left out too.
+///
+/// # Errors
+/// [`DesignError`] for what cannot be computed, and where nothing is left.
+pub fn answer_sifted(
+    inputs: &Inputs,
+    touches: &[Touch],
+    sites: &[GivenSite],
+    mut rows: Sifted,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<Answer, DesignError> {
+    inputs.project.check()?;
+    rows.check()?;
     // Solved, read out row by row, and written as text: several times the numbers themselves.
     design::check_room(sites.len(), touches.len(), 24)?;
+    let touches: Vec<Touch> = rows.touches.iter().map(|&k| touches[k]).collect();
+    let places: Vec<DVec3> = rows.sites.iter().map(|&k| sites[k].position).collect();
     let mut notes = Vec::new();
-    let inputs = facing_touches(inputs, touches, &index, &mut notes);
     let index = SurfaceIndex::new(&inputs.part);
-    let distances = |points: &mut dyn Iterator<Item = DVec3>| -> Vec<f64> {
-        points.map(|p| index.nearest(p).1).collect()
-    };
-    let touch_distances = distances(&mut touches.iter().map(|t| t.position));
-    let site_distances = distances(&mut sites.iter().map(|s| s.position));
-    askew(touches, &index, &inputs.part, &mut notes);
+    let inputs = facing_touches(inputs, &touches, &index, &mut notes);
+    askew(&touches, &rows, &inputs.part, &mut notes);
 
     let ground = design::ground(&inputs, watch)?;
-    let places: Vec<DVec3> = sites.iter().map(|s| s.position).collect();
     ground.check(&inputs.project)?;
-    let built = ground.build(touches, &places, &budget.elements, watch)?;
+    let built = ground.build(&touches, &places, &budget.elements, watch)?;
     let checks = Checks::of(&built);
     let Built {
         laid,
@@ -106,18 +122,14 @@ pub fn answer(
         .map(|t| t.tip_radius)
         .fold(f64::INFINITY, f64::min);
     notes.extend(ground.cautions(&laid, smallest));
-    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index().nearest(p).0).collect();
-    let observer = model.observer(&points, Face::Inside);
-    let angles = angles(sites, &observer)?;
+    let (observer, angles) = observed(&*model, sites, &mut rows);
+    rows.check()?;
     let reading = Reading::GaugeAndDisplacement(&angles);
-    let responses = respond(&*model, touches, &observer, reading, watch)?;
+    let responses = respond(&*model, &touches, &observer, reading, watch)?;
     Ok(Answer {
         model,
         responses,
-        sites: sites.len(),
-        touches: touches.len(),
-        touch_distances,
-        site_distances,
+        rows,
         discretization: estimate,
         linearity,
         checks,
@@ -125,23 +137,70 @@ pub fn answer(
     })
 }
 
+/// The sites that are left on a model, and the angle of each gauge there; one whose direction the model's surface
+/// does not have is left out.
+fn observed(model: &dyn Model, sites: &[GivenSite], rows: &mut Sifted) -> (Observer, Vec<f64>) {
+    let on = |rows: &[usize]| {
+        let nearest = |&k: &usize| model.index().nearest(sites[k].position).0;
+        let points: Vec<SurfacePoint> = rows.iter().map(nearest).collect();
+        model.observer(&points, Face::Inside)
+    };
+    let observer = on(&rows.sites);
+    let laid: Vec<Result<f64, f64>> = (rows.sites.iter().zip(observer.frames()))
+        .map(|(&k, frame)| angle_within(sites[k].direction, frame))
+        .collect();
+    let angles: Vec<f64> = laid.iter().flatten().copied().collect();
+    if laid.iter().all(Result::is_ok) {
+        return (observer, angles);
+    }
+    let tried = std::mem::take(&mut rows.sites);
+    for (row, angle) in tried.into_iter().zip(laid) {
+        match angle {
+            Ok(_) => rows.sites.push(row),
+            Err(angle_deg) => rows.left_out.push(LeftOut {
+                table: Table::Sites,
+                row,
+                why: DesignError::AcrossTheWall {
+                    number: row,
+                    angle_deg,
+                },
+            }),
+        }
+    }
+    (on(&rows.sites), angles)
+}
+
+/// The angle of a direction in a tangent frame (radians), of its part in the surface; where next to nothing of it
+/// is, how far it points out (degrees).
+fn angle_within(direction: DVec3, frame: &SiteFrame) -> Result<f64, f64> {
+    let (x, y) = (direction.dot(frame.x_axis), direction.dot(frame.y_axis));
+    let within = x.hypot(y) / direction.length();
+    // No number at all is no direction either.
+    if within >= 0.1 {
+        Ok(y.atan2(x))
+    } else {
+        Err(within.min(1.0).acos().to_degrees())
+    }
+}
+
 impl Answer {
     /// All pairs, touch by touch.
     pub fn pairs(&self) -> impl Iterator<Item = Pair> + '_ {
+        let Sifted { touches, sites, .. } = &self.rows;
         let rows: Vec<Vec<f64>> = (0..self.responses.rows())
             .map(|r| {
-                let mut row = vec![0.0; self.touches];
+                let mut row = vec![0.0; touches.len()];
                 self.responses.row_into(r, &mut row);
                 row
             })
             .collect();
-        let sites = self.sites;
-        (0..self.touches * sites).map(move |k| {
-            let (touch, site) = (k / sites, k % sites);
-            let u = |c: usize| rows[sites + 3 * site + c][touch];
+        let count = sites.len();
+        (0..touches.len() * count).map(move |k| {
+            let (touch, site) = (k / count, k % count);
+            let u = |c: usize| rows[count + 3 * site + c][touch];
             Pair {
-                touch,
-                site,
+                touch: touches[touch],
+                site: sites[site],
                 displacement: DVec3::new(u(0), u(1), u(2)),
                 strain: rows[site][touch],
             }
@@ -175,79 +234,12 @@ fn facing_touches(
     inputs
 }
 
-/// Whether points can be meant for a part: none lies farther from it than it is large.
-///
-/// # Errors
-/// [`DesignError::OffThePart`] for the first that does; `what` it is.
-pub fn check_reach(
-    part: &TriMesh,
-    what: &'static str,
-    points: impl Iterator<Item = DVec3>,
-) -> Result<(), DesignError> {
-    Reach::of(part, &SurfaceIndex::new(part)).check(what, points)
-}
-
-/// How far from a part points can be meant for it: no farther than it is large.
-struct Reach<'a> {
-    index: &'a SurfaceIndex,
-    lower: DVec3,
-    upper: DVec3,
-    /// m.
-    size: f64,
-}
-
-impl<'a> Reach<'a> {
-    fn of(part: &TriMesh, index: &'a SurfaceIndex) -> Self {
-        let (lower, upper) = part.bounds();
-        Self {
-            index,
-            lower,
-            upper,
-            size: (upper - lower).length(),
-        }
-    }
-
-    fn check(
-        &self,
-        what: &'static str,
-        points: impl Iterator<Item = DVec3>,
-    ) -> Result<(), DesignError> {
-        for (number, point) in points.enumerate() {
-            let distance = self.distance(point);
-            if distance > self.size {
-                return Err(DesignError::OffThePart {
-                    what,
-                    number,
-                    distance_mm: distance * 1000.0,
-                    size_mm: self.size * 1000.0,
-                });
-            }
-        }
-        Ok(())
-    }
-
-    /// From the part (m); of what is out of reach, from the box around it. The box is asked first: very far
-    /// out squares are no numbers any more, and the nearest place is not found.
-    fn distance(&self, point: DVec3) -> f64 {
-        if !point.is_finite() {
-            return f64::INFINITY;
-        }
-        let beyond = (point - point.clamp(self.lower, self.upper)).abs();
-        let widest = beyond.max_element();
-        if widest > self.size {
-            widest * (beyond / widest).length()
-        } else {
-            self.index.nearest(point).1
-        }
-    }
-}
-
-fn askew(touches: &[Touch], index: &SurfaceIndex, part: &TriMesh, notes: &mut Vec<String>) {
-    let turned: Vec<usize> = touches
-        .iter()
-        .enumerate()
-        .filter(|(_, t)| part.normal(index.nearest(t.position).0).dot(t.normal) < ASKEW)
-        .map(|(k, _)| k)
+/// Remarks on touches that press along what is not nearly the surface's normal.
+fn askew(touches: &[Touch], rows: &Sifted, part: &TriMesh, notes: &mut Vec<String>) {
+    let index = SurfaceIndex::new(part);
+    let turned: Vec<usize> = (touches.iter().zip(&rows.touches))
+        .filter(|(t, _)| part.normal(index.nearest(t.position).0).dot(t.normal) < ASKEW)
+        .map(|(_, &row)| row)
         .collect();
     if let Some(first) = turned.first() {
         notes.push(format!(
@@ -255,20 +247,4 @@ fn askew(touches: &[Touch], index: &SurfaceIndex, part: &TriMesh, notes: &mut Ve
             turned.len()
         ));
     }
-}
-
-fn angles(sites: &[GivenSite], observer: &Observer) -> Result<Vec<f64>, DesignError> {
-    sites
-        .iter()
-        .zip(observer.frames())
-        .enumerate()
-        .map(|(number, (site, frame))| {
-            let d = site.direction;
-            let (x, y) = (d.dot(frame.x_axis), d.dot(frame.y_axis));
-            if x.hypot(y) < 0.1 * d.length() || !d.is_finite() || d.length() == 0.0 {
-                return Err(DesignError::AcrossTheWall { number });
-            }
-            Ok(y.atan2(x))
-        })
-        .collect()
 }

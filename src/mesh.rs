@@ -21,6 +21,8 @@ mod report;
 pub mod room;
 pub mod sample;
 pub mod scatter;
+pub mod stance;
+pub mod stretch;
 pub mod surface;
 mod thicken;
 mod topology;

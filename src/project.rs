@@ -1,5 +1,6 @@
 //! A project: everything a design depends on, as plain data in the units of its file.
 
+mod axis;
 mod kept;
 mod live;
 mod masks;
@@ -19,7 +20,6 @@ use crate::evaluation::{EstimatorKind, Forces, Judging};
 use crate::feasible::FeasibleRules;
 use crate::limb::BoxMm;
 use crate::mesh::reach::FINGERTIP;
-use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
 use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
@@ -27,6 +27,7 @@ use crate::uncertainty::{Gluing, Pressing, Uncertainty};
 
 use ranges::check;
 
+pub use axis::PartAxis;
 pub use kept::{Kept, KeptError, KeptFailure};
 pub use live::{GluedKeys, LiveKeys};
 pub use masks::Masks;
@@ -385,7 +386,7 @@ impl Project {
                 thickness_mm: part::defaults::thickness(),
                 inside: None,
                 outside: None,
-                axis: Axis::Z,
+                axis: PartAxis::Auto,
             },
             material: MaterialKeys::default(),
             supports: Vec::new(),

@@ -14,7 +14,7 @@ use hapdef::io::project_file;
 use hapdef::limb::barrel::BarrelSpec;
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::unroll::Axis;
-use hapdef::project::PartModel;
+use hapdef::project::{PartAxis, PartModel};
 
 fn hapdef(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_hapdef"))
@@ -169,7 +169,8 @@ fn both_examples_open_and_their_meshes_go_where_they_are_saved() {
     }
     let barrel = Example::Barrel.open().unwrap().inputs;
     assert_eq!(barrel.project.part.model, PartModel::Solid);
-    assert_eq!(barrel.project.part.axis, Axis::Y);
+    assert_eq!(barrel.project.part.axis, PartAxis::Coordinate(Axis::Y));
+    assert_eq!(PartAxis::Auto.stance(&barrel.part).up(), DVec3::Y);
     // One rim is held, and something of the part lies there.
     let [low, high] = barrel.project.supports[0].box_mm.unwrap().map(DVec3::from);
     let held = |p: &&DVec3| (**p * 1000.0).cmpge(low).all() && (**p * 1000.0).cmple(high).all();

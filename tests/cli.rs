@@ -772,3 +772,81 @@ fn a_folder_that_another_writes_into_is_refused_at_once() {
     let arguments = ["trade", "--within-s", "10", "--out", text(&out)];
     refused(&arguments, 1, &["nothing is measured there yet"]);
 }
+
+#[test]
+fn rows_that_are_off_are_listed_and_left_out() {
+    let (folder, project) = project(|t| t.replace("\"standard\"", "\"draft\""));
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let touches = file("t.csv", &format!("{TOUCHES}80,0,60,1,0,0,10,5\n"));
+    // Along the wall; 20° out of it; 45°; and far away, below a remark.
+    let sites = file(
+        "s.csv",
+        "x_mm,y_mm,z_mm,dx,dy,dz\n31.8,0,60,0,0,1\n31.8,0,60,0.342,0,0.94\n31.8,0,60,1,0,1\n# away\n31.8,0,1e6,0,0,1\n",
+    );
+    let run = |out: &Path, more: &[&str]| {
+        let given = [
+            "simulate",
+            text(&project),
+            "--touches",
+            text(&touches),
+            "--sites",
+            text(&sites),
+            "--out",
+            text(out),
+        ];
+        hapdef(&[&given[..], more].concat())
+    };
+    let out = folder.path().join("r.csv");
+    let output = run(&out, &["--json"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    for words in [
+        "t.csv, line 4: touch 2 lies",
+        "s.csv, line 4: the direction of site 2 points 45° out",
+        "s.csv, line 6: site 3 lies",
+        "s.csv, line 3: site 1: its direction points 20° out",
+        "1 of 3 touches and 2 of 4 sites left out",
+    ] {
+        let lines = said.lines().filter(|line| line.contains(words)).count();
+        assert_eq!(lines, 1, "{words}: {said}");
+    }
+    let result = std::fs::read_to_string(&out).unwrap();
+    let (remarks, rows): (Vec<&str>, Vec<&str>) =
+        result.lines().skip(1).partition(|l| l.starts_with('#'));
+    assert_eq!(remarks.len(), 3, "{result}");
+    let answered: Vec<String> = (rows.iter())
+        .map(|row| row.split(',').take(2).collect::<Vec<_>>().join(","))
+        .collect();
+    assert_eq!(answered, ["0,0", "0,1", "1,0", "1,1"]);
+    // Laid into the surface, the second reads what the first does.
+    let strain = |row: &str| row.split(',').nth(5).unwrap().parse::<f64>().unwrap();
+    assert!(
+        (strain(rows[0]) / strain(rows[1]) - 1.0).abs() < 0.02,
+        "{result}"
+    );
+    let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(summary["left_out"].as_array().unwrap().len(), 3);
+    assert_eq!(summary["left_out"][1]["line"], 4);
+    // As arrays, the rows keep their places.
+    let arrays = folder.path().join("r.npz");
+    assert!(run(&arrays, &[]).status.success());
+    let arrays = zip::ZipArchive::new(std::fs::File::open(&arrays).unwrap()).unwrap();
+    for name in [
+        "touch_left_out.npy",
+        "site_left_out.npy",
+        "site_angle_deg.npy",
+    ] {
+        assert!(arrays.index_for_name(name).is_some(), "{name}");
+    }
+    // Asked to be strict, it stops at the first, before anything is computed or written.
+    let never = folder.path().join("never.csv");
+    let output = run(&never, &["--strict"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("t.csv, line 4: touch 2 lies"), "{said}");
+    assert!(!said.contains("site 2") && !never.exists(), "{said}");
+}

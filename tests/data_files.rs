@@ -278,6 +278,7 @@ fn a_point_farther_than_the_part_is_large_is_named() {
             .arg(sites)
             .arg("--out")
             .arg(folder.path("r.csv"))
+            .arg("--strict")
             .output()
             .unwrap();
         let said = String::from_utf8_lossy(&output.stderr);

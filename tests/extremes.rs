@@ -497,8 +497,8 @@ fn touches_off_the_part_are_projected_or_refused() {
         )
     };
     let answer = at(3e-3, 0.0).unwrap();
-    assert!((answer.touch_distances[0] - 3e-3).abs() < 1e-9);
-    assert!((answer.site_distances[0] - 0.5e-3).abs() < 1e-9);
+    assert!((answer.rows.touch_distances[0] - 3e-3).abs() < 1e-9);
+    assert!((answer.rows.site_distances[0] - 0.5e-3).abs() < 1e-9);
     let straight = at(0.0, 0.0).unwrap();
     let strain = |a: &given::Answer| a.pairs().next().unwrap().strain;
     assert!((strain(&answer) / strain(&straight) - 1.0).abs() < 1e-9);

@@ -14,7 +14,9 @@ use crate::limb::barrel::BarrelSpec;
 use crate::limb::{BoxMm, LimbSpec, LimbSupport};
 use crate::mesh::TriMesh;
 use crate::mesh::unroll::Axis;
-use crate::project::{Lattice, Masks, PartModel, Project, RegionKeys, SupportKeys, SupportKind};
+use crate::project::{
+    Lattice, Masks, PartAxis, PartModel, Project, RegionKeys, SupportKeys, SupportKind,
+};
 
 /// What a limb's wall is made of.
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
@@ -208,6 +210,7 @@ fn tube(args: &LimbArgs) -> anyhow::Result<Made> {
     let spec = args.spec();
     let (mut mesh, boxes) = spec.build()?;
     let mut project = Project::around("limb.glb", None);
+    project.part.axis = PartAxis::Coordinate(Axis::Z);
     project.supports = clamped(&boxes);
     project.sites.lattice = Lattice::Unrolled;
     let wide = (2.0 * spec.radius() * spec.taper.max(1.0)).ceil().max(80.0);
@@ -233,7 +236,7 @@ fn barrel(args: &LimbArgs) -> anyhow::Result<Made> {
     let mut project = Project::around("barrel.glb", None);
     project.part.model = PartModel::Solid;
     project.part.thickness_mm = spec.wall;
-    project.part.axis = Axis::Y;
+    project.part.axis = PartAxis::Coordinate(Axis::Y);
     project.supports = clamped(&boxes);
     let wide = (2.0 * spec.radius).ceil();
     let top = spec.height - spec.rim;

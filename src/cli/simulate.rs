@@ -1,5 +1,7 @@
 //! `hapdef simulate`: the elastic model only, over the whole part or at given points.
 
+mod off;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
@@ -25,6 +27,10 @@ pub struct SimulateArgs {
     /// Gauges to answer for (.csv): `x_mm,y_mm,z_mm,dx,dy,dz`, with d the direction of the gauge.
     #[arg(long, requires = "touches")]
     pub sites: Option<PathBuf>,
+    /// Stop at the first touch or gauge that is off the part, or points out of its surface, instead of leaving it
+    /// out.
+    #[arg(long, requires = "touches")]
+    pub strict: bool,
     /// The dataset (.npz), or the answers at given points (.csv or .npz): touch, site, displacement
     /// (mm) and strain on the inside face, and how far the given points lay from the part (mm).
     #[arg(long)]
@@ -117,30 +123,47 @@ fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()>
 fn at_points(
     args: &SimulateArgs,
     loaded: &LoadedProject,
-    touches: &Path,
-    sites: &Path,
+    touches_file: &Path,
+    sites_file: &Path,
 ) -> anyhow::Result<()> {
-    let placed = |error| in_file(error, touches, sites);
-    let touches = points::read_touches(touches)?;
-    let sites = points::read_sites(sites)?;
+    let placed = |error| in_file(error, touches_file, sites_file);
+    let touches = points::read_touches(touches_file)?;
+    let sites = points::read_sites(sites_file)?;
+    let mut rows = given::sift(&loaded.inputs.part, &touches, &sites);
+    if args.strict {
+        rows.refuse_any().map_err(placed)?;
+    }
+    let places = off::Places::of(touches_file, sites_file);
+    places.say_all(&rows);
+    let told = rows.left_out.len();
     let budget = loaded.inputs.project.budget.budget();
     let bar = Bar::default();
     let result = args.common.in_pool(|| {
         let watch = |p| bar.show(p);
-        given::answer(&loaded.inputs, &touches, &sites, &budget, &watch).map_err(placed)
+        given::answer_sifted(&loaded.inputs, &touches, &sites, rows, &budget, &watch)
+            .map_err(placed)
     });
     bar.finish();
-    let answer = result?;
+    let mut answer = result?;
+    if args.strict {
+        answer.rows.refuse_any().map_err(placed)?;
+    }
+    places.say_later(&answer.rows, told);
     points::write_answers(&args.out, &answer)?;
     if let Some(path) = &args.vtu {
-        let first = &touches[..touches.len().min(vtu::TOUCHES)];
-        let fields = vtu::fields(&*answer.model, first);
+        let first = answer.rows.touches.iter().take(vtu::TOUCHES);
+        let first: Vec<_> = first.map(|&row| touches[row]).collect();
+        let fields = vtu::fields(&*answer.model, &first);
         vtu::write(path, answer.model.mesh(), &fields)?;
     }
     say(&answer.notes);
+    if let Some(summary) = off::summary(&answer.rows) {
+        out::say(&summary);
+    }
     let summary = json!({
-        "sites": sites.len(),
-        "touches": touches.len(),
+        "sites": answer.rows.sites.len(),
+        "touches": answer.rows.touches.len(),
+        "left_out": places.json(&answer.rows),
         "vertices": answer.model.mesh().positions().len(),
         "unknowns": answer.model.system().dimension(),
         "discretization": answer.discretization,
@@ -160,7 +183,7 @@ pub(super) fn in_file(error: DesignError, touches: &Path, sites: &Path) -> anyho
             number,
             ..
         } => (touches, number),
-        DesignError::OffThePart { number, .. } | DesignError::AcrossTheWall { number } => {
+        DesignError::OffThePart { number, .. } | DesignError::AcrossTheWall { number, .. } => {
             (sites, number)
         }
         _ => return error.into(),

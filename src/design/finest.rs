@@ -53,7 +53,7 @@ impl Finest {
         let ground = ground(inputs, watch)?;
         ground.check(project)?;
         let layout = ground.site_layout(&inputs.part);
-        let places: Vec<DVec3> = (lay_out_sites(&layout, project)?.iter())
+        let places: Vec<DVec3> = (lay_out_sites(&layout, inputs)?.iter())
             .map(|&at| layout.point(at))
             .collect();
         let surface = ground.touch_layout(&inputs.part);

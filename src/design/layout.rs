@@ -106,15 +106,16 @@ fn count_sites(mesh: &TriMesh, project: &Project) -> Result<usize, DesignError> 
     Ok(places.round() as usize)
 }
 
-/// The sites of a project on a mesh.
+/// The sites of a project on a mesh of its part.
 ///
 /// # Errors
 /// [`DesignError`] where there would be none or far too many.
-pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoint>, DesignError> {
+pub fn lay_out_sites(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<SurfacePoint>, DesignError> {
+    let project = &inputs.project;
     let count = count_sites(mesh, project)?;
     let points = match project.sites.lattice {
         Lattice::Even => sample::even(mesh, count, project.budget.seed, |_| true),
-        Lattice::Unrolled => unrolled_sites(mesh, project)?,
+        Lattice::Unrolled => unrolled_sites(mesh, inputs)?,
     };
     if points.is_empty() {
         let area_mm2 = mesh.area() * 1e6;
@@ -134,11 +135,12 @@ pub fn lay_out_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoi
 }
 
 /// Sites in rows and columns about the axis.
-fn unrolled_sites(mesh: &TriMesh, project: &Project) -> Result<Vec<SurfacePoint>, DesignError> {
+fn unrolled_sites(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<SurfacePoint>, DesignError> {
     /// Places of the lattice that are looked at, whether the part is there or not.
     const MOST_PLACES: f64 = 5e6;
+    let project = &inputs.project;
     let spacing = project.sites.spacing_mm * 1e-3;
-    let unrolling = Unrolling::of(mesh, project.part.axis);
+    let unrolling = Unrolling::of(mesh, inputs.stance());
     let round = unrolling.circumference();
     let high = unrolling.height.1 - unrolling.height.0;
     if (round / spacing) * (high / spacing) > MOST_PLACES {
@@ -378,8 +380,10 @@ fn gigabytes(numbers: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::project::Unit;
+    use crate::project::{Masks, Unit};
 
     #[test]
     fn what_is_held_is_the_larger_of_strains_and_glued_gauges() {
@@ -422,7 +426,13 @@ mod tests {
         let mut project = Project::around("panel.obj", Some(Unit::Metre));
         project.sites.spacing_mm = 4.0;
         project.sites.lattice = Lattice::Unrolled;
-        let refused = lay_out_sites(&panel, &project).unwrap_err();
+        let inputs = Inputs {
+            project,
+            part: Arc::new(panel.clone()),
+            painted: None,
+            masks: Masks::default(),
+        };
+        let refused = lay_out_sites(&panel, &inputs).unwrap_err();
         assert!(
             matches!(refused, DesignError::WideLattice { .. }),
             "{refused}"

@@ -91,7 +91,7 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
     ground.check(project)?;
     let even = ground.site_layout(&inputs.part);
     let touches = lay_out_touches(&ground.touch_layout(&inputs.part), inputs, budget)?;
-    let sites = lay_out_sites(&even, project)?;
+    let sites = lay_out_sites(&even, inputs)?;
     let places: Vec<DVec3> = sites.iter().map(|&at| even.point(at)).collect();
     let graded = ground.build(&touches, &places, &budget.elements, watch)?;
     let gauges = chosen_gauges(project, &*graded.model);

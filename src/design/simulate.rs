@@ -69,7 +69,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     ground.check(project)?;
     check_foreseen(inputs, budget)?;
     let layout = ground.site_layout(&inputs.part);
-    let sites = lay_out_sites(&layout, project)?;
+    let sites = lay_out_sites(&layout, inputs)?;
     let count = project.touch.count.min(budget.touches);
     check_memory(sites.len(), count, project.gauge.signal)?;
     let touches = lay_out_touches(&ground.touch_layout(&inputs.part), inputs, budget)?;
@@ -118,7 +118,7 @@ pub fn simulate_again(
     let project = &inputs.project;
     project.check()?;
     let layout = last.ground.site_layout(&inputs.part);
-    let sites = lay_out_sites(&layout, project)?;
+    let sites = lay_out_sites(&layout, inputs)?;
     check_memory(
         sites.len(),
         last.dataset.touches.len(),

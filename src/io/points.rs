@@ -11,7 +11,7 @@ use super::table::{Row, Table};
 use super::{FileError, atomic};
 use crate::board::{GivenPress, PRESSES};
 use crate::elasticity::Touch;
-use crate::given::{Answer, GivenSite};
+use crate::given::{self, Answer, GivenSite, LeftOut};
 use crate::project::LENGTH;
 
 const TOUCHES: [&str; 8] = [
@@ -93,9 +93,18 @@ pub fn read_presses(path: &Path) -> Result<Vec<GivenPress>, FileError> {
 /// The line of such a table that a touch, gauge or press stands in, counted as they were read, from 0.
 #[must_use]
 pub fn line(path: &Path, number: usize) -> Option<u64> {
-    let table = Table::read(path).ok()?;
-    let row = table.rows().nth(number)?.ok()?;
-    Some(row.line())
+    lines(path).get(number).copied()
+}
+
+/// The lines of all rows of such a table; none of what cannot be read.
+#[must_use]
+pub fn lines(path: &Path) -> Vec<u64> {
+    let Ok(table) = Table::read(path) else {
+        return Vec::new();
+    };
+    (table.rows())
+        .map_while(|row| Some(row.ok()?.line()))
+        .collect()
 }
 
 /// The unit vector along `v`, if it has a direction. Its size is taken out first: the squares of what is very
@@ -152,7 +161,8 @@ fn taken<const N: usize, T>(
         .collect()
 }
 
-/// Writes the answers: as CSV, one row a pair, touch by touch; or as NPZ, one array a column.
+/// Writes the answers: as CSV, one row a pair, touch by touch, and below them in lines that begin with # which rows
+/// were left out; or as NPZ, one array a column, with what was left out as no numbers, and arrays that say so.
 ///
 /// # Errors
 /// [`FileError`] naming the file.
@@ -160,40 +170,47 @@ pub fn write_answers(path: &Path, answer: &Answer) -> Result<(), FileError> {
     if path.extension().is_some_and(|e| e == "npz") {
         return write_npz(path, answer).map_err(|e| FileError::of(path, &e))?;
     }
-    let mut text = Vec::new();
-    let written = (|| -> std::io::Result<()> {
-        writeln!(
-            text,
-            "touch,site,ux_mm,uy_mm,uz_mm,strain,touch_distance_mm,site_distance_mm"
-        )?;
-        for pair in answer.pairs() {
-            let u = pair.displacement * 1000.0;
-            writeln!(
-                text,
-                "{},{},{:e},{:e},{:e},{:e},{:e},{:e}",
-                pair.touch,
-                pair.site,
-                u.x,
-                u.y,
-                u.z,
-                pair.strain,
-                answer.touch_distances[pair.touch] * 1000.0,
-                answer.site_distances[pair.site] * 1000.0
-            )?;
-        }
-        Ok(())
-    })();
-    written.map_err(|e| FileError::of(path, &e))?;
+    let text = csv(answer).map_err(|e| FileError::of(path, &e))?;
     atomic::write(path, &text)
 }
 
-fn write_npz(path: &Path, answer: &Answer) -> std::io::Result<Result<(), FileError>> {
-    let shape = [answer.touch_distances.len(), answer.site_distances.len()];
-    let mut columns = [const { Vec::new() }; 4];
+fn csv(answer: &Answer) -> std::io::Result<Vec<u8>> {
+    let rows = &answer.rows;
+    let mut text = Vec::new();
+    writeln!(
+        text,
+        "touch,site,ux_mm,uy_mm,uz_mm,strain,touch_distance_mm,site_distance_mm"
+    )?;
     for pair in answer.pairs() {
         let u = pair.displacement * 1000.0;
+        writeln!(
+            text,
+            "{},{},{:e},{:e},{:e},{:e},{:e},{:e}",
+            pair.touch,
+            pair.site,
+            u.x,
+            u.y,
+            u.z,
+            pair.strain,
+            rows.touch_distances[pair.touch] * 1000.0,
+            rows.site_distances[pair.site] * 1000.0
+        )?;
+    }
+    for LeftOut { why, .. } in &rows.left_out {
+        writeln!(text, "# left out: {why}")?;
+    }
+    Ok(text)
+}
+
+fn write_npz(path: &Path, answer: &Answer) -> std::io::Result<Result<(), FileError>> {
+    let rows = &answer.rows;
+    let shape = [rows.touch_distances.len(), rows.site_distances.len()];
+    let mut columns: [Vec<f64>; 4] = std::array::from_fn(|_| vec![f64::NAN; shape[0] * shape[1]]);
+    for pair in answer.pairs() {
+        let u = pair.displacement * 1000.0;
+        let place = pair.touch * shape[1] + pair.site;
         for (column, value) in columns.iter_mut().zip([u.x, u.y, u.z, pair.strain]) {
-            column.push(value);
+            column[place] = value;
         }
     }
     let mut file = NpzFile::default();
@@ -201,12 +218,21 @@ fn write_npz(path: &Path, answer: &Answer) -> std::io::Result<Result<(), FileErr
         file.add(name, &shape, column)?;
     }
     let mm = |d: &[f64]| d.iter().map(|d| d * 1000.0).collect::<Vec<_>>();
-    file.add(
-        "touch_distance_mm",
-        &shape[..1],
-        &mm(&answer.touch_distances),
-    )?;
-    file.add("site_distance_mm", &shape[1..], &mm(&answer.site_distances))?;
+    let (touches, sites) = (&shape[..1], &shape[1..]);
+    file.add("touch_distance_mm", touches, &mm(&rows.touch_distances))?;
+    file.add("site_distance_mm", sites, &mm(&rows.site_distances))?;
+    file.add("site_angle_deg", sites, &rows.site_angles)?;
+    let missing = |table: given::Table, count: usize| {
+        let mut missing = vec![0_u8; count];
+        for left_out in rows.left_out.iter().filter(|l| l.table == table) {
+            missing[left_out.row] = 1;
+        }
+        missing
+    };
+    let left_out = missing(given::Table::Touches, shape[0]);
+    file.add("touch_left_out", touches, &left_out)?;
+    let left_out = missing(given::Table::Sites, shape[1]);
+    file.add("site_left_out", sites, &left_out)?;
     Ok(file.save(path))
 }
 

@@ -300,8 +300,8 @@ mod tests {
     use super::*;
     use crate::mesh::unroll::Axis;
     use crate::project::{
-        ChosenSite, CostKeys, Kept, KeptError, KeptFailure, RegionKeys, SupportKeys, SupportKind,
-        Unit,
+        ChosenSite, CostKeys, Kept, KeptError, KeptFailure, PartAxis, RegionKeys, SupportKeys,
+        SupportKind, Unit,
     };
 
     fn full() -> Project {
@@ -318,6 +318,7 @@ mod tests {
             vertices: Some("rim \"left\"".into()),
             normal: Axis::Z,
         });
+        p.part.axis = PartAxis::Along([0.1, 1.0 / 3.0, -2.0]);
         p.candidates.count = Some(407);
         p.budget.limits = crate::budget::Limits {
             elements_percent: Some(2.5),

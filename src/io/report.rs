@@ -11,7 +11,7 @@ use crate::colormap::ColorMap;
 use crate::design::{Design, Inputs, Simulated};
 use crate::evaluation::{EstimatorKind, Failures};
 use crate::gaussian_process::GpTrial;
-use crate::mesh::unroll::Unrolling;
+use crate::mesh::flatten::Flat;
 use crate::placement::SelectorKind;
 use crate::regression::Hyper;
 
@@ -189,9 +189,10 @@ fn pictures(page: &mut String, inputs: &Inputs, design: &Design) {
     let mesh = &design.simulated.mesh;
     let tint = feasible_tint(design);
     let markers = markers(design);
-    let unrolling = Unrolling::of(mesh, inputs.project.part.axis);
+    let stance = inputs.stance();
+    let flat = Flat::of(mesh, stance);
     page.push_str("<h2>Where the gauges go</h2><p>Green: feasible for a gauge. Each bar shows the gauge's direction; hollow gauges are on the far wall. All gauges are glued to the inside.</p><div class=\"views\">");
-    for view in svg::standard_views(unrolling.axis, unrolling.zero) {
+    for view in svg::standard_views(stance) {
         let _ = write!(
             page,
             "<figure>{}<figcaption>{}</figcaption></figure>",
@@ -201,8 +202,9 @@ fn pictures(page: &mut String, inputs: &Inputs, design: &Design) {
     }
     let _ = write!(
         page,
-        "</div><figure>{}<figcaption>unrolled, seen from outside</figcaption></figure>",
-        svg::unrolled(mesh, &unrolling, Paint::Tint(&tint), &markers, 900.0)
+        "</div><figure>{}<figcaption>unrolled, seen from outside. {}</figcaption></figure>",
+        svg::unrolled(&flat, Paint::Tint(&tint), &markers, 900.0),
+        flat.stretch.words()
     );
 }
 
@@ -299,20 +301,15 @@ fn error_map(page: &mut String, inputs: &Inputs, design: &Design) {
     };
     let top = robust_top(&errors);
     let shares: Vec<f64> = errors.iter().map(|e| e / top).collect();
-    let unrolling = Unrolling::of(mesh, inputs.project.part.axis);
+    let flat = Flat::of(mesh, inputs.stance());
     let map = ColorMap::Viridis;
     let _ = write!(
         page,
-        "<h2>Where the error is</h2><p>Mean error around each place, of the chosen gauges on unseen touches of {} N.</p>{}<figure>{}<figcaption>unrolled, seen from outside</figcaption></figure>",
+        "<h2>Where the error is</h2><p>Mean error around each place, of the chosen gauges on unseen touches of {} N.</p>{}<figure>{}<figcaption>unrolled, seen from outside. {}</figcaption></figure>",
         compared_n(inputs, design),
         svg::legend(map, "error (mm)", 0.0, top),
-        svg::unrolled(
-            mesh,
-            &unrolling,
-            Paint::Map(map, &shares),
-            &markers(design),
-            900.0
-        )
+        svg::unrolled(&flat, Paint::Map(map, &shares), &markers(design), 900.0),
+        flat.stretch.words()
     );
 }
 

@@ -6,7 +6,9 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::colormap::ColorMap;
 use crate::mesh::TriMesh;
-use crate::mesh::unroll::Unrolling;
+use crate::mesh::flatten::Flat;
+use crate::mesh::stance::Stance;
+use crate::mesh::stretch::KEPT;
 
 /// A gauge to be drawn: its number, place (m) and direction.
 #[derive(Clone, Copy, Debug)]
@@ -25,22 +27,21 @@ pub struct View {
     pub up: DVec3,
 }
 
-/// The sides a report shows.
+/// The sides a report shows, named as in the window.
 #[must_use]
-pub fn standard_views(axis: DVec3, zero: DVec3) -> Vec<View> {
-    let side = axis.cross(zero);
+pub fn standard_views(stance: Stance) -> [View; 4] {
+    let (up, front, right) = (stance.up(), stance.front(), stance.right());
     [
-        ("front", zero),
-        ("left", side),
-        ("back", -zero),
-        ("right", -side),
+        ("front", front),
+        ("right", right),
+        ("back", -front),
+        ("left", -right),
     ]
     .map(|(name, toward)| View {
         name,
-        toward: (toward + axis * 0.25).normalize(),
-        up: axis,
+        toward: (toward + up * 0.25).normalize(),
+        up,
     })
-    .to_vec()
 }
 
 const ACCENT: &str = "#d55e00";
@@ -55,15 +56,7 @@ pub fn limb(mesh: &TriMesh, paint: Paint, markers: &[Marker], view: &View, width
     let (lower, upper) = bounds(seen.iter().map(|p| p.truncate()));
     let canvas = Canvas::new(lower, upper, width);
     let mut svg = canvas.open(&format!("The limb from the {}", view.name));
-    let mut order: Vec<usize> = (0..mesh.triangles().len()).collect();
-    let depth = |t: usize| -> f64 {
-        mesh.triangles()[t]
-            .iter()
-            .map(|&v| seen[v as usize].z)
-            .sum()
-    };
-    order.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)).then(a.cmp(&b)));
-    for t in order {
+    for t in from_behind(mesh.triangles(), &seen) {
         let tri = mesh.triangles()[t];
         let facing = mesh.facet_normal(t as u32).dot(view.toward);
         let points = tri.map(|v| canvas.place(seen[v as usize].truncate()));
@@ -84,57 +77,64 @@ pub fn limb(mesh: &TriMesh, paint: Paint, markers: &[Marker], view: &View, width
     svg
 }
 
-/// The limb laid flat, s to the right and z up, in millimetres, with axes.
+/// Facets in the order in which they are painted over each other: those with the least z first.
+fn from_behind(triangles: &[[u32; 3]], positions: &[DVec3]) -> Vec<usize> {
+    let depth = |t: usize| -> f64 {
+        let corners = triangles[t].iter();
+        corners.map(|&v| positions[v as usize].z).sum()
+    };
+    let mut order: Vec<usize> = (0..triangles.len()).collect();
+    order.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)).then(a.cmp(&b)));
+    order
+}
+
+/// The limb laid flat, its axis up, with its size in millimetres; hatched where lengths are not kept.
 #[must_use]
-pub fn unrolled(
-    mesh: &TriMesh,
-    unrolling: &Unrolling,
-    paint: Paint,
-    markers: &[Marker],
-    width: f64,
-) -> String {
-    let around = unrolling.circumference();
-    let low = DVec2::new(0.0, unrolling.height.0);
-    let canvas = Canvas::new(low, DVec2::new(around, unrolling.height.1), width);
+pub fn unrolled(flat: &Flat, paint: Paint, markers: &[Marker], width: f64) -> String {
+    let canvas = Canvas::new(flat.lower, flat.upper, width);
     let mut svg = canvas.open("The limb unrolled, with numbered gauges");
-    for tri in mesh.triangles() {
-        let mut flat = tri.map(|v| unrolling.flat(mesh.positions()[v as usize]));
-        // A facet across the seam is drawn on the side of its first corner.
-        for k in 1..3 {
-            flat[k].x -= ((flat[k].x - flat[0].x) / around).round() * around;
-        }
-        let points = flat.map(|p| canvas.place(p));
+    let corners = |tri: &[u32; 3]| tri.map(|v| canvas.place(flat.positions[v as usize].truncate()));
+    for t in from_behind(&flat.triangles, &flat.positions) {
+        let tri = &flat.triangles[t];
+        let of_part = tri.map(|v| flat.vertices[v as usize]);
         let _ = write!(
             svg,
             "<path d=\"{}\" fill=\"{}\"/>",
-            path(&points),
-            paint.facet(*tri, 0.85)
+            path(&corners(tri)),
+            paint.facet(of_part, 0.85)
         );
     }
+    let stretched = (flat.triangles.iter().zip(&flat.stretch.facets))
+        .filter(|&(_, &off)| off > KEPT)
+        .map(|(tri, _)| path(&corners(tri)));
+    hatch(&mut svg, &stretched.collect::<String>());
     for marker in markers {
-        let at = unrolling.flat(marker.position);
-        let ahead = unrolling.flat(marker.position + marker.direction * 1e-4);
-        let mut direction = ahead - at;
-        direction.x -= (direction.x / around).round() * around;
+        let at = canvas.place(flat.place(marker.position));
+        let direction = flat.turn(marker.position, marker.direction);
         let direction = direction.normalize_or_zero();
-        draw_marker(
-            &mut svg,
-            canvas.place(at),
-            DVec2::new(direction.x, -direction.y),
-            marker.number,
-            true,
-        );
+        let direction = DVec2::new(direction.x, -direction.y);
+        draw_marker(&mut svg, at, direction, marker.number, true);
     }
-    svg.push_str("</g>");
+    let size = (flat.upper - flat.lower) * 1000.0;
     let _ = write!(
         svg,
-        "<text x=\"{:.0}\" y=\"{:.0}\">around, 0 – {:.0} mm →  ·  up, {:.0} mm ↑</text></svg>",
-        PAD,
+        "</g><text x=\"{PAD:.0}\" y=\"{:.0}\">across, {:.0} mm →  ·  up, {:.0} mm ↑</text></svg>",
         canvas.height + 2.0 * PAD + 14.0,
-        around * 1000.0,
-        (unrolling.height.1 - unrolling.height.0) * 1000.0
+        size.x,
+        size.y
     );
     svg
+}
+
+/// Stripes over what a path encloses.
+fn hatch(svg: &mut String, outlines: &str) {
+    if outlines.is_empty() {
+        return;
+    }
+    let _ = write!(
+        svg,
+        "<defs><pattern id=\"stretched\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\"><path d=\"M0 0V6\" stroke=\"#1d2430\" stroke-opacity=\".45\" style=\"stroke-width:1.2\"/></pattern></defs><path class=\"stretched\" d=\"{outlines}\" fill=\"url(#stretched)\"/>"
+    );
 }
 
 /// One line of a plot: name, colour-blind-safe colour and points.

@@ -3,7 +3,9 @@
 use glam::{DVec2, DVec3};
 
 use super::locate::SurfaceIndex;
-use super::unroll::{Axis, Unrolling};
+use super::stance::Stance;
+use super::stretch::{Seen, Stretch};
+use super::unroll::Unrolling;
 use super::{SurfacePoint, TriMesh};
 
 /// How points of the part become points of the plane.
@@ -30,14 +32,39 @@ pub struct Flat {
     pub vertices: Vec<u32>,
     pub lower: DVec2,
     pub upper: DVec2,
+    /// What became of lengths.
+    pub stretch: Stretch,
     index: SurfaceIndex,
 }
 
 impl Flat {
-    /// Unrolls a part about an axis; one whose normals mostly agree is a plate and seen from above.
+    /// Unrolls a part about its axis, at the radius that keeps lengths on most of what is seen; a part whose
+    /// normals mostly agree is a plate and seen from above.
     #[must_use]
-    pub fn of(mesh: &TriMesh, axis: Axis) -> Self {
-        let rule = rule(mesh, axis);
+    pub fn of(mesh: &TriMesh, stance: Stance) -> Self {
+        let mut rule = rule(mesh, stance);
+        let flat = Self::by(rule, mesh);
+        let seen = Seen::of(mesh, &flat.positions, &flat.triangles, &flat.index);
+        let factor = match &mut rule {
+            Rule::Tube(unrolling) => {
+                let factor = seen.best_factor();
+                unrolling.radius *= factor;
+                factor
+            }
+            Rule::Plate { .. } => 1.0,
+        };
+        let flat = if rule == flat.rule {
+            flat
+        } else {
+            Self::by(rule, mesh)
+        };
+        Self {
+            stretch: seen.stretch(factor),
+            ..flat
+        }
+    }
+
+    fn by(rule: Rule, mesh: &TriMesh) -> Self {
         let mut positions: Vec<DVec3> = mesh.positions().iter().map(|&p| rule.lay(p)).collect();
         let mut vertices: Vec<u32> = (0..positions.len() as u32).collect();
         let mut triangles = mesh.triangles().to_vec();
@@ -50,6 +77,7 @@ impl Flat {
         let upper = flat().fold(DVec2::NEG_INFINITY, DVec2::max);
         Self {
             index: SurfaceIndex::of(positions.clone(), &triangles),
+            stretch: Stretch::default(),
             rule,
             positions,
             triangles,
@@ -57,6 +85,23 @@ impl Flat {
             lower,
             upper,
         }
+    }
+
+    /// How far lengths are off around each vertex, as a share: the mean over what is seen there.
+    #[must_use]
+    pub fn stretch_at_vertices(&self) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0.0); self.positions.len()];
+        for (tri, &off) in self.triangles.iter().zip(&self.stretch.facets) {
+            let [a, b, c] = tri.map(|v| self.positions[v as usize].truncate());
+            let area = (b - a).perp_dot(c - a).abs();
+            for &v in tri.iter().filter(|_| off > 0.0) {
+                let (sum, weight) = &mut sums[v as usize];
+                *sum += area * off;
+                *weight += area;
+            }
+        }
+        let mean = |(sum, weight): (f64, f64)| if weight > 0.0 { sum / weight } else { 0.0 };
+        sums.into_iter().map(mean).collect()
     }
 
     /// Where a point of the part (m) is in the plane.
@@ -78,13 +123,13 @@ impl Flat {
     pub fn turn(&self, p: DVec3, direction: DVec3) -> DVec2 {
         let size = (self.upper - self.lower).length();
         let step = 1e-5 * size;
-        let across = self.place(p + direction * step) - self.place(p - direction * step);
-        // Over the seam the two ends are a whole turn apart.
-        if across.length() > 0.5 * size {
-            DVec2::ZERO
-        } else {
-            across / (2.0 * step)
+        let mut across = self.place(p + direction * step) - self.place(p - direction * step);
+        if let Rule::Tube(unrolling) = &self.rule {
+            // Over the seam the two ends are a whole turn apart.
+            let around = unrolling.circumference();
+            across.x -= (across.x / around).round() * around;
         }
+        across / (2.0 * step)
     }
 }
 
@@ -105,21 +150,20 @@ impl Rule {
     }
 }
 
-fn rule(mesh: &TriMesh, axis: Axis) -> Rule {
+fn rule(mesh: &TriMesh, stance: Stance) -> Rule {
     /// The mean of all unit normals: none on a tube, one on a plate.
     const AGREE: f64 = 0.8;
     let areas: DVec3 = (0..mesh.triangles().len() as u32)
         .map(|t| mesh.facet_normal(t) * mesh.facet_area(t))
         .sum();
     if areas.length() < AGREE * mesh.area() {
-        return Rule::Tube(Unrolling::of(mesh, axis));
+        return Rule::Tube(Unrolling::of(mesh, stance));
     }
     let normal = areas.normalize();
-    let aim = axis.direction();
-    let aim = if aim.dot(normal).abs() > 0.9 {
-        DVec3::new(aim.y, aim.z, aim.x)
+    let aim = if stance.up().dot(normal).abs() > 0.9 {
+        stance.right()
     } else {
-        aim
+        stance.up()
     };
     let up = (aim - normal * aim.dot(normal)).normalize();
     let (lower, upper) = mesh.bounds();
@@ -189,7 +233,7 @@ mod tests {
     #[test]
     fn a_tube_unrolls_without_tearing_its_triangles() {
         let mesh = tube();
-        let flat = Flat::of(&mesh, Axis::Z);
+        let flat = Flat::of(&mesh, Stance::about(DVec3::Z));
         let size = flat.upper - flat.lower;
         assert!(
             (size.y - 0.06).abs() < 1e-9 && size.x > 0.9 * std::f64::consts::TAU * 0.03,
@@ -223,10 +267,17 @@ mod tests {
     }
 
     #[test]
+    fn a_direction_is_kept_across_the_seam() {
+        let flat = Flat::of(&tube(), Stance::about(DVec3::Z));
+        let turned = flat.turn(DVec3::new(-0.03, 0.0, 0.02), DVec3::NEG_Y);
+        assert!(turned.distance(DVec2::X) < 0.01, "{turned}");
+    }
+
+    #[test]
     fn a_plate_is_seen_from_above() {
         let p = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
         let mesh = TriMesh::new(&p, &[[0, 1, 2], [0, 2, 3]], 0).unwrap().0;
-        let flat = Flat::of(&mesh, Axis::Z);
+        let flat = Flat::of(&mesh, Stance::about(DVec3::Z));
         assert!(((flat.upper - flat.lower) - DVec2::ONE).length() < 1e-9);
         let at = flat.lift(flat.place(DVec3::new(0.3, 0.6, 0.0))).unwrap();
         assert!(mesh.point(at).distance(DVec3::new(0.3, 0.6, 0.0)) < 1e-9);

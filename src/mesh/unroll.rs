@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use super::SurfacePoint;
 use super::TriMesh;
 use super::locate::SurfaceIndex;
+use super::stance::Stance;
 
 /// Cylinder coordinates about an axis of the part. `s` runs from 0 to the circumference at the mean
 /// radius, with the seam opposite to `zero`; lengths in metres.
@@ -20,7 +21,7 @@ pub struct Unrolling {
     pub height: (f64, f64),
 }
 
-/// The axis a project names for unrolling.
+/// An axis of the file's coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Axis {
@@ -40,33 +41,33 @@ impl Axis {
         }
     }
 
-    /// Where the middle of the strip points.
-    fn zero(self) -> DVec3 {
-        match self {
-            Self::X => DVec3::Y,
-            Self::Y => DVec3::Z,
-            Self::Z => DVec3::X,
-        }
+    /// The one that is nearest to a direction, whichever way it points.
+    #[must_use]
+    pub fn nearest(direction: DVec3) -> Self {
+        [Self::X, Self::Y, Self::Z][direction.abs().max_position()]
     }
 }
 
 impl Unrolling {
-    /// The axis runs through the centre of the circle that fits the vertices best (least squares,
-    /// Kåsa), so that an open arc is unrolled about its own centre.
+    /// The axis runs through the centre of the circle that fits the outermost vertices best (least squares,
+    /// Kåsa), so that an open arc is unrolled about its own centre, and a frame inside counts for nothing. The
+    /// middle of the strip is the part's front.
     #[must_use]
-    pub fn of(mesh: &TriMesh, axis: Axis) -> Self {
-        let (direction, zero) = (axis.direction(), axis.zero());
-        let side = direction.cross(zero);
+    pub fn of(mesh: &TriMesh, stance: Stance) -> Self {
+        let (direction, zero, side) = (stance.up(), stance.front(), stance.right());
         let flat: Vec<DVec2> = mesh
             .positions()
             .iter()
             .map(|p| DVec2::new(p.dot(zero), p.dot(side)))
             .collect();
-        let (centre, radius) = fit_circle(&flat);
-        let along = mesh.positions().iter().map(|p| p.dot(direction));
-        let height = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| {
+        let along: Vec<f64> = (mesh.positions().iter())
+            .map(|p| p.dot(direction))
+            .collect();
+        let height = (along.iter()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &z| {
             (l.min(z), h.max(z))
         });
+        let (centre, _) = fit_circle(&flat);
+        let (centre, radius) = fit_circle(&outermost(&flat, &along, height, centre));
         Self {
             origin: zero * centre.x + side * centre.y,
             axis: direction,
@@ -119,6 +120,33 @@ impl Unrolling {
             })
             .collect()
     }
+}
+
+/// Of points around a centre, with their heights, those that none lies far outside of.
+fn outermost(
+    points: &[DVec2],
+    along: &[f64],
+    (low, high): (f64, f64),
+    centre: DVec2,
+) -> Vec<DVec2> {
+    const SECTORS: f64 = 36.0;
+    const LEVELS: f64 = 32.0;
+    /// Of the farthest radius nearby: what is nearer to the axis is not of the same wall.
+    const SAME_WALL: f64 = 0.8;
+    let level = LEVELS / (high - low).max(f64::MIN_POSITIVE);
+    let cell = |p: &DVec2, z: f64| -> (u32, u32) {
+        let turn = (p - centre).to_angle() / std::f64::consts::TAU + 0.5;
+        ((turn * SECTORS) as u32, ((z - low) * level) as u32)
+    };
+    let mut farthest = std::collections::BTreeMap::<(u32, u32), f64>::new();
+    for (p, &z) in points.iter().zip(along) {
+        let radius = farthest.entry(cell(p, z)).or_default();
+        *radius = radius.max(p.distance(centre));
+    }
+    (points.iter().zip(along))
+        .filter(|&(p, &z)| p.distance(centre) >= SAME_WALL * farthest[&cell(p, z)])
+        .map(|(p, _)| *p)
+        .collect()
 }
 
 fn fit_circle(points: &[DVec2]) -> (DVec2, f64) {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::MM;
+use super::{MM, PartAxis};
 use crate::limb::BoxMm;
 use crate::mesh::repair::Repair;
 use crate::mesh::unroll::Axis;
@@ -80,9 +80,9 @@ pub struct Part {
     pub inside: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outside: Option<String>,
-    /// The axis the part is unrolled about.
+    /// Which way the part stands.
     #[serde(default)]
-    pub axis: Axis,
+    pub axis: PartAxis,
 }
 
 impl Part {

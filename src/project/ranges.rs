@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use glam::DVec3;
 
-use super::{BadValue, ChosenSite, Project};
+use super::{BadValue, ChosenSite, PartAxis, Project};
 use crate::dataset::Signal;
 use crate::elasticity::support::MOST;
 use crate::evaluation::failures::MOST_FAILED;
@@ -295,7 +295,25 @@ impl Project {
         bounded("budget.limits.elements_percent", percent, &(1e-6..=1e6))
     }
 
+    fn check_axis(&self) -> Result<(), BadValue> {
+        /// Below this a direction is nobody's.
+        const LEAST: f64 = 1e-6;
+        let PartAxis::Along(direction) = self.part.axis else {
+            return Ok(());
+        };
+        check_place("part.axis", &direction)?;
+        if direction.iter().any(|x| x.abs() >= LEAST) {
+            return Ok(());
+        }
+        Err(BadValue {
+            key: "part.axis".to_owned(),
+            rule: "a direction, whose numbers are not all 0".into(),
+            value: format!("[{}]", direction.map(number).join(", ")),
+        })
+    }
+
     fn check_places(&self) -> Result<(), BadValue> {
+        self.check_axis()?;
         let supports = self.supports.iter().filter_map(|s| s.box_mm.as_ref());
         let regions = self.evaluation.regions.iter().map(|r| &r.box_mm);
         let costs = self.selection.costs.iter().map(|c| &c.box_mm);

@@ -1,12 +1,15 @@
-//! An orbit camera with z up.
+//! An orbit camera, upright as the part is.
 
 use glam::camera::rh::proj::directx::perspective;
 use glam::camera::rh::view::look_at_mat4;
 use glam::{DVec2, DVec3, Mat4, Vec3, Vec4};
 
-/// Looks at `target` (m) from `distance`, around by `yaw` and up by `pitch` (radians).
+use crate::mesh::stance::Stance;
+
+/// Looks at `target` (m) from `distance`, from the part's front around by `yaw` and up by `pitch` (radians).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
+    pub stance: Stance,
     pub target: DVec3,
     pub distance: f64,
     pub yaw: f64,
@@ -67,9 +70,10 @@ const STEEPEST: f64 = 1.55;
 impl Camera {
     /// Shows all of a box (m).
     #[must_use]
-    pub fn framing(lower: DVec3, upper: DVec3) -> Self {
+    pub fn framing(lower: DVec3, upper: DVec3, stance: Stance) -> Self {
         let radius = (upper - lower).length() / 2.0;
         Self {
+            stance,
             target: (lower + upper) / 2.0,
             distance: 1.12 * radius / (FOV / 2.0).sin(),
             yaw: 0.6,
@@ -104,7 +108,8 @@ impl Camera {
     pub fn toward_eye(&self) -> DVec3 {
         let (sp, cp) = self.pitch.sin_cos();
         let (sy, cy) = self.yaw.sin_cos();
-        DVec3::new(cp * cy, cp * sy, sp)
+        let Self { stance, .. } = self;
+        stance.front() * (cp * cy) + stance.right() * (cp * sy) + stance.up() * sp
     }
 
     #[must_use]
@@ -120,7 +125,7 @@ impl Camera {
 
     fn plane(&self) -> (DVec3, DVec3) {
         let toward = self.toward_eye();
-        let right = DVec3::Z.cross(toward).normalize();
+        let right = self.stance.up().cross(toward).normalize();
         (right, toward.cross(right))
     }
 
@@ -129,7 +134,8 @@ impl Camera {
     #[must_use]
     pub fn matrix(&self, aspect: f32) -> Mat4 {
         let eye = self.toward_eye().as_vec3();
-        let view = look_at_mat4(eye, Vec3::ZERO, Vec3::Z);
+        let up = self.stance.up().as_vec3();
+        let view = look_at_mat4(eye, Vec3::ZERO, up);
         perspective(FOV as f32, aspect, 0.02, 20.0) * view
     }
 
@@ -192,7 +198,8 @@ mod tests {
 
     #[test]
     fn a_ray_passes_through_what_is_seen_there() {
-        let mut camera = Camera::framing(DVec3::splat(-0.05), DVec3::splat(0.05));
+        let stance = Stance::about(DVec3::new(0.3, 0.9, -0.2));
+        let mut camera = Camera::framing(DVec3::splat(-0.05), DVec3::splat(0.05), stance);
         camera.orbit(DVec2::new(123.0, -45.0));
         camera.pan(DVec2::new(30.0, 20.0), 600.0);
         let p = DVec3::new(0.02, -0.01, 0.03);
@@ -204,10 +211,18 @@ mod tests {
 
     #[test]
     fn presets_look_along_their_axes() {
-        let mut camera = Camera::framing(DVec3::ZERO, DVec3::ONE);
-        camera.look_from(Preset::Right);
-        assert!(camera.toward_eye().distance(DVec3::Y) < 1e-12);
-        camera.look_from(Preset::Top);
-        assert!(camera.toward_eye().z > 0.99);
+        for up in [DVec3::Z, DVec3::Y, DVec3::X, DVec3::new(0.3, 0.9, -0.2)] {
+            let stance = Stance::about(up);
+            let mut camera = Camera::framing(DVec3::ZERO, DVec3::ONE, stance);
+            camera.look_from(Preset::Front);
+            assert!(camera.toward_eye().distance(stance.front()) < 1e-12);
+            camera.look_from(Preset::Right);
+            assert!(camera.toward_eye().distance(stance.right()) < 1e-12);
+            let above = camera.target + stance.up() * 0.1;
+            let at = |p| camera.project(p, 1.0).unwrap().0;
+            assert!(at(above).y < at(camera.target).y - 0.01, "up is up");
+            camera.look_from(Preset::Top);
+            assert!(camera.toward_eye().dot(stance.up()) > 0.99);
+        }
     }
 }

@@ -21,6 +21,8 @@ pub struct Vertex {
     /// m.
     pub position: [f32; 3],
     pub normal: [f32; 3],
+    /// The share that lengths are off by as it is drawn.
+    pub stretch: f32,
 }
 
 /// Triangles to be drawn.
@@ -38,6 +40,7 @@ impl Solid {
                 .map(|(p, n)| Vertex {
                     position: p.as_vec3().to_array(),
                     normal: n.as_vec3().to_array(),
+                    stretch: 0.0,
                 })
                 .collect(),
             triangles: mesh.triangles().to_vec(),
@@ -78,6 +81,8 @@ pub struct Uniforms {
     /// x: how much of the wall that faces the eye covers what is behind it, 1 for all; y: 1 where the first layer
     /// marks what is blind.
     pub look: [f32; 4],
+    /// xyz: the direction up; w: the stretch above which lengths are marked as off, 0 for none.
+    pub up: [f32; 4],
 }
 
 /// One frame to be drawn.
@@ -483,7 +488,7 @@ fn scene_pipeline(
         bind_group_layouts: &[Some(layout)],
         immediate_size: 0,
     });
-    let fixed = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
+    let fixed = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 5 => Float32];
     let changing = wgpu::vertex_attr_array![2 => Float32x3, 3 => Float32, 4 => Unorm8x4];
     let buffer = |stride, attributes| {
         Some(wgpu::VertexBufferLayout {

@@ -472,7 +472,7 @@ impl Studio {
             Command::SeeThrough => self.view.see_through = !self.view.see_through,
             Command::Section => {
                 let (lower, upper) = self.document.part.bounds();
-                let axis = Axis::X;
+                let axis = Axis::nearest(self.view.camera.stance.front());
                 self.view.section = match self.view.section {
                     Some(_) => None,
                     None => Some(Section {

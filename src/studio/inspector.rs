@@ -1,6 +1,9 @@
 //! The right side: the settings of a stage, in the units of the project's file.
 
+use std::sync::Arc;
+
 use egui::{DragValue, RichText, Ui};
+use glam::DVec3;
 
 use super::form::{choice, count, number, percentage, rows};
 use super::{Stage, Studio, quality_name};
@@ -13,7 +16,8 @@ use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
 use crate::project::{
     ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCES, GAIN_OFF, GAUGES, Lattice, PLACE_OFF,
-    PartModel, Project, RegionKeys, SupportKeys, SupportKind, TIP_OFF, TOUCHES, ToleranceKeys,
+    PartAxis, PartModel, Project, RegionKeys, SupportKeys, SupportKind, TIP_OFF, TOUCHES,
+    ToleranceKeys,
 };
 
 impl Studio {
@@ -79,7 +83,8 @@ impl Studio {
         ui.weak(if from_file { &file } else { "The bundled limb" });
         let project = &mut self.document.state.project;
         let mut pressed = false;
-        rows(ui, "Model", |ui| part(ui, project));
+        let up = self.view.camera.stance.up();
+        rows(ui, "Model", |ui| part(ui, project, up));
         if from_file {
             rows(ui, "Taking the mesh in", |ui| {
                 pressed = taking_in(ui, project, bodies, again);
@@ -94,11 +99,16 @@ impl Studio {
     }
 
     fn supports_form(&mut self, ui: &mut Ui) {
-        let bounds = self.document.part.bounds();
-        let bounds = [bounds.0, bounds.1].map(|p| (p * 1000.0).to_array());
+        let part = Arc::clone(&self.document.part);
+        let stance = self.view.camera.stance;
         let project = &mut self.document.state.project;
         rows(ui, "Material", |ui| material(ui, project));
-        rows(ui, "Supports", |ui| supports(ui, project, bounds));
+        // A slice at the lower end: a start that holds something on any part.
+        let start = || {
+            let (low, high) = stance.lower_end(&part, 0.05);
+            [low, high].map(|p| (p * 1000.0).to_array())
+        };
+        rows(ui, "Supports", |ui| supports(ui, project, start));
         let paint = ui
             .button("Paint a support")
             .on_hover_text("Another support, on the vertices that you paint next");
@@ -223,17 +233,60 @@ fn quality(ui: &mut Ui, project: &mut Project) {
     ui.add_space(4.0);
 }
 
-fn axis_name(axis: Axis) -> &'static str {
+fn axis_name(axis: PartAxis) -> &'static str {
     match axis {
-        Axis::X => "x",
-        Axis::Y => "y",
-        Axis::Z => "z",
+        PartAxis::Auto => "By its shape",
+        PartAxis::Coordinate(Axis::X) => "x",
+        PartAxis::Coordinate(Axis::Y) => "y",
+        PartAxis::Coordinate(Axis::Z) => "z",
+        PartAxis::Along(_) => "Direction",
     }
 }
 
-const AXES: [Axis; 3] = [Axis::X, Axis::Y, Axis::Z];
+/// Which way the part stands; `up` is how it does.
+fn axis(ui: &mut Ui, axis: &mut PartAxis, up: DVec3) {
+    let direction = if let PartAxis::Along(direction) = *axis {
+        direction
+    } else {
+        up.to_array()
+    };
+    let all = [
+        PartAxis::Auto,
+        PartAxis::Coordinate(Axis::X),
+        PartAxis::Coordinate(Axis::Y),
+        PartAxis::Coordinate(Axis::Z),
+        PartAxis::Along(direction),
+    ];
+    choice(
+        ui,
+        "Axis",
+        axis,
+        &all,
+        axis_name,
+        "What is up for the part: views, unrolling and new supports follow it",
+    );
+    match axis {
+        PartAxis::Coordinate(_) => {}
+        PartAxis::Auto => {
+            ui.label("Found");
+            let [x, y, z] = up.to_array();
+            ui.label(format!("{x:.2}, {y:.2}, {z:.2}"));
+            ui.end_row();
+        }
+        PartAxis::Along(direction) => {
+            ui.label("Direction");
+            ui.horizontal(|ui| {
+                for (value, name) in direction.iter_mut().zip(["x", "y", "z"]) {
+                    ui.add(DragValue::new(value).speed(0.01).max_decimals(4))
+                        .accessible_name(format!("Axis, {name}"));
+                }
+            });
+            ui.end_row();
+        }
+    }
+}
 
-fn part(ui: &mut Ui, project: &mut Project) {
+fn part(ui: &mut Ui, project: &mut Project, up: DVec3) {
     choice(
         ui,
         "Taken as",
@@ -253,14 +306,7 @@ fn part(ui: &mut Ui, project: &mut Project) {
             "Of the shell; the mesh is its mid-surface",
         );
     }
-    choice(
-        ui,
-        "Axis",
-        &mut project.part.axis,
-        &AXES,
-        axis_name,
-        "The axis the part is unrolled about",
-    );
+    axis(ui, &mut project.part.axis, up);
 }
 
 fn material(ui: &mut Ui, project: &mut Project) {
@@ -284,7 +330,8 @@ fn material(ui: &mut Ui, project: &mut Project) {
     );
 }
 
-fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm) {
+/// The supports, with a new one beginning as the box that `start` gives.
+fn supports(ui: &mut Ui, project: &mut Project, start: impl FnOnce() -> BoxMm) {
     let mut removed = None;
     for (k, support) in project.supports.iter_mut().enumerate() {
         let number = k + 1;
@@ -328,9 +375,7 @@ fn supports(ui: &mut Ui, project: &mut Project, bounds: BoxMm) {
         .on_hover_text("Everything inside a box is held")
         .clicked()
     {
-        // A slice at the lower end: a start that holds something on any part.
-        let [low, mut high] = bounds;
-        high[2] = low[2] + 0.05 * (high[2] - low[2]);
+        let [low, high] = start();
         project.supports.push(SupportKeys {
             kind: SupportKind::Clamped,
             box_mm: Some([low.map(|x| x - 0.01), high.map(|x| x + 0.01)]),

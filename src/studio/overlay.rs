@@ -12,6 +12,7 @@ use super::viewport::Pane;
 use super::{Studio, labels, theme};
 use crate::colormap::ColorMap;
 use crate::document::Layer;
+use crate::mesh::stretch::KEPT;
 use crate::project::ChosenSite;
 use crate::render::gpu::{Frame3d, Slot, Uniforms};
 
@@ -55,6 +56,7 @@ impl Studio {
             deform: self.deform_flags(self.exaggeration().unwrap_or(0.0) as f32),
             section,
             look: self.look(if self.view.see_through { GHOST } else { 1.0 }),
+            up: camera.stance.up().as_vec3().extend(0.0).to_array(),
         };
         let back = if transparent {
             Color32::TRANSPARENT
@@ -113,6 +115,7 @@ impl Studio {
             deform: self.deform_flags(0.0),
             section: [0.0, 0.0, 0.0, -1.0],
             look: self.look(1.0),
+            up: [0.0, 0.0, 1.0, KEPT as f32],
         };
         let back = theme::backdrop(ui.ctx().theme());
         let frame = Frame3d {
@@ -126,6 +129,16 @@ impl Studio {
         };
         ui.painter()
             .add(egui_wgpu::Callback::new_paint_callback(rect, frame));
+    }
+
+    /// Under the unrolled view: what became of lengths there.
+    pub(super) fn paint_stretch(&self, painter: &Painter, rect: Rect) {
+        let words = self.view.unrolled.flat.stretch.words();
+        let room = rect.width() - 40.0;
+        let font = FontId::proportional(12.5);
+        let galley = painter.layout(words, font, Color32::WHITE, room.max(80.0));
+        let at = rect.center_bottom() - vec2(0.0, 14.0);
+        plate(painter, at, Align2::CENTER_BOTTOM, galley);
     }
 
     pub(super) fn paint_touch(&self, painter: &Painter, pane: Pane) {

@@ -12,8 +12,10 @@ use super::tools::{Gesture, Tool};
 use crate::document::{Document, Layer};
 use crate::mesh::flatten::Flat;
 use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::stance::Stance;
 use crate::mesh::unroll::Axis;
 use crate::mesh::{SurfacePoint, TriMesh};
+use crate::project::PartAxis;
 use crate::render::camera::Camera;
 use crate::render::gpu::{Solid, Vertex};
 
@@ -53,16 +55,18 @@ impl Section {
 pub(super) struct Unrolled {
     pub flat: Flat,
     pub solid: Arc<Solid>,
-    axis: Axis,
+    stance: Stance,
 }
 
 impl Unrolled {
-    fn of(mesh: &TriMesh, axis: Axis) -> Self {
-        let flat = Flat::of(mesh, axis);
+    fn of(mesh: &TriMesh, stance: Stance) -> Self {
+        let flat = Flat::of(mesh, stance);
         let up = [0.0, 0.0, 1.0];
-        let vertices = flat.positions.iter().map(|p| Vertex {
+        let stretch = flat.stretch_at_vertices();
+        let vertices = flat.positions.iter().zip(stretch).map(|(p, off)| Vertex {
             position: p.as_vec3().to_array(),
             normal: up,
+            stretch: off as f32,
         });
         let solid = Solid {
             vertices: vertices.collect(),
@@ -71,7 +75,7 @@ impl Unrolled {
         Self {
             solid: Arc::new(solid),
             flat,
-            axis,
+            stance,
         }
     }
 
@@ -83,6 +87,8 @@ impl Unrolled {
 /// State of the views; none of it belongs to the project.
 pub struct Viewport {
     pub camera: Camera,
+    /// The key that the camera stands by.
+    axis: PartAxis,
     pub tool: Tool,
     pub layer: Layer,
     pub field: Field,
@@ -115,9 +121,12 @@ impl Viewport {
     #[must_use]
     pub fn new(document: &Document) -> Self {
         let (lower, upper) = document.part.bounds();
-        let unrolled = Unrolled::of(&document.part, document.state.project.part.axis);
+        let axis = document.state.project.part.axis;
+        let stance = axis.stance(&document.part);
+        let unrolled = Unrolled::of(&document.part, stance);
         Self {
-            camera: Camera::framing(lower, upper),
+            camera: Camera::framing(lower, upper, stance),
+            axis,
             tool: Tool::Touch,
             layer: Layer::Feasible,
             field: Field::Region,
@@ -143,7 +152,7 @@ impl Viewport {
 
     pub fn frame(&mut self, document: &Document) {
         let (lower, upper) = document.part.bounds();
-        let framed = Camera::framing(lower, upper);
+        let framed = Camera::framing(lower, upper, self.camera.stance);
         self.camera.target = framed.target;
         self.camera.distance = framed.distance;
         self.flat_view.1 = 0.0;
@@ -158,7 +167,7 @@ impl Viewport {
         let around = DVec3::splat(0.08 * (part_upper - part_lower).length());
         let lower = points.iter().fold(first, |l, &p| l.min(p)) - around;
         let upper = points.iter().fold(first, |u, &p| u.max(p)) + around;
-        let framed = Camera::framing(lower, upper);
+        let framed = Camera::framing(lower, upper, self.camera.stance);
         self.camera.target = framed.target;
         self.camera.distance = framed.distance;
         let flat = points.iter().map(|&p| self.unrolled.flat.place(p));
@@ -314,12 +323,7 @@ impl Studio {
         self.toolbar(ui);
         ui.reset_style();
         self.view.hover = None;
-        let axis = self.document.state.project.part.axis;
-        if self.view.unrolled_shown && self.view.unrolled.axis != axis {
-            self.view.unrolled = Unrolled::of(&self.document.part, axis);
-            self.view.flat_view.1 = 0.0;
-            self.view.built = None;
-        }
+        self.stand_upright();
         let all = ui.available_rect_before_wrap();
         let beside = if self.view.unrolled_shown { 0.42 } else { 0.0 };
         let split = all.right() - beside * all.width();
@@ -342,6 +346,21 @@ impl Studio {
             ui.painter().vline(split, all.y_range(), line);
         }
         self.options(ui, limb);
+    }
+
+    /// Has the views follow the part's axis where that has changed.
+    fn stand_upright(&mut self) {
+        let axis = self.document.state.project.part.axis;
+        if self.view.axis != axis {
+            self.view.axis = axis;
+            self.view.camera.stance = axis.stance(&self.document.part);
+        }
+        let stance = self.view.camera.stance;
+        if self.view.unrolled_shown && self.view.unrolled.stance != stance {
+            self.view.unrolled = Unrolled::of(&self.document.part, stance);
+            self.view.flat_view.1 = 0.0;
+            self.view.built = None;
+        }
     }
 
     /// Takes in what the pointer does in a view.
@@ -380,7 +399,9 @@ impl Studio {
         self.paint_measure(&painter, pane);
         self.paint_brush(&painter, pane);
         self.paint_outline(&painter, pane);
-        if pane == Pane::Limb {
+        if pane == Pane::Unrolled {
+            self.paint_stretch(&painter, rect);
+        } else {
             self.paint_legend(&painter, rect);
             self.paint_region_key(&painter, rect);
             self.paint_hint(&painter, rect);

@@ -88,7 +88,7 @@ fn part(t: &mut Text, project: &Project) {
     t.key(
         "axis",
         serialized(&part.axis),
-        "the axis the part is unrolled about: \"x\", \"y\" or \"z\"",
+        "which way is up for views, unrolling and new boxes: \"auto\" (by the part's shape), \"x\", \"y\", \"z\" or a direction [x, y, z]",
     );
     t.table("material");
     t.key(

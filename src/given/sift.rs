@@ -1,0 +1,321 @@
+//! Which of the given points can be meant for a part, before anything is computed for them.
+
+use glam::DVec3;
+
+use super::GivenSite;
+use crate::design::DesignError;
+use crate::elasticity::Touch;
+use crate::mesh::locate::SurfaceIndex;
+use crate::mesh::{SurfacePoint, TriMesh};
+
+/// What lies farther from the part than this share of its size is on no surface of it.
+const OFF: f64 = 0.05;
+/// A direction that points further out of the surface (degrees) is no direction along it.
+const STEEPEST: f64 = 30.0;
+
+/// A table of given points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Table {
+    Touches,
+    Sites,
+}
+
+impl Table {
+    /// One row of it in words.
+    #[must_use]
+    pub fn row(self) -> &'static str {
+        match self {
+            Self::Touches => "touch",
+            Self::Sites => "site",
+        }
+    }
+
+    /// All of them in words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Touches => "touches",
+            Self::Sites => "sites",
+        }
+    }
+}
+
+/// A row that cannot be answered, and why.
+#[derive(Debug)]
+pub struct LeftOut {
+    pub table: Table,
+    /// Counted from 0.
+    pub row: usize,
+    pub why: DesignError,
+}
+
+/// The rows that can be answered, and how far each row is off.
+#[derive(Debug)]
+pub struct Sifted {
+    /// Rows that are left, counted from 0.
+    pub touches: Vec<usize>,
+    pub sites: Vec<usize>,
+    pub left_out: Vec<LeftOut>,
+    /// How far each row lies from the part (m).
+    pub touch_distances: Vec<f64>,
+    pub site_distances: Vec<f64>,
+    /// How far the direction of each gauge points out of the surface (degrees).
+    pub site_angles: Vec<f64>,
+}
+
+/// Tells the rows that can be meant for a part from those that cannot: too far off it, or gauges that point out of
+/// its surface.
+#[must_use]
+pub fn sift(part: &TriMesh, touches: &[Touch], sites: &[GivenSite]) -> Sifted {
+    let index = SurfaceIndex::new(part);
+    let reach = Reach::of(part, &index);
+    let touch_distances: Vec<f64> = (touches.iter())
+        .map(|t| reach.distance(t.position))
+        .collect();
+    let site_distances: Vec<f64> = (sites.iter()).map(|s| reach.distance(s.position)).collect();
+    let site_angles: Vec<f64> = (sites.iter().zip(&site_distances))
+        .map(|(site, &distance)| {
+            // Of what lies far away there is no surface beside it.
+            let near = distance <= OFF * reach.size;
+            if near {
+                angle_out(part, &index, site)
+            } else {
+                0.0
+            }
+        })
+        .collect();
+    let far = |table: Table, row: usize, distance: f64| {
+        (distance > OFF * reach.size).then(|| reach.off(table.row(), row, distance))
+    };
+    let across = |row: usize| {
+        let angle_deg = site_angles[row];
+        (angle_deg > STEEPEST).then_some(DesignError::AcrossTheWall {
+            number: row,
+            angle_deg,
+        })
+    };
+    let mut left_out = Vec::new();
+    let touches = kept(Table::Touches, touches.len(), &mut left_out, |row| {
+        far(Table::Touches, row, touch_distances[row])
+    });
+    let sites = kept(Table::Sites, sites.len(), &mut left_out, |row| {
+        far(Table::Sites, row, site_distances[row]).or_else(|| across(row))
+    });
+    Sifted {
+        touches,
+        sites,
+        left_out,
+        touch_distances,
+        site_distances,
+        site_angles,
+    }
+}
+
+impl Sifted {
+    /// Refuses where any row was left out, by the first.
+    ///
+    /// # Errors
+    /// [`DesignError`] as it says why.
+    pub fn refuse_any(&mut self) -> Result<(), DesignError> {
+        if self.left_out.is_empty() {
+            return Ok(());
+        }
+        Err(self.left_out.swap_remove(0).why)
+    }
+
+    /// Refuses where no row of a table is left.
+    ///
+    /// # Errors
+    /// [`DesignError::NothingLeft`].
+    pub fn check(&self) -> Result<(), DesignError> {
+        for (table, left, distances) in [
+            (Table::Touches, &self.touches, &self.touch_distances),
+            (Table::Sites, &self.sites, &self.site_distances),
+        ] {
+            if left.is_empty() {
+                return Err(DesignError::NothingLeft {
+                    what: table.name(),
+                    count: distances.len(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The rows of a table with nothing against them.
+fn kept(
+    table: Table,
+    rows: usize,
+    left_out: &mut Vec<LeftOut>,
+    against: impl Fn(usize) -> Option<DesignError>,
+) -> Vec<usize> {
+    let mut kept = Vec::with_capacity(rows);
+    for row in 0..rows {
+        match against(row) {
+            None => kept.push(row),
+            Some(why) => left_out.push(LeftOut { table, row, why }),
+        }
+    }
+    kept
+}
+
+/// How far a direction points out of the surface beside it (degrees). At an edge or a corner the facet that it lies
+/// in best counts.
+fn angle_out(part: &TriMesh, index: &SurfaceIndex, site: &GivenSite) -> f64 {
+    let at = index.nearest(site.position).0;
+    let direction = site.direction.normalize_or(DVec3::NAN);
+    let out = |normal: DVec3| {
+        // NaN.min(1.0) is 1: what is no direction points out as far as any.
+        let share = normal.dot(direction).abs().min(1.0);
+        share.asin().to_degrees()
+    };
+    let facets = facets_at(part, at).into_iter();
+    let angles = facets.map(|t| out(part.facet_normal(t)));
+    angles.fold(out(part.normal(at)), f64::min)
+}
+
+/// The facets that share a point: several where it lies on an edge or a corner.
+fn facets_at(part: &TriMesh, at: SurfacePoint) -> Vec<u32> {
+    /// Weights below this are rounding.
+    const NONE: f64 = 1e-6;
+    let corners = part.triangles()[at.triangle as usize];
+    let on: Vec<u32> = (corners.into_iter().zip(at.barycentric))
+        .filter(|&(_, weight)| weight > NONE)
+        .map(|(v, _)| v)
+        .collect();
+    let Some(&first) = on.first().filter(|_| on.len() < corners.len()) else {
+        return vec![at.triangle];
+    };
+    let around = part.vertex_triangles()[first as usize].iter().copied();
+    let shares = |&t: &u32| {
+        let corners = part.triangles()[t as usize];
+        on.iter().all(|v| corners.contains(v))
+    };
+    around.filter(shares).collect()
+}
+
+/// Whether points can be meant for a part: none lies farther from it than it is large.
+///
+/// # Errors
+/// [`DesignError::OffThePart`] for the first that does; `what` it is.
+pub fn check_reach(
+    part: &TriMesh,
+    what: &'static str,
+    points: impl Iterator<Item = DVec3>,
+) -> Result<(), DesignError> {
+    let index = SurfaceIndex::new(part);
+    let reach = Reach::of(part, &index);
+    for (number, point) in points.enumerate() {
+        let distance = reach.distance(point);
+        if distance > reach.size {
+            return Err(reach.off(what, number, distance));
+        }
+    }
+    Ok(())
+}
+
+/// How far from a part points lie.
+struct Reach<'a> {
+    index: &'a SurfaceIndex,
+    lower: DVec3,
+    upper: DVec3,
+    /// m.
+    size: f64,
+}
+
+impl<'a> Reach<'a> {
+    fn of(part: &TriMesh, index: &'a SurfaceIndex) -> Self {
+        let (lower, upper) = part.bounds();
+        Self {
+            index,
+            lower,
+            upper,
+            size: (upper - lower).length(),
+        }
+    }
+
+    fn off(&self, what: &'static str, number: usize, distance: f64) -> DesignError {
+        DesignError::OffThePart {
+            what,
+            number,
+            distance_mm: distance * 1000.0,
+            size_mm: self.size * 1000.0,
+        }
+    }
+
+    /// From the part (m); of what is out of reach, from the box around it. The box is asked first: very far
+    /// out squares are no numbers any more, and the nearest place is not found.
+    fn distance(&self, point: DVec3) -> f64 {
+        if !point.is_finite() {
+            return f64::INFINITY;
+        }
+        let beyond = (point - point.clamp(self.lower, self.upper)).abs();
+        let widest = beyond.max_element();
+        if widest > self.size {
+            widest * (beyond / widest).length()
+        } else {
+            self.index.nearest(point).1
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two square plates (100 mm) at right angles along x.
+    fn corner() -> TriMesh {
+        let p = [
+            DVec3::ZERO,
+            DVec3::X,
+            DVec3::new(1.0, 1.0, 0.0),
+            DVec3::Y,
+            DVec3::new(1.0, 0.0, 1.0),
+            DVec3::Z,
+        ]
+        .map(|p| p * 0.1);
+        let t = [[0, 1, 2], [0, 2, 3], [1, 0, 5], [1, 5, 4]];
+        TriMesh::new(&p, &t, 0).unwrap().0
+    }
+
+    fn site(x: f64, y: f64, z: f64, direction: DVec3) -> GivenSite {
+        GivenSite {
+            position: DVec3::new(x, y, z) * 1e-3,
+            direction,
+        }
+    }
+
+    #[test]
+    fn only_rows_that_are_off_are_left_out() {
+        let sites = [
+            site(50.0, 50.0, 0.0, DVec3::new(1.0, 0.0, 0.5)),
+            site(50.0, 50.0, 0.0, DVec3::new(1.0, 0.0, 0.6)),
+            site(50.0, 50.0, -30.0, DVec3::X),
+            site(50.0, 50.0, f64::NAN, DVec3::X),
+            site(50.0, 50.0, 0.0, DVec3::ZERO),
+            // On the edge that both plates share, along either.
+            site(50.0, 0.0, 0.0, DVec3::Y),
+            site(50.0, 0.0, 0.0, DVec3::Z),
+        ];
+        let touch = |z: f64| Touch {
+            position: DVec3::new(0.05, 0.05, z),
+            normal: DVec3::Z,
+            force: 1.0,
+            tip_radius: 1e-3,
+        };
+        let sifted = sift(&corner(), &[touch(2e-3), touch(0.03), touch(1e200)], &sites);
+        assert_eq!(sifted.touches, [0]);
+        assert_eq!(sifted.sites, [0, 5, 6]);
+        assert!((sifted.site_angles[0] - 0.5_f64.atan().to_degrees()).abs() < 1e-9);
+        let rows = |table| {
+            let rows = sifted.left_out.iter().filter(move |l| l.table == table);
+            rows.map(|l| l.row).collect::<Vec<_>>()
+        };
+        assert_eq!(rows(Table::Touches), [1, 2]);
+        assert_eq!(rows(Table::Sites), [1, 2, 3, 4]);
+        assert!(sifted.check().is_ok());
+        let none = sift(&corner(), &[touch(1.0)], &sites).check().unwrap_err();
+        assert!(none.to_string().contains("1 touches"), "{none}");
+    }
+}

@@ -1,0 +1,253 @@
+//! Which way a part stands: the axis that is found or set, and what follows it.
+
+use glam::{DQuat, DVec3};
+use hapdef::io::svg;
+use hapdef::mesh::TriMesh;
+use hapdef::mesh::flatten::Flat;
+use hapdef::mesh::stance::Stance;
+use hapdef::mesh::stretch::KEPT;
+use hapdef::mesh::unroll::{Axis, Unrolling};
+use hapdef::project::{PartAxis, Project, Unit};
+
+const AROUND: usize = 48;
+
+/// A body of revolution about z (m): its profile as radius over height.
+fn turned(profile: impl Fn(f64) -> f64, height: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    const LEVELS: usize = 24;
+    let ring = |j: usize| {
+        let z = height * j as f64 / LEVELS as f64;
+        let radius = profile(z);
+        (0..AROUND).map(move |i| {
+            let a = i as f64 / AROUND as f64 * std::f64::consts::TAU;
+            DVec3::new(radius * a.cos(), radius * a.sin(), z)
+        })
+    };
+    let points = (0..=LEVELS).flat_map(ring).collect();
+    let at = |i: usize, j: usize| (j * AROUND + i % AROUND) as u32;
+    let triangles = (0..LEVELS)
+        .flat_map(|j| {
+            (0..AROUND).flat_map(move |i| {
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                [[a, b, c], [a, c, d]]
+            })
+        })
+        .collect();
+    (points, triangles)
+}
+
+fn mesh(points: &[DVec3], triangles: &[[u32; 3]], turn: DQuat) -> TriMesh {
+    let points: Vec<DVec3> = points.iter().map(|&p| turn * p + 0.4).collect();
+    TriMesh::new(&points, triangles, 0).unwrap().0
+}
+
+fn tube(radius: f64, height: f64, turn: DQuat) -> TriMesh {
+    let (points, triangles) = turned(|_| radius, height);
+    mesh(&points, &triangles, turn)
+}
+
+/// A closed box from the origin.
+fn closed_box(size: DVec3) -> TriMesh {
+    let points: Vec<DVec3> = (0..8)
+        .map(|k| size * DVec3::new(f64::from(k & 1), f64::from((k >> 1) & 1), f64::from(k >> 2)))
+        .collect();
+    let faces = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles: Vec<[u32; 3]> = (faces.iter())
+        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+        .collect();
+    TriMesh::new(&points, &triangles, 0).unwrap().0
+}
+
+fn up(mesh: &TriMesh) -> DVec3 {
+    Stance::of(mesh).up()
+}
+
+/// Turns z to a direction.
+fn onto(direction: DVec3) -> DQuat {
+    DQuat::from_rotation_arc(DVec3::Z, direction.normalize())
+}
+
+#[test]
+fn a_tube_stands_along_its_axis_however_long_it_is_and_however_it_lies() {
+    for height in [0.2, 0.02] {
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+            assert_eq!(up(&tube(0.03, height, onto(axis))), axis);
+        }
+        let oblique = DVec3::new(-0.5, 0.8, 0.6).normalize();
+        for direction in [oblique, -oblique] {
+            let found = up(&tube(0.03, height, onto(direction)));
+            assert!(found.distance(oblique) < 1e-6, "{height}: {found}");
+        }
+        // A few degrees off an axis of its coordinates it is meant along that.
+        let leaning = DVec3::new(0.08, 1.0, -0.05);
+        assert_eq!(up(&tube(0.03, height, onto(leaning))), DVec3::Y);
+    }
+}
+
+#[test]
+fn what_sticks_out_at_one_end_does_not_tilt_the_axis() {
+    let (mut points, triangles) = turned(|_| 0.03, 0.15);
+    // A boss of 60 mm at the upper end: the longest principal axis leans to it by 33°.
+    for p in &mut points {
+        if p.z > 0.11 && p.y.atan2(p.x).abs() < 0.4 {
+            (p.x, p.y) = (3.0 * p.x, 3.0 * p.y);
+        }
+    }
+    let part = mesh(&points, &triangles, onto(DVec3::Y));
+    assert_eq!(up(&part), DVec3::Y);
+    // Nor where the file has it in no direction of its own.
+    let oblique = DVec3::new(0.5, 0.6, -0.5).normalize();
+    let found = up(&mesh(&points, &triangles, onto(oblique)));
+    assert!(found.dot(oblique) > 3_f64.to_radians().cos(), "{found}");
+}
+
+#[test]
+fn of_directions_that_are_as_good_the_longest_is_up_and_then_z() {
+    assert_eq!(up(&closed_box(DVec3::ONE)), DVec3::Z);
+    assert_eq!(up(&closed_box(DVec3::new(3.0, 2.0, 1.0))), DVec3::X);
+    assert_eq!(up(&closed_box(DVec3::new(1.0, 1.0, 4.0))), DVec3::Z);
+    // A plate is as thin along both of its sides.
+    let plate = |x: f64, y: f64| {
+        let points = [
+            DVec3::ZERO,
+            DVec3::X * x,
+            DVec3::new(x, y, 0.0),
+            DVec3::Y * y,
+        ];
+        TriMesh::new(&points, &[[0, 1, 2], [0, 2, 3]], 0).unwrap().0
+    };
+    assert_eq!(up(&plate(2.0, 1.0)), DVec3::X);
+    assert_eq!(up(&plate(1.0, 1.0)), DVec3::Y);
+}
+
+#[test]
+fn the_views_of_a_report_are_of_the_part() {
+    for up in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, -2.0, 0.5)] {
+        let stance = Stance::about(up);
+        assert!(stance.up().distance(up.normalize()) < 1e-12);
+        assert!(stance.front().dot(stance.up()).abs() < 1e-12);
+        let views = svg::standard_views(stance);
+        assert_eq!(views.map(|v| v.name), ["front", "right", "back", "left"]);
+        for view in &views {
+            assert_eq!(view.up, stance.up());
+        }
+        // What is on the right of who looks from in front is seen from the right.
+        let right = views[0].up.cross(views[0].toward).normalize();
+        assert!(views[1].toward.dot(right) > 0.9);
+    }
+    assert_eq!(Stance::about(DVec3::Z).front(), DVec3::X);
+}
+
+#[test]
+fn a_barrel_says_where_its_lengths_are_not_kept_and_a_tube_keeps_them() {
+    let straight = Flat::of(&tube(0.03, 0.1, onto(DVec3::Y)), Stance::about(DVec3::Y));
+    assert!(straight.stretch.off < 1e-12 && straight.stretch.most < 0.01);
+    assert!(straight.stretch.words().contains("kept"));
+    assert!((straight.upper - straight.lower).y - 0.1 < 1e-9);
+
+    // Half as wide again in the middle as at both ends.
+    let profile = |z: f64| 0.02 + 0.01 * (1.0 - (z / 0.05 - 1.0).powi(2));
+    let (points, triangles) = turned(profile, 0.1);
+    let flat = Flat::of(
+        &mesh(&points, &triangles, DQuat::IDENTITY),
+        Stance::about(DVec3::Z),
+    );
+    let stretch = &flat.stretch;
+    assert!(stretch.off > 0.2 && stretch.off < 0.8, "{}", stretch.off);
+    assert!(
+        stretch.most > 0.15 && stretch.most < 0.6,
+        "{}",
+        stretch.most
+    );
+    assert!(stretch.words().contains("Hatched"), "{}", stretch.words());
+    // The belly, where most of it is, is kept; the ends are said to be off.
+    let vertices = flat.stretch_at_vertices();
+    for (p, off) in flat.positions.iter().zip(vertices) {
+        let along = (p.y - flat.lower.y) / (flat.upper.y - flat.lower.y);
+        if (0.4..0.6).contains(&along) {
+            assert!(off < KEPT, "{along}: {off}");
+        } else if !(0.1..0.9).contains(&along) {
+            assert!(off > KEPT, "{along}: {off}");
+        }
+    }
+    let values = vec![0.0; points.len()];
+    let picture = svg::unrolled(&flat, svg::Paint::Tint(&values), &[], 900.0);
+    assert!(picture.contains("url(#stretched)"));
+}
+
+#[test]
+fn a_frame_inside_neither_moves_nor_shrinks_the_unrolled_wall() {
+    let (mut points, mut triangles) = turned(|_| 0.03, 0.1);
+    let (inner, more) = turned(|_| 0.008, 0.1);
+    let first = points.len() as u32;
+    points.extend(inner.iter().map(|p| p + DVec3::X * 0.01));
+    triangles.extend(more.iter().map(|t| t.map(|v| first + v)));
+    // A floor holds both together.
+    for i in 0..AROUND as u32 {
+        let next = (i + 1) % AROUND as u32;
+        triangles.extend([[i, first + i, next], [next, first + i, first + next]]);
+    }
+    let part = mesh(&points, &triangles, DQuat::IDENTITY);
+    let unrolling = Unrolling::of(&part, Stance::about(DVec3::Z));
+    assert!(
+        (unrolling.radius - 0.03).abs() < 1e-6,
+        "{}",
+        unrolling.radius
+    );
+    let middle = unrolling.origin - DVec3::splat(0.4);
+    assert!(middle.truncate().length() < 1e-6, "{middle}");
+    // What lies behind the wall is not seen, and says nothing of the view.
+    let flat = Flat::of(&part, Stance::about(DVec3::Z));
+    assert!(flat.stretch.off < 1e-12, "{}", flat.stretch.off);
+}
+
+#[test]
+fn a_new_support_is_a_slice_at_the_lower_end() {
+    let part = tube(0.03, 0.2, onto(DVec3::Y));
+    let (lower, upper) = part.bounds();
+    let (low, high) = Stance::of(&part).lower_end(&part, 0.05);
+    assert!(low.distance(lower) < 1e-9, "{low} {lower}");
+    let expected = DVec3::new(upper.x, lower.y + 0.01, upper.z);
+    assert!(high.distance(expected) < 1e-9, "{high} {expected}");
+}
+
+#[test]
+fn the_key_is_a_word_or_a_direction() {
+    let read = |value: &str| {
+        let text = format!("format = 1\n[part]\nmesh = \"a.stl\"\nunit = \"mm\"\n{value}");
+        toml::from_str::<Project>(&text).map(|p| p.part.axis)
+    };
+    let axis = |value: &str| read(&format!("axis = {value}")).unwrap();
+    assert_eq!(read("").unwrap(), PartAxis::Auto);
+    assert_eq!(axis("\"auto\""), PartAxis::Auto);
+    assert_eq!(axis("\"y\""), PartAxis::Coordinate(Axis::Y));
+    assert_eq!(axis("[0, 1, -0.5]"), PartAxis::Along([0.0, 1.0, -0.5]));
+    for wrong in ["\"w\"", "[0, 1]", "[0, 1, 0, 0]", "3", "[\"x\", 0, 0]"] {
+        let said = read(&format!("axis = {wrong}")).unwrap_err().to_string();
+        assert!(said.contains("axis"), "{said}");
+    }
+    let said = read("axis = \"w\"").unwrap_err().to_string();
+    assert!(said.contains("\"auto\", \"x\", \"y\", \"z\""), "{said}");
+
+    let mut project = Project::around("a.stl", Some(Unit::Millimetre));
+    assert_eq!(project.part.axis, PartAxis::Auto);
+    for (direction, fine) in [
+        ([0.0, -2.0, 0.1], true),
+        ([0.0; 3], false),
+        ([0.0, f64::NAN, 1.0], false),
+        ([1e300, 0.0, 0.0], false),
+    ] {
+        project.part.axis = PartAxis::Along(direction);
+        let checked = project.check().map_err(|e| e.to_string());
+        assert_eq!(checked.is_ok(), fine, "{direction:?}: {checked:?}");
+        if let Err(said) = checked {
+            assert!(said.contains("part.axis"), "{said}");
+        }
+    }
+}
