@@ -168,7 +168,8 @@ pub(super) fn pieces(n: usize) -> impl Iterator<Item = [[f64; 3]; 3]> {
     })
 }
 
-fn merge(mut shares: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
+/// Shares of vertices or nodes, those of the same one added up, in rising order.
+pub(super) fn merge(mut shares: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
     shares.sort_by_key(|w| w.0);
     let mut merged: Vec<(u32, f64)> = Vec::new();
     for (v, w) in shares {

@@ -11,8 +11,10 @@ pub mod grid;
 pub mod grip;
 pub mod ground;
 pub mod immersed;
+pub mod isotropic;
 pub mod lagrange;
 pub mod orders;
+pub mod pressed;
 pub mod series;
 pub mod simplex;
 pub mod sizing;
@@ -26,6 +28,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use self::grip::Grip;
+use self::pressed::nodal_shares;
 use super::Material;
 use super::load::{Touch, pressure};
 use super::model::{ElasticError, LoadCheck, Model};
@@ -66,8 +69,15 @@ pub trait Elements: Send + Sync {
     /// Stiffness (N/m) over the nodes' displacements: row 3 a + i.
     fn stiffness(&self, element: usize, material: &Material) -> Mat<f64>;
 
+    /// The element that a point of the surface (m) with this outward normal belongs to, and its place there in the
+    /// element's own coordinates. `guess` is what a search leaves to the next one nearby.
+    fn find(&self, point: DVec3, outward: DVec3, guess: &mut u32) -> (u32, DVec3);
+
+    /// Values of an element's shape functions at a place in it, in the order of its nodes.
+    fn values(&self, place: DVec3, into: &mut Vec<f64>);
+
     /// The shape functions at a point of the surface (m) with this outward normal.
-    fn shape(&self, at: SurfacePoint, point: DVec3, outward: DVec3) -> Shape;
+    fn shape(&self, point: DVec3, outward: DVec3) -> Shape;
 
     /// Nodes in a good order of elimination, where there is one.
     fn elimination(&self) -> Option<Vec<u32>>;
@@ -84,6 +94,8 @@ pub struct SolidModel {
     /// Displacements at the vertices of the surface, as rows over solved blocks.
     vertices: Rows,
     pieces: usize,
+    /// For each facet of the surface, where a search for its element may begin.
+    guesses: Vec<u32>,
 }
 
 impl SolidModel {
@@ -120,7 +132,9 @@ impl SolidModel {
             system,
             vertices: Rows::default(),
             pieces,
+            guesses: Vec::new(),
         };
+        model.guesses = model.guesses();
         model.vertices = model.displacement_rows(&mesh.vertex_points());
         Ok(model)
     }
@@ -134,7 +148,19 @@ impl SolidModel {
     fn shape(&self, at: SurfacePoint) -> Shape {
         let point = self.mesh.point(at);
         self.elements
-            .shape(at, point, self.mesh.facet_normal(at.triangle))
+            .shape(point, self.mesh.facet_normal(at.triangle))
+    }
+
+    fn guesses(&self) -> Vec<u32> {
+        let facets = 0..self.mesh.triangles().len() as u32;
+        let guess = |facet: u32| {
+            let middle = self.mesh.corners(facet).iter().sum::<DVec3>() / 3.0;
+            let mut guess = 0;
+            let outward = self.mesh.facet_normal(facet);
+            self.elements.find(middle, outward, &mut guess);
+            guess
+        };
+        facets.into_par_iter().map(guess).collect()
     }
 
     /// A row over freedoms as one over solved blocks: held freedoms are zero.
@@ -198,17 +224,10 @@ impl Model for SolidModel {
 
     fn load(&self, touch: &Touch) -> Vec<(usize, f64)> {
         let force = -touch.normal * touch.force;
-        let mut load: std::collections::BTreeMap<usize, f64> = std::collections::BTreeMap::new();
-        for (at, share) in pressure(&self.mesh, &self.index, touch, self.elements.grain()) {
-            let shape = self.shape(at);
-            for (&node, (value, _)) in shape.nodes.iter().zip(&shape.values) {
-                for axis in 0..3 {
-                    *load.entry(3 * node as usize + axis).or_default() +=
-                        value * share * force[axis];
-                }
-            }
-        }
-        load.into_iter().collect()
+        let pressure = pressure(&self.mesh, &self.index, touch, self.elements.grain());
+        let shares = nodal_shares(&*self.elements, &self.mesh, &self.guesses, &pressure);
+        let along = |(node, share)| (0..3).map(move |i| (3 * node as usize + i, share * force[i]));
+        shares.into_iter().flat_map(along).collect()
     }
 
     fn observer(&self, points: &[SurfacePoint], _: Face) -> Observer {
@@ -221,17 +240,16 @@ impl Model for SolidModel {
 
     fn check_all(&self, touches: &[Touch], solutions: &[Vec<f64>]) -> LoadCheck {
         let mut internal = vec![vec![0.0; self.system.freedoms()]; solutions.len()];
-        for element in 0..self.elements.count() {
-            let k = self.elements.stiffness(element, &self.material);
-            let nodes = self.elements.nodes_of(element);
-            let freedoms: Vec<usize> = nodes
-                .iter()
-                .flat_map(|&n| (0..3).map(move |i| 3 * n as usize + i))
+        for first in (0..self.elements.count()).step_by(AT_ONCE) {
+            let last = (first + AT_ONCE).min(self.elements.count());
+            let forces: Vec<_> = (first..last)
+                .into_par_iter()
+                .map(|element| self.internal_forces(element, solutions))
                 .collect();
-            for (internal, u) in internal.iter_mut().zip(solutions) {
-                for (j, &from) in freedoms.iter().enumerate() {
-                    for (i, &into) in freedoms.iter().enumerate() {
-                        internal[into] += k[(i, j)] * u[from];
+            for (freedoms, forces) in forces {
+                for (internal, forces) in internal.iter_mut().zip(forces) {
+                    for (&freedom, force) in freedoms.iter().zip(forces) {
+                        internal[freedom] += force;
                     }
                 }
             }
@@ -273,6 +291,30 @@ impl Model for SolidModel {
 }
 
 impl SolidModel {
+    /// The freedoms of an element, and the forces on them that hold each solution.
+    fn internal_forces(
+        &self,
+        element: usize,
+        solutions: &[Vec<f64>],
+    ) -> (Vec<usize>, Vec<Vec<f64>>) {
+        let stiffness = self.elements.stiffness(element, &self.material);
+        let nodes = self.elements.nodes_of(element).iter();
+        let freedoms: Vec<usize> = nodes
+            .flat_map(|&n| (0..3).map(move |i| 3 * n as usize + i))
+            .collect();
+        let forces = |u: &Vec<f64>| {
+            let mut forces = vec![0.0; freedoms.len()];
+            for (j, &from) in freedoms.iter().enumerate() {
+                for (force, k) in forces.iter_mut().zip(stiffness.col_as_slice(j)) {
+                    *force += k * u[from];
+                }
+            }
+            forces
+        };
+        let forces = solutions.iter().map(forces).collect();
+        (freedoms, forces)
+    }
+
     fn balance(&self, load: &[(usize, f64)], u: &[f64], internal: &[f64]) -> LoadCheck {
         let (mut reaction, mut total) = (DVec3::ZERO, DVec3::ZERO);
         let mut external = 0.0;
@@ -357,6 +399,9 @@ fn pattern(elements: &dyn Elements, unknowns: &[u32]) -> Result<SymmetricMatrix,
     })
 }
 
+/// Elements whose matrices are there at the same time.
+const AT_ONCE: usize = 512;
+
 /// Element matrices on the rayon pool, added up in the order of the elements.
 fn assemble(
     elements: &dyn Elements,
@@ -365,10 +410,9 @@ fn assemble(
     into: &mut SymmetricMatrix,
     watch: Watch,
 ) -> Result<(), ElasticError> {
-    const CHUNK: usize = 512;
-    for first in (0..elements.count()).step_by(CHUNK) {
+    for first in (0..elements.count()).step_by(AT_ONCE) {
         report(watch, "Assembling", first, elements.count())?;
-        let last = (first + CHUNK).min(elements.count());
+        let last = (first + AT_ONCE).min(elements.count());
         let matrices: Vec<Mat<f64>> = (first..last)
             .into_par_iter()
             .map(|e| elements.stiffness(e, material))

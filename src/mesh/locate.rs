@@ -64,6 +64,23 @@ impl SurfaceIndex {
         (at, projection.point.distance(point) * self.size)
     }
 
+    /// As [`Self::nearest`], for points that may lie on the triangle of the last one: those need no search.
+    #[must_use]
+    pub fn nearest_from(&self, guess: u32, point: DVec3) -> SurfacePoint {
+        /// A point this near (in sizes of the surface) lies on a triangle.
+        const ON_IT: f64 = 1e-13;
+        let scaled = self.scaled(point);
+        let (projection, location) =
+            (self.tree.triangle(guess)).project_local_point_and_get_location(scaled, false);
+        match location.barycentric_coordinates() {
+            Some(barycentric) if projection.point.distance(scaled) < ON_IT => SurfacePoint {
+                triangle: guess,
+                barycentric,
+            },
+            _ => self.nearest(point).0,
+        }
+    }
+
     /// The first point a ray meets and its distance in units of `direction`.
     #[must_use]
     pub fn ray(&self, origin: DVec3, direction: DVec3) -> Option<(SurfacePoint, f64)> {
@@ -111,6 +128,9 @@ mod tests {
         assert!((d - 1.0).abs() < 1e-12);
         assert!(mesh.point(at).distance(DVec3::new(0.0, 0.5, 0.0)) < 1e-12);
         assert!(index.ray(DVec3::splat(2.0), DVec3::X).is_none());
+        for point in [DVec3::new(0.3, 0.4, 0.0), DVec3::new(3.0, -1.0, 2.0)] {
+            assert_eq!(index.nearest_from(0, point), index.nearest(point).0);
+        }
         assert_eq!(index.triangles_near(DVec3::new(1.2, 0.0, 0.0), 0.3), [0]);
     }
 }

@@ -12,11 +12,11 @@ use rayon::prelude::*;
 
 use super::cut::{Cell, Cutter, Cutting, Moments};
 use super::grid::{Grid, Place};
+use super::isotropic::isotropic;
 use super::lagrange::{Lagrange, gauss};
 use super::{Elements, Shape};
 use crate::budget::{Cancelled, Watch, report};
 use crate::elasticity::Material;
-use crate::mesh::SurfacePoint;
 use crate::mesh::inside::SignedDistance;
 
 /// The cells of a part.
@@ -201,10 +201,19 @@ impl Elements for FiniteCells {
         );
         let scale = 2.0 / cell.sides;
         let volume = cell.sides.element_product() / 8.0;
-        elastic(&gram, material, scale, volume)
+        isotropic(&gram, material, scale * volume.sqrt())
     }
 
-    fn shape(&self, _: SurfacePoint, point: DVec3, outward: DVec3) -> Shape {
+    fn find(&self, point: DVec3, outward: DVec3, _: &mut u32) -> (u32, DVec3) {
+        let number = self.holding(point, outward);
+        (number, self.cell(number as usize).local(point))
+    }
+
+    fn values(&self, place: DVec3, into: &mut Vec<f64>) {
+        self.shapes.values(place, into);
+    }
+
+    fn shape(&self, point: DVec3, outward: DVec3) -> Shape {
         let number = self.holding(point, outward);
         let cell = self.cell(number as usize);
         let scale = 2.0 / cell.sides;
@@ -222,28 +231,6 @@ impl Elements for FiniteCells {
             self.shapes.order() as u32,
         ))
     }
-}
-
-/// From the integrals G of products of gradients on the unit box, Gᵢⱼ = ∫ ∂ᵢM ∂ⱼN, to the stiffness of an isotropic
-/// material on one with other sides: λ Gᵢⱼ + μ (Gⱼᵢ + δᵢⱼ tr G) for every two shape functions M and N.
-fn elastic(gram: &Mat<f64>, material: &Material, scale: DVec3, volume: f64) -> Mat<f64> {
-    let (lambda, mu) = material.lame();
-    let scale = scale.to_array();
-    let mut k = Mat::zeros(gram.nrows(), gram.ncols());
-    for b in 0..gram.ncols() / 3 {
-        for a in 0..gram.nrows() / 3 {
-            let g =
-                |i: usize, j: usize| gram[(3 * a + i, 3 * b + j)] * scale[i] * scale[j] * volume;
-            let trace = g(0, 0) + g(1, 1) + g(2, 2);
-            for j in 0..3 {
-                for i in 0..3 {
-                    let own = if i == j { mu * trace } else { 0.0 };
-                    k[(3 * a + i, 3 * b + j)] = lambda * g(i, j) + mu * g(j, i) + own;
-                }
-            }
-        }
-    }
-    k
 }
 
 fn gradients(shapes: &Lagrange) -> Mat<f64> {

@@ -103,7 +103,7 @@ impl Grip {
                 let point = mesh.point(at);
                 self.springs.push(Spring {
                     point,
-                    shape: elements.shape(at, point, normal),
+                    shape: elements.shape(point, normal),
                     held,
                     stiffness: STIFF * material.youngs_modulus / size * area,
                 });

@@ -422,7 +422,7 @@ impl Solved {
     }
 
     fn of(fineness: Fineness, model: SolidModel, touches: &[Touch], places: &[DVec3]) -> Self {
-        let loads: Vec<_> = touches.iter().map(|t| model.load(t)).collect();
+        let loads: Vec<_> = touches.par_iter().map(|t| model.load(t)).collect();
         let solutions = model.system().solve_loads(&loads);
         Self {
             sample: Sample::of(&model, touches, &solutions, places),

@@ -63,6 +63,18 @@ impl Lagrange {
         (values, slopes)
     }
 
+    /// Values of all shape functions at a point.
+    pub fn values(&self, xi: DVec3, into: &mut Vec<f64>) {
+        let n = self.points.len();
+        let [x, y, z] = xi.to_array().map(|c| self.line(c).0);
+        into.clear();
+        for k in 0..n {
+            for j in 0..n {
+                into.extend(x[..n].iter().map(|x| x * y[j] * z[k]));
+            }
+        }
+    }
+
     /// Values and gradients (along the box's own coordinates) of all shape functions at a point.
     #[must_use]
     pub fn at(&self, xi: DVec3) -> Vec<(f64, DVec3)> {

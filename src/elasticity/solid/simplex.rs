@@ -74,6 +74,14 @@ impl Simplex {
         (values, slopes)
     }
 
+    /// Values of all shape functions at a point of the unit tetrahedron.
+    pub fn values(&self, xi: DVec3, into: &mut Vec<f64>) {
+        let lines = [1.0 - xi.x - xi.y - xi.z, xi.x, xi.y, xi.z].map(|l| self.line(l).0);
+        let shape = |steps: &[usize; 4]| (0..4).map(|c| lines[c][steps[c]]).product::<f64>();
+        into.clear();
+        into.extend(self.lattice.iter().map(shape));
+    }
+
     /// Values and gradients (in the unit tetrahedron) of all shape functions at a point of it.
     #[must_use]
     pub fn at(&self, xi: DVec3) -> Vec<(f64, DVec3)> {
@@ -144,6 +152,9 @@ mod tests {
             let power = order as i32;
             let f = |q: DVec3| q.x.powi(power) - 2.0 * q.y.powi(power) + q.z;
             let (mut value, mut gradient) = (0.0, DVec3::ZERO);
+            let mut values = Vec::new();
+            simplex.values(at, &mut values);
+            assert!(values.iter().zip(simplex.at(at)).all(|(v, a)| *v == a.0));
             for (node, (shape, slope)) in simplex.at(at).into_iter().enumerate() {
                 let place = simplex.place(node);
                 for (other, (there, _)) in simplex.at(place).into_iter().enumerate() {

@@ -12,11 +12,11 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use glam::DVec3;
 
+use super::isotropic::isotropic;
 use super::simplex::Simplex;
 use super::{Elements, Shape, neighbours};
 use crate::elasticity::Material;
 use crate::elasticity::solver::Plan;
-use crate::mesh::SurfacePoint;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::volume::{FacePlace, VolumeMesh, jacobian, shapes};
 
@@ -32,6 +32,8 @@ pub struct Tetrahedra {
     index: SurfaceIndex,
     /// For each of those its element and the places of its corners in it.
     places: Vec<FacePlace>,
+    /// Asked for by every load.
+    grain: f64,
     plan: OnceLock<Option<Plan>>,
 }
 
@@ -93,6 +95,7 @@ impl Tetrahedra {
         Self {
             index: SurfaceIndex::of(mesh.nodes.clone(), &triangles),
             rule: simplex.rule().into_iter().map(point).collect(),
+            grain: mesh.mean_edge() / order as f64,
             mesh: Arc::clone(mesh),
             nodes,
             numbers,
@@ -148,12 +151,12 @@ impl Tetrahedra {
             let jacobian = jacobian(&nodes, point.at);
             let inverse = jacobian.inverse().transpose();
             let weight = point.weight * jacobian.determinant();
-            for (a, gradient) in point.gradients.iter().enumerate() {
+            let gradients = gradients.col_as_slice_mut(q).chunks_exact_mut(3);
+            let weighted = weighted.col_as_slice_mut(q).chunks_exact_mut(3);
+            for ((own, weighted), gradient) in gradients.zip(weighted).zip(&point.gradients) {
                 let gradient = inverse * *gradient;
-                for i in 0..3 {
-                    gradients[(3 * a + i, q)] = gradient[i];
-                    weighted[(3 * a + i, q)] = weight * gradient[i];
-                }
+                own.copy_from_slice(&gradient.to_array());
+                weighted.copy_from_slice(&(weight * gradient).to_array());
             }
         }
         let mut products = Mat::<f64>::zeros(rows, rows);
@@ -184,7 +187,7 @@ impl Elements for Tetrahedra {
     }
 
     fn grain(&self) -> f64 {
-        self.mesh.mean_edge() / self.simplex.order() as f64
+        self.grain
     }
 
     fn centre(&self, element: usize) -> DVec3 {
@@ -192,36 +195,29 @@ impl Elements for Tetrahedra {
     }
 
     fn stiffness(&self, element: usize, material: &Material) -> Mat<f64> {
-        let (lambda, mu) = material.lame();
-        let products = self.products(element);
-        let count = self.simplex.lattice().len();
-        let mut k = Mat::<f64>::zeros(3 * count, 3 * count);
-        for b in 0..count {
-            for a in 0..count {
-                let product = |i: usize, j: usize| products[(3 * a + i, 3 * b + j)];
-                let dot = product(0, 0) + product(1, 1) + product(2, 2);
-                for j in 0..3 {
-                    for i in 0..3 {
-                        let own = if i == j { mu * dot } else { 0.0 };
-                        k[(3 * a + i, 3 * b + j)] =
-                            lambda * product(i, j) + mu * product(j, i) + own;
-                    }
-                }
-            }
-        }
-        k
+        isotropic(&self.products(element), material, DVec3::ONE)
     }
 
-    fn shape(&self, _: SurfacePoint, point: DVec3, _: DVec3) -> Shape {
-        let (at, _) = self.index.nearest(point);
+    fn find(&self, point: DVec3, _: DVec3, guess: &mut u32) -> (u32, DVec3) {
+        let at = self.index.nearest_from(*guess, point);
+        *guess = at.triangle;
         let (element, corners) = &self.places[at.triangle as usize];
-        let place: DVec3 = (0..3).map(|i| corners[i] * at.barycentric[i]).sum();
-        let nodes = self.corners(*element as usize);
+        let place = (0..3).map(|i| corners[i] * at.barycentric[i]).sum();
+        (*element, place)
+    }
+
+    fn values(&self, place: DVec3, into: &mut Vec<f64>) {
+        self.simplex.values(place, into);
+    }
+
+    fn shape(&self, point: DVec3, outward: DVec3) -> Shape {
+        let (element, place) = self.find(point, outward, &mut 0);
+        let nodes = self.corners(element as usize);
         let inverse = jacobian(&nodes, place).inverse().transpose();
         let values = self.simplex.at(place).into_iter();
         Shape {
-            element: *element,
-            nodes: self.nodes_of(*element as usize).to_vec(),
+            element,
+            nodes: self.nodes_of(element as usize).to_vec(),
             values: values.map(|(n, g)| (n, inverse * g)).collect(),
         }
     }
