@@ -126,6 +126,7 @@ fn shin(text: &mut String, _quick: bool) {
         project.supports.push(SupportKeys {
             kind: SupportKind::Clamped,
             box_mm: Some([[-80.0, y[0], -80.0], [80.0, y[1], 80.0]]),
+            box_axis: None,
             vertices: None,
             normal: Axis::Z,
         });

@@ -5,7 +5,7 @@
 
 use std::ops::{AddAssign, ControlFlow};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// How far one stage has come: `done` of `total` units of its own choosing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -221,6 +221,7 @@ pub struct Elements {
     pub vertices: usize,
     pub most_vertices: usize,
     /// The most vertices × loads.
+    #[serde(serialize_with = "or_null")]
     pub effort: usize,
     /// Estimated errors at which no more are added (%): rms over the loads of the displacement under the
     /// load, and of the strain beyond two tip radii over the load's largest.
@@ -238,6 +239,16 @@ impl Elements {
     }
 }
 
+/// A limit as it is written for others: nothing where there is none.
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde asks with a reference"
+)]
+fn or_null<S: Serializer>(limit: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+    let limit = Some(*limit).filter(|&limit| limit != usize::MAX);
+    limit.serialize(serializer)
+}
+
 /// An explicit budget: the largest effort each stage may spend, and the tolerances it works to.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Budget {
@@ -246,12 +257,14 @@ pub struct Budget {
     /// their size; of a solid two thirds.
     pub elements: Elements,
     /// Most touches the model is asked for.
+    #[serde(serialize_with = "or_null")]
     pub touches: usize,
     /// Whether the tip is taken as a point where the model learns; what judges it has the tip as it is.
     pub point_tip: bool,
     /// Unseen touches that evaluation uses.
     pub test_touches: usize,
     /// Most candidates kept by the reduction.
+    #[serde(serialize_with = "or_null")]
     pub candidates: usize,
     /// Most sites that the Gaussian process knows; half as many again where no gauge can go.
     pub locations: usize,

@@ -14,6 +14,7 @@ pub mod locate;
 pub mod mount;
 mod numbers;
 mod orientation;
+pub mod oriented_box;
 pub mod reach;
 pub mod remesh;
 pub mod repair;

@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::budget::{Achieved, Cancelled, Watch};
 use crate::dataset::SignalMatrix;
 use crate::pca::PcaError;
+use crate::plain;
 pub use expected_error::Certificate;
 pub use wishes::{LostBy, Wishes};
 
@@ -153,10 +154,12 @@ pub enum PlacementError {
     #[error("there is no site to choose from: all are left out, or there are none")]
     NoSites,
     #[error(
-        "{wanted} gauges were asked for, but only {available} sites can be chosen from: ask for fewer gauges or allow more sites"
+        "{} asked for, but only {} to choose from: ask for fewer gauges or allow more sites",
+        plain::either(*.wanted, "gauge was", "gauges were"),
+        plain::either(*.available, "site is there", "sites are there")
     )]
     TooFewSites { wanted: usize, available: usize },
-    #[error("{touches} touches are too few to learn from: ask for at least {least}")]
+    #[error("{} too few to learn from: ask for at least {least}", plain::either(*.touches, "touch is", "touches are"))]
     TooFewTouches { touches: usize, least: usize },
     #[error(
         "{places} places are too few to learn from and to judge on in {folds} folds: at least {least} are needed, or fewer folds (the {touches} touches are repeats of them, which are never divided)"

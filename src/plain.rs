@@ -50,6 +50,12 @@ pub fn count(number: usize, thing: &str) -> String {
     format!("{number} {thing}{many}")
 }
 
+/// So many of something with a form of its own for one: `1 edge was`, `3 edges were`.
+#[must_use]
+pub fn either(number: usize, one: &str, many: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { many })
+}
+
 /// A number with three significant digits, and no zeros behind them.
 #[must_use]
 pub fn digits(number: f64) -> String {
@@ -189,6 +195,8 @@ mod tests {
         assert_eq!(allowed_gb(8.009), "8 GB");
         assert_eq!(count(1, "gauge"), "1 gauge");
         assert_eq!(count(0, "gauge"), "0 gauges");
+        assert_eq!(either(1, "edge was", "edges were"), "1 edge was");
+        assert_eq!(either(0, "edge was", "edges were"), "0 edges were");
     }
 
     #[test]

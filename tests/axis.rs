@@ -1,13 +1,17 @@
 //! Which way a part stands: the axis that is found or set, and what follows it.
 
+use std::sync::Arc;
+
 use glam::{DQuat, DVec3};
-use hapdef::io::svg;
+use hapdef::elasticity::support::HeldPart;
+use hapdef::io::{project_file, svg};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::flatten::Flat;
-use hapdef::mesh::stance::Stance;
+use hapdef::mesh::oriented_box::OrientedBox;
+use hapdef::mesh::stance::{Direction, Stance};
 use hapdef::mesh::stretch::KEPT;
 use hapdef::mesh::unroll::{Axis, Unrolling};
-use hapdef::project::{PartAxis, Project, Unit};
+use hapdef::project::{Masks, PartAxis, Project, SupportKeys, Unit};
 
 const AROUND: usize = 48;
 
@@ -211,7 +215,8 @@ fn a_frame_inside_neither_moves_nor_shrinks_the_unrolled_wall() {
 fn a_new_support_is_a_slice_at_the_lower_end() {
     let part = tube(0.03, 0.2, onto(DVec3::Y));
     let (lower, upper) = part.bounds();
-    let (low, high) = Stance::of(&part).lower_end(&part, 0.05);
+    let stance = Stance::of(&part);
+    let (low, high) = stance.lower_end(&part, 0.05).along_axes().unwrap();
     assert!(low.distance(lower) < 1e-9, "{low} {lower}");
     let expected = DVec3::new(upper.x, lower.y + 0.01, upper.z);
     assert!(high.distance(expected) < 1e-9, "{high} {expected}");
@@ -250,4 +255,103 @@ fn the_key_is_a_word_or_a_direction() {
             assert!(said.contains("part.axis"), "{said}");
         }
     }
+}
+
+/// What a support holds of a tube, as a share of its surface, and how long the border of that is.
+fn held_share(part: &TriMesh, keys: SupportKeys) -> (f64, f64) {
+    let mut project = Project::around("a.stl", Some(Unit::Millimetre));
+    project.supports = vec![keys];
+    let supports = project.supports(&Masks::new()).unwrap();
+    let held = HeldPart::new(&Arc::new(part.clone()), &supports);
+    let mesh = &held.mesh;
+    let facets = (0..mesh.triangles().len() as u32).filter(|&t| held.facet_belongs(t, 0));
+    let area: f64 = facets.map(|t| mesh.facet_area(t)).sum();
+    let border = mesh.edges().iter().filter(|e| held.is_border(e));
+    let length = border.map(|e| {
+        let [a, b] = [e.a, e.b].map(|v| mesh.positions()[v as usize]);
+        a.distance(b)
+    });
+    (area / part.area(), length.sum())
+}
+
+#[test]
+fn a_new_support_is_turned_as_the_part_is() {
+    let oblique = DVec3::new(0.5, 0.8, 0.6).normalize();
+    let around = std::f64::consts::TAU * 0.03;
+    for direction in [DVec3::X, DVec3::Y, DVec3::Z, oblique] {
+        // Not at a row of vertices: the part is cut along the box, whichever way that lies.
+        const SHARE: f64 = 0.13;
+        let part = tube(0.03, 0.2, onto(direction));
+        let stance = Stance::of(&part);
+        let keys = SupportKeys::clamping(&stance.lower_end(&part, SHARE).grown(1e-5));
+        assert_eq!(keys.box_axis.is_some(), direction == oblique);
+        let again = keys.oriented_box().unwrap();
+        let [low, high] = again.span(Direction::Up);
+        if direction == oblique {
+            assert!((high - low - 0.2 * SHARE - 2e-5).abs() < 1e-6);
+        }
+        let (share, border) = held_share(&part, keys);
+        assert!((share - SHARE).abs() < 1e-3, "{direction}: {share}");
+        assert!(
+            (border / around - 1.0).abs() < 0.01,
+            "{direction}: {border}"
+        );
+    }
+}
+
+#[test]
+fn a_turned_box_is_kept_by_the_project_and_one_by_the_axes_writes_what_it_did() {
+    let mut project = Project::around("a.stl", Some(Unit::Millimetre));
+    let part = tube(0.03, 0.2, onto(DVec3::new(0.5, 0.8, 0.6)));
+    let stance = Stance::of(&part);
+    for stance in [Stance::default(), stance] {
+        let held = stance.lower_end(&part, 0.05);
+        project.supports = vec![SupportKeys::clamping(&held)];
+        let text = project_file::to_text(&project);
+        assert_eq!(text.contains("box_axis"), stance != Stance::default());
+        assert_eq!(project_file::parse(&text).unwrap(), project);
+    }
+    for (axis, fine) in [
+        ([0.0, -2.0, 0.1], true),
+        ([0.0; 3], false),
+        ([f64::NAN; 3], false),
+    ] {
+        project.supports[0].box_axis = Some(axis);
+        let checked = project.check().map_err(|e| e.to_string());
+        assert_eq!(checked.is_ok(), fine, "{axis:?}: {checked:?}");
+        if let Err(said) = checked {
+            assert!(said.contains("support.box_axis"), "{said}");
+        }
+    }
+    project.supports[0].box_axis = Some([0.0, 0.0, 1.0]);
+    project.supports[0].box_mm = None;
+    project.supports[0].vertices = Some("rim".into());
+    let said = project.check().map_err(|e| e.to_string());
+    assert!(said.is_err_and(|said| said.contains("support.box_axis")));
+}
+
+#[test]
+fn images_and_halves_are_of_the_part_as_it_stands() {
+    let direction = DVec3::new(0.5, 0.8, 0.6).normalize();
+    let part = tube(0.03, 0.2, onto(direction));
+    let around = OrientedBox::around(&part, Stance::of(&part));
+    // The tube lies about (0.4, 0.4, 0.4), from there on along its axis.
+    let middle = DVec3::splat(0.4) + direction * 0.1;
+    for (number, d) in Direction::ALL.into_iter().enumerate() {
+        let along = around.stance.direction(d);
+        assert!((around.middle(d) - middle.dot(along)).abs() < 1e-4, "{d:?}");
+        let p = middle + DVec3::new(0.01, -0.02, 0.03);
+        let image = around.mirrored(p, d);
+        assert!(around.mirrored(image, d).distance(p) < 1e-12);
+        let moved = around.stance.coordinates(image - p);
+        for other in (0..3).filter(|&other| other != number) {
+            assert!(moved[other].abs() < 1e-12, "{d:?}: {moved}");
+        }
+        assert!(around.contains(part.positions()[0], 1e-12));
+    }
+    // By the file's axes for a part along z.
+    let upright = OrientedBox::around(&tube(0.03, 0.2, DQuat::IDENTITY), Stance::default());
+    let [front, right, up] = Direction::ALL.map(|d| upright.stance.direction(d));
+    assert_eq!([front, right, up], DVec3::AXES);
+    assert_eq!(upright.along_axes(), Some((upright.lower, upright.upper)));
 }

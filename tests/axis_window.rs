@@ -3,7 +3,9 @@
 
 mod window;
 
+use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;
+use hapdef::mesh::stance::Direction;
 use hapdef::mesh::unroll::Axis;
 use hapdef::project::PartAxis;
 use hapdef::studio::Command;
@@ -37,4 +39,64 @@ fn views_follow_the_axis_of_the_part() {
     let hatched = w.picture();
     let both = kept.pixels().zip(hatched.pixels());
     assert!(both.filter(|(a, b)| a != b).count() > 10_000);
+}
+
+#[test]
+fn sections_mirrors_and_new_boxes_follow_the_axis_of_the_part() {
+    let Some(mut w) = Window::open() else { return };
+    let ctx = w.harness.ctx.clone();
+    w.harness.state_mut().execute(&ctx, Command::Section);
+    w.harness.state_mut().view.mirror = Some(Direction::Right);
+    w.stage("Supports");
+    let oblique = DVec3::new(0.5, 0.8, 0.6);
+    for (axis, turned) in [
+        (PartAxis::Auto, false),
+        (PartAxis::Coordinate(Axis::Y), false),
+        (PartAxis::Along(oblique.to_array()), true),
+    ] {
+        w.harness.state_mut().document.state.project.part.axis = axis;
+        w.harness.run_ok();
+        let stance = w.harness.state().view.camera.stance;
+        for (name, side) in [
+            ("front", Direction::Front),
+            ("right", Direction::Right),
+            ("top", Direction::Up),
+        ] {
+            w.press(&format!("Cut away: {name}"));
+            let section = w.harness.state().view.section.unwrap();
+            assert_eq!(section.normal, stance.direction(side), "{axis:?}");
+            assert!(section.cuts(stance.direction(side) * 10.0));
+        }
+        let image = w.harness.state().view.image(DVec3::ZERO).unwrap();
+        assert!(image.cross(stance.right()).length() < 1e-12, "{axis:?}");
+        let document = &mut w.harness.state_mut().document;
+        document.state.project.supports.clear();
+        w.harness.run_ok();
+        w.press("Add support");
+        let added = &w.harness.state().document.state.project.supports;
+        assert_eq!(added.len(), 1);
+        assert_eq!(added[0].box_axis.is_some(), turned, "{axis:?}");
+        w.assert_named("the supports");
+    }
+}
+
+#[test]
+fn an_example_goes_by_its_own_name() {
+    use hapdef::cli::examples::Example;
+
+    let Some(mut w) = Window::open() else { return };
+    let ctx = w.harness.ctx.clone();
+    for example in Example::ALL {
+        // The first of them is open.
+        if example != Example::Tube {
+            let open = Command::Example(example);
+            w.harness.state_mut().execute(&ctx, open);
+        }
+        w.wait("the example", 60, |s| {
+            Example::of_mesh(&s.document.mesh_path) == Some(example)
+        });
+        w.stage("Part");
+        let shown = w.harness.query_all_by_label(example.name()).count();
+        assert!(shown > 0, "{}", example.name());
+    }
 }

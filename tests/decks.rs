@@ -636,3 +636,19 @@ fn the_deck_of_the_paper_is_read_as_it_is() {
     assert_eq!(other.groups["FIXED"], *fixed);
     assert_eq!(other.found.material, found.material);
 }
+
+#[test]
+fn a_deck_that_speaks_of_a_material_and_has_none_says_so() {
+    let said = |text: &str| {
+        let loaded = parsed("inp", text.as_bytes()).unwrap();
+        notes(&loaded).contains("no elastic constants")
+    };
+    let whole = inp();
+    let start = line_of(&whole, "*ELASTIC");
+    let bare = without(&whole, start, 2);
+    assert!(!said(&whole));
+    assert!(said(&format!("{bare}\n*MATERIAL, NAME=A\n")));
+    assert!(said(&format!(
+        "{bare}\n*SOLID SECTION, ELSET=ALL, MATERIAL=A\n"
+    )));
+}

@@ -233,6 +233,7 @@ fn one_triangle_and_a_sliver() {
         project.supports.push(SupportKeys {
             kind: SupportKind::Clamped,
             box_mm: Some([[-1.0, -0.001, -1.0], [51.0, 0.001, 1.0]]),
+            box_axis: None,
             vertices: None,
             normal: hapdef::mesh::unroll::Axis::Z,
         });
@@ -340,6 +341,7 @@ fn plate(thickness: f64, nu: f64, sliver: f64) -> (Inputs, f64) {
     project.supports.push(SupportKeys {
         kind: SupportKind::Clamped,
         box_mm: None,
+        box_axis: None,
         vertices: Some("rim".into()),
         normal: hapdef::mesh::unroll::Axis::Z,
     });
@@ -564,6 +566,7 @@ fn a_million_triangles_are_taken_in_and_computed_on() {
     project.supports.push(SupportKeys {
         kind: SupportKind::Clamped,
         box_mm: Some([[-1.0, -1.0, -1.0], [80.0, 10.0, 1.0]]),
+        box_axis: None,
         vertices: None,
         normal: hapdef::mesh::unroll::Axis::Z,
     });

@@ -37,6 +37,7 @@ fn clamped() -> Inputs {
     inputs.project.supports.push(SupportKeys {
         kind: SupportKind::Clamped,
         box_mm: Some([[-1.0, -1.0, -1.0], [21.0, 21.0, 4.0]]),
+        box_axis: None,
         vertices: None,
         normal: Axis::Z,
     });

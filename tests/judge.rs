@@ -154,9 +154,20 @@ fn files_say_which_estimator_and_which_force() {
     let provenance = artifacts::Provenance {
         mesh_path: std::path::Path::new("limb.glb"),
         version: "test",
+        taken_in: None,
     };
     let page = hapdef::io::report::html(&asked, design, &provenance);
-    for said in ["25 N", "Calibrated", " known presses", "Blind", "left out"] {
+    for said in [
+        "25 N",
+        "Calibrated",
+        " known presses",
+        "Blind",
+        "left out",
+        "The part",
+        "Shell, ",
+        "mean error as drawn",
+        "gauges as built",
+    ] {
         assert!(page.contains(said), "{said}");
     }
     assert!(!page.contains("NaN") && !page.contains("trained anew"));
@@ -239,4 +250,21 @@ fn displacements_are_judged_by_regression_and_it_is_said() {
     let row = &summary["evaluation"][0];
     assert_eq!(row["estimator"], "svr");
     assert_eq!(row["force_n"], 10.0);
+}
+
+#[test]
+fn a_report_shows_the_near_wall_as_near_and_no_limit_as_none() {
+    use hapdef::io::report::markers;
+    use hapdef::project::PartModel;
+
+    let (mut asked, design) = (inputs(EstimatorKind::Matching), matched());
+    let of_shell = markers(&asked, design);
+    asked.project.part.model = PartModel::Solid;
+    // A solid's gauges are on a face that looks inward; what faces the reader is the other side of that wall.
+    for (solid, shell) in markers(&asked, design).iter().zip(of_shell) {
+        assert_eq!(solid.normal, -shell.normal);
+    }
+    let written = serde_json::to_value(Quality::Standard.budget()).unwrap();
+    assert!(written["candidates"].is_null() && written["touches"].is_null());
+    assert!(written["folds"].is_u64());
 }

@@ -30,6 +30,7 @@ fn real_limbs_become_datasets() {
             project.supports.push(SupportKeys {
                 kind: SupportKind::Clamped,
                 box_mm: Some([[-80.0, y[0], -80.0], [80.0, y[1], 80.0]]),
+                box_axis: None,
                 vertices: None,
                 normal: Axis::Z,
             });

@@ -75,6 +75,7 @@ fn a_painted_support_holds_like_the_box_it_covers() {
         painted.project.supports.push(SupportKeys {
             kind: SupportKind::Clamped,
             box_mm: None,
+            box_axis: None,
             vertices: Some(name),
             normal: Axis::Z,
         });
@@ -231,6 +232,7 @@ fn gauges_put_by_hand_are_what_the_report_shows() {
         let provenance = artifacts::Provenance {
             mesh_path: std::path::Path::new("limb.glb"),
             version: "test",
+            taken_in: None,
         };
         artifacts::write_all(folder.path(), &inputs, &hand, &provenance).unwrap();
         let report = std::fs::read_to_string(folder.path().join("report.html")).unwrap();

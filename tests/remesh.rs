@@ -271,6 +271,7 @@ fn computed(part: Arc<TriMesh>) {
     project.supports.push(SupportKeys {
         kind: SupportKind::Clamped,
         box_mm: Some([low.to_array(), high.to_array()]),
+        box_axis: None,
         vertices: None,
         normal: hapdef::mesh::unroll::Axis::Z,
     });

@@ -14,6 +14,7 @@ use hapdef::given::{self, GivenSite};
 use hapdef::io::mesh_file::read_mesh;
 use hapdef::limb::{BoxMm, LimbSpec, LimbSupport};
 use hapdef::mesh::TriMesh;
+use hapdef::mesh::oriented_box::OrientedBox;
 use hapdef::mesh::repair::Repair;
 use hapdef::mesh::unroll::Axis;
 use hapdef::project::{Masks, Project, SupportKeys, SupportKind, Unit};
@@ -128,6 +129,7 @@ fn inputs(written: Written) -> Inputs {
         project.supports.push(SupportKeys {
             kind: SupportKind::Clamped,
             box_mm: Some(moved),
+            box_axis: None,
             vertices: None,
             normal: Axis::Z,
         });
@@ -275,10 +277,7 @@ fn what_is_not_held_is_told_where_the_part_lies() {
     let (part, _) = TriMesh::new(&positions, tube.triangles(), 0).unwrap();
     let part = Arc::new(part);
     let beside = Support {
-        region: Region::Box {
-            lower: DVec3::ZERO,
-            upper: DVec3::ONE,
-        },
+        region: Region::Box(OrientedBox::of_file(DVec3::ZERO, DVec3::ONE)),
         held: Freedoms::ALL,
     };
     let ground = Ground::new(&part, SECTION, &[beside], false);

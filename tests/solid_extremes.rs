@@ -149,6 +149,7 @@ fn an_open_surface_is_no_solid() {
     project.supports.push(SupportKeys {
         kind: SupportKind::Clamped,
         box_mm: Some([[-80.0, -80.0, -1.0], [80.0, 80.0, 6.0]]),
+        box_axis: None,
         vertices: None,
         normal: Axis::Z,
     });

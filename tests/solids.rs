@@ -3,13 +3,15 @@
 
 mod bench;
 
-use bench::solids::{Found, bent_tube, block, clamp, model, shell_of, slotted, strip, tube};
+use bench::solids::{Found, bent_tube, block, clamp, model, shell_of, slotted, strip, tube, under};
 use glam::{DQuat, DVec3};
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::solid::SolidModel;
 use hapdef::elasticity::solid::immersed::Fineness;
 use hapdef::elasticity::support::Region;
 use hapdef::elasticity::{Freedoms, Material, Model as _, Support, Touch};
+use hapdef::mesh::oriented_box::OrientedBox;
+use hapdef::mesh::stance::Stance;
 
 #[test]
 fn cells_larger_than_the_wall_bend_as_a_beam() {
@@ -149,7 +151,7 @@ fn mirror(axis: usize) -> Support {
     upper[axis] = 1e-9;
     lower[axis] = -1e-9;
     Support {
-        region: Region::Box { lower, upper },
+        region: Region::Box(OrientedBox::of_file(lower, upper)),
         held: Freedoms::symmetry(axis),
     }
 }
@@ -228,4 +230,33 @@ fn a_solid_and_a_shell_of_the_same_tube_agree() {
     let found = shell_of(3.0);
     println!("{found:?}");
     assert!(found.displacement < 2.5 && found.strain < 2.0, "{found:?}");
+}
+
+#[test]
+fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
+    let sides = DVec3::new(0.01, 0.01, 0.05);
+    let turned = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 0.5).normalize(), 0.8);
+    let [upright, oblique] = [DQuat::IDENTITY, turned].map(|turn| {
+        let part = block(sides, |p| turn * p);
+        let foot = Support {
+            region: Region::Box(OrientedBox {
+                stance: Stance::about(turn * DVec3::Z),
+                lower: DVec3::NEG_ONE,
+                upper: DVec3::new(1.0, 1.0, 0.01),
+            }),
+            held: Freedoms::ALL,
+        };
+        let touch = Touch {
+            position: turn * DVec3::new(0.01, 0.005, 0.045),
+            normal: turn * DVec3::X,
+            force: 1.0,
+            tip_radius: 3e-3,
+        };
+        let m = model(&part, RESIN, &[foot], &Fineness::of(3e-3, 0.01));
+        under(&m, &touch)
+    });
+    // The one holds all of the material in it, the other its surface: that gives a little more.
+    let more = oblique / upright - 1.0;
+    println!("{:.1} % more", 100.0 * more);
+    assert!(more.abs() < 0.08, "{upright} {oblique}");
 }

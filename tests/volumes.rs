@@ -169,6 +169,7 @@ fn answer(loaded: LoadedMesh, set: Option<&str>) -> (f64, f64, Vec<String>) {
         box_mm: set
             .is_none()
             .then_some([[-1.0, -1.0, -1.0], [0.001, 30.0, 3.0]]),
+        box_axis: None,
         vertices: set.map(str::to_owned),
         normal: Axis::Z,
     });

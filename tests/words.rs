@@ -166,6 +166,7 @@ fn a_plate_of_two_triangles_is_touched_all_over_but_its_margin() {
     project.supports.push(SupportKeys {
         kind: SupportKind::Clamped,
         box_mm: Some([[-1.0, -1.0, -1.0], [1.0, 81.0, 1.0]]),
+        box_axis: None,
         vertices: None,
         normal: Axis::Z,
     });
@@ -342,6 +343,7 @@ fn an_open_solid_that_welding_closes_is_told_the_key() {
         project.supports.push(SupportKeys {
             kind: SupportKind::Clamped,
             box_mm: Some([[-1.0, -1.0, -1.0], [21.0, 21.0, 1.0]]),
+            box_axis: None,
             vertices: None,
             normal: Axis::Z,
         });

@@ -77,6 +77,7 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
     let provenance = Provenance {
         mesh_path: &loaded.mesh_path,
         version: env!("CARGO_PKG_VERSION"),
+        taken_in: loaded.repairs.in_words(loaded.inputs.project.part.body),
     };
     let files = artifacts::write_into(&report, &loaded.inputs, &design, &provenance)?;
     if args.common.json {

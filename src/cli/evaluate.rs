@@ -9,6 +9,7 @@ use super::progress::Bar;
 use super::ranges::{between, misuse, whole};
 use crate::io::{cpu_seconds, dataset_file};
 use crate::placement::greedy_svr::GreedySvr;
+use crate::plain;
 use crate::regression::Grouping;
 use crate::study::{self, Data, Estimator, Verdict};
 
@@ -171,7 +172,8 @@ impl EvaluateArgs {
         for (k, &site) in self.sites.iter().enumerate() {
             anyhow::ensure!(
                 site < count,
-                "--sites {site}: there are only {count} sites, counted from 0"
+                "--sites {site}: the data have only {}, counted from 0",
+                plain::count(count, "site")
             );
             anyhow::ensure!(
                 !self.sites[..k].contains(&site),

@@ -61,7 +61,8 @@ impl Example {
     }
 
     /// The example whose mesh has the name of this file.
-    fn of_mesh(mesh: &Path) -> Option<Self> {
+    #[must_use]
+    pub fn of_mesh(mesh: &Path) -> Option<Self> {
         let name = mesh.file_name()?;
         Self::ALL
             .into_iter()

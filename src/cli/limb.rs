@@ -254,6 +254,7 @@ fn clamped(boxes: &[BoxMm]) -> Vec<SupportKeys> {
         .map(|&box_mm| SupportKeys {
             kind: SupportKind::Clamped,
             box_mm: Some(box_mm),
+            box_axis: None,
             vertices: None,
             normal: Axis::default(),
         })

@@ -389,7 +389,10 @@ impl SelectArgs {
 fn known(flag: &str, sites: &[usize], data: &Data) -> anyhow::Result<()> {
     let count = data.x.rows();
     match sites.iter().find(|&&site| site >= count) {
-        Some(site) => bail!("{flag} {site}: there are only {count} sites, counted from 0"),
+        Some(site) => bail!(
+            "{flag} {site}: the data have only {}, counted from 0",
+            plain::count(count, "site")
+        ),
         None => Ok(()),
     }
 }

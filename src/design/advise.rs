@@ -67,6 +67,8 @@ impl Cost {
     }
 
     fn words(&self) -> String {
+        /// Up to here numbers are read without words.
+        const FEW: f64 = 1e4;
         let theory = if self.theory_percent > 0.0 {
             format!(" and {} % of theory", digits(self.theory_percent))
         } else {
@@ -82,9 +84,13 @@ impl Cost {
         } else {
             format!("{} % error of elements", digits(self.error_percent))
         };
+        let unknowns = if self.unknowns < FEW {
+            digits(self.unknowns)
+        } else {
+            format!("{} thousand", digits(self.unknowns / 1e3))
+        };
         format!(
-            "{elements}, about {} thousand unknowns, {} s of processor time, {} GB, {error}{theory} under a touch",
-            digits(self.unknowns / 1e3),
+            "{elements}, about {unknowns} unknowns, {} s of processor time, {} GB, {error}{theory} under a touch",
             digits(self.seconds.round().max(1.0)),
             digits(self.memory_gb.max(0.1)),
         )

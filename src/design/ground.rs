@@ -176,6 +176,15 @@ impl Ground {
         }))
     }
 
+    /// How thick the walls of a solid usually are, as measured (m).
+    #[must_use]
+    pub fn usual_wall(&self) -> Option<f64> {
+        match self {
+            Self::Shell(_) => None,
+            Self::Solid(solid) => Some(solid.reach.usual).filter(|usual| usual.is_finite()),
+        }
+    }
+
     /// What of the part is neither touched nor glued to, in plain words.
     #[must_use]
     pub fn left_out(&self, surroundings: Option<&Surroundings>) -> Vec<String> {

@@ -2,6 +2,7 @@
 
 use super::Inputs;
 use crate::feasible::{Blame, Feasibility, Filter};
+use crate::plain;
 
 /// Fewer sites are feasible than gauges were asked for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -25,7 +26,11 @@ impl Shortage {
         let head = if available == 0 {
             "no site is feasible".to_owned()
         } else {
-            format!("{wanted} gauges were asked for, but only {available} sites are feasible")
+            format!(
+                "{} asked for, but only {} feasible",
+                plain::either(wanted, "gauge was", "gauges were"),
+                plain::either(available, "site is", "sites are")
+            )
         };
         let mut words = format!("{head}: {}", taken_in_words(inputs, feasibility));
         if available > 0 {

@@ -230,6 +230,14 @@ fn read(
     })
 }
 
+impl Simulated {
+    /// How thick the walls of a solid usually are, as measured (m).
+    #[must_use]
+    pub fn usual_wall(&self) -> Option<f64> {
+        self.ground.usual_wall()
+    }
+}
+
 /// A word where many touches press on what is held: they move next to nothing, so that no gauge can tell them
 /// apart, and rule every mean.
 fn on_supports(inputs: &Inputs, touches: &[Touch]) -> Result<Option<String>, DesignError> {
@@ -241,9 +249,7 @@ fn on_supports(inputs: &Inputs, touches: &[Touch]) -> Result<Option<String>, Des
     let index = SurfaceIndex::new(&inputs.part);
     let is_held = |touch: &&Touch| {
         held.iter().any(|support| match &support.region {
-            Region::Box { lower, upper } => {
-                touch.position.cmpge(*lower).all() && touch.position.cmple(*upper).all()
-            }
+            Region::Box(held) => held.contains(touch.position, 0.0),
             Region::Vertices(mask) => {
                 let at = index.nearest(touch.position).0;
                 inputs.part.mostly_in(mask, at)

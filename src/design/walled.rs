@@ -35,19 +35,18 @@ pub fn walled(inputs: &Inputs) -> Option<Inputs> {
 
 /// Widens a box across the wall that it holds, and not along it.
 fn reach_through(support: &mut SupportKeys, part: &TriMesh, half: f64) {
-    let Some([a, b]) = &mut support.box_mm else {
+    let Some(mut region) = support.oriented_box() else {
         return;
     };
-    let [low, high] = [&*a, &*b].map(|p| DVec3::from_array(*p) * 1e-3);
-    let (lower, upper) = (low.min(high), low.max(high));
     let held = part.positions().iter().zip(part.vertex_normals());
     let reach = held
-        .filter(|(p, _)| p.cmpge(lower).all() && p.cmple(upper).all())
-        .fold(DVec3::ZERO, |reach, (_, n)| reach.max(n.abs() * half));
+        .filter(|(p, _)| region.contains(**p, 0.0))
+        .map(|(_, n)| region.stance.coordinates(*n).abs() * half)
+        .fold(DVec3::ZERO, DVec3::max);
     // A little more, so that the faces themselves lie within.
-    let (lower, upper) = (lower - reach * 1.001, upper + reach * 1.001);
-    *a = (lower * 1e3).to_array();
-    *b = (upper * 1e3).to_array();
+    region.lower -= reach * 1.001;
+    region.upper += reach * 1.001;
+    support.set_box(&region);
 }
 
 #[cfg(test)]

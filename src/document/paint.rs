@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::Document;
 use crate::mesh::SurfacePoint;
 use crate::mesh::unroll::Axis;
@@ -110,6 +108,7 @@ impl Document {
         self.state.project.supports.push(SupportKeys {
             kind: SupportKind::Clamped,
             box_mm: None,
+            box_axis: None,
             vertices: Some(name),
             normal: Axis::Z,
         });
@@ -276,14 +275,6 @@ impl Document {
         }
     }
 
-    /// The mirror image of a point of the part, through the middle of the part across an axis.
-    #[must_use]
-    pub fn mirrored(&self, p: DVec3, axis: Axis) -> DVec3 {
-        let (lower, upper) = self.part.bounds();
-        let along = axis.direction();
-        p + along * 2.0 * ((lower + upper) / 2.0 - p).dot(along)
-    }
-
     /// Every vertex is painted.
     pub fn fill(&mut self, layer: Layer) {
         self.repaint(layer, |_, mask| mask.fill(true));
@@ -412,16 +403,5 @@ mod tests {
         assert!(d.state.project.feasible.keep_out.is_none());
         d.undo();
         assert!(count(&d, Layer::KeepOut).unwrap() > 10);
-    }
-
-    #[test]
-    fn an_image_in_the_mirror() {
-        let d = document();
-        let p = DVec3::new(0.01, 0.02, 0.03);
-        let twice = d.mirrored(d.mirrored(p, Axis::Y), Axis::Y);
-        assert!(twice.distance(p) < 1e-15);
-        let (lower, upper) = d.part.bounds();
-        let moved = d.mirrored(p, Axis::Y) - p;
-        assert!((moved.y - (lower.y + upper.y - 0.04)).abs() < 1e-12 && moved.x == 0.0);
     }
 }

@@ -7,6 +7,7 @@ use glam::DVec3;
 use crate::mesh::canonical::Canonical;
 use crate::mesh::cut::{ON_PLANE, cut_by_boxes};
 use crate::mesh::mount::Mount;
+use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::{Edge, SurfacePoint, TriMesh};
 
 /// The held ones among the six freedoms of a node: displacement x, y, z, rotation x, y, z.
@@ -39,8 +40,8 @@ impl Freedoms {
 /// Where a support holds.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Region {
-    /// Every point of the part inside a box (m).
-    Box { lower: DVec3, upper: DVec3 },
+    /// Every point of the part inside a box.
+    Box(OrientedBox),
     /// Every point between vertices of the part that are set (one value a vertex): a painted mask or a
     /// group of the mesh file.
     Vertices(Arc<Vec<bool>>),
@@ -58,10 +59,7 @@ impl Support {
     #[must_use]
     pub fn canonical(&self, part: &Canonical) -> Self {
         let region = match &self.region {
-            Region::Box { lower, upper } => Region::Box {
-                lower: part.frame.snapped(*lower),
-                upper: part.frame.snapped(*upper),
-            },
+            Region::Box(held) => Region::Box(part.frame.snapped_box(held)),
             Region::Vertices(mask) => Region::Vertices(Arc::new(part.in_order(mask))),
         };
         Self {
@@ -92,10 +90,10 @@ impl HeldPart {
     /// Cuts the part along its support boxes.
     #[must_use]
     pub fn new(part: &Arc<TriMesh>, supports: &[Support]) -> Self {
-        let boxes: Vec<(DVec3, DVec3)> = supports
+        let boxes: Vec<OrientedBox> = supports
             .iter()
             .filter_map(|s| match s.region {
-                Region::Box { lower, upper } => Some((lower, upper)),
+                Region::Box(held) => Some(held),
                 Region::Vertices(_) => None,
             })
             .collect();
@@ -225,11 +223,7 @@ fn members(mesh: &TriMesh, supports: &[Support]) -> Vec<Members> {
 fn in_boxes(p: DVec3, supports: &[Support], slack: f64) -> Members {
     let boxes = supports.iter().enumerate().take(MOST);
     boxes.fold(0, |members, (k, s)| match s.region {
-        Region::Box { lower, upper }
-            if p.cmpge(lower - slack).all() && p.cmple(upper + slack).all() =>
-        {
-            members | 1 << k
-        }
+        Region::Box(held) if held.contains(p, slack) => members | 1 << k,
         _ => members,
     })
 }
@@ -272,10 +266,10 @@ mod tests {
     #[test]
     fn a_box_holds_exactly_what_it_covers() {
         let support = Support {
-            region: Region::Box {
-                lower: DVec3::splat(-1.0),
-                upper: DVec3::new(1.3, 2.0, 1.0),
-            },
+            region: Region::Box(OrientedBox::of_file(
+                DVec3::splat(-1.0),
+                DVec3::new(1.3, 2.0, 1.0),
+            )),
             held: Freedoms::ALL,
         };
         let part = HeldPart::new(&strip(), &[support]);
@@ -310,10 +304,10 @@ mod tests {
         ];
         let part = Arc::new(TriMesh::new(&p, &[[0, 1, 2], [0, 2, 3]], 0).unwrap().0);
         let clamp = |from: f64, to: f64| Support {
-            region: Region::Box {
-                lower: DVec3::new(from, -1.0, -1.0),
-                upper: DVec3::new(to, 2.0, 1.0),
-            },
+            region: Region::Box(OrientedBox::of_file(
+                DVec3::new(from, -1.0, -1.0),
+                DVec3::new(to, 2.0, 1.0),
+            )),
             held: Freedoms::ALL,
         };
         let held = HeldPart::new(&part, &[clamp(-1.0, 1.0), clamp(9.0, 11.0)]);

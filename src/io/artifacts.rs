@@ -21,6 +21,8 @@ use crate::project::{ChosenSite, Project};
 pub struct Provenance<'a> {
     pub mesh_path: &'a Path,
     pub version: &'static str,
+    /// What was left out, mended and taken over when the mesh was read, in words.
+    pub taken_in: Option<String>,
 }
 
 /// The project among the files of a design.

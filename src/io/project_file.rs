@@ -309,12 +309,14 @@ mod tests {
         p.supports.push(SupportKeys {
             kind: SupportKind::Symmetry,
             box_mm: Some([[0.0, 1e-3, -2.0], [1.0, 2.0, 3.0]]),
+            box_axis: Some([0.1, -2.0, 1.0 / 3.0]),
             vertices: None,
             normal: Axis::X,
         });
         p.supports.push(SupportKeys {
             kind: SupportKind::Pinned,
             box_mm: None,
+            box_axis: None,
             vertices: Some("rim \"left\"".into()),
             normal: Axis::Z,
         });
@@ -488,6 +490,7 @@ mod tests {
         project.supports.push(SupportKeys {
             kind: SupportKind::Clamped,
             box_mm: None,
+            box_axis: None,
             vertices: Some("support-1".into()),
             normal: Axis::Z,
         });

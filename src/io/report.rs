@@ -2,6 +2,7 @@
 
 mod certificate;
 mod matched;
+mod part;
 
 use std::fmt::Write as _;
 
@@ -9,10 +10,11 @@ use super::artifacts::{Provenance, range, run_key, signal_to_noise, signal_unit}
 use super::svg::{self, Marker, Paint, Series, escape};
 use crate::colormap::ColorMap;
 use crate::design::{Design, Inputs, Simulated};
-use crate::evaluation::{EstimatorKind, Failures};
+use crate::evaluation::{BASELINE, EstimatorKind, Failures};
 use crate::gaussian_process::GpTrial;
 use crate::mesh::flatten::Flat;
 use crate::placement::SelectorKind;
+use crate::project::PartModel;
 use crate::regression::Hyper;
 
 const STYLE: &str = "
@@ -52,6 +54,7 @@ pub fn html(inputs: &Inputs, design: &Design, provenance: &Provenance) -> String
     error_map(&mut page, inputs, design);
     failures(&mut page, design);
     kernel_search(&mut page, design);
+    part::section(&mut page, inputs, design, provenance);
     settings(&mut page, inputs, design, provenance);
     page.push_str("</body></html>\n");
     page
@@ -86,7 +89,7 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
         number(
             page,
             &format!("{:.2} mm", row.error_mm),
-            &format!("mean error, {}{at_force}", row.region),
+            &format!("mean error as drawn, {}{at_force}", row.region),
         );
         number(page, &format!("{:.2} mm", row.median_mm), "median");
     }
@@ -143,16 +146,21 @@ fn number(page: &mut String, value: &str, label: &str) {
     );
 }
 
-/// The chosen gauges as markers.
+/// The chosen gauges as markers, which face as their wall does from outside.
 #[must_use]
-pub fn markers(design: &Design) -> Vec<Marker> {
+pub fn markers(inputs: &Inputs, design: &Design) -> Vec<Marker> {
     let sites = &design.simulated.dataset.sites;
+    // The inner face of a solid looks inward, the mid-surface of a shell outward.
+    let outward = match inputs.project.part.model {
+        PartModel::Solid => -1.0,
+        PartModel::Shell => 1.0,
+    };
     (1..)
         .zip(design.chosen())
         .map(|(number, &s)| Marker {
             number,
             position: sites[s].position,
-            normal: sites[s].normal,
+            normal: sites[s].normal * outward,
             direction: sites[s].direction,
         })
         .collect()
@@ -188,10 +196,10 @@ fn feasible_tint(design: &Design) -> Vec<f64> {
 fn pictures(page: &mut String, inputs: &Inputs, design: &Design) {
     let mesh = &design.simulated.mesh;
     let tint = feasible_tint(design);
-    let markers = markers(design);
+    let markers = markers(inputs, design);
     let stance = inputs.stance();
     let flat = Flat::of(mesh, stance);
-    page.push_str("<h2>Where the gauges go</h2><p>Green: feasible for a gauge. Each bar shows the gauge's direction; hollow gauges are on the far wall. All gauges are glued to the inside.</p><div class=\"views\">");
+    page.push_str("<h2>Where the gauges go</h2><p>Green: feasible for a gauge. Each bar shows the gauge's direction; hollow gauges are on the far wall. All gauges are glued to the inside. Up is the part's axis.</p><div class=\"views\">");
     for view in svg::standard_views(stance) {
         let _ = write!(
             page,
@@ -213,11 +221,11 @@ fn sites(page: &mut String, inputs: &Inputs, design: &Design) {
     let unit = signal_unit(dataset.signal);
     let _ = write!(
         page,
-        "<h2>Sites</h2><table><tr><th>Gauge</th><th>x (mm)</th><th>y (mm)</th><th>z (mm)</th><th>Direction</th><th>{} ({unit})</th><th>Rms strain (microstrain)</th><th>Signal to noise</th></tr>",
+        "<h2>Sites</h2><table><tr><th>Gauge</th><th>x (mm)</th><th>y (mm)</th><th>z (mm)</th><th>Direction (x, y, z)</th><th>{} ({unit})</th><th>Rms strain (microstrain)</th><th>Signal to noise</th></tr>",
         match dataset.signal {
             crate::dataset::Signal::Strain => "Strain, from – to",
             _ => "Displacement, from – to",
-        }
+        },
     );
     for (k, &s) in design.chosen().iter().enumerate() {
         let site = &dataset.sites[s];
@@ -239,7 +247,11 @@ fn sites(page: &mut String, inputs: &Inputs, design: &Design) {
             site.rms_strain * 1e6
         );
     }
-    page.push_str("</table>");
+    let _ = write!(
+        page,
+        "</table><p>Places and directions are in the coordinates of the mesh file, in millimetres. Strains and signals are those under touches of {} N anywhere on the part.</p>",
+        inputs.project.touch.force_n
+    );
 }
 
 fn plots(page: &mut String, design: &Design) {
@@ -308,7 +320,12 @@ fn error_map(page: &mut String, inputs: &Inputs, design: &Design) {
         "<h2>Where the error is</h2><p>Mean error around each place, of the chosen gauges on unseen touches of {} N.</p>{}<figure>{}<figcaption>unrolled, seen from outside. {}</figcaption></figure>",
         compared_n(inputs, design),
         svg::legend(map, "error (mm)", 0.0, top),
-        svg::unrolled(&flat, Paint::Map(map, &shares), &markers(design), 900.0),
+        svg::unrolled(
+            &flat,
+            Paint::Map(map, &shares),
+            &markers(inputs, design),
+            900.0
+        ),
         flat.stretch.words()
     );
 }
@@ -420,11 +437,19 @@ pub fn failure_ways(by: EstimatorKind) -> &'static [(bool, &'static str)] {
 
 /// The selector of a set with failed gauges, as read by people.
 #[must_use]
-pub fn failure_name(set: &Failures) -> &'static str {
+pub fn failure_name(set: &Failures) -> &str {
+    title_of(&set.selector)
+}
+
+/// What a set was chosen by, as read by people.
+fn title_of(selector: &str) -> &str {
+    if selector == BASELINE {
+        return "All candidates";
+    }
     SelectorKind::ALL
         .into_iter()
-        .find(|k| k.name() == set.selector)
-        .map_or("", SelectorKind::title)
+        .find(|k| k.name() == selector)
+        .map_or(selector, |kind| kind.title())
 }
 
 /// Error against number of failed gauges.
@@ -457,7 +482,7 @@ fn failures(page: &mut String, design: &Design) {
             let _ = write!(
                 page,
                 "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{} of {}</td></tr>",
-                escape(&set.selector),
+                escape(title_of(&set.selector)),
                 set.sensors,
                 r.failed,
                 if r.retrained { "yes" } else { "no" },
@@ -476,7 +501,7 @@ fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
         .evaluation
         .rows
         .iter()
-        .find(|r| r.selector == "all-candidates" && r.region == region)?;
+        .find(|r| r.selector == BASELINE && r.region == region)?;
     let most = design.selections.iter().map(|s| s.sets.len()).max()? as f64;
     Some(Series {
         name: "All candidates",
@@ -491,11 +516,11 @@ fn errors(page: &mut String, design: &Design) {
     }
     let _ = write!(
         page,
-        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, drawn off the nodes of a finer model ({:.2} mm). “As built”: every gauge {}, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
+        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, {}. “As built”: every gauge {}, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
         design.simulated.dataset.touches.len(),
         design.simulated.element_mm,
         design.truth.touches.len(),
-        design.truth.element_mm,
+        judged_on(design),
         design.truth.off.gluing.in_words()
     );
     for r in &design.evaluation.rows {
@@ -503,7 +528,7 @@ fn errors(page: &mut String, design: &Design) {
         let _ = write!(
             page,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td>{c}</td><td>{epsilon}</td><td>{gamma}</td></tr>",
-            escape(&r.selector),
+            escape(title_of(&r.selector)),
             r.sensors,
             escape(&r.region),
             r.error_mm,
@@ -514,6 +539,18 @@ fn errors(page: &mut String, design: &Design) {
         );
     }
     page.push_str("</table></details>");
+}
+
+/// What the touches that judge are computed on: where a finer model would not have fitted, on one like the design's.
+fn judged_on(design: &Design) -> String {
+    /// Sizes that differ by less are the same.
+    const SAME: f64 = 0.99;
+    let (own, truth) = (design.simulated.element_mm, design.truth.element_mm);
+    if truth < SAME * own {
+        format!("drawn off the nodes of a finer model ({truth:.2} mm)")
+    } else {
+        format!("drawn off the nodes of a model with elements of the same size ({truth:.2} mm)")
+    }
 }
 
 /// C, ε and γ of a regression.
@@ -579,28 +616,10 @@ fn settings(page: &mut String, inputs: &Inputs, design: &Design, provenance: &Pr
     let work = design.work();
     let rows: Vec<(&str, String)> = vec![
         (
-            "Part",
-            escape(
-                &provenance
-                    .mesh_path
-                    .file_name()
-                    .map(|n| n.to_string_lossy().into_owned())
-                    .unwrap_or_default(),
-            ),
-        ),
-        ("Thickness", format!("{} mm", p.part.thickness_mm)),
-        (
-            "Material",
-            format!(
-                "E {} GPa, ν {}",
-                p.material.youngs_modulus_gpa, p.material.poissons_ratio
-            ),
-        ),
-        (
             "Touch",
             format!(
-                "{} N over a radius of {} mm",
-                p.touch.force_n, p.touch.tip_radius_mm
+                "{} N over a radius of {} mm; expected from {} to {} N",
+                p.touch.force_n, p.touch.tip_radius_mm, p.touch.forces_n[0], p.touch.forces_n[1]
             ),
         ),
         (

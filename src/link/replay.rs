@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::{Got, Pace, Port};
 use crate::memory;
+use crate::plain;
 use crate::wire::{Decoder, Event};
 
 /// The longest that is waited for between two frames (µs): no board is slower than one sample a second, and a
@@ -49,10 +50,10 @@ fn whole(path: &Path) -> Result<Vec<u8>, String> {
     let size = about.len() as f64;
     if GROWTH * size > memory::allowed() {
         return Err(format!(
-            "the recording has {:.1} GB, and at most {:.1} GB are read with {:.1} GB of memory. Allow more with --memory-gb",
-            size / 1e9,
-            memory::allowed_gb() / GROWTH,
-            memory::allowed_gb()
+            "the recording has {}, and at most {} are read with {} of memory. Allow more with --memory-gb",
+            plain::needed_gb(size / 1e9),
+            plain::allowed_gb(memory::allowed_gb() / GROWTH),
+            plain::allowed_gb(memory::allowed_gb())
         ));
     }
     std::fs::read(path).map_err(unreadable)
@@ -155,6 +156,18 @@ mod tests {
                 Got::Bytes(count) => all.extend(&buffer[..count]),
             }
         }
+    }
+
+    #[test]
+    fn what_is_larger_than_memory_is_refused_in_numbers_that_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hapdrec");
+        let file = std::fs::File::create(&path).unwrap();
+        file.set_len(1_234_500_000_000).unwrap();
+        let Err(said) = open(&path, Pace::Fast) else {
+            panic!("a terabyte was read");
+        };
+        assert!(said.contains("the recording has 1240 GB"), "{said}");
     }
 
     #[test]

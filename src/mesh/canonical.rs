@@ -11,6 +11,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::TriMesh;
+use super::oriented_box::OrientedBox;
 
 /// Vertices of the part are rounded to its size over this power of two: far above the rounding of files and shifts, far
 /// below what any part is made to.
@@ -45,6 +46,17 @@ impl Frame {
     #[must_use]
     pub fn snapped(&self, place: DVec3) -> DVec3 {
         self.rounded(place - self.origin, PART)
+    }
+
+    /// A box that a file gives, in the frame.
+    #[must_use]
+    pub fn snapped_box(&self, given: &OrientedBox) -> OrientedBox {
+        let origin = given.stance.coordinates(self.origin);
+        OrientedBox {
+            stance: given.stance,
+            lower: self.rounded(given.lower - origin, PART),
+            upper: self.rounded(given.upper - origin, PART),
+        }
     }
 
     /// A vertex that was laid on the part (m), in the frame: exactly what [`Self::outward`] was given.

@@ -6,31 +6,28 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::TriMesh;
+use super::oriented_box::{OrientedBox, around};
+use super::stance::Stance;
 
 /// Points within this share of the part's size of a plane lie on it: files round their numbers, and people
 /// draw boxes a hair too large.
 pub const ON_PLANE: f64 = 1e-4;
 
-/// The mesh with every triangle that reaches through a face of a box (m) cut there. Old vertices keep
+/// The mesh with every triangle that reaches through a face of a box cut there. Old vertices keep
 /// their numbers; of each new one, the two old ones between which it lies and how far it is along.
 #[must_use]
-pub fn cut_by_boxes(mesh: &TriMesh, boxes: &[(DVec3, DVec3)]) -> (TriMesh, Vec<(u32, u32, f64)>) {
+pub fn cut_by_boxes(mesh: &TriMesh, boxes: &[OrientedBox]) -> (TriMesh, Vec<(u32, u32, f64)>) {
     let (lower, upper) = mesh.bounds();
     let slack = ON_PLANE * (upper - lower).length();
     let mut cut = Cutter {
         positions: mesh.positions().to_vec(),
         triangles: mesh.triangles().to_vec(),
         parents: Vec::new(),
+        places: Vec::new(),
         slack,
     };
-    for &(low, high) in boxes {
-        for axis in 0..3 {
-            for value in [low[axis], high[axis]] {
-                if value > lower[axis] + slack && value < upper[axis] - slack {
-                    cut.by_face(axis, value, low, high);
-                }
-            }
-        }
+    for region in boxes {
+        cut.by_box(region);
     }
     if cut.parents.is_empty() {
         return (mesh.clone(), cut.parents);
@@ -45,13 +42,28 @@ struct Cutter {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     parents: Vec<(u32, u32, f64)>,
+    /// The positions in the coordinates of the box that is cut along.
+    places: Vec<DVec3>,
     slack: f64,
 }
 
 impl Cutter {
-    fn by_face(&mut self, axis: usize, value: f64, low: DVec3, high: DVec3) {
+    fn by_box(&mut self, region: &OrientedBox) {
+        let places = self.positions.iter();
+        self.places = places.map(|&p| region.stance.coordinates(p)).collect();
+        let (lower, upper) = around(&self.places);
+        for axis in 0..3 {
+            for value in [region.lower[axis], region.upper[axis]] {
+                if value > lower[axis] + self.slack && value < upper[axis] - self.slack {
+                    self.by_face(axis, value, region);
+                }
+            }
+        }
+    }
+
+    fn by_face(&mut self, axis: usize, value: f64, region: &OrientedBox) {
         let side: Vec<f64> = self
-            .positions
+            .places
             .iter()
             .map(|p| {
                 let d = p[axis] - value;
@@ -63,7 +75,7 @@ impl Cutter {
         let reaching: Vec<bool> = self
             .triangles
             .iter()
-            .map(|t| self.reaches(t, axis, low, high))
+            .map(|t| self.reaches(t, axis, region))
             .collect();
         for (tri, _) in self
             .triangles
@@ -75,7 +87,7 @@ impl Cutter {
             for i in 0..3 {
                 let (p, q) = (tri[i], tri[(i + 1) % 3]);
                 if side[p as usize] * side[q as usize] < 0.0 {
-                    self.cut_edge(p.min(q), p.max(q), &side, &mut middles);
+                    self.cut_edge([p.min(q), p.max(q)], &side, &mut middles, region.stance);
                 }
             }
         }
@@ -89,15 +101,21 @@ impl Cutter {
             .collect();
     }
 
-    fn reaches(&self, tri: &[u32; 3], axis: usize, low: DVec3, high: DVec3) -> bool {
+    fn reaches(&self, tri: &[u32; 3], axis: usize, region: &OrientedBox) -> bool {
         (0..3).filter(|&a| a != axis).all(|a| {
-            let x = tri.map(|v| self.positions[v as usize][a]);
+            let x = tri.map(|v| self.places[v as usize][a]);
             let (least, most) = (x[0].min(x[1]).min(x[2]), x[0].max(x[1]).max(x[2]));
-            least <= high[a] + self.slack && most >= low[a] - self.slack
+            least <= region.upper[a] + self.slack && most >= region.lower[a] - self.slack
         })
     }
 
-    fn cut_edge(&mut self, a: u32, b: u32, side: &[f64], middles: &mut HashMap<(u32, u32), u32>) {
+    fn cut_edge(
+        &mut self,
+        [a, b]: [u32; 2],
+        side: &[f64],
+        middles: &mut HashMap<(u32, u32), u32>,
+        stance: Stance,
+    ) {
         let next = self.positions.len() as u32;
         if *middles.entry((a, b)).or_insert(next) != next {
             return;
@@ -105,7 +123,9 @@ impl Cutter {
         let (x, y) = (side[a as usize], side[b as usize]);
         let along = x / (x - y);
         let (p, q) = (self.positions[a as usize], self.positions[b as usize]);
-        self.positions.push(p.lerp(q, along));
+        let middle = p.lerp(q, along);
+        self.positions.push(middle);
+        self.places.push(stance.coordinates(middle));
         self.parents.push((a, b, along));
     }
 }
@@ -140,7 +160,7 @@ mod tests {
         ];
         let (mesh, _) = TriMesh::new(&p, &[[0, 1, 2], [0, 2, 3]], 0).unwrap();
         let (low, high) = (DVec3::new(2.0, 1.0, -1.0), DVec3::new(5.0, 4.0, 1.0));
-        let (cut, _) = cut_by_boxes(&mesh, &[(low, high)]);
+        let (cut, _) = cut_by_boxes(&mesh, &[OrientedBox::of_file(low, high)]);
         assert!((cut.area() - 80.0).abs() < 1e-12);
         // No crack: the free rim is as long as it was.
         let rim: f64 = cut
@@ -161,8 +181,8 @@ mod tests {
     fn what_no_box_reaches_is_left_alone() {
         let p = [DVec3::ZERO, DVec3::X, DVec3::Y];
         let (mesh, _) = TriMesh::new(&p, &[[0, 1, 2]], 0).unwrap();
-        let far = (DVec3::splat(5.0), DVec3::splat(6.0));
-        let (cut, parents) = cut_by_boxes(&mesh, &[far, (DVec3::splat(-1.0), DVec3::splat(9.0))]);
+        let cube = |low, high| OrientedBox::of_file(DVec3::splat(low), DVec3::splat(high));
+        let (cut, parents) = cut_by_boxes(&mesh, &[cube(5.0, 6.0), cube(-1.0, 9.0)]);
         assert_eq!((cut.triangles(), parents.len()), (mesh.triangles(), 0));
     }
 }

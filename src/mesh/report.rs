@@ -43,30 +43,73 @@ impl RepairReport {
                 self.bodies - 1
             ));
         }
-        let mut count = |n: usize, what: &str| {
-            if n > 0 {
-                parts.push(format!("{n} {what}"));
-            }
-        };
-        count(self.joined_vertices, "near vertices joined");
-        count(self.degenerate_triangles, "triangles without area dropped");
-        count(self.duplicate_triangles, "duplicate triangles dropped");
-        count(self.flipped_triangles, "triangles turned over");
-        count(self.filled_holes, "holes filled");
-        count(
-            self.non_manifold_edges,
-            "edges join more than two triangles",
-        );
-        count(self.slivers, "slivers");
+        let found = [
+            (
+                self.joined_vertices,
+                "near vertex joined",
+                "near vertices joined",
+            ),
+            (
+                self.degenerate_triangles,
+                "triangle without area dropped",
+                "triangles without area dropped",
+            ),
+            (
+                self.duplicate_triangles,
+                "duplicate triangle dropped",
+                "duplicate triangles dropped",
+            ),
+            (
+                self.flipped_triangles,
+                "triangle turned over",
+                "triangles turned over",
+            ),
+            (self.filled_holes, "hole filled", "holes filled"),
+            (
+                self.non_manifold_edges,
+                "edge joins more than two triangles",
+                "edges join more than two triangles",
+            ),
+            (self.slivers, "sliver", "slivers"),
+        ];
+        let found = found.into_iter().filter(|&(number, ..)| number > 0);
+        parts.extend(found.map(|(number, one, many)| plain::either(number, one, many)));
         if let Some(within) = self.closes_within {
             let mm = plain::digits(within * 1e3);
             parts.push(format!(
-                "{} edges are open, and the mesh closes when vertices within {mm} mm are joined (part.weld_mm = {mm})",
-                self.boundary_edges
+                "{} open, and the mesh closes when vertices within {mm} mm are joined (part.weld_mm = {mm})",
+                plain::either(self.boundary_edges, "edge is", "edges are")
             ));
         }
         let changed = (!parts.is_empty()).then(|| parts.join(", "));
         let said: Vec<String> = changed.into_iter().chain(self.notes.clone()).collect();
         (!said.is_empty()).then(|| said.join("; "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_of_a_thing_is_not_many() {
+        let words = |number: usize| {
+            let report = RepairReport {
+                joined_vertices: number,
+                flipped_triangles: number,
+                non_manifold_edges: number,
+                slivers: number,
+                boundary_edges: number,
+                closes_within: Some(1e-6),
+                ..RepairReport::default()
+            };
+            report.in_words(0).unwrap()
+        };
+        assert_eq!(
+            words(1),
+            "1 near vertex joined, 1 triangle turned over, 1 edge joins more than two triangles, 1 sliver, 1 edge is open, and the mesh closes when vertices within 0.001 mm are joined (part.weld_mm = 0.001)"
+        );
+        assert!(words(2).starts_with("2 near vertices joined, 2 triangles turned over, 2 edges"));
+        assert!(words(2).contains("2 slivers, 2 edges are open"));
     }
 }

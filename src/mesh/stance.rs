@@ -4,6 +4,7 @@ use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::TriMesh;
+use super::oriented_box::{OrientedBox, around};
 
 /// The directions of a part, of unit length and at right angles to each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,15 +52,35 @@ impl Stance {
         self.up.cross(self.front)
     }
 
-    /// The box (lower and upper corner, m) around that share of the part's height which is lowest.
+    /// One of its directions, of unit length.
     #[must_use]
-    pub fn lower_end(&self, mesh: &TriMesh, share: f64) -> (DVec3, DVec3) {
+    pub fn direction(&self, direction: Direction) -> DVec3 {
+        match direction {
+            Direction::Front => self.front,
+            Direction::Right => self.right(),
+            Direction::Up => self.up,
+        }
+    }
+
+    /// How far a point or a vector reaches to the front, to the right and up. For a part that stands along z these are
+    /// its x, y and z.
+    #[must_use]
+    pub fn coordinates(&self, p: DVec3) -> DVec3 {
+        DVec3::from_array(Direction::ALL.map(|d| self.direction(d).dot(p)))
+    }
+
+    /// The point or vector of such coordinates.
+    #[must_use]
+    pub fn place(&self, coordinates: DVec3) -> DVec3 {
+        self.front * coordinates.x + self.right() * coordinates.y + self.up * coordinates.z
+    }
+
+    /// The box around that share of the part's height which is lowest.
+    #[must_use]
+    pub fn lower_end(&self, mesh: &TriMesh, share: f64) -> OrientedBox {
         let height = |p: DVec3| p.dot(self.up);
-        let (low, high) = (mesh.positions().iter())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &p| {
-                (low.min(height(p)), high.max(height(p)))
-            });
-        let level = low + share * (high - low);
+        let whole = OrientedBox::around(mesh, *self);
+        let level = whole.lower.z + share * (whole.upper.z - whole.lower.z);
         let ends = mesh.edges().iter().flat_map(|edge| {
             let [a, b] = [edge.a, edge.b].map(|v| mesh.positions()[v as usize]);
             let (a, b) = if height(a) < height(b) {
@@ -78,10 +99,33 @@ impl Stance {
                 .into_iter()
                 .flatten()
         });
-        ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), p| {
-            (l.min(p), u.max(p))
-        })
+        let ends: Vec<DVec3> = ends.map(|p| self.coordinates(p)).collect();
+        let (lower, upper) = around(&ends);
+        OrientedBox {
+            stance: *self,
+            lower,
+            upper,
+        }
     }
+}
+
+/// As the axes of the file.
+impl Default for Stance {
+    fn default() -> Self {
+        Self::about(DVec3::Z)
+    }
+}
+
+/// The directions of a part, in the order of their coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    Front,
+    Right,
+    Up,
+}
+
+impl Direction {
+    pub const ALL: [Self; 3] = [Self::Front, Self::Right, Self::Up];
 }
 
 /// Means over a surface.

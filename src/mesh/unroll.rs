@@ -40,12 +40,6 @@ impl Axis {
             Self::Z => DVec3::Z,
         }
     }
-
-    /// The one that is nearest to a direction, whichever way it points.
-    #[must_use]
-    pub fn nearest(direction: DVec3) -> Self {
-        [Self::X, Self::Y, Self::Z][direction.abs().max_position()]
-    }
 }
 
 impl Unrolling {

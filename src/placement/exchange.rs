@@ -4,6 +4,7 @@
 
 use super::wishes::{Field, Wishes, reached};
 use super::{PlacementError, Pool, Request, SensorSet};
+use crate::plain;
 
 /// How often each gauge may be exchanged.
 pub const ROUNDS: usize = 4;
@@ -186,8 +187,8 @@ impl<'f> Run<'f> {
         let exchanged = self.exchanged();
         (exchanged > 0).then(|| {
             format!(
-                "{exchanged} of {} gauges were exchanged after all were chosen: {:.2} {} instead of {:.2}.",
-                self.places.len(),
+                "{exchanged} of {} exchanged after all were chosen: {:.2} {} instead of {:.2}.",
+                plain::count(self.places.len(), "gauge"),
                 C::told(self.value),
                 C::UNIT,
                 C::told(self.grown)

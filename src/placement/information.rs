@@ -8,6 +8,7 @@ use super::wishes::{Field, shortage};
 use super::{PlacementError, Pool, Request, Selection, SelectorKind, lead};
 use crate::budget::{Achieved, StopReason, Work};
 use crate::gaussian_process::{Covariance, GpKernel, GpTrial};
+use crate::plain;
 
 /// A Gaussian process over locations on the surface; the pool's sites come first, then those where no
 /// gauge can go.
@@ -154,8 +155,8 @@ pub(super) fn finish(
     let mut notes = geometry.covariance.notes();
     if geometry.coinciding > 0 {
         notes.push(format!(
-            "{} sites lie at the place of another: of such sites only one is ever chosen.",
-            geometry.coinciding
+            "{} at the place of another: of such sites only one is ever chosen.",
+            plain::either(geometry.coinciding, "site lies", "sites lie")
         ));
     }
     notes.extend(field.constant_notes());
@@ -166,8 +167,9 @@ pub(super) fn finish(
         cautions.push(shortage(&why, sets.len(), wanted));
     } else if short {
         cautions.push(format!(
-            "Only {} of {wanted} gauges: beyond them nothing uncertain is left that wishes allow.",
-            sets.len()
+            "Only {} of {}: beyond them nothing uncertain is left that wishes allow.",
+            sets.len(),
+            plain::count(wanted, "gauge")
         ));
     }
     Ok(Selection {

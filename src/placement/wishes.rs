@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{PlacementError, Pool, SensorSet};
 use crate::pca::PcaError;
+use crate::plain;
 use crate::regression::Standardizer;
 
 /// Wishes; the default asks for nothing but the count.
@@ -137,7 +138,10 @@ pub fn reached(sets: &[SensorSet], wishes: &Wishes) -> bool {
 /// A note on a choice that ended short of what was wanted, with what [`Field::closed`] says.
 #[must_use]
 pub fn shortage(why: &str, reached: usize, wanted: usize) -> String {
-    format!("Only {reached} of {wanted} gauges fit: {why}.")
+    format!(
+        "Only {reached} of {} fit: {why}.",
+        plain::count(wanted, "gauge")
+    )
 }
 
 /// What is to be said where the error that was asked for is not reached.
@@ -146,8 +150,8 @@ pub fn unreached(sets: &[SensorSet], wishes: &Wishes) -> Option<String> {
     let error = sets.last().and_then(|s| s.criterion)?;
     let target = wishes.target_mm.filter(|t| error > *t)?;
     Some(format!(
-        "The error asked for, {target} mm, was not reached: {error:.2} mm with {} gauges.",
-        sets.len()
+        "The error asked for, {target} mm, was not reached: {error:.2} mm with {}.",
+        plain::count(sets.len(), "gauge")
     ))
 }
 
@@ -408,8 +412,8 @@ impl<'a> Field<'a> {
         let mut notes = Vec::new();
         if !left_out.is_empty() {
             notes.push(format!(
-                "{} sites report the same under every touch and were left out.",
-                left_out.len()
+                "Left out: {} with the same report under every touch.",
+                plain::count(left_out.len(), "site")
             ));
         }
         notes.extend(kept.iter().map(|&place| {

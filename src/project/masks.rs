@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::DVec3;
-
-use super::{BadValue, MM, Project, SupportKeys, SupportKind};
+use super::{BadValue, Project, SupportKeys, SupportKind};
 use crate::elasticity::support::Region;
 use crate::elasticity::{Freedoms, Support};
 use crate::mesh::unroll::Axis;
@@ -91,14 +89,8 @@ fn names(masks: &Masks) -> String {
 }
 
 fn region(support: &SupportKeys, masks: &Masks) -> Result<Region, BadValue> {
-    match (&support.box_mm, &support.vertices) {
-        (Some(corners), None) => {
-            let [a, b] = corners.map(|p| DVec3::from_array(p) * MM);
-            Ok(Region::Box {
-                lower: a.min(b),
-                upper: a.max(b),
-            })
-        }
+    match (support.oriented_box(), &support.vertices) {
+        (Some(held), None) => Ok(Region::Box(held)),
         (None, Some(name)) => {
             let mask = Project::mask("support.vertices", Some(name), masks)?;
             let mask = mask.map(Arc::clone).unwrap_or_default();

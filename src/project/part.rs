@@ -1,10 +1,13 @@
 //! The part: its mesh and what is made of it, what it is made of, and how it is held.
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::{MM, PartAxis};
 use crate::limb::BoxMm;
+use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::repair::Repair;
+use crate::mesh::stance::Stance;
 use crate::mesh::unroll::Axis;
 
 /// Unit of a mesh file.
@@ -155,12 +158,56 @@ pub struct SupportKeys {
     /// Every point of the part inside it is held.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub box_mm: Option<BoxMm>,
+    /// Where the box does not lie along the file's axes: the direction it stands along. Its corners are then along
+    /// the front, the right and the up of a part of that axis, from the file's origin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_axis: Option<[f64; 3]>,
     /// Instead of a box: a mask of the part's vertices, by its name in the arrays beside the project
     /// file, or a group of the mesh file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vertices: Option<String>,
     #[serde(default)]
     pub normal: Axis,
+}
+
+impl SupportKeys {
+    /// Clamps what lies inside a box.
+    #[must_use]
+    pub fn clamping(region: &OrientedBox) -> Self {
+        let mut keys = Self {
+            kind: SupportKind::Clamped,
+            box_mm: None,
+            box_axis: None,
+            vertices: None,
+            normal: Axis::Z,
+        };
+        keys.set_box(region);
+        keys
+    }
+
+    /// Its box, where it has one.
+    #[must_use]
+    pub fn oriented_box(&self) -> Option<OrientedBox> {
+        let [a, b] = self.box_mm?.map(|p| DVec3::from_array(p) * MM);
+        let stance = (self.box_axis).map_or_else(Stance::default, |axis| {
+            Stance::about(DVec3::from_array(axis))
+        });
+        Some(OrientedBox {
+            stance,
+            lower: a.min(b),
+            upper: a.max(b),
+        })
+    }
+
+    /// Gives it a box: by the file's axes where the box lies along them.
+    pub fn set_box(&mut self, region: &OrientedBox) {
+        let (lower, upper, axis) = match region.along_axes() {
+            Some((lower, upper)) => (lower, upper, None),
+            None => (region.lower, region.upper, Some(region.stance.up())),
+        };
+        self.box_mm = Some([lower, upper].map(|p| (p * 1e3).to_array()));
+        self.box_axis = axis.map(|axis| axis.to_array());
+    }
 }
 
 /// What stands in place of a key that is left out.

@@ -295,25 +295,28 @@ impl Project {
         bounded("budget.limits.elements_percent", percent, &(1e-6..=1e6))
     }
 
-    fn check_axis(&self) -> Result<(), BadValue> {
-        /// Below this a direction is nobody's.
-        const LEAST: f64 = 1e-6;
-        let PartAxis::Along(direction) = self.part.axis else {
-            return Ok(());
-        };
-        check_place("part.axis", &direction)?;
-        if direction.iter().any(|x| x.abs() >= LEAST) {
-            return Ok(());
+    fn check_axes(&self) -> Result<(), BadValue> {
+        if let PartAxis::Along(direction) = self.part.axis {
+            check_direction("part.axis", direction)?;
         }
-        Err(BadValue {
-            key: "part.axis".to_owned(),
-            rule: "a direction, whose numbers are not all 0".into(),
-            value: format!("[{}]", direction.map(number).join(", ")),
-        })
+        for support in &self.supports {
+            let Some(direction) = support.box_axis else {
+                continue;
+            };
+            check_direction("support.box_axis", direction)?;
+            if support.box_mm.is_none() {
+                return Err(BadValue {
+                    key: "support.box_axis".to_owned(),
+                    rule: "given beside box_mm, which it turns".into(),
+                    value: "given without it".into(),
+                });
+            }
+        }
+        Ok(())
     }
 
     fn check_places(&self) -> Result<(), BadValue> {
-        self.check_axis()?;
+        self.check_axes()?;
         let supports = self.supports.iter().filter_map(|s| s.box_mm.as_ref());
         let regions = self.evaluation.regions.iter().map(|r| &r.box_mm);
         let costs = self.selection.costs.iter().map(|c| &c.box_mm);
@@ -419,6 +422,20 @@ pub(super) fn check(key: &str, rule: &'static str, value: f64, ok: bool) -> Resu
 }
 
 /// A number as people write it: nobody reads three hundred digits.
+fn check_direction(key: &str, direction: [f64; 3]) -> Result<(), BadValue> {
+    /// Below this a direction is nobody's.
+    const LEAST: f64 = 1e-6;
+    check_place(key, &direction)?;
+    if direction.iter().any(|x| x.abs() >= LEAST) {
+        return Ok(());
+    }
+    Err(BadValue {
+        key: key.to_owned(),
+        rule: "a direction, whose numbers are not all 0".into(),
+        value: format!("[{}]", direction.map(number).join(", ")),
+    })
+}
+
 fn number(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 || !size.is_finite() || (1e-4..1e7).contains(&size) {

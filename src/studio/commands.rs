@@ -6,11 +6,9 @@ use super::dialogs::Dialog;
 use super::gauges::Way;
 use super::palette::Palette;
 use super::tools::Tool;
-use super::viewport::Section;
 use super::{Stage, Studio};
 use crate::cli::examples::Example;
 use crate::document::Layer;
-use crate::mesh::unroll::Axis;
 use crate::render::camera::Preset;
 
 /// By how much a key makes the brush wider.
@@ -470,18 +468,7 @@ impl Studio {
                 self.view.frame_points(&picked, &self.document);
             }
             Command::SeeThrough => self.view.see_through = !self.view.see_through,
-            Command::Section => {
-                let (lower, upper) = self.document.part.bounds();
-                let axis = Axis::nearest(self.view.camera.stance.front());
-                self.view.section = match self.view.section {
-                    Some(_) => None,
-                    None => Some(Section {
-                        axis,
-                        offset: ((lower + upper) / 2.0).dot(axis.direction()),
-                        flip: false,
-                    }),
-                };
-            }
+            Command::Section => self.view.toggle_section(),
             Command::Unrolled => {
                 self.view.unrolled_shown = !self.view.unrolled_shown;
                 // What was begun in a view that goes ends with it.

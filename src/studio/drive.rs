@@ -597,6 +597,7 @@ impl Studio {
         };
         let inputs = result.inputs.clone();
         let (bundled, mesh) = (self.document.bundled, self.document.mesh_path.clone());
+        let taken_in = self.document.repairs.in_words(inputs.project.part.body);
         self.jobs.start(ctx, Task::Export, String::new(), move |_| {
             let mesh_path = if bundled {
                 saving::bundled_mesh_in(&folder, &mesh).map_err(Stop::Failed)?
@@ -606,6 +607,7 @@ impl Studio {
             let provenance = artifacts::Provenance {
                 mesh_path: &mesh_path,
                 version: env!("CARGO_PKG_VERSION"),
+                taken_in,
             };
             artifacts::write_all(&folder, &inputs, &design, &provenance)
                 .map_err(|e| Stop::Failed(e.to_string()))?;

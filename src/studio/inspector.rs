@@ -8,12 +8,15 @@ use glam::DVec3;
 use super::form::{choice, count, number, percentage, rows};
 use super::{Stage, Studio, quality_name};
 use crate::budget::{Limits, Quality};
+use crate::cli::examples::Example;
 use crate::dataset::Signal;
 use crate::document::Layer;
 use crate::evaluation::EstimatorKind;
 use crate::limb::BoxMm;
+use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::unroll::Axis;
 use crate::placement::SelectorKind;
+use crate::plain;
 use crate::project::{
     ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCES, GAIN_OFF, GAUGES, Lattice, PLACE_OFF,
     PartAxis, PartModel, Project, RegionKeys, SupportKeys, SupportKind, TIP_OFF, TOUCHES,
@@ -79,8 +82,10 @@ impl Studio {
         let from_file = !self.document.bundled;
         let bodies = self.document.repairs.bodies;
         let again = from_file && self.document.asks_for_another_part();
-        let file = self.document.mesh_path.display().to_string();
-        ui.weak(if from_file { &file } else { "The bundled limb" });
+        let mesh = &self.document.mesh_path;
+        let example = Example::of_mesh(mesh).filter(|_| !from_file);
+        let file = || mesh.display().to_string();
+        ui.weak(example.map_or_else(file, |example| example.name().to_owned()));
         let project = &mut self.document.state.project;
         let mut pressed = false;
         let up = self.view.camera.stance.up();
@@ -104,10 +109,7 @@ impl Studio {
         let project = &mut self.document.state.project;
         rows(ui, "Material", |ui| material(ui, project));
         // A slice at the lower end: a start that holds something on any part.
-        let start = || {
-            let (low, high) = stance.lower_end(&part, 0.05);
-            [low, high].map(|p| (p * 1000.0).to_array())
-        };
+        let start = || stance.lower_end(&part, 0.05);
         rows(ui, "Supports", |ui| supports(ui, project, start));
         let paint = ui
             .button("Paint a support")
@@ -331,7 +333,7 @@ fn material(ui: &mut Ui, project: &mut Project) {
 }
 
 /// The supports, with a new one beginning as the box that `start` gives.
-fn supports(ui: &mut Ui, project: &mut Project, start: impl FnOnce() -> BoxMm) {
+fn supports(ui: &mut Ui, project: &mut Project, start: impl FnOnce() -> OrientedBox) {
     let mut removed = None;
     for (k, support) in project.supports.iter_mut().enumerate() {
         let number = k + 1;
@@ -355,7 +357,8 @@ fn supports(ui: &mut Ui, project: &mut Project, start: impl FnOnce() -> BoxMm) {
             ui.end_row();
         }
         if let Some(held) = &mut support.box_mm {
-            corners(ui, &format!("Support {number}"), held);
+            let names = names_along(ui, support.box_axis);
+            corners(ui, &format!("Support {number}"), names, held);
         }
         ui.label("");
         if ui
@@ -375,13 +378,10 @@ fn supports(ui: &mut Ui, project: &mut Project, start: impl FnOnce() -> BoxMm) {
         .on_hover_text("Everything inside a box is held")
         .clicked()
     {
-        let [low, high] = start();
-        project.supports.push(SupportKeys {
-            kind: SupportKind::Clamped,
-            box_mm: Some([low.map(|x| x - 0.01), high.map(|x| x + 0.01)]),
-            vertices: None,
-            normal: Axis::Z,
-        });
+        /// What lies on the box's faces is meant (m).
+        const ROOM: f64 = 1e-5;
+        let held = start().grown(ROOM);
+        project.supports.push(SupportKeys::clamping(&held));
     }
     ui.end_row();
 }
@@ -394,7 +394,8 @@ fn regions_form(ui: &mut Ui, regions: &mut Vec<RegionKeys>, bounds: BoxMm) {
         ui.text_edit_singleline(&mut region.name)
             .labelled_by(name.id);
         ui.end_row();
-        corners(ui, &format!("Region {number}"), &mut region.box_mm);
+        let names = names_along(ui, None);
+        corners(ui, &format!("Region {number}"), names, &mut region.box_mm);
         ui.label("");
         let button = ui.button("Remove");
         if button
@@ -420,12 +421,27 @@ fn regions_form(ui: &mut Ui, regions: &mut Vec<RegionKeys>, bounds: BoxMm) {
     ui.end_row();
 }
 
+/// What the edges of a box lie along: the file's axes, or with an axis of its own its front, right and up, which is
+/// said over it.
+fn names_along(ui: &mut Ui, box_axis: Option<[f64; 3]>) -> [&'static str; 3] {
+    let Some(axis) = box_axis else {
+        return ["x", "y", "z"];
+    };
+    ui.label("along");
+    let [x, y, z] = axis.map(|x| format!("{x:.3}"));
+    ui.label("front, right, up").on_hover_text(format!(
+        "The box stands along [{x}, {y}, {z}], as the part did when it was made"
+    ));
+    ui.end_row();
+    ["front", "right", "up"]
+}
+
 /// Two opposite corners of a box (mm).
-fn corners(ui: &mut Ui, of: &str, corners: &mut BoxMm) {
+fn corners(ui: &mut Ui, of: &str, names: [&str; 3], corners: &mut BoxMm) {
     for (end, corner) in ["from", "to"].into_iter().zip(corners) {
         ui.label(format!("{end} (mm)"));
         ui.horizontal(|ui| {
-            for (axis, value) in ["x", "y", "z"].into_iter().zip(corner) {
+            for (axis, value) in names.into_iter().zip(corner) {
                 // As far as a project may name places: what is typed may be no number at all.
                 let number = DragValue::new(value).range(-FARTHEST..=FARTHEST);
                 let number = number.clamp_existing_to_range(false);
@@ -752,7 +768,11 @@ fn pins(ui: &mut Ui, project: &mut Project) {
         return;
     }
     ui.horizontal(|ui| {
-        ui.label(format!("{pinned} places must have a gauge"));
+        ui.label(plain::either(
+            pinned,
+            "place must have a gauge",
+            "places must have a gauge",
+        ));
         if ui.button("Release all pins").clicked() {
             project.selection.required_mm.clear();
         }

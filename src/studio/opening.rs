@@ -21,6 +21,7 @@ use crate::document::{Document, State};
 use crate::io::mesh_file::read_mesh;
 use crate::io::project_file::{self, LoadedProject};
 use crate::job::Stop;
+use crate::plain;
 use crate::project::Unit;
 
 /// A project ready to be shown.
@@ -134,7 +135,8 @@ impl Studio {
             }
             if lost > 0 {
                 opened.said.push(format!(
-                    "{lost} supports were on painted vertices that this mesh does not have: they are gone. Hold the part anew"
+                    "Gone, with painted vertices that this mesh does not have: {}. Hold the part anew",
+                    plain::count(lost, "support")
                 ));
             }
             Ok(Finished::Opened(Box::new(opened)))

@@ -244,11 +244,8 @@ impl Studio {
             return;
         }
         let mut centres = vec![centre];
-        if let Some(axis) = self.view.mirror {
-            let (image, _) = self
-                .view
-                .index
-                .nearest(self.document.mirrored(centre, axis));
+        if let Some(image) = self.view.image(centre) {
+            let (image, _) = self.view.index.nearest(image);
             centres.push(self.document.part.point(image));
         }
         let colour = if self.view.tool == Tool::Paint {

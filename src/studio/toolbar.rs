@@ -7,10 +7,27 @@ use super::tools::Tool;
 use super::viewport::Section;
 use super::{Command, Studio};
 use crate::document::Layer;
-use crate::mesh::unroll::Axis;
+use crate::mesh::stance::Direction;
 use crate::render::camera::Preset;
 
-const AXES: [(Axis, &str); 3] = [(Axis::X, "x"), (Axis::Y, "y"), (Axis::Z, "z")];
+/// The side of the part that a section cuts away.
+fn side_name(side: Direction) -> &'static str {
+    match side {
+        Direction::Front => "Front",
+        Direction::Right => "Right",
+        Direction::Up => "Top",
+    }
+}
+
+/// What a stroke is repeated from and to.
+fn mirror_name(across: Option<Direction>) -> &'static str {
+    match across {
+        None => "No mirror",
+        Some(Direction::Front) => "Front–back",
+        Some(Direction::Right) => "Left–right",
+        Some(Direction::Up) => "Up–down",
+    }
+}
 
 impl Studio {
     /// Two rows that stay as high as they are, whatever is chosen in them.
@@ -144,24 +161,7 @@ impl Studio {
             .on_hover_text("Of the brush over the surface ([ and ], or the wheel with Shift)")
             .accessible_name("Radius of the brush");
             self.view.brush = mm / 1000.0;
-            let mirror = self.view.mirror;
-            let name = |m: Option<Axis>| match m {
-                None => "No mirror",
-                Some(Axis::X) => "Mirror x",
-                Some(Axis::Y) => "Mirror y",
-                Some(Axis::Z) => "Mirror z",
-            };
-            egui::ComboBox::new("mirror", "")
-                .selected_text(name(mirror))
-                .width(80.0)
-                .show_ui(ui, |ui| {
-                    for option in std::iter::once(None).chain(AXES.map(|(axis, _)| Some(axis))) {
-                        ui.selectable_value(&mut self.view.mirror, option, name(option));
-                    }
-                })
-                .response
-                .on_hover_text("Repeat each stroke on the other side of the part's middle")
-                .accessible_name("Mirror");
+            self.mirror_control(ui);
         }
         ui.horizontal_wrapped(|ui| {
             for command in [
@@ -174,6 +174,23 @@ impl Studio {
                 self.toggle(ui, command);
             }
         });
+    }
+
+    fn mirror_control(&mut self, ui: &mut Ui) {
+        let options = std::iter::once(None).chain(Direction::ALL.map(Some));
+        egui::ComboBox::new("mirror", "")
+            .selected_text(mirror_name(self.view.mirror))
+            .width(80.0)
+            .show_ui(ui, |ui| {
+                for option in options {
+                    ui.selectable_value(&mut self.view.mirror, option, mirror_name(option));
+                }
+            })
+            .response
+            .on_hover_text(
+                "Repeat each stroke on the other side of the part's middle, as the part stands",
+            )
+            .accessible_name("Mirror");
     }
 
     fn field_controls(&mut self, ui: &mut Ui) {
@@ -223,22 +240,19 @@ impl Studio {
     }
 
     fn section_controls(&mut self, ui: &mut Ui) {
-        let (lower, upper) = self.document.part.bounds();
+        let around = self.view.around;
         let Some(section) = &mut self.view.section else {
             return;
         };
-        ui.horizontal(|ui| {
-            ui.label("Cut across");
-            for (axis, name) in AXES {
+        ui.horizontal_wrapped(|ui| {
+            ui.label("Cut away");
+            for side in Direction::ALL {
+                let name = side_name(side);
                 let button = ui
-                    .add(egui::Button::selectable(section.axis == axis, name))
-                    .accessible_name(format!("Section across {name}"));
+                    .add(egui::Button::selectable(section.side == side, name))
+                    .accessible_name(format!("Cut away: {}", name.to_lowercase()));
                 if button.clicked() {
-                    *section = Section {
-                        axis,
-                        offset: ((lower + upper) / 2.0).dot(axis.direction()),
-                        ..*section
-                    };
+                    *section = Section::halving(&around, side, section.flip);
                 }
             }
             let flip = ui
@@ -249,12 +263,11 @@ impl Studio {
                 section.flip = !section.flip;
             }
         });
-        let along = section.axis.direction();
-        let range = lower.dot(along) * 1000.0..=upper.dot(along) * 1000.0;
+        let [low, high] = around.span(section.side);
         let mut mm = section.offset * 1000.0;
         ui.spacing_mut().slider_width = 110.0;
         ui.add(
-            egui::Slider::new(&mut mm, range)
+            egui::Slider::new(&mut mm, low * 1000.0..=high * 1000.0)
                 .suffix(" mm")
                 .fixed_decimals(1),
         )

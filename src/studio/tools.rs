@@ -252,10 +252,7 @@ impl Studio {
                 continue;
             };
             self.document.dab(self.view.layer, brush, place, radius);
-            if let Some(axis) = self.view.mirror {
-                let image = self
-                    .document
-                    .mirrored(self.document.part.point(place), axis);
+            if let Some(image) = self.view.image(self.document.part.point(place)) {
                 let (image, off) = self.view.index.nearest(image);
                 // A part that is not its own mirror image has nothing there.
                 if off < radius {

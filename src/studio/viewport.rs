@@ -12,8 +12,8 @@ use super::tools::{Gesture, Tool};
 use crate::document::{Document, Layer};
 use crate::mesh::flatten::Flat;
 use crate::mesh::locate::SurfaceIndex;
-use crate::mesh::stance::Stance;
-use crate::mesh::unroll::Axis;
+use crate::mesh::oriented_box::OrientedBox;
+use crate::mesh::stance::{Direction, Stance};
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::PartAxis;
 use crate::render::camera::Camera;
@@ -29,19 +29,32 @@ pub enum Pane {
 /// What is cut away so that the inside can be seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
-    pub axis: Axis,
-    /// Along the axis (m).
+    /// The side of the part that is cut away.
+    pub side: Direction,
+    /// That way, of unit length, and from where on (m).
+    pub normal: DVec3,
     pub offset: f64,
-    /// Cut away what lies below instead of what lies above.
+    /// Cut away the other side instead.
     pub flip: bool,
 }
 
 impl Section {
+    /// One half of a part, of which the box around it is given.
+    #[must_use]
+    pub fn halving(part: &OrientedBox, side: Direction, flip: bool) -> Self {
+        Self {
+            side,
+            normal: part.stance.direction(side),
+            offset: part.middle(side),
+            flip,
+        }
+    }
+
     /// Normal n and d: what has n·p > d is cut away.
     #[must_use]
     pub fn plane(&self) -> (DVec3, f64) {
         let sign = if self.flip { -1.0 } else { 1.0 };
-        (self.axis.direction() * sign, self.offset * sign)
+        (self.normal * sign, self.offset * sign)
     }
 
     #[must_use]
@@ -87,15 +100,16 @@ impl Unrolled {
 /// State of the views; none of it belongs to the project.
 pub struct Viewport {
     pub camera: Camera,
-    /// The key that the camera stands by.
+    /// The key that the camera stands by, and the box around the part as it stands so.
     axis: PartAxis,
+    pub(super) around: OrientedBox,
     pub tool: Tool,
     pub layer: Layer,
     pub field: Field,
     /// Brush radius (m).
     pub brush: f64,
-    /// Strokes are repeated on the other side of the part's middle across this axis.
-    pub mirror: Option<Axis>,
+    /// Strokes are repeated on the other side of the part's middle, across this direction.
+    pub mirror: Option<Direction>,
     pub section: Option<Section>,
     pub see_through: bool,
     pub unrolled_shown: bool,
@@ -127,6 +141,7 @@ impl Viewport {
         Self {
             camera: Camera::framing(lower, upper, stance),
             axis,
+            around: OrientedBox::around(&document.part, stance),
             tool: Tool::Touch,
             layer: Layer::Feasible,
             field: Field::Region,
@@ -148,6 +163,20 @@ impl Viewport {
             flat_rect: Rect::NOTHING,
             covered: Rect::NOTHING,
         }
+    }
+
+    /// Where a stroke at a point of the part (m) is repeated.
+    #[must_use]
+    pub fn image(&self, p: DVec3) -> Option<DVec3> {
+        Some(self.around.mirrored(p, self.mirror?))
+    }
+
+    /// Cuts one side of the part away, or nothing any more.
+    pub(super) fn toggle_section(&mut self) {
+        self.section = match self.section {
+            Some(_) => None,
+            None => Some(Section::halving(&self.around, Direction::Front, false)),
+        };
     }
 
     pub fn frame(&mut self, document: &Document) {
@@ -352,8 +381,13 @@ impl Studio {
     fn stand_upright(&mut self) {
         let axis = self.document.state.project.part.axis;
         if self.view.axis != axis {
+            let stance = axis.stance(&self.document.part);
             self.view.axis = axis;
-            self.view.camera.stance = axis.stance(&self.document.part);
+            self.view.camera.stance = stance;
+            self.view.around = OrientedBox::around(&self.document.part, stance);
+            let around = &self.view.around;
+            self.view.section =
+                (self.view.section).map(|cut| Section::halving(around, cut.side, cut.flip));
         }
         let stance = self.view.camera.stance;
         if self.view.unrolled_shown && self.view.unrolled.stance != stance {

@@ -35,6 +35,7 @@ pub fn inputs() -> Inputs {
     project.supports.push(SupportKeys {
         kind: SupportKind::Clamped,
         box_mm: Some([[-80.0, -80.0, -1.0], [80.0, 80.0, 6.0]]),
+        box_axis: None,
         vertices: None,
         normal: Axis::Z,
     });

@@ -15,6 +15,7 @@ use hapdef::elasticity::{Freedoms, Material, Model as _, Support, Touch};
 use hapdef::given::GivenSite;
 use hapdef::io::points::{read_sites, read_touches};
 use hapdef::mesh::TriMesh;
+use hapdef::mesh::oriented_box::OrientedBox;
 use hapdef::mesh::walls::Side;
 
 /// A surface of quadrangles (each counter-clockwise from outside), cut in two.
@@ -72,7 +73,7 @@ pub fn tube(inner: f64, outer: f64, length: f64, n: u32) -> Arc<TriMesh> {
 /// All displacements held in a box.
 pub fn clamp(lower: DVec3, upper: DVec3) -> Support {
     Support {
-        region: Region::Box { lower, upper },
+        region: Region::Box(OrientedBox::of_file(lower, upper)),
         held: Freedoms::ALL,
     }
 }

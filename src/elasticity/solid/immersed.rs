@@ -97,7 +97,7 @@ impl Immersed {
     pub fn cells(&self, fineness: &Fineness, watch: Watch) -> Result<FiniteCells, ElasticError> {
         let mut planes: [Vec<f64>; 3] = Default::default();
         for support in &self.supports {
-            if let Region::Box { lower, upper } = support.region {
+            if let Some((lower, upper)) = along_planes(support) {
                 for axis in 0..3 {
                     planes[axis].extend([lower[axis], upper[axis]]);
                 }
@@ -209,12 +209,9 @@ impl Immersed {
         for (number, support) in self.supports.iter().enumerate() {
             let held = displacements(support);
             let is_volume = held == Freedoms::DISPLACEMENTS && {
-                let inside = |p: DVec3| match support.region {
-                    Region::Box { lower, upper }
-                        if p.cmpge(lower).all() && p.cmple(upper).all() =>
-                    {
-                        held
-                    }
+                let planes = along_planes(support);
+                let inside = |p: DVec3| match planes {
+                    Some((lower, upper)) if p.cmpge(lower).all() && p.cmple(upper).all() => held,
                     _ => Freedoms::default(),
                 };
                 let any = (0..cells.count()).any(|c| inside(cells.centre(c)).0 != 0);
@@ -237,6 +234,15 @@ fn displacements(support: &Support) -> Freedoms {
     Freedoms(support.held.0 & Freedoms::DISPLACEMENTS.0)
 }
 
+/// The box (m) of a support where planes of a grid can lie along its faces. One that is turned holds the surface in it
+/// by springs, as what is painted does: cells that it goes through would hold a staircase.
+fn along_planes(support: &Support) -> Option<(DVec3, DVec3)> {
+    match &support.region {
+        Region::Box(held) => held.along_axes(),
+        Region::Vertices(_) => None,
+    }
+}
+
 /// Holds the nodes in a support's box; whether there are any.
 fn hold_box(
     grip: &mut Grip,
@@ -244,11 +250,11 @@ fn hold_box(
     support: &Support,
     fineness: &Fineness,
 ) -> bool {
-    let Region::Box { lower, upper } = support.region else {
+    let Region::Box(held) = support.region else {
         return false;
     };
     let slack = 1e-9 * fineness.size;
     grip.hold_nodes(elements, displacements(support), |p| {
-        p.cmpge(lower - slack).all() && p.cmple(upper + slack).all()
+        held.contains(p, slack)
     })
 }

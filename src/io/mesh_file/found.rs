@@ -2,7 +2,7 @@
 //! comes first.
 
 use crate::elasticity::Material;
-use crate::plain::quote;
+use crate::plain::{self, quote};
 use crate::project::{Masks, MaterialKeys, PartModel, Project, SupportKeys, Unit};
 
 /// A pound-force on a square inch (Pa).
@@ -102,8 +102,8 @@ impl Said {
         });
         if !lost.is_empty() {
             notes.push(format!(
-                "{} supports of the file hold no node of the part's surface and are left out",
-                lost.len()
+                "left out, as no node of the part's surface is held by it: {} of the file",
+                plain::count(lost.len(), "support")
             ));
         }
         Found {

@@ -194,12 +194,15 @@ impl Walk<'_> {
             no_surface(self.without_area, "primitives of points or lines"),
             (self.morphed > 0).then(|| {
                 format!(
-                    "{} meshes of the file have shapes to morph into: they are read as they are at rest",
-                    self.morphed
+                    "read as at rest: {} of the file with shapes to morph into",
+                    plain::either(self.morphed, "mesh", "meshes")
                 )
             }),
             (other_scenes > 0).then(|| {
-                format!("{other_scenes} other scenes of the file were left out")
+                format!(
+                    "{} of the file left out",
+                    plain::either(other_scenes, "other scene was", "other scenes were")
+                )
             }),
         ];
         self.soup.notes.extend(left_out.into_iter().flatten());

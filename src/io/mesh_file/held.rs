@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::elasticity::Freedoms;
 use crate::mesh::unroll::Axis;
+use crate::plain;
 use crate::project::{SupportKeys, SupportKind};
 
 /// A name and nodes, in rising order.
@@ -86,6 +87,7 @@ impl Held {
             self.nodes.values().any(is_own).then(|| SupportKeys {
                 kind: way.kind,
                 box_mm: None,
+                box_axis: None,
                 vertices: Some(name_of(self.held(way.need), way.name, sets)),
                 normal: way.normal,
             })
@@ -104,7 +106,8 @@ impl Held {
         let lost = self.nodes.values().filter(in_part).count();
         if lost > 0 {
             notes.push(format!(
-                "{lost} nodes are held in a way that is neither clamped, pinned nor a mirror plane: in part they are free here"
+                "{} held in a way that is neither clamped, pinned nor a mirror plane: in part free here",
+                plain::either(lost, "node is", "nodes are")
             ));
         }
         supports

@@ -102,6 +102,7 @@ struct Reader {
 impl Reader {
     fn begin(&mut self, keyword: &Keyword) -> Result<(), String> {
         self.element_is_whole()?;
+        self.elastic.notice(keyword);
         let line = keyword.line;
         self.reading = match keyword.name.as_str() {
             "NODE" => self.begin_nodes(keyword)?,

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::Soup;
 use super::words::{at, no_surface, number};
-use crate::plain::quote;
+use crate::plain::{self, quote};
 
 /// Reads all polygons of a file.
 pub fn read(bytes: &[u8]) -> Result<Soup, String> {
@@ -180,7 +180,8 @@ impl Reader {
         }
         if let Some((count, line, word)) = self.unknown {
             self.soup.notes.push(format!(
-                "{count} lines are not known in an OBJ file and were left out, the first is line {line} ({})",
+                "left out: {} not known in an OBJ file, the first is line {line} ({})",
+                plain::count(count, "line"),
                 quote(&word)
             ));
         }

@@ -101,6 +101,10 @@ fn part(t: &mut Text, project: &Project) {
         float(project.material.poissons_ratio),
         "above -1 and below 0.5",
     );
+    supports(t, project);
+}
+
+fn supports(t: &mut Text, project: &Project) {
     for support in &project.supports {
         t.list("support");
         t.key("kind", serialized(&support.kind), "\"clamped\" (no displacement, no rotation), \"pinned\" (no displacement) or \"symmetry\"");
@@ -109,6 +113,13 @@ fn part(t: &mut Text, project: &Project) {
             support.box_mm.as_ref().map(corners),
             "every point of the part inside it is held",
         );
+        if let Some(axis) = &support.box_axis {
+            t.key(
+                "box_axis",
+                numbers(axis),
+                "the box stands along this direction: its corners are along the front, the right and the up of a part of that axis",
+            );
+        }
         t.maybe(
             "vertices",
             support.vertices.as_deref().map(quoted),

@@ -16,7 +16,7 @@ pub(super) fn line(page: &mut String, design: &Design) {
     };
     let _ = write!(
         page,
-        "<details><summary>{}</summary><p>Expected error of these gauges {expected:.2} mm, of which {:.2} mm where one place is meant, which the bound is of. {}</p></details>",
+        "<details><summary>{}, for gauges as built</summary><p>Expected error of these gauges, with all that the project says to be off, {expected:.2} mm, which compares with the errors “as built” and not with those as drawn; of it {:.2} mm where one place is meant, which the bound is of. {}</p></details>",
         escape(&certificate.words(expected)),
         certificate.local_mm,
         escape(ASSUMES)

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::escape;
+use super::{escape, judged_on, title_of};
 use crate::design::{BLIND, Design};
 use crate::evaluation::MatchedRow;
 
@@ -28,7 +28,7 @@ pub(super) fn by_force(page: &mut String, design: &Design) {
 /// The cells of all figures of a row.
 fn figures(r: &MatchedRow) -> String {
     format!(
-        "<td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td>{:.0} %</td><td>{}</td>",
+        "<td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td>{:.1} %</td><td>{}</td>",
         r.error_mm,
         r.median_mm,
         r.p95_mm,
@@ -45,10 +45,10 @@ pub(super) fn errors(page: &mut String, design: &Design) {
     let presses = truth.pressed.as_ref().map_or(0, |p| p.presses.len());
     let _ = write!(
         page,
-        "<p>Each reading is matched with the model ({:.2} mm elements), which needs no training; judged on {} touches that no selection has seen, drawn off the nodes of a finer model ({:.2} mm). “As built”: every gauge {}, of which the model knows no more than that. “Calibrated”: the same gauges after {presses} known presses, each made by hand {}. “Blind”: touches that move no gauge by more than {BLIND} times its noise.</p>",
+        "<p>Each reading is matched with the model ({:.2} mm elements), which needs no training; judged on {} touches that no selection has seen, {}. “As built”: every gauge {}, of which the model knows no more than that. “Calibrated”: the same gauges after {presses} known presses, each made by hand {}. “Blind”: touches that move no gauge by more than {BLIND} times its noise.</p>",
         design.simulated.element_mm,
         truth.touches.len(),
-        truth.element_mm,
+        judged_on(design),
         truth.off.gluing.in_words(),
         truth.off.pressing.in_words()
     );
@@ -57,7 +57,7 @@ pub(super) fn errors(page: &mut String, design: &Design) {
         let _ = write!(
             page,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>{}</tr>",
-            escape(&r.selector),
+            escape(title_of(&r.selector)),
             r.sensors,
             r.force_n,
             escape(&r.region),

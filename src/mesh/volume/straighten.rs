@@ -29,9 +29,9 @@ impl Straightened {
     pub fn in_words(&self) -> Option<String> {
         (self.edges > 0).then(|| {
             format!(
-                "{} tetrahedra were turned inside out by bent edges: {} edges were straightened, which moved their nodes by {} at most (near {:.2} mm; part.straighten_mm is the limit)",
-                self.tetrahedra,
-                self.edges,
+                "{} turned inside out by bent edges: {} straightened, which moved nodes by {} at most (near {:.2} mm; part.straighten_mm is the limit)",
+                plain::either(self.tetrahedra, "tetrahedron was", "tetrahedra were"),
+                plain::either(self.edges, "edge was", "edges were"),
                 plain::mm(self.largest * 1e3),
                 self.place * 1e3
             )

@@ -9,6 +9,7 @@ use crate::io::mesh_file::sets::{Numbered, check_count};
 use crate::io::mesh_file::tetrahedra::Tetrahedra;
 use crate::io::mesh_file::unread::Unread;
 use crate::io::mesh_file::words::at;
+use crate::plain;
 
 /// Elements by what is made of them.
 #[derive(Default)]
@@ -142,7 +143,7 @@ impl Reader {
         if missing > 0 {
             self.soup.notes.push(format!(
                 "the component {} names {missing} nodes or elements that are not there",
-                crate::plain::quote(&name)
+                plain::quote(&name)
             ));
         }
         self.soup.node_sets.push((name, found));
@@ -160,7 +161,8 @@ impl Reader {
         let curved = sorted.shells.iter().filter(curved).count();
         if curved > 0 {
             notes.push(format!(
-                "{curved} curved shells are taken as flat: their nodes between the corners are left out"
+                "{} taken as flat: nodes between the corners are left out",
+                plain::either(curved, "curved shell is", "curved shells are")
             ));
         }
     }
@@ -169,8 +171,8 @@ impl Reader {
     fn note_rest(&self, left_out: &Unread, notes: &mut Vec<String>) {
         if !left_out.is_empty() {
             notes.push(format!(
-                "{} elements are left out, which are not computed on: {}",
-                left_out.total(),
+                "{} left out, as not computed on: {}",
+                plain::either(left_out.total(), "element is", "elements are"),
                 left_out.listed()
             ));
         }

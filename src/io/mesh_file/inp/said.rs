@@ -7,6 +7,7 @@ use super::values;
 use crate::elasticity::Freedoms;
 use crate::io::mesh_file::held::{Held, NodeSet};
 use crate::io::mesh_file::words::{fortran, listed, whole};
+use crate::plain;
 use crate::project::SupportKeys;
 
 /// The first isotropic elastic constants of the file.
@@ -15,9 +16,16 @@ pub struct Elastic {
     constants: Option<[f64; 2]>,
     /// Lines of constants: one for each material and temperature.
     lines: usize,
+    /// Whether the file is more than a mesh: it speaks of a material.
+    meant: bool,
 }
 
 impl Elastic {
+    /// Notices that a keyword speaks of a material.
+    pub fn notice(&mut self, keyword: &Keyword) {
+        self.meant |= keyword.name == "MATERIAL" || keyword.name.ends_with(" SECTION");
+    }
+
     /// Whether the lines after a keyword are constants of an isotropic material.
     #[must_use]
     pub fn is_read(keyword: &Keyword) -> bool {
@@ -48,6 +56,11 @@ impl Elastic {
                 "the file has {} elastic materials or temperatures: the first is taken",
                 self.lines
             ));
+        }
+        if self.meant && self.constants.is_none() {
+            notes.push(
+                "the file has no elastic constants that are read (*ELASTIC of an isotropic material): the project's are taken".to_owned(),
+            );
         }
         self.constants
     }
@@ -119,8 +132,8 @@ impl Boundaries {
         }
         if self.others > 0 {
             notes.push(format!(
-                "{} lines of *BOUNDARY move what they hold, or hold no displacement, and are left out",
-                self.others
+                "left out: {} of *BOUNDARY that move what is held, or hold no displacement",
+                plain::count(self.others, "line")
             ));
         }
         all.supports(true, sets, notes)

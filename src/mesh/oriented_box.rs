@@ -1,0 +1,95 @@
+//! Boxes that stand as a part does, along directions of their own.
+
+use glam::DVec3;
+
+use super::TriMesh;
+use super::stance::{Direction, Stance};
+
+/// A box whose edges lie along the front, the right and the up of a stance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OrientedBox {
+    pub stance: Stance,
+    /// Its corners (m), in the coordinates of the stance.
+    pub lower: DVec3,
+    pub upper: DVec3,
+}
+
+impl OrientedBox {
+    /// A box (m) along the axes of the file.
+    #[must_use]
+    pub fn of_file(lower: DVec3, upper: DVec3) -> Self {
+        Self {
+            stance: Stance::default(),
+            lower,
+            upper,
+        }
+    }
+
+    /// The box around a part as it stands.
+    #[must_use]
+    pub fn around(mesh: &TriMesh, stance: Stance) -> Self {
+        let places = mesh.positions().iter();
+        let places: Vec<DVec3> = places.map(|&p| stance.coordinates(p)).collect();
+        let (lower, upper) = around(&places);
+        Self {
+            stance,
+            lower,
+            upper,
+        }
+    }
+
+    /// A box that reaches further on all sides (m).
+    #[must_use]
+    pub fn grown(self, by: f64) -> Self {
+        Self {
+            lower: self.lower - by,
+            upper: self.upper + by,
+            ..self
+        }
+    }
+
+    /// Whether a point lies inside, or within `slack` (m) of it along its edges.
+    #[must_use]
+    pub fn contains(&self, p: DVec3, slack: f64) -> bool {
+        let at = self.stance.coordinates(p);
+        at.cmpge(self.lower - slack).all() && at.cmple(self.upper + slack).all()
+    }
+
+    /// Its corners (m) in the file's coordinates, where it lies along the axes of the file.
+    #[must_use]
+    pub fn along_axes(&self) -> Option<(DVec3, DVec3)> {
+        /// What rounding leaves between two directions that are the same.
+        const SAME: f64 = 1e-9;
+        let lies = |d: &Direction| self.stance.direction(*d).abs().max_element() > 1.0 - SAME;
+        Direction::ALL.iter().all(lies).then(|| {
+            let [a, b] = [self.lower, self.upper].map(|corner| self.stance.place(corner));
+            (a.min(b), a.max(b))
+        })
+    }
+
+    /// The mirror image of a point (m), through the middle of the box across one of its directions.
+    #[must_use]
+    pub fn mirrored(&self, p: DVec3, across: Direction) -> DVec3 {
+        let along = self.stance.direction(across);
+        p + along * 2.0 * (self.middle(across) - p.dot(along))
+    }
+
+    /// How far its middle is along one of its directions (m).
+    #[must_use]
+    pub fn middle(&self, along: Direction) -> f64 {
+        let [low, high] = self.span(along);
+        f64::midpoint(low, high)
+    }
+
+    /// From where to where it reaches along one of its directions (m).
+    #[must_use]
+    pub fn span(&self, along: Direction) -> [f64; 2] {
+        [self.lower, self.upper].map(|corner| corner[along as usize])
+    }
+}
+
+/// The corners of the box around some points, in the coordinates that these have.
+pub(super) fn around(points: &[DVec3]) -> (DVec3, DVec3) {
+    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    { points.iter() }.fold(empty, |(l, u), &p| (l.min(p), u.max(p)))
+}
