@@ -175,6 +175,6 @@ mod tests {
         let kinds: Vec<SupportKind> = supports.iter().map(|s| s.kind).collect();
         assert_eq!(kinds, [SupportKind::Clamped, SupportKind::Pinned]);
         assert_eq!(sets[1].1, [1, 2]);
-        assert!(notes[0].starts_with("1 nodes"), "{notes:?}");
+        assert!(notes[0].starts_with("1 node is"), "{notes:?}");
     }
 }
