@@ -1,6 +1,6 @@
 //! Solids at the edge: right, or refused in plain words.
 
-mod bench;
+use crate::bench;
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};

@@ -6,7 +6,7 @@
 //! Plates and Shells". Ratios that the same pair of elements reaches on the same meshes are known; each
 //! must be at least as near to one, to 0.01.
 
-mod bench;
+use crate::bench;
 
 use bench::{ratio_cook, ratio_cylinder, ratio_disc, ratio_plate, ratio_roof, ratio_twisted};
 use std::sync::Arc;

@@ -1,6 +1,6 @@
 //! The judge that does what runs live: the design's model matched to what a finer one reads.
 
-mod coarse;
+use crate::coarse;
 
 use std::sync::{Arc, OnceLock};
 

@@ -1,7 +1,7 @@
 //! Solids in a grid: against closed forms, against a solid model of someone else, against the shell, and under
 //! refinement.
 
-mod bench;
+use crate::bench;
 
 use bench::solids::{Found, bent_tube, block, clamp, model, shell_of, slotted, strip, tube, under};
 use glam::{DQuat, DVec3};

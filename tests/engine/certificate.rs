@@ -1,6 +1,6 @@
 //! The bound beside a choice by expected error: below the best of all sets, and near enough to it to say something.
 
-mod coarse;
+use crate::coarse;
 
 use std::ops::ControlFlow;
 

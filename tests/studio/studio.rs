@@ -5,7 +5,7 @@
     reason = "a small file is put together here"
 )]
 
-mod window;
+use crate::window;
 
 use egui::{Modifiers, Pos2};
 use egui_kittest::kittest::Queryable as _;

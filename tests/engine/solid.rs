@@ -1,6 +1,6 @@
 //! The shell against a solid model of the same limb (see `bench/slotted.rs`).
 
-mod bench;
+use crate::bench;
 
 use bench::slotted::agreement;
 use hapdef::budget::Quality;

@@ -1,7 +1,7 @@
 //! Live touch in the real window: a simulated board from start to replay.
 #![cfg(feature = "studio")]
 
-mod window;
+use crate::window;
 
 use std::collections::BTreeMap;
 use std::path::Path;

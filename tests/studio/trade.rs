@@ -1,7 +1,7 @@
 //! Speed against accuracy: measured, stopped and gone on from, reproduced, and turned as a dial in the window.
 #![cfg(feature = "studio")]
 
-mod window;
+use crate::window;
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -228,7 +228,7 @@ fn knobs_do_what_they_say() {
 /// The bundled record is of the bundled limb, and what the pages show is what it says.
 #[test]
 fn the_bundled_trade_is_of_the_bundled_limb() {
-    let text = include_str!("../assets/trade/trade.json");
+    let text = include_str!("../../assets/trade/trade.json");
     let record = Record::parse(text).unwrap();
     let inputs = cli::bundled().unwrap().inputs;
     assert!(
@@ -236,8 +236,11 @@ fn the_bundled_trade_is_of_the_bundled_limb() {
         "remake it: cargo bench --bench trade"
     );
     let tables = trade_file::markdown(&inputs.project, &record);
-    assert_eq!(tables, include_str!("../assets/trade/trade.md"));
-    for page in [include_str!("../README.md"), include_str!("../RESULTS.md")] {
+    assert_eq!(tables, include_str!("../../assets/trade/trade.md"));
+    for page in [
+        include_str!("../../README.md"),
+        include_str!("../../RESULTS.md"),
+    ] {
         assert!(page.contains(tables.trim_end()));
     }
     for quality in [Quality::Draft, Quality::Standard] {

@@ -1,6 +1,6 @@
 //! What a user is told: the cause that it really is, and which key to change to what.
 
-mod coarse;
+use crate::coarse;
 
 use std::path::Path;
 use std::process::Command;

@@ -1,7 +1,7 @@
 //! A closed part in the real window: measured, corrected with the brush, pressed, designed and reported.
 #![cfg(feature = "studio")]
 
-mod window;
+use crate::window;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

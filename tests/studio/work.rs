@@ -3,7 +3,7 @@
 //! The tally is of the whole process, so this is one test in a program of its own.
 #![cfg(feature = "studio")]
 
-mod window;
+use crate::window;
 
 use std::time::{Duration, Instant};
 

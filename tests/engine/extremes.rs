@@ -1,7 +1,7 @@
 //! The ends of every range: a right answer or a plain refusal, never a panic, never a number that is not
 //! one.
 
-mod coarse;
+use crate::coarse;
 
 use std::sync::Arc;
 

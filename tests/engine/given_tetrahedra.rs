@@ -1,6 +1,6 @@
 //! What is foreseen of a part with tetrahedra of its own, against what the road then does with them.
 
-mod bench;
+use crate::bench;
 
 use bench::hexes::Bricks;
 use glam::DVec3;

@@ -1,7 +1,7 @@
 //! The window stands as the part does.
 #![cfg(feature = "studio")]
 
-mod window;
+use crate::window;
 
 use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;

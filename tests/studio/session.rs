@@ -1,7 +1,7 @@
 //! Whole sessions in the real window, as an engineer has them who has read nothing.
 #![cfg(feature = "studio")]
 
-mod window;
+use crate::window;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -1,6 +1,6 @@
 //! What the choice by expected error promises is what matching then does.
 
-mod agreement;
+use crate::agreement;
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};

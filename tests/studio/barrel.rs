@@ -1,7 +1,7 @@
 //! The barrel of triangles: a closed solid of the paper's kind, written by this program and bundled with it.
 
 #[cfg(feature = "studio")]
-mod window;
+use crate::window;
 
 use std::collections::BTreeMap;
 use std::path::Path;

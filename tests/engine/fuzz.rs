@@ -4,7 +4,7 @@
 //! A few thousand files a reader here, the same in every run. `cargo bench --bench hard` does a million, with
 //! time and memory of each; `CONTRIBUTING.md` says how.
 
-mod hard;
+use crate::hard;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,6 +1,6 @@
 //! Meshes of tetrahedra that the user has, from the file to an answer.
 
-mod bench;
+use crate::bench;
 
 use std::fmt::Write as _;
 

@@ -33,7 +33,7 @@ fn matrix(rows: &[Vec<f64>]) -> SignalMatrix {
 
 #[test]
 fn objective_and_predictions_are_those_of_libsvm() {
-    let fixtures: Fixtures = serde_json::from_str(include_str!("fixtures/svr.json")).unwrap();
+    let fixtures: Fixtures = serde_json::from_str(include_str!("../fixtures/svr.json")).unwrap();
     assert!(fixtures.problems.len() >= 7);
     for (k, p) in fixtures.problems.iter().enumerate() {
         let (x, unseen) = (matrix(&p.x), matrix(&p.unseen));
@@ -88,7 +88,7 @@ impl Draw {
 
 #[test]
 fn two_hundred_random_problems_reach_the_optimum_of_libsvm() {
-    let fixtures: Fixtures = serde_json::from_str(include_str!("fixtures/svr.json")).unwrap();
+    let fixtures: Fixtures = serde_json::from_str(include_str!("../fixtures/svr.json")).unwrap();
     assert_eq!(fixtures.random.len(), 200);
     let (mut worst, mut agree) = (0.0f64, 0);
     for (seed, &objective) in fixtures.random.iter().enumerate() {

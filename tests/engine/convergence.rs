@@ -1,7 +1,7 @@
 //! How fast the shell converges, in displacement and in the strain of its inner face; and whether what it
 //! says about its own error is true.
 
-mod bench;
+use crate::bench;
 
 use std::sync::Arc;
 

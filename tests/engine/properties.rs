@@ -1,7 +1,7 @@
 //! What must hold whatever the numbers: rigid motion, rotation, renumbering, superposition, reciprocity,
 //! determinism, and each fast way against a naive one.
 
-mod bench;
+use crate::bench;
 
 use std::sync::Arc;
 

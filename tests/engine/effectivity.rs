@@ -1,7 +1,7 @@
 //! What the program says of its own error on solids, against the error it has: an independent solution of
 //! tetrahedra on the very same parts.
 
-mod bench;
+use crate::bench;
 
 use bench::hexes::{Bricks, ends};
 use bench::solids::clamp;

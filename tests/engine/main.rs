@@ -1,0 +1,43 @@
+//! What is computed and what the command line says of it: no window is opened and no board is connected.
+
+#[path = "../agreement/mod.rs"]
+mod agreement;
+#[path = "../bench/mod.rs"]
+mod bench;
+#[path = "../coarse/mod.rs"]
+mod coarse;
+#[path = "../hard/mod.rs"]
+mod hard;
+
+mod analytic;
+mod axis;
+mod certificate;
+mod cli;
+mod continuity;
+mod convergence;
+mod data_files;
+mod decks;
+mod effectivity;
+mod expected;
+mod extremes;
+mod fuzz;
+mod given_tetrahedra;
+mod inference;
+mod judge;
+mod layers;
+mod libsvm;
+mod mesh_files;
+mod pictures;
+mod placement;
+mod properties;
+mod reach;
+mod real_parts;
+mod regions;
+mod remesh;
+mod same_part;
+mod solid;
+mod solid_extremes;
+mod solids;
+mod study;
+mod volumes;
+mod words;

@@ -1,0 +1,14 @@
+//! Boards, streams and whole programs in real time.
+//!
+//! Apart from the others, so that nothing heavy runs beside them.
+
+#[cfg(feature = "studio")]
+#[path = "../window/mod.rs"]
+mod window;
+
+mod board;
+mod display;
+mod ends;
+mod firmware;
+mod live;
+mod promise;
