@@ -1,6 +1,7 @@
 //! What every site reports under every touch, and where the touches were.
 
 mod slopes;
+mod survey;
 
 use std::f64::consts::PI;
 
@@ -15,6 +16,7 @@ use crate::elasticity::{Model, Touch};
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 
 pub use slopes::GluingSlopes;
+pub use survey::{Move, Surveyed, survey};
 
 /// What a site reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -141,6 +143,24 @@ pub struct Dataset {
 }
 
 impl Dataset {
+    /// Forgets all sites but the first.
+    pub(crate) fn truncate(&mut self, sites: usize) {
+        self.sites.truncate(sites);
+        self.x.values.truncate(sites * self.x.columns);
+        if let Some(slopes) = &mut self.slopes {
+            slopes.truncate(sites);
+        }
+    }
+
+    /// One site more, read under every touch.
+    pub(crate) fn push(&mut self, gauge: &Surveyed) {
+        self.sites.push(gauge.site);
+        self.x.values.extend_from_slice(&gauge.x);
+        if let Some(slopes) = &mut self.slopes {
+            slopes.push(&gauge.slopes);
+        }
+    }
+
     /// Touch positions in millimetres: the targets that inference learns.
     #[must_use]
     pub fn targets_mm(&self) -> Vec<[f64; 3]> {

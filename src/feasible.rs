@@ -1,5 +1,7 @@
 //! Which sites a gauge can really sit on.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 use serde::Serialize;
 
@@ -126,10 +128,14 @@ impl Surroundings {
 
     /// The same, where what is closed is open for those who glue.
     #[must_use]
-    pub fn opened(mut self) -> Self {
-        if self.are_closed() {
-            self.room.fill(f64::INFINITY);
-        }
+    pub fn opened(self) -> Self {
+        if self.are_closed() { self.open() } else { self }
+    }
+
+    /// The same, all of it open for those who glue.
+    #[must_use]
+    pub fn open(mut self) -> Self {
+        self.room.fill(f64::INFINITY);
         self
     }
 }
@@ -153,11 +159,34 @@ pub struct FeasibleInput<'a> {
 /// Applies all filters.
 #[must_use]
 pub fn feasible(input: &FeasibleInput, rules: &FeasibleRules) -> Feasibility {
-    let filters = Filters::new(input, rules);
-    let verdict = |i: usize| Filter::ALL.into_iter().find(|&f| !filters.passes(f, i));
-    Feasibility {
-        verdicts: (0..input.sites.len()).map(verdict).collect(),
-    }
+    Filters::new(input, rules).verdicts()
+}
+
+/// How far each vertex of a mesh is from anything held, over the surface (m).
+#[must_use]
+pub fn clearance(mesh: &TriMesh, supported: &[u32]) -> Vec<f64> {
+    geodesic::from_vertices(mesh, supported, f64::INFINITY)
+}
+
+/// As [`feasible`], of gauges beside the sites: `sites`, where these are (m), say how near to an edge each gauge is, and
+/// `clearance` ([`clearance`]) how far from what is held.
+#[must_use]
+pub fn feasible_beside(
+    input: &FeasibleInput,
+    rules: &FeasibleRules,
+    clearance: &[f64],
+    sites: &[DVec3],
+) -> Feasibility {
+    let off_centre = (input.sites.iter())
+        .map(|gauge| off_centre_of(sites, gauge.position, rules.edge_neighbours))
+        .collect();
+    let filters = Filters {
+        clearance: Cow::Borrowed(clearance),
+        off_centre,
+        input,
+        rules,
+    };
+    filters.verdicts()
 }
 
 /// The filter that keeps most sites out, and what would let some of them in.
@@ -203,7 +232,7 @@ struct Filters<'a> {
     input: &'a FeasibleInput<'a>,
     rules: &'a FeasibleRules,
     /// From anything held, over the surface (m), a vertex of the mesh.
-    clearance: Vec<f64>,
+    clearance: Cow<'a, [f64]>,
     /// From each site to the centre of mass of its neighbours (m).
     off_centre: Vec<f64>,
 }
@@ -211,10 +240,17 @@ struct Filters<'a> {
 impl<'a> Filters<'a> {
     fn new(input: &'a FeasibleInput<'a>, rules: &'a FeasibleRules) -> Self {
         Self {
-            clearance: geodesic::from_vertices(input.mesh, input.supported, f64::INFINITY),
+            clearance: Cow::Owned(clearance(input.mesh, input.supported)),
             off_centre: off_centre(input.sites, rules.edge_neighbours),
             input,
             rules,
+        }
+    }
+
+    fn verdicts(&self) -> Feasibility {
+        let verdict = |i: usize| Filter::ALL.into_iter().find(|&f| !self.passes(f, i));
+        Feasibility {
+            verdicts: (0..self.input.sites.len()).map(verdict).collect(),
         }
     }
 
@@ -302,6 +338,26 @@ fn off_centre(sites: &[Site], neighbours: usize) -> Vec<f64> {
             centre.distance(positions[i])
         })
         .collect()
+}
+
+/// The same for a gauge beside the sites, where these are (m): of a gauge on a site, as for the site itself.
+fn off_centre_of(sites: &[DVec3], gauge: DVec3, neighbours: usize) -> f64 {
+    /// A gauge so near to a site is on it (m²).
+    const SAME: f64 = 1e-12;
+    let mut near: Vec<(f64, usize)> = (sites.iter().enumerate())
+        .map(|(i, site)| (site.distance_squared(gauge), i))
+        .collect();
+    near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    // The site itself is no neighbour of its own.
+    let own = usize::from(near.first().is_some_and(|n| n.0 <= SAME));
+    let list: Vec<DVec3> = (near.iter().skip(own).take(neighbours))
+        .map(|&(_, i)| sites[i])
+        .collect();
+    if list.is_empty() {
+        return 0.0;
+    }
+    let centre = list.iter().sum::<DVec3>() / list.len() as f64;
+    centre.distance(gauge)
 }
 
 /// The k nearest others of each position, by a search radius that grows for those that have not found as many: what
@@ -413,6 +469,30 @@ mod tests {
         for i in [0, 7, 10_101, 19_999, 20_000, 20_030, 20_059] {
             assert!(is_nearest(&positions, i, &lists[i]), "{i}");
         }
+    }
+
+    #[test]
+    fn a_gauge_on_a_site_is_as_far_from_an_edge_as_the_site() {
+        let plate: Vec<DVec3> = (0..400)
+            .map(|i| DVec3::new(f64::from(i % 20), f64::from(i / 20), 0.0) * 2.1e-3)
+            .collect();
+        let site = |&position: &DVec3| Site {
+            position,
+            normal: DVec3::Z,
+            direction: DVec3::X,
+            rms_strain: 0.0,
+            peak_strain: 0.0,
+        };
+        let sites: Vec<Site> = plate.iter().map(site).collect();
+        let all = off_centre(&sites, 8);
+        for i in [0, 7, 105, 210, 399] {
+            let own = off_centre_of(&plate, plate[i], 8);
+            assert!((own - all[i]).abs() < 1e-12, "{i}: {own} {}", all[i]);
+        }
+        // Between the sites of the middle it is near no edge, beside the last ones it is.
+        let between = off_centre_of(&plate, plate[210] + DVec3::new(1.05e-3, 1.05e-3, 0.0), 8);
+        assert!(between < 1e-3, "{between}");
+        assert!(off_centre_of(&plate, plate[399] + DVec3::X * 1e-3, 8) > all[399]);
     }
 
     #[test]

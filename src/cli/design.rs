@@ -105,7 +105,7 @@ fn as_in_the_paper(project: &mut Project) -> Vec<SelectorKind> {
 fn print_summary(design: &Design) -> anyhow::Result<()> {
     out::line(&format!(
         "{} inside sites, {} feasible, {} candidates, {} touches",
-        design.simulated.dataset.sites.len(),
+        design.simulated.lattice,
         design.reduced.feasible.len(),
         design.reduced.sites.len(),
         design.simulated.dataset.touches.len()

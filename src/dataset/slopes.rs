@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{Site, gauges_on};
 use crate::budget::{Cancelled, Watch};
-use crate::elasticity::respond::{Reading, respond};
+use crate::elasticity::respond::{Pressed, Reading, Responses, respond};
 use crate::elasticity::{Model, Touch};
 use crate::uncertainty::Gluing;
 
@@ -50,9 +50,33 @@ impl GluingSlopes {
         let moved: Vec<Site> = sites.iter().flat_map(shifted).collect();
         let (observer, angles) = gauges_on(model, &moved);
         let responses = respond(model, &pressed, &observer, Reading::Gauge(&angles), watch)?;
-        let count = columns.len();
-        let mut along = vec![0.0_f32; sites.len() * count];
-        let mut across = vec![0.0_f32; sites.len() * count];
+        let slopes = Self::between(&responses, sites.len(), columns.to_vec(), turned);
+        Ok((slopes, responses.solves))
+    }
+
+    /// As [`Self::of`] under all of some touches, of which the loads are there already.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub(super) fn under(
+        pressed: &Pressed,
+        sites: &[Site],
+        turned: Vec<f32>,
+        watch: Watch,
+    ) -> Result<(Self, usize), Cancelled> {
+        let moved: Vec<Site> = sites.iter().flat_map(shifted).collect();
+        let (observer, angles) = gauges_on(pressed.model(), &moved);
+        let responses = pressed.read(&observer, Reading::Gauge(&angles), watch)?;
+        let columns = (0..pressed.touches()).collect();
+        let slopes = Self::between(&responses, sites.len(), columns, turned);
+        Ok((slopes, responses.solves))
+    }
+
+    /// Central differences between what moved gauges read.
+    fn between(responses: &Responses, sites: usize, touches: Vec<usize>, turned: Vec<f32>) -> Self {
+        let count = touches.len();
+        let mut along = vec![0.0_f32; sites * count];
+        let mut across = vec![0.0_f32; sites * count];
         let rows = along
             .par_chunks_mut(count)
             .zip(across.par_chunks_mut(count));
@@ -68,13 +92,41 @@ impl GluingSlopes {
                 }
             },
         );
-        let slopes = Self {
-            touches: columns.to_vec(),
+        Self {
+            touches,
             along,
             across,
             turned,
-        };
-        Ok((slopes, responses.solves))
+        }
+    }
+
+    /// Slopes that are known already: along, across and turned.
+    #[cfg(test)]
+    pub(super) fn known(touches: Vec<usize>, [along, across, turned]: [Vec<f32>; 3]) -> Self {
+        Self {
+            touches,
+            along,
+            across,
+            turned,
+        }
+    }
+
+    /// Forgets all sites but the first.
+    pub(super) fn truncate(&mut self, sites: usize) {
+        let count = sites * self.touches.len();
+        for values in [&mut self.along, &mut self.across, &mut self.turned] {
+            values.truncate(count);
+        }
+    }
+
+    /// One site more, of which the slopes are known under every touch.
+    pub(super) fn push(&mut self, site: &Self) {
+        let [along, across, turned] = site.row(0);
+        for &touch in &self.touches {
+            self.along.push(along[touch]);
+            self.across.push(across[touch]);
+            self.turned.push(turned[touch]);
+        }
     }
 
     /// The touches of the dataset that slopes are known for, column by column.

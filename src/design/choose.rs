@@ -1,14 +1,15 @@
 //! Which sites gauges may have, and which they get.
 
 use std::borrow::Cow;
-use std::sync::OnceLock;
+use std::cell::LazyCell;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
 use super::known::{Known, detail};
 use super::{DesignError, HEARD_SEED, Inputs, LEAST_TOUCHES, Shortage, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
-use crate::dataset::{Dataset, Signal, SignalMatrix, Site};
+use crate::dataset::{Signal, SignalMatrix, Site};
 use crate::elasticity::support::supported_vertices;
 use crate::evaluation;
 use crate::feasible::{Feasibility, FeasibleInput, blame, feasible};
@@ -22,7 +23,7 @@ use crate::placement::expected_error::{self, ExpectedError};
 use crate::placement::greedy_svr::{self, GreedySvr};
 use crate::placement::information::Geometry;
 use crate::placement::mutual_information::MutualInformation;
-use crate::placement::wishes::{Loss, Thorough};
+use crate::placement::wishes::Thorough;
 use crate::placement::{
     PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes, lead,
     pca_qr,
@@ -63,9 +64,10 @@ struct LookedAt {
 
 impl LookedAt {
     fn of(inputs: &Inputs, simulated: &Simulated) -> Self {
-        let on = |mask: &std::sync::Arc<Vec<bool>>| {
-            painted_sites(&inputs.part, mask, &simulated.dataset)
-        };
+        let part = LazyCell::new(|| SurfaceIndex::new(&inputs.part));
+        // Gauges that were moved off the lattice are no sites to choose.
+        let sites = &simulated.dataset.sites[..simulated.lattice];
+        let on = |mask: &Arc<Vec<bool>>| painted_sites(&inputs.part, &part, mask, sites);
         let named = inputs.project.feasible.keep_out.as_ref();
         Self {
             index: SurfaceIndex::new(&simulated.mesh),
@@ -80,8 +82,8 @@ impl LookedAt {
             mesh: &simulated.mesh,
             index: &self.index,
             supported: &self.supported,
-            points: &simulated.points,
-            sites: &simulated.dataset.sites,
+            points: &simulated.points[..simulated.lattice],
+            sites: &simulated.dataset.sites[..simulated.lattice],
             surroundings: simulated.surroundings.as_ref(),
             painted: self.painted.as_deref(),
             kept_out: self.kept_out.as_deref(),
@@ -90,10 +92,13 @@ impl LookedAt {
 }
 
 /// Whether each site lies where the mask (one value a vertex of the part) is mostly set.
-fn painted_sites(part: &TriMesh, mask: &[bool], dataset: &Dataset) -> Vec<bool> {
-    let index = SurfaceIndex::new(part);
-    dataset
-        .sites
+pub(super) fn painted_sites(
+    part: &TriMesh,
+    index: &SurfaceIndex,
+    mask: &[bool],
+    sites: &[Site],
+) -> Vec<bool> {
+    sites
         .iter()
         .map(|site| part.mostly_in(mask, index.nearest(site.position).0))
         .collect()
@@ -238,7 +243,7 @@ pub fn geometry(
 ) -> Result<Located, Cancelled> {
     /// Locations nearer than this are one (m).
     const SAME: f64 = 1e-6;
-    let mut feasible = vec![false; simulated.points.len()];
+    let mut feasible = vec![false; simulated.lattice];
     for &site in &reduced.feasible {
         feasible[site] = true;
     }
@@ -308,10 +313,7 @@ impl<'a> Offer<'a> {
             budget: keys.cost_budget,
             target_mm: keys.target_mm,
             failure: keys.failure,
-            loss: Loss {
-                gauges: keys.lost,
-                by: keys.lost_by,
-            },
+            loss: keys.loss(),
             thorough: Thorough {
                 exchange: keys.exchange,
                 starts: keys.starts,
@@ -356,7 +358,7 @@ fn nearest(positions: &[DVec3], at_mm: [f64; 3]) -> Option<usize> {
 }
 
 /// What a gauge costs at each position (m).
-fn costs(boxes: &[CostKeys], positions: &[DVec3]) -> Vec<f64> {
+pub(super) fn costs(boxes: &[CostKeys], positions: &[DVec3]) -> Vec<f64> {
     let cost = |p: &DVec3| {
         let inside = boxes.iter().rev().find(|b| b.contains(*p * 1000.0));
         inside.map_or(1.0, |b| b.cost)

@@ -41,6 +41,8 @@ pub struct Truth {
     pub work: Work,
     /// Dataset sites that were measured, rising, and their signals.
     pub sites: Vec<usize>,
+    /// Where they are: gauges off the lattice may have moved under the same number.
+    pub drawn: Vec<Site>,
     pub x: SignalMatrix,
     /// The same sites as a workshop would build them.
     pub workshop: SignalMatrix,
@@ -54,17 +56,24 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// Whether it measures exactly these sites, in any order, built and pressed as far off as that, and what this
+    /// Whether it measures exactly these of all sites, in any order, built and pressed as far off as that, and what this
     /// estimator asks for beside.
     #[must_use]
-    pub fn measures(&self, sites: &[usize], off: &Uncertainty, project: &Project) -> bool {
+    pub fn measures(
+        &self,
+        sites: &[usize],
+        all: &[Site],
+        off: &Uncertainty,
+        project: &Project,
+    ) -> bool {
         let mut rows = sites.to_vec();
         rows.sort_unstable();
         rows.dedup();
+        let here = rows.iter().filter_map(|&s| all.get(s));
         let by = project.judging().estimator();
         let presses = by == EstimatorKind::Svr || self.pressed.is_some();
         let same = off.builds_as(&self.off) && grid(project) == self.grid;
-        rows == self.sites && same && presses
+        rows == self.sites && here.eq(&self.drawn) && same && presses
     }
 
     /// The same, judged in the regions that a project asks for.
@@ -182,10 +191,11 @@ pub(super) fn measured_by(
     rows.sort_unstable();
     rows.dedup();
     // Both kinds of gauges in one measurement: the loads are solved for once.
-    let drawn = rows.iter().map(|&s| simulated.dataset.sites[s]);
+    let all = &simulated.dataset.sites;
+    let drawn: Vec<Site> = rows.iter().map(|&s| all[s]).collect();
     let (off, seed) = (known::off(project, simulated), project.budget.seed);
     let built = sites_as_built(simulated, &rows, &off.gluing, seed);
-    let gauges: Vec<Site> = drawn.chain(built).collect();
+    let gauges: Vec<Site> = drawn.iter().copied().chain(built).collect();
     let (signals, solves) = read(model, inputs, &touches, &gauges, grid, watch)?;
     let half =
         |k: usize| signals.select_rows(&(k * rows.len()..(k + 1) * rows.len()).collect::<Vec<_>>());
@@ -200,6 +210,7 @@ pub(super) fn measured_by(
             ..Work::default()
         },
         sites: rows,
+        drawn,
         x,
         workshop,
         off,
@@ -507,6 +518,7 @@ mod tests {
             element_mm: 1.0,
             work: Work::default(),
             sites: vec![2, 5],
+            drawn: vec![site(); 2],
             x: SignalMatrix::default(),
             workshop: SignalMatrix::default(),
             off: Uncertainty::default(),
@@ -520,9 +532,10 @@ mod tests {
         };
         let mut project = Project::around("limb.stl", None);
         project.evaluation.estimator = EstimatorKind::Svr;
-        assert!(truth.measures(&[5, 2, 5], &usual, &project));
-        assert!(!truth.measures(&[5, 3], &usual, &project));
-        assert!(!truth.measures(&[5, 2], &other, &project));
+        let mut all = vec![site(); 6];
+        assert!(truth.measures(&[5, 2, 5], &all, &usual, &project));
+        assert!(!truth.measures(&[5, 3], &all, &usual, &project));
+        assert!(!truth.measures(&[5, 2], &all, &other, &project));
         project.evaluation.estimator = EstimatorKind::Matching;
         let matched = Truth {
             grid: grid(&project),
@@ -532,9 +545,13 @@ mod tests {
             }),
             ..truth.clone()
         };
-        assert!(!truth.measures(&[5, 2], &usual, &project));
-        assert!(matched.measures(&[5, 2], &usual, &project));
+        assert!(!truth.measures(&[5, 2], &all, &usual, &project));
+        assert!(matched.measures(&[5, 2], &all, &usual, &project));
+        // A gauge off the lattice may lie elsewhere now.
+        all[5].position.x += 1e-4;
+        assert!(!matched.measures(&[5, 2], &all, &usual, &project));
+        all[5] = site();
         project.gauge.grid_length_mm += 1.0;
-        assert!(!matched.measures(&[5, 2], &usual, &project));
+        assert!(!matched.measures(&[5, 2], &all, &usual, &project));
     }
 }

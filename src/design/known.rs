@@ -48,9 +48,19 @@ impl<'a> Known<'a> {
     pub fn variance(&self, site: usize, touch: usize) -> f64 {
         let reading = self.simulated.dataset.x.row(site)[touch];
         let slopes = self.simulated.dataset.slopes.as_ref();
-        let column = slopes.and_then(|s| s.touches().binary_search(&touch).ok());
+        self.variance_of(reading, slopes.map(|s| (s, site)), touch)
+    }
+
+    /// What they put on a gauge's reading of a touch that its slopes, those of a site among some, are known for.
+    pub fn variance_of(
+        &self,
+        reading: f64,
+        slopes: Option<(&GluingSlopes, usize)>,
+        touch: usize,
+    ) -> f64 {
+        let column = slopes.and_then(|(s, _)| s.touches().binary_search(&touch).ok());
         let glued = match (slopes, column) {
-            (Some(slopes), Some(column)) => {
+            (Some((slopes, site)), Some(column)) => {
                 slopes.variance(site, column, reading, &self.off.gluing)
             }
             _ => 0.0,

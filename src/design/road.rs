@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    DesignError, Found, Inputs, Reduced, Simulated, Truth, evaluate, filter, reduce_sites,
+    DesignError, Found, Inputs, Reduced, Simulated, Truth, evaluate, filter, reduce_sites, refine,
     select_step_by_step, simulate, sites_to_judge, truth,
 };
 use crate::budget::{Budget, Watch, Work};
@@ -36,7 +36,8 @@ pub struct Design {
 #[derive(Clone, Default)]
 pub struct Known {
     pub reduced: Option<(Arc<Feasibility>, Arc<Reduced>)>,
-    /// By the same selectors in the same order.
+    /// By the same selectors in the same order; of the simulation that goes with them, which has the gauges that were
+    /// moved off its lattice.
     pub selections: Option<Arc<Vec<Selection>>>,
     /// Of the same simulation.
     pub truth: Option<Arc<Truth>>,
@@ -357,18 +358,27 @@ pub fn run_step_by_step(
         (Arc::new(feasibility), Arc::new(reduced))
     };
     (hooks.entered)(Step::Select);
-    let selections = match known.selections {
-        Some(known) => known,
-        None => Arc::new(select_all(
+    let (simulated, selections) = if let Some(known) = known.selections {
+        (simulated, known)
+    } else {
+        let mut chosen = select_all(
             inputs, &simulated, &reduced, kinds, budget, &mut times, hooks,
-        )?),
+        )?;
+        let refined = refine_chosen(inputs, simulated, &reduced, &mut chosen, budget, hooks)?;
+        if inputs.project.selection.refine {
+            times.lap("refine places");
+        }
+        (refined, Arc::new(chosen))
     };
     (hooks.entered)(Step::Evaluate);
     let judging = inputs.project.judging();
     let by = judging.estimator();
     let judged = sites_to_judge(by, &reduced, &selections);
     let off = super::known::off(&inputs.project, &simulated);
-    let measured = (known.truth).filter(|t| t.measures(&judged, &off, &inputs.project));
+    let measured = (known.truth).filter(|t| {
+        let all = &simulated.dataset.sites;
+        t.measures(&judged, all, &off, &inputs.project)
+    });
     let same = |e: &Arc<Evaluation>| measured.is_some() && e.judging == judging;
     let known = known.evaluation.filter(same);
     let truth = match measured {
@@ -427,6 +437,28 @@ fn select_all(
         });
     }
     Ok(selections)
+}
+
+/// Moves the gauges chosen by expected error off the lattice, where that is asked for; the simulation with them.
+fn refine_chosen(
+    inputs: &Inputs,
+    simulated: Arc<Simulated>,
+    reduced: &Reduced,
+    chosen: &mut [Selection],
+    budget: &Budget,
+    hooks: &Hooks,
+) -> Result<Arc<Simulated>, DesignError> {
+    let kind = SelectorKind::ExpectedError;
+    let mut chosen = chosen.iter_mut().filter(|s| s.selector == kind);
+    let asked = inputs.project.selection.refine;
+    let Some(selection) = chosen.next().filter(|_| asked) else {
+        return Ok(simulated);
+    };
+    let refined = refine(inputs, simulated, reduced, selection, budget, hooks.watch)?;
+    if let Some(last) = selection.sets.last() {
+        (hooks.found)(kind, last, &refined.dataset.sites);
+    }
+    Ok(refined)
 }
 
 struct Stopwatch<'a> {

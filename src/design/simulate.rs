@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::ground::{Built, Ground, Laid, ground, open_solid};
 use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches};
 use super::{DesignError, Inputs, SLOPE_TOUCHES};
-use crate::budget::{Achieved, Budget, Quality, StopReason, Watch, Work};
-use crate::dataset::{self, Dataset};
+use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
+use crate::dataset::{self, Dataset, Surveyed};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::support::Region;
@@ -22,6 +22,7 @@ use crate::project::{Elements as ElementKind, PartModel, Project};
 use crate::regression::folds::evenly;
 
 /// The elastic stage: the mesh that was computed on, the sites on it and the dataset.
+#[derive(Clone)]
 pub struct Simulated {
     /// The surface that gauges are glued to: the elements of a shell, the inside of a solid.
     pub mesh: Arc<TriMesh>,
@@ -38,7 +39,12 @@ pub struct Simulated {
     pub points: Vec<SurfacePoint>,
     /// What lies before and behind the sites of a solid.
     pub surroundings: Option<Surroundings>,
+    /// The sites of the lattice, and after them gauges that were moved off it.
     pub dataset: Dataset,
+    /// How many sites the lattice has.
+    pub lattice: usize,
+    /// Shared by all that have only other gauges off the lattice.
+    mark: Arc<()>,
     pub unknowns: usize,
     /// Of a shell.
     pub linearity: Option<Linearity>,
@@ -53,6 +59,59 @@ impl Simulated {
     /// [`DesignError`] as when it was built first.
     pub fn model(&self) -> Result<Box<dyn Model>, DesignError> {
         self.ground.model(&self.laid, &crate::budget::unwatched)
+    }
+
+    /// Whether two are of one simulation, whatever gauges were moved off its lattice.
+    #[must_use]
+    pub fn is_one_with(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.mark, &other.mark)
+    }
+
+    /// What lies before and behind gauges on points of its mesh; as for its sites.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub(super) fn surroundings_of(
+        &self,
+        points: &[SurfacePoint],
+        watch: Watch,
+    ) -> Result<Option<Surroundings>, Cancelled> {
+        let Some(known) = &self.surroundings else {
+            return Ok(None);
+        };
+        let found = self.ground.surroundings(points, watch)?;
+        // What is closed was opened for all of it.
+        let opened = known.room.iter().all(|room| room.is_infinite());
+        Ok(found.map(|found| if opened { found.open() } else { found }))
+    }
+
+    /// The same with these gauges off its lattice, in place of those that there were. It holds no more at once than the
+    /// simulation itself has.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub(super) fn with_gauges(
+        mut self,
+        gauges: &[&Surveyed],
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
+        let index = SurfaceIndex::new(&self.mesh);
+        let at = |gauge: &&Surveyed| index.nearest(gauge.site.position).0;
+        let points: Vec<SurfacePoint> = gauges.iter().map(at).collect();
+        let around = self.surroundings_of(&points, watch)?;
+        self.dataset.truncate(self.lattice);
+        for gauge in gauges {
+            self.dataset.push(gauge);
+        }
+        self.points.truncate(self.lattice);
+        self.points.extend(points);
+        if let (Some(all), Some(around)) = (&mut self.surroundings, around) {
+            all.behind.truncate(self.lattice);
+            all.behind.extend(around.behind);
+            all.room.truncate(self.lattice);
+            all.room.extend(around.room);
+        }
+        Ok(self)
     }
 }
 
@@ -223,6 +282,8 @@ fn read(
         discretization: estimate,
         points,
         surroundings,
+        lattice: dataset.sites.len(),
+        mark: Arc::default(),
         dataset,
         unknowns,
         linearity,

@@ -129,12 +129,11 @@ pub fn respond_from(
     reading: Reading,
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
+    if side == Side::Outputs {
+        return Pressed::new(model, touches).read(observer, reading, watch);
+    }
     let loads = touch_rows(model, touches);
     let points = observer.frames().len();
-    if side == Side::Outputs {
-        let outputs = output_rows(observer, reading);
-        return by_outputs(model, &loads, &outputs, watch);
-    }
     let blocks = model.system().solve_rows(
         &loads,
         "Solving touches",
@@ -172,6 +171,45 @@ pub fn respond_from(
         blocks,
         found: Vec::new(),
     })
+}
+
+/// Touches that ever other gauges are read under: their forces are laid on the model once, and each gauge is solved for.
+pub struct Pressed<'a> {
+    model: &'a dyn Model,
+    loads: Rows,
+}
+
+impl<'a> Pressed<'a> {
+    #[must_use]
+    pub fn new(model: &'a dyn Model, touches: &[Touch]) -> Self {
+        let loads = touch_rows(model, touches);
+        Self { model, loads }
+    }
+
+    #[must_use]
+    pub fn model(&self) -> &'a dyn Model {
+        self.model
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn touches(&self) -> usize {
+        self.loads.count()
+    }
+
+    /// Reads an observer's points under all of them.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn read(
+        &self,
+        observer: &Observer,
+        reading: Reading,
+        watch: Watch,
+    ) -> Result<Responses, Cancelled> {
+        let outputs = output_rows(observer, reading);
+        by_outputs(self.model, &self.loads, &outputs, watch)
+    }
 }
 
 fn by_outputs(

@@ -269,6 +269,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
             let p = site.position * 1000.0;
             json!({
                 "index": s,
+                "refined": s >= design.simulated.lattice,
                 "x_mm": p.x, "y_mm": p.y, "z_mm": p.z,
                 "direction": site.direction.to_array(),
                 "rms_microstrain": site.rms_strain * 1e6,
@@ -302,7 +303,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         "signal": dataset.signal,
         "sites": sites,
         "counts": {
-            "inside_sites": dataset.sites.len(),
+            "inside_sites": design.simulated.lattice,
             "touches": dataset.touches.len(),
             "feasible": design.reduced.feasible.len(),
             "candidates": design.reduced.sites.len(),

@@ -360,6 +360,7 @@ mod tests {
         p.selection.lost_by = crate::placement::LostBy::Worst;
         p.selection.exchange = true;
         p.selection.starts = 3;
+        p.selection.refine = true;
         p.selection.cost_budget = Some(12.5);
         p.selection.costs.push(CostKeys {
             box_mm: [[0.0; 3], [1.0; 3]],

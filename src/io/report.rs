@@ -93,7 +93,8 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
         );
         number(page, &format!("{:.2} mm", row.median_mm), "median");
     }
-    number(page, &dataset.sites.len().to_string(), "inside sites");
+    let inside = design.simulated.lattice.to_string();
+    number(page, &inside, "inside sites");
     number(page, &design.reduced.feasible.len().to_string(), "feasible");
     number(page, &design.reduced.sites.len().to_string(), "candidates");
     page.push_str("</div>");

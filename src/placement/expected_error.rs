@@ -12,12 +12,14 @@ mod elliptic;
 mod expectation;
 mod hand;
 mod mistaken;
+mod moving;
 mod scene;
 
 pub use self::certificate::{ASSUMES, Certificate, certify};
 pub use self::elliptic::mean_length;
 pub use self::hand::{BLIND, Hand, blind, least_helpful, most_helpful};
 pub use self::mistaken::{Mistaken, Pair, posterior, taken_for, worst_pairs};
+pub use self::moving::Moving;
 pub use self::scene::{
     Detail, Forces, Knowledge, Reading, Scatter, Scene, Template, Variance, templates,
 };

@@ -10,6 +10,10 @@ use crate::placement::SelectorKind;
 use crate::placement::wishes::{Loss, LostBy, Thorough};
 use crate::regression::Hyper;
 
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "keys of a file that do not depend on each other"
+)]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SelectionKeys {
@@ -40,6 +44,8 @@ pub struct SelectionKeys {
     pub exchange: bool,
     /// From how many first gauges a set is begun, of which the best is kept.
     pub starts: usize,
+    /// Whether gauges chosen by expected error are moved off the sites to where and how they serve best.
+    pub refine: bool,
     /// Whether the other selectors choose too, to be compared.
     pub compare: bool,
     pub gaussian_process: GaussianProcessKeys,
@@ -71,10 +77,22 @@ impl Default for SelectionKeys {
             lost_by: loss.by,
             exchange: thorough.exchange,
             starts: thorough.starts,
+            refine: false,
             compare: false,
             gaussian_process: GaussianProcessKeys::default(),
             costs: Vec::new(),
             sites: Vec::new(),
+        }
+    }
+}
+
+impl SelectionKeys {
+    /// Which gauges may be lost.
+    #[must_use]
+    pub fn loss(&self) -> Loss {
+        Loss {
+            gauges: self.lost,
+            by: self.lost_by,
         }
     }
 }

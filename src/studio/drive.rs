@@ -288,7 +288,7 @@ impl Studio {
         };
         let inputs = self.document.inputs();
         let key = self.document.design_key_at(quality);
-        let known = self.known(quality, &simulated);
+        let (simulated, known) = self.known(quality, simulated);
         let last = self
             .last
             .get(&quality)
@@ -310,25 +310,44 @@ impl Studio {
         });
     }
 
-    /// What of the last design of a quality still holds.
-    fn known(&self, quality: Quality, simulated: &Arc<Simulated>) -> Known {
+    /// What of the last design of a quality still holds, and the simulation to go on from: where its gauges do, that
+    /// which has those off the lattice.
+    fn known(&self, quality: Quality, simulated: Arc<Simulated>) -> (Arc<Simulated>, Known) {
         let last = self
             .last
             .get(&quality)
             .and_then(|last| last.design.as_ref());
-        let same = |d: &&DesignResult| Arc::ptr_eq(&d.design.simulated, simulated);
+        let same = |d: &&DesignResult| d.design.simulated.is_one_with(&simulated);
         let Some(last) = last.filter(same) else {
-            return Known::default();
+            return (simulated, Known::default());
         };
         let design = &last.design;
         let reduced = self.document.candidates_key_at(quality) == last.keys[0];
         let selections = self.document.selection_key_at(quality) == last.keys[1];
-        Known {
+        let known = Known {
             reduced: reduced
                 .then(|| (Arc::clone(&design.feasibility), Arc::clone(&design.reduced))),
             selections: selections.then(|| Arc::clone(&design.selections)),
             truth: Some(Arc::clone(&design.truth)),
             evaluation: selections.then(|| Arc::clone(&design.evaluation)),
+        };
+        if selections {
+            (Arc::clone(&design.simulated), known)
+        } else {
+            (simulated, known)
+        }
+    }
+
+    /// The simulation that is shown has the gauges that the design that is shown moved off its lattice.
+    fn show_refined(&mut self) {
+        let (Some(simulation), Some(design)) = (&mut self.simulation, &self.design) else {
+            return;
+        };
+        let refined = &design.design.simulated;
+        if simulation.simulated.is_one_with(refined) && !Arc::ptr_eq(&simulation.simulated, refined)
+        {
+            simulation.simulated = Arc::clone(refined);
+            self.expected.ask_again();
         }
     }
 
@@ -448,6 +467,7 @@ impl Studio {
         };
         self.last.entry(quality).or_default().design = Some(result.clone());
         self.design = Some(result);
+        self.show_refined();
         if self.shown_feasible_key() == Some(self.document.feasible_key_at(quality)) {
             self.feasibility = Some((self.document.feasible_key_at(quality), feasibility));
         }
@@ -490,6 +510,7 @@ impl Studio {
                 }
             }
         }
+        self.show_refined();
     }
 
     /// The project's gauges are those that the design chose.

@@ -79,6 +79,11 @@ impl Expecting {
         error
     }
 
+    /// What sets are asked of holds no longer, until that is looked at again.
+    pub fn ask_again(&mut self) {
+        self.holds = false;
+    }
+
     /// What sets are asked of, while it holds.
     pub fn in_hand(&self) -> Option<&Arc<InHand>> {
         let (_, ready) = self.ready.as_ref().filter(|_| self.holds)?;
@@ -114,12 +119,15 @@ fn serve(first: Question, desk: &Desk<Question, Answer>) -> Option<Question> {
 impl Studio {
     /// What is expected of sets depends on; nothing where no simulation holds.
     pub(super) fn expected_key(&self) -> Option<String> {
-        let quality = self.simulation.as_ref()?.quality;
+        let simulation = self.simulation.as_ref()?;
+        let (quality, simulated) = (simulation.quality, &simulation.simulated);
         let project = &self.document.state.project;
         let holds = self.simulation_holds() == Some(true);
+        // Gauges off the lattice are of one design alone.
+        let off = &simulated.dataset.sites[simulated.lattice..];
         holds.then(|| {
             format!(
-                "{} {:?} {:?} {}",
+                "{} {:?} {:?} {} {off:?}",
                 self.document.simulation_key_at(quality),
                 project.gauge,
                 project.touch,

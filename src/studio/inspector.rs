@@ -823,6 +823,12 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         .labelled_by(name.id)
         .accessible_name("With noise");
     ui.end_row();
+    let name = ui.label("Refine places");
+    ui.checkbox(&mut project.selection.refine, "")
+        .on_hover_text("Move the gauges that “Expected error” has chosen off the sites, along the surface and by their angle, while the expected error falls. Strain only")
+        .labelled_by(name.id)
+        .accessible_name("Refine places");
+    ui.end_row();
 }
 
 fn regression(ui: &mut Ui, project: &mut Project) {

@@ -329,7 +329,7 @@ impl Studio {
         let mut lines = vec![
             format!(
                 "{} sites × {} touches",
-                dataset.sites.len(),
+                s.simulated.lattice,
                 dataset.touches.len()
             ),
             format!(

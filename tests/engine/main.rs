@@ -32,6 +32,7 @@ mod placement;
 mod properties;
 mod reach;
 mod real_parts;
+mod refine;
 mod regions;
 mod remesh;
 mod same_part;

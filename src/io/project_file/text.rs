@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::budget::Limits;
-use crate::project::{Kept, Project};
+use crate::project::{Kept, Project, SelectionKeys};
 
 /// The commented text of a project.
 #[must_use]
@@ -444,16 +444,7 @@ fn selection(t: &mut Text, project: &Project) {
         quoted(selection.lost_by.name()),
         "\"expected\": the mean over which ones are lost counts, or the \"worst\"",
     );
-    t.key(
-        "exchange",
-        selection.exchange,
-        "exchange gauges after all are chosen (greedy SVR, entropy, mutual information; expected error always does)",
-    );
-    t.key(
-        "starts",
-        selection.starts,
-        "first gauges that a set is begun from; the best set is kept",
-    );
+    beyond_greedy(t, selection);
     let process = &selection.gaussian_process;
     t.table("selection.gaussian_process");
     t.maybe(
@@ -481,6 +472,25 @@ fn selection(t: &mut Text, project: &Project) {
         t.key("position_mm", numbers(&site.position_mm), "");
         t.key("direction", numbers(&site.direction), "");
     }
+}
+
+/// How far a choice goes beyond gauge after gauge.
+fn beyond_greedy(t: &mut Text, selection: &SelectionKeys) {
+    t.key(
+        "exchange",
+        selection.exchange,
+        "exchange gauges after all are chosen (greedy SVR, entropy, mutual information; expected error always does)",
+    );
+    t.key(
+        "starts",
+        selection.starts,
+        "first gauges that a set is begun from; the best set is kept",
+    );
+    t.key(
+        "refine",
+        selection.refine,
+        "move the chosen gauges off the sites to where they serve best (expected error on strain)",
+    );
 }
 
 fn live(t: &mut Text, project: &Project) {

@@ -57,10 +57,24 @@ pub struct Certificate {
     pub bound_mm: f64,
     /// The error (mm) of this set where one place is meant: what the bound is of.
     pub local_mm: f64,
+    /// Whether gauges of the set have left the sites that the bound is of.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub refined: bool,
 }
 
 impl Certificate {
-    /// By what share (0.07: 7 %) a set with this expected error (mm) is at most worse than the best one.
+    /// The same beside a set whose gauges have left the sites, with its own error (mm) where one place is meant.
+    #[must_use]
+    pub fn refined(self, local_mm: f64) -> Self {
+        Self {
+            local_mm,
+            refined: true,
+            ..self
+        }
+    }
+
+    /// By what share (0.07: 7 %) a set with this expected error (mm) is at most worse than the best one; below zero for
+    /// gauges that have left the sites and are better than any on them.
     #[must_use]
     pub fn excess(&self, expected_mm: f64) -> f64 {
         expected_mm.max(self.local_mm) / self.bound_mm - 1.0
@@ -74,12 +88,19 @@ impl Certificate {
         // Rounded to where it holds as it is written.
         let bound = (100.0 * self.bound_mm).floor() / 100.0;
         let excess = self.excess(expected_mm);
-        if excess < FAR {
+        let possible = if self.refined {
+            "possible on the sites before they were refined"
+        } else {
+            "possible"
+        };
+        if excess < 0.0 {
+            format!("Better than the best {possible} (bound {bound:.2} mm)")
+        } else if excess < FAR {
             let percent = (100.0 * excess).ceil();
-            format!("Within {percent:.0} % of the best possible (bound {bound:.2} mm)")
+            format!("Within {percent:.0} % of the best {possible} (bound {bound:.2} mm)")
         } else {
             let times = (10.0 * (1.0 + excess)).ceil() / 10.0;
-            format!("At most {times:.1} times the best possible (bound {bound:.2} mm)")
+            format!("At most {times:.1} times the best {possible} (bound {bound:.2} mm)")
         }
     }
 }
@@ -115,6 +136,7 @@ pub fn certify(
     Ok(sound.map(|bound_mm| Certificate {
         bound_mm,
         local_mm: local.mm,
+        refined: false,
     }))
 }
 
@@ -391,6 +413,7 @@ mod tests {
         let certificate = Certificate {
             bound_mm: 0.548,
             local_mm: 0.56,
+            refined: false,
         };
         assert_eq!(
             certificate.words(0.58),
@@ -402,5 +425,15 @@ mod tests {
         );
         // An estimate below what is certain counts as that.
         assert_eq!(certificate.excess(0.1), certificate.excess(0.56));
+        // Of gauges that have left the sites the bound says nothing but how they stand to those on them.
+        let refined = certificate.refined(0.52);
+        assert_eq!(
+            refined.words(0.53),
+            "Better than the best possible on the sites before they were refined (bound 0.54 mm)"
+        );
+        assert_eq!(
+            refined.words(0.58),
+            "Within 6 % of the best possible on the sites before they were refined (bound 0.54 mm)"
+        );
     }
 }

@@ -32,17 +32,17 @@ struct Scenes {
 }
 
 /// Sets of gauges that may be lost.
-struct Losses {
+pub(super) struct Losses {
     /// How many together.
     gauges: usize,
     seed: u64,
     /// Whether there are so many that what is left is looked at in coarse detail.
-    many: bool,
+    pub many: bool,
 }
 
 impl Losses {
     /// Nothing where no gauge may be lost.
-    fn of(wishes: &Wishes, seed: u64) -> Option<Self> {
+    pub fn of(wishes: &Wishes, seed: u64) -> Option<Self> {
         /// From so many on they are many.
         const MANY: usize = 12;
         let losses = Self {
@@ -65,11 +65,43 @@ impl Losses {
 }
 
 /// What is expected of a set.
-struct Expected {
+pub(super) struct Expected {
     /// With all gauges (mm).
-    whole: f64,
+    pub whole: f64,
     /// After each loss (mm).
-    lost: Vec<f64>,
+    pub lost: Vec<f64>,
+}
+
+impl Expected {
+    /// Of a set of a scene, and where gauges may be lost, of what is left of it in another of the same touches.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when `report` does so.
+    pub fn of(
+        scene: &Scene,
+        losses: Option<(&Losses, &Scene)>,
+        set: &[usize],
+        report: &(dyn Fn() -> Result<(), Cancelled> + Sync),
+    ) -> Result<Self, Cancelled> {
+        report()?;
+        let whole = Bank::of(scene, set).error();
+        let Some((losses, scene)) = losses else {
+            let lost = Vec::new();
+            return Ok(Self { whole, lost });
+        };
+        let error = |lost: &Vec<usize>| -> Result<f64, Cancelled> {
+            report()?;
+            Ok(left(scene, seats(set, set.len()), lost).error())
+        };
+        let lost: Result<Vec<f64>, Cancelled> =
+            losses.all(set.len()).par_iter().map(error).collect();
+        Ok(Self { whole, lost: lost? })
+    }
+
+    /// As it counts (mm).
+    pub fn weighed(self, wishes: &Wishes) -> f64 {
+        wishes.weighed(self.whole, self.lost.into_iter())
+    }
 }
 
 impl<'a> Expectation<'a> {
@@ -100,25 +132,13 @@ impl<'a> Expectation<'a> {
 
     /// The criterion (mm) of a set.
     fn error(&self, set: &[usize]) -> Result<f64, Cancelled> {
-        let Expected { whole, lost } = self.expected(set)?;
-        Ok(self.request.wishes.weighed(whole, lost.into_iter()))
+        Ok(self.expected(set)?.weighed(self.request.wishes))
     }
 
     fn expected(&self, set: &[usize]) -> Result<Expected, Cancelled> {
-        self.report(set.len())?;
-        let whole = Bank::of(&self.scenes.fine, set).error();
-        let Some(losses) = &self.losses else {
-            let lost = Vec::new();
-            return Ok(Expected { whole, lost });
-        };
-        let scene = self.scene_of(losses);
-        let error = |lost: &Vec<usize>| -> Result<f64, Cancelled> {
-            self.report(set.len())?;
-            Ok(left(scene, seats(set, set.len()), lost).error())
-        };
-        let lost: Result<Vec<f64>, Cancelled> =
-            losses.all(set.len()).par_iter().map(error).collect();
-        Ok(Expected { whole, lost: lost? })
+        let losses = self.losses.as_ref().map(|l| (l, self.scene_of(l)));
+        let report = || self.report(set.len());
+        Expected::of(&self.scenes.fine, losses, set, &report)
     }
 
     /// The touches in the detail in which losses are looked at.

@@ -98,6 +98,11 @@ pub(super) struct Report<'a> {
 impl Reports {
     const ROWS: usize = 4;
 
+    fn of_mut(&mut self, site: usize) -> &mut [f32] {
+        let length = Self::ROWS * self.count;
+        &mut self.values[site * length..][..length]
+    }
+
     pub fn of(&self, site: usize) -> Report<'_> {
         let all = &self.values[site * Self::ROWS * self.count..][..Self::ROWS * self.count];
         let row = |k: usize| &all[k * self.count..][..self.count];
@@ -161,37 +166,7 @@ impl Scene {
         detail: Detail,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
-        report(watch, "Looking at touches", 0, 2)?;
-        let merged = Merged::new(targets, known.forces.map(|f| f.touches));
-        let all = merged.among(known.among);
-        let mut places = farthest_first(&merged.positions, &all, detail.places);
-        // A press may come to one of the places: what stands near it is its own all the same.
-        let presses = in_turns(&evenly(all.len(), detail.presses));
-        let presses: Vec<usize> = presses.into_iter().map(|k| all[k]).collect();
-        in_neighbourhoods(&mut places, &merged.positions);
-        let around = Around::new(&merged.positions, &merged.groups);
-        let reader = Reader {
-            x,
-            merged: &merged,
-            around: &around,
-            known,
-            unit: unit(x, known.noise).recip(),
-        };
-        let stand = |of: &[usize]| standing(&merged.positions, of);
-        let (places_at, presses_at) = (stand(&places), stand(&presses));
-        let at_places = reader.reports(&places);
-        report(watch, "Looking at touches", 1, 2)?;
-        let at_presses = reader.reports(&presses);
-        Ok(Self {
-            levels: levels(presses.len(), known.forces.map(|f| f.coming)),
-            draws: draws(TURNS, presses.len(), known.seed),
-            sites: x.rows(),
-            places: places_at,
-            presses: presses_at,
-            at_places,
-            at_presses,
-            hardest: known.forces.map(|f| f.possible),
-        })
+        Outlook::new(x, targets, known, detail, watch)?.scene(x, known.variance, watch)
     }
 
     /// Noise of unit deviation in what the gauge of a turn reads of a press.
@@ -202,6 +177,111 @@ impl Scene {
     #[must_use]
     pub fn sites(&self) -> usize {
         self.sites
+    }
+}
+
+/// Where a scene looks, whatever is glued: what gauges report there may be taken again for one of them alone.
+pub(super) struct Outlook<'a> {
+    merged: Merged,
+    places: Spots,
+    presses: Spots,
+    /// One over the unit of readings.
+    unit: f64,
+    forces: Option<Forces<'a>>,
+    seed: u64,
+}
+
+/// Some of the places of data.
+struct Spots {
+    numbers: Vec<usize>,
+    neighbours: Vec<Vec<Neighbour>>,
+    standing: Vec<Place>,
+}
+
+impl<'a> Outlook<'a> {
+    /// Of touches under which sites read `x`; readings are measured in their noise.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn new(
+        x: &SignalMatrix,
+        targets: &[[f64; 3]],
+        known: &Knowledge<'a>,
+        detail: Detail,
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
+        report(watch, "Looking at touches", 0, 2)?;
+        let merged = Merged::new(targets, known.forces.map(|f| f.touches));
+        let all = merged.among(known.among);
+        let mut places = farthest_first(&merged.positions, &all, detail.places);
+        // A press may come to one of the places: what stands near it is its own all the same.
+        let presses = in_turns(&evenly(all.len(), detail.presses));
+        let presses: Vec<usize> = presses.into_iter().map(|k| all[k]).collect();
+        in_neighbourhoods(&mut places, &merged.positions);
+        let around = Around::new(&merged.positions, &merged.groups);
+        let [places, presses] = [places, presses].map(|numbers| Spots {
+            neighbours: (numbers.par_iter().map(|&at| around.of(at).neighbours)).collect(),
+            standing: standing(&merged.positions, &numbers),
+            numbers,
+        });
+        Ok(Self {
+            places,
+            presses,
+            unit: unit(x, known.noise).recip(),
+            forces: known.forces,
+            seed: known.seed,
+            merged,
+        })
+    }
+
+    /// With what some sites report: `x` of each under every touch, and the variance that is on it.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn scene(
+        &self,
+        x: &SignalMatrix,
+        variance: Option<Variance>,
+        watch: Watch,
+    ) -> Result<Scene, Cancelled> {
+        let reader = self.reader(x, variance);
+        let at_places = reader.reports(&self.places);
+        report(watch, "Looking at touches", 1, 2)?;
+        let at_presses = reader.reports(&self.presses);
+        let presses = self.presses.numbers.len();
+        Ok(Scene {
+            levels: levels(presses, self.forces.map(|f| f.coming)),
+            draws: draws(TURNS, presses, self.seed),
+            sites: x.rows(),
+            places: self.places.standing.clone(),
+            presses: self.presses.standing.clone(),
+            at_places,
+            at_presses,
+            hardest: self.forces.map(|f| f.possible),
+        })
+    }
+
+    /// Puts another gauge in the stead of a site of a scene: what it reads under every touch, as one row, and the
+    /// variance that is on it.
+    pub fn retake(&self, scene: &mut Scene, site: usize, x: &SignalMatrix, variance: Variance) {
+        let reader = self.reader(x, Some(variance));
+        let of = [
+            (&mut scene.at_places, &self.places),
+            (&mut scene.at_presses, &self.presses),
+        ];
+        for (reports, spots) in of {
+            reports.of_mut(site).copy_from_slice(&reader.rows(0, spots));
+        }
+    }
+
+    fn reader<'b>(&'b self, x: &'b SignalMatrix, variance: Option<Variance<'b>>) -> Reader<'b> {
+        Reader {
+            x,
+            merged: &self.merged,
+            variance,
+            forces: self.forces,
+            unit: self.unit,
+        }
     }
 }
 
@@ -335,35 +415,34 @@ fn spacing(positions: &[DVec3], of: impl Iterator<Item = usize>, at: usize) -> f
 struct Reader<'a> {
     x: &'a SignalMatrix,
     merged: &'a Merged,
-    around: &'a Around<'a>,
-    known: &'a Knowledge<'a>,
+    variance: Option<Variance<'a>>,
+    forces: Option<Forces<'a>>,
     /// One over the unit of readings.
     unit: f64,
 }
 
 impl Reader<'_> {
-    fn reports(&self, at: &[usize]) -> Reports {
-        let neighbours: Vec<Vec<Neighbour>> = at
-            .par_iter()
-            .map(|&at| self.around.of(at).neighbours)
-            .collect();
-        let rows = |site: usize| {
-            let mut rows = vec![0.0; Reports::ROWS * at.len()];
-            for (k, &place) in at.iter().enumerate() {
-                let of = self.report(site, place, &neighbours[k]);
-                for (row, value) in of.into_iter().enumerate() {
-                    rows[row * at.len() + k] = value as f32;
-                }
-            }
-            rows
-        };
+    fn reports(&self, at: &Spots) -> Reports {
         Reports {
-            count: at.len(),
+            count: at.numbers.len(),
             values: (0..self.x.rows())
                 .into_par_iter()
-                .flat_map_iter(rows)
+                .flat_map_iter(|site| self.rows(site, at))
                 .collect(),
         }
+    }
+
+    /// Those of one site.
+    fn rows(&self, site: usize, at: &Spots) -> Vec<f32> {
+        let count = at.numbers.len();
+        let mut rows = vec![0.0; Reports::ROWS * count];
+        for (k, (&place, neighbours)) in at.numbers.iter().zip(&at.neighbours).enumerate() {
+            let of = self.report(site, place, neighbours);
+            for (row, value) in of.into_iter().enumerate() {
+                rows[row * count + k] = value as f32;
+            }
+        }
+        rows
     }
 
     fn report(&self, site: usize, place: usize, around: &[Neighbour]) -> [f64; 4] {
@@ -386,12 +465,12 @@ impl Reader<'_> {
 
     /// Per newton squared.
     fn variance(&self, site: usize, place: usize) -> f64 {
-        let Some(variance) = self.known.variance else {
+        let Some(variance) = self.variance else {
             return 0.0;
         };
         let touches = || self.merged.touches[place].iter().map(|&(t, _)| t);
         let of = |t: usize| {
-            let force = self.known.forces.map_or(1.0, |f| f.touches[t]);
+            let force = self.forces.map_or(1.0, |f| f.touches[t]);
             variance(site, t) / (force * force)
         };
         touches().map(of).sum::<f64>() / touches().count() as f64 * self.unit * self.unit
@@ -436,8 +515,8 @@ pub fn templates(
     let reader = Reader {
         x,
         merged: &merged,
-        around: &around,
-        known,
+        variance: known.variance,
+        forces: known.forces,
         unit: unit.recip(),
     };
     let template = |place: usize| {

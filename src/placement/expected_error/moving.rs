@@ -1,0 +1,102 @@
+//! Sets of gauges that may be anywhere: the criterion of a choice where what a gauge reads is taken again as it moves.
+
+use rayon::prelude::*;
+
+use super::bank::Bank;
+use super::expectation::{Expected, Losses};
+use super::hand::Hand;
+use super::scene::{Outlook, Scene, Variance};
+use super::{Detail, Knowledge};
+use crate::budget::{Cancelled, Watch};
+use crate::dataset::SignalMatrix;
+use crate::placement::Wishes;
+
+/// Seats for gauges, numbered from zero, under the touches that a choice looked at; who sits there may change.
+pub struct Moving<'a> {
+    fine: Seated<'a>,
+    /// Where so many gauges may be lost that this is looked at in less detail.
+    coarse: Option<Seated<'a>>,
+    losses: Option<Losses>,
+    wishes: &'a Wishes,
+}
+
+/// The seats, in some detail.
+struct Seated<'a> {
+    outlook: Outlook<'a>,
+    scene: Scene,
+}
+
+impl<'a> Moving<'a> {
+    /// So many seats, with nobody in them. Readings are measured as those of a choice from sites that read `x`; of what
+    /// is known of these the variance is not asked for.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn new(
+        x: &SignalMatrix,
+        targets: &[[f64; 3]],
+        known: &Knowledge<'a>,
+        (detail, seats): (Detail, usize),
+        wishes: &'a Wishes,
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
+        let nobody = SignalMatrix::new(x.columns(), vec![0.0; seats * x.columns()]);
+        let seated = |detail: Detail| -> Result<Seated<'a>, Cancelled> {
+            let outlook = Outlook::new(x, targets, known, detail, watch)?;
+            let scene = outlook.scene(&nobody, None, watch)?;
+            Ok(Seated { outlook, scene })
+        };
+        let losses = Losses::of(wishes, known.seed);
+        let many = losses.as_ref().is_some_and(|l| l.many);
+        let coarse = many.then(|| seated(detail.coarse())).transpose()?;
+        Ok(Self {
+            fine: seated(detail)?,
+            coarse,
+            losses,
+            wishes,
+        })
+    }
+
+    /// Puts a gauge into a seat: what it reads under every touch, and the variance that is on it, by the touch.
+    pub fn seat(&mut self, seat: usize, x: &[f64], variance: &(dyn Fn(usize) -> f64 + Sync)) {
+        let row = SignalMatrix::new(x.len(), x.to_vec());
+        let variance: Variance = &|_, touch| variance(touch);
+        for seated in std::iter::once(&mut self.fine).chain(&mut self.coarse) {
+            (seated.outlook).retake(&mut seated.scene, seat, &row, variance);
+        }
+    }
+
+    /// The criterion (mm) of a choice for the gauges in some seats; `report` is asked whether to go on.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when `report` does not want it to.
+    pub fn error(
+        &self,
+        set: &[usize],
+        report: &(dyn Fn() -> Result<(), Cancelled> + Sync),
+    ) -> Result<f64, Cancelled> {
+        let lossy = self.coarse.as_ref().unwrap_or(&self.fine);
+        let losses = self.losses.as_ref().map(|l| (l, &lossy.scene));
+        let expected = Expected::of(&self.fine.scene, losses, set, report)?;
+        Ok(expected.weighed(self.wishes))
+    }
+
+    /// The part of the error (mm) that is left where one place is meant.
+    #[must_use]
+    pub fn local(&self, set: &[usize]) -> f64 {
+        Bank::of(&self.fine.scene, set).local()
+    }
+
+    /// The expected error (mm), with no gauge lost, of a set in which one gauge (its number in the set) is replaced by
+    /// each of some others.
+    #[must_use]
+    pub fn with_each(&self, set: &[usize], number: usize, others: &[usize]) -> Vec<f64> {
+        let scene = &self.fine.scene;
+        let hand = Hand::around(scene, set, number);
+        let error = |&seat: &usize| {
+            let errors = hand.errors_with(seat);
+            scene.mean_among(&errors, |_| true).unwrap_or(f64::INFINITY)
+        };
+        others.par_iter().map(error).collect()
+    }
+}
