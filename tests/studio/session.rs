@@ -36,7 +36,7 @@ fn gauges(w: &Window) -> usize {
 /// would fewer do, and what does the workshop get?
 #[test]
 fn the_whole_design_task() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     let home = tempfile::tempdir().unwrap();
     w.harness.state_mut().keep_unsaved_in(home.path());
     w.harness.run_ok();
@@ -348,9 +348,9 @@ fn out(w: &mut Window, home: &std::path::Path) {
         w.harness.step();
         std::thread::sleep(Duration::from_millis(5));
     }
-    let mut again = Window::open().unwrap();
+    let mut again = Window::open();
     // The first window is still there, and its lock with it: it must be gone first.
-    let gone = std::mem::replace(w, Window::open().unwrap());
+    let gone = std::mem::replace(w, Window::open());
     drop(gone);
     again.harness.state_mut().keep_unsaved_in(home);
     again.harness.run_ok();
@@ -369,7 +369,7 @@ fn out(w: &mut Window, home: &std::path::Path) {
 /// Every control that can be reached has a name, with every tool and at every stage.
 #[test]
 fn every_control_has_a_name() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     w.press("Section");
     for stage in Stage::ALL {
         w.harness.state_mut().stage = stage;
@@ -385,7 +385,7 @@ fn every_control_has_a_name() {
 
 #[test]
 fn an_idle_window_rests() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     w.press("Unrolled");
     w.press("See-through");
     let rests = |w: &mut Window| {
@@ -407,7 +407,7 @@ fn an_idle_window_rests() {
 /// (`HAPDEF_REVIEW=1 cargo test --test session reviewed` writes them anew).
 #[test]
 fn reviewed_pictures_stay_as_they_are() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     reviewed(&mut w, "start");
     w.press("Unrolled");
     w.press("See-through");

@@ -61,7 +61,7 @@ fn without_gauges(w: &mut Window) {
 
 #[test]
 fn the_limb_is_shown_and_bends_under_a_click() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     without_gauges(&mut w);
     w.press("Front");
     // On the hoop at the front, between the columns.
@@ -104,7 +104,7 @@ fn the_limb_is_shown_and_bends_under_a_click() {
 
 #[test]
 fn painting_erasing_undo_and_redo() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     without_gauges(&mut w);
     w.press("Front");
     w.press("Paint");
@@ -138,7 +138,7 @@ fn painting_erasing_undo_and_redo() {
 
 #[test]
 fn from_the_limb_to_the_report() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     w.press("Simulate");
     w.wait("the simulation", 120, |s| !s.busy());
     assert!(
@@ -218,7 +218,7 @@ fn from_the_limb_to_the_report() {
 
 #[test]
 fn a_job_can_be_cancelled_and_bad_files_change_nothing() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     w.harness.state_mut().document.state.project.budget.quality = Quality::Standard;
     w.harness.run_ok();
     w.press("Simulate");
@@ -261,7 +261,7 @@ fn a_job_can_be_cancelled_and_bad_files_change_nothing() {
 
 #[test]
 fn results_survive_saving_and_undo_is_not_mistaken_for_them() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     let key = w.harness.state().document.simulation_key();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("elsewhere.hapdef.toml");
@@ -297,7 +297,7 @@ fn results_survive_saving_and_undo_is_not_mistaken_for_them() {
 
 #[test]
 fn a_saved_project_opens_again() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mine.hapdef.toml");
     w.press("Front");
@@ -327,7 +327,7 @@ fn a_saved_project_opens_again() {
 
 #[test]
 fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
-    let Some(mut w) = Window::open() else { return };
+    let mut w = Window::open();
     // Two plates, the smaller one with a hole.
     let folder = tempfile::tempdir().unwrap();
     let mut obj = String::new();
@@ -410,9 +410,7 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
 
 #[test]
 fn the_palette_reaches_every_command() {
-    let Some(mut window) = Window::open() else {
-        return;
-    };
+    let mut window = Window::open();
     let painted = |w: &Window| {
         let mask = w.harness.state().document.state.painted.clone();
         mask.map(|m| m.iter().filter(|&&m| m).count())
@@ -448,9 +446,7 @@ fn the_palette_reaches_every_command() {
 #[test]
 fn what_was_not_saved_is_offered_again() {
     let home = tempfile::tempdir().unwrap();
-    let Some(mut window) = Window::open() else {
-        return;
-    };
+    let mut window = Window::open();
     window.harness.state_mut().keep_unsaved_in(home.path());
     window.harness.run_ok();
     assert!(!asks(&window), "nothing was left yet");
@@ -470,7 +466,7 @@ fn what_was_not_saved_is_offered_again() {
     window.wait("changes to be kept", 30, |_| kept());
     // Killed: nobody says goodbye.
     drop(window);
-    let mut window = Window::open().unwrap();
+    let mut window = Window::open();
     window.harness.state_mut().keep_unsaved_in(home.path());
     window.harness.run_ok();
     assert!(asks(&window));
@@ -493,12 +489,12 @@ fn asks(window: &Window) -> bool {
 }
 
 /// The bundled limb simulated, and its sites filtered.
-fn simulated() -> Option<Window> {
-    let mut w = Window::open()?;
+fn simulated() -> Window {
+    let mut w = Window::open();
     w.press("Simulate");
     w.wait("the simulation", 120, |s| !s.busy());
     w.wait("the filters", 20, |s| s.feasibility.is_some());
-    Some(w)
+    w
 }
 
 fn gauges(w: &Window) -> Vec<hapdef::project::ChosenSite> {
@@ -513,7 +509,7 @@ fn expected(w: &mut Window) -> f64 {
 
 #[test]
 fn the_expected_error_and_its_map_follow_the_hand() {
-    let Some(mut w) = simulated() else { return };
+    let mut w = simulated();
     w.press("Gauges");
     let before = expected(&mut w);
     assert!(before > 0.05 && before < 30.0, "{before}");
@@ -557,10 +553,10 @@ fn the_expected_error_and_its_map_follow_the_hand() {
 
 #[test]
 fn one_key_adds_the_gauge_that_helps_most() {
-    let Some(w) = Window::open() else { return };
+    let w = Window::open();
     assert!(!w.harness.state().enabled(Command::AddHelpful));
     drop(w);
-    let mut w = simulated().unwrap();
+    let mut w = simulated();
     w.press("Gauges");
     let before = expected(&mut w);
     let sites = gauges(&w);
@@ -576,10 +572,10 @@ fn one_key_adds_the_gauge_that_helps_most() {
 
 #[test]
 fn one_key_finds_the_gauge_that_helps_least() {
-    let Some(w) = Window::open() else { return };
+    let w = Window::open();
     assert!(!w.harness.state().enabled(Command::FindSpare));
     drop(w);
-    let mut w = simulated().unwrap();
+    let mut w = simulated();
     let sites = gauges(&w);
     w.key(Modifiers::NONE, egui::Key::W);
     w.wait("the gauge", 120, |s| !s.busy());
