@@ -35,7 +35,7 @@ fn main() {
 fn shell(text: &mut String) {
     let _ = writeln!(
         text,
-        "## The shell element\n\nComputed over reference on n × n meshes (twisted beam 6n × n), as asserted by `tests/analytic.rs`; in brackets what the same pair of elements is known to reach.\n\n| test | n: ratio |\n|---|---|"
+        "## The shell element\n\nComputed over reference on n × n meshes (twisted beam 6n × n), as asserted by `tests/engine/analytic.rs`; in brackets what the same pair of elements is known to reach.\n\n| test | n: ratio |\n|---|---|"
     );
     let mut row = |name: &str, ratio: &dyn Fn(usize) -> f64, known: &[(usize, f64)]| {
         let cells: Vec<String> = known
@@ -85,7 +85,7 @@ fn shell(text: &mut String) {
 fn own_error(text: &mut String) {
     let _ = writeln!(
         text,
-        "## What the model says of its own error\n\nA clamped round plate (free radius 40 mm, tip 4 mm) with closed forms for displacement (bending and shear) and inner strain: estimated and true error, rms in %, and their ratio. Asserted between 0.5 and 2 by `tests/convergence.rs`.\n\n| mesh | t (mm) | vertices | displacement: estimated / true (ratio) | strain: estimated / true (ratio) |\n|---|---|---|---|---|"
+        "## What the model says of its own error\n\nA clamped round plate (free radius 40 mm, tip 4 mm) with closed forms for displacement (bending and shear) and inner strain: estimated and true error, rms in %, and their ratio. Asserted between 0.5 and 2 by `tests/engine/convergence.rs`.\n\n| mesh | t (mm) | vertices | displacement: estimated / true (ratio) | strain: estimated / true (ratio) |\n|---|---|---|---|---|"
     );
     for thickness in [0.4e-3, 1e-3, 2e-3] {
         for (name, vertices, passes, given) in [

@@ -103,7 +103,7 @@ pub fn answer_sifted(
     let built = ground.build(&touches, &places, &budget.elements, watch)?;
     let checks = Checks::of(&built);
     let Built {
-        laid,
+        meshed,
         model,
         estimate,
         linearity,
@@ -121,7 +121,7 @@ pub fn answer_sifted(
         .iter()
         .map(|t| t.tip_radius)
         .fold(f64::INFINITY, f64::min);
-    notes.extend(ground.cautions(&laid, smallest));
+    notes.extend(meshed.cautions(smallest));
     let (observer, angles) = observed(&*model, sites, &mut rows);
     rows.check()?;
     let reading = Reading::GaugeAndDisplacement(&angles);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
+use super::ground::solid_ground;
 use super::layout::size_mm;
 use super::{DesignError, Ground, Inputs, SLOPE_TOUCHES, ground};
 use crate::budget::{Budget, Watch};
@@ -112,9 +113,8 @@ pub struct Faces {
 pub fn advise(inputs: &Inputs, watch: Watch) -> Result<Advice, DesignError> {
     let mut as_solid = inputs.clone();
     as_solid.project.part.model = PartModel::Solid;
-    match ground(&as_solid, watch) {
-        Ok(Ground::Solid(solid)) => of_closed(inputs, &solid, watch),
-        Ok(Ground::Shell(_)) => unreachable!("a solid was asked for"),
+    match solid_ground(&as_solid, watch) {
+        Ok(solid) => of_closed(inputs, &solid, watch),
         Err(DesignError::Elastic(ElasticError::Open { rims, .. })) => {
             Ok(of_open(inputs, rims, watch))
         }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::judge::{ByMatching, grid, judge, measured_by};
 use super::layout::{lay_out_sites, touches_on};
-use super::{Design, DesignError, Ground, Inputs, Laid, Simulated, Truth, ground};
+use super::{Design, DesignError, Inputs, Meshed, Simulated, Truth, ground};
 use crate::budget::{Budget, Elements, Watch};
 use crate::elasticity::{Model, Touch};
 use crate::evaluation::{Candidate, EvaluationRow, Judging};
@@ -27,7 +27,7 @@ const FINEST: Elements = Elements {
 
 /// The judge.
 pub struct Finest {
-    laid: Laid,
+    meshed: Meshed,
     model: Box<dyn Model>,
     touches: Vec<Touch>,
 }
@@ -58,13 +58,13 @@ impl Finest {
             .collect();
         let surface = ground.touch_layout(&inputs.part);
         let sample = touches_on(&surface, inputs, LAID_FOR, project.budget.seed, true)?;
-        let laid = ground.build(&sample, &places, &FINEST, watch)?.laid;
-        let (laid, model) = ground.truth(&laid, watch)?;
-        let surface = ground.touched_surface(&laid);
+        let coarse = ground.build(&sample, &places, &FINEST, watch)?.meshed;
+        let (meshed, model) = coarse.truth(watch)?;
+        let surface = meshed.touched_surface();
         let seed = project.budget.seed.wrapping_add(JUDGE_SEED);
         Ok(Self {
             touches: touches_on(&surface, inputs, JUDGED, seed, false)?,
-            laid,
+            meshed,
             model,
         })
     }
@@ -72,7 +72,7 @@ impl Finest {
     /// Size of its elements (mm).
     #[must_use]
     pub fn element_mm(&self) -> f64 {
-        Ground::element_mm(&self.laid)
+        self.meshed.element_mm()
     }
 
     #[must_use]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::layout::{check_shape, size_mm};
-use super::{DesignError, Inputs, LAYOUT};
+use super::{DesignError, Inputs, LAYOUT, Meshed};
 use crate::budget::{Cancelled, Elements, Watch};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::grade::{self, Graded};
@@ -13,31 +13,23 @@ use crate::elasticity::linearity::Linearity;
 use crate::elasticity::model::LoadCheck;
 use crate::elasticity::shell::check_section;
 use crate::elasticity::solid::ground::SolidGround;
-use crate::elasticity::solid::immersed::Fineness;
-use crate::elasticity::{Freedoms, Model, Touch};
+use crate::elasticity::{Model, Touch};
 use crate::feasible::Surroundings;
 use crate::mesh::locate::SurfaceIndex;
-use crate::mesh::remesh::Remeshed;
 use crate::mesh::walls::Side;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::{Elements as ElementKind, PartModel, Project};
 
 /// A part with its supports, ready to have elements laid on it or cells around it.
-pub enum Ground {
-    Shell(Box<grade::Ground>),
-    Solid(Box<SolidGround>),
-}
-
-/// The elements of a model.
 #[derive(Clone)]
-pub enum Laid {
-    Shell(Remeshed),
-    Solid(Fineness),
+pub enum Ground {
+    Shell(Arc<grade::Ground>),
+    Solid(Arc<SolidGround>),
 }
 
 /// The elements, with the model built on them.
 pub struct Built {
-    pub laid: Laid,
+    pub meshed: Meshed,
     pub model: Box<dyn Model>,
     pub estimate: Discretization,
     /// Of a shell; a solid's is not estimated.
@@ -57,18 +49,7 @@ pub fn ground(inputs: &Inputs, watch: Watch) -> Result<Ground, DesignError> {
     let supports = project.supports(&inputs.masks)?;
     check_shape(&inputs.part)?;
     if project.part.model == PartModel::Solid {
-        let told = told(inputs)?;
-        let material = project.section().material;
-        material.check()?;
-        let solid = SolidGround::touched_by(
-            project.fingertip(),
-            &inputs.part,
-            material,
-            &supports,
-            &told,
-            watch,
-        )?;
-        return Ok(Ground::Solid(Box::new(solid)));
+        return Ok(Ground::Solid(Arc::new(solid_ground(inputs, watch)?)));
     }
     if project.part.thickness_mm > size_mm(&inputs.part) {
         return Err(DesignError::ThickerThanWide {
@@ -78,7 +59,24 @@ pub fn ground(inputs: &Inputs, watch: Watch) -> Result<Ground, DesignError> {
     }
     let as_given = project.part.elements == ElementKind::AsGiven;
     let shell = grade::Ground::new(&inputs.part, project.section(), &supports, as_given);
-    Ok(Ground::Shell(Box::new(shell)))
+    Ok(Ground::Shell(Arc::new(shell)))
+}
+
+/// The part as a solid, whatever its project takes it for.
+///
+/// # Errors
+/// As [`ground`].
+pub(super) fn solid_ground(inputs: &Inputs, watch: Watch) -> Result<SolidGround, DesignError> {
+    let project = &inputs.project;
+    let supports = project.supports(&inputs.masks)?;
+    check_shape(&inputs.part)?;
+    let told = told(inputs)?;
+    let material = project.section().material;
+    material.check()?;
+    let fingertip = project.fingertip();
+    let solid =
+        SolidGround::touched_by(fingertip, &inputs.part, material, &supports, &told, watch)?;
+    Ok(solid)
 }
 
 /// What has to be known of a solid whose surface is not closed; its inside is guessed at there.
@@ -148,16 +146,6 @@ impl Ground {
         }
     }
 
-    /// The surface that gauges are glued to, on these elements, and what is held at its vertices.
-    #[must_use]
-    pub fn gauge_surface(&self, laid: &Laid) -> (Arc<TriMesh>, Vec<Freedoms>) {
-        match (self, laid) {
-            (Self::Shell(shell), Laid::Shell(laid)) => (Arc::clone(&laid.mesh), shell.held(laid)),
-            (Self::Solid(solid), _) => (Arc::clone(&solid.inside), solid.inside_held.clone()),
-            (Self::Shell(_), Laid::Solid(_)) => unreachable!("cells are of solids"),
-        }
-    }
-
     /// What lies before and behind points of the surface that gauges are glued to; a shell is all wall.
     ///
     /// # Errors
@@ -200,16 +188,6 @@ impl Ground {
         words
     }
 
-    /// The surface that touches press on, on these elements.
-    #[must_use]
-    pub fn touched_surface(&self, laid: &Laid) -> Arc<TriMesh> {
-        match (self, laid) {
-            (Self::Solid(solid), _) => Arc::clone(&solid.outside),
-            (Self::Shell(_), Laid::Shell(laid)) => Arc::clone(&laid.mesh),
-            (Self::Shell(_), Laid::Solid(_)) => unreachable!("cells are of solids"),
-        }
-    }
-
     /// A mesh of about one edge length (m) where touches land.
     #[must_use]
     pub fn of_size(&self, size: f64) -> Arc<TriMesh> {
@@ -225,25 +203,6 @@ impl Ground {
         match self {
             Self::Shell(shell) => shell.area(),
             Self::Solid(solid) => solid.outside.area(),
-        }
-    }
-
-    /// Where the theory is off for this part, these elements and a tip of this radius (m).
-    #[must_use]
-    pub fn cautions(&self, laid: &Laid, tip_radius: f64) -> Vec<String> {
-        match (self, laid) {
-            (Self::Solid(solid), Laid::Solid(fineness)) => solid.cautions(fineness),
-            (Self::Shell(shell), _) => shell.cautions(tip_radius),
-            (Self::Solid(_), Laid::Shell(_)) => unreachable!("triangles are of shells"),
-        }
-    }
-
-    /// Size of the elements (mm): mean edge of triangles, largest side of cells.
-    #[must_use]
-    pub fn element_mm(laid: &Laid) -> f64 {
-        match laid {
-            Laid::Shell(laid) => laid.mesh.mean_edge() * 1e3,
-            Laid::Solid(fineness) => fineness.size * 1e3 / f64::from(1 << fineness.halvings),
         }
     }
 
@@ -291,7 +250,7 @@ impl Ground {
                     ..
                 } = shell.grade(touches, places, aim, watch)?;
                 Ok(Built {
-                    laid: Laid::Shell(laid),
+                    meshed: Meshed::Shell(Arc::clone(shell), laid),
                     model: Box::new(model),
                     estimate,
                     linearity: Some(linearity),
@@ -303,7 +262,7 @@ impl Ground {
             Self::Solid(solid) => {
                 let graded = solid.grade(touches, places, aim, watch)?;
                 Ok(Built {
-                    laid: Laid::Solid(graded.fineness),
+                    meshed: Meshed::Solid(Arc::clone(solid), graded.fineness),
                     model: Box::new(graded.model),
                     estimate: graded.estimate,
                     linearity: None,
@@ -315,44 +274,6 @@ impl Ground {
         }
     }
 
-    /// Finer elements, for the truth: half as large for a shell, two thirds for a solid, its own tetrahedra one order
-    /// higher.
-    fn finer(&self, laid: &Laid) -> Laid {
-        match (self, laid) {
-            (Self::Shell(shell), Laid::Shell(laid)) => Laid::Shell(shell.halved(laid)),
-            (Self::Solid(solid), Laid::Solid(fineness)) => Laid::Solid(solid.finer(fineness)),
-            _ => unreachable!("cells are of solids, triangles of shells"),
-        }
-    }
-
-    /// The model on elements.
-    ///
-    /// # Errors
-    /// [`DesignError`] for what cannot be computed.
-    pub fn model(&self, laid: &Laid, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
-        Ok(match (self, laid) {
-            (Self::Shell(shell), Laid::Shell(laid)) => Box::new(shell.model(laid, watch)?),
-            (Self::Solid(solid), Laid::Solid(fineness)) => Box::new(solid.model(fineness, watch)?),
-            _ => unreachable!("cells are of solids, triangles of shells"),
-        })
-    }
-
-    /// The model that others are judged by, with its elements: finer ones, or where those do not fit into memory
-    /// the same.
-    ///
-    /// # Errors
-    /// [`DesignError`] for what cannot be computed.
-    pub fn truth(&self, laid: &Laid, watch: Watch) -> Result<(Laid, Box<dyn Model>), DesignError> {
-        let finer = self.finer(laid);
-        match self.model(&finer, watch) {
-            Ok(model) => Ok((finer, model)),
-            Err(DesignError::Elastic(error)) if error.is_memory() => {
-                Ok((laid.clone(), self.model(laid, watch)?))
-            }
-            Err(error) => Err(error),
-        }
-    }
-
     /// A model that is quick to have.
     ///
     /// # Errors
@@ -360,11 +281,14 @@ impl Ground {
     pub fn quick(&self, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
         /// Unknowns of a solid.
         const UNKNOWNS: f64 = 18_000.0;
-        let laid = match self {
-            Self::Shell(shell) => Laid::Shell(shell.even(LAYOUT)),
-            Self::Solid(solid) => Laid::Solid(solid.fineness(solid.size_for(UNKNOWNS))),
+        let meshed = match self {
+            Self::Shell(shell) => Meshed::Shell(Arc::clone(shell), shell.even(LAYOUT)),
+            Self::Solid(solid) => {
+                let fineness = solid.fineness(solid.size_for(UNKNOWNS));
+                Meshed::Solid(Arc::clone(solid), fineness)
+            }
         };
-        self.model(&laid, watch)
+        meshed.model(watch)
     }
 }
 

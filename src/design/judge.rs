@@ -12,7 +12,7 @@ use super::known;
 use super::layout::touches_on;
 use super::sense::{gauge_at, proposed};
 use super::{
-    Design, DesignError, Ground, Inputs, NOISE_SEED, PRESS_SEED, Reduced, Simulated, TEST_SEED,
+    Design, DesignError, Inputs, NOISE_SEED, PRESS_SEED, Reduced, Simulated, TEST_SEED,
     WORKSHOP_SEED,
 };
 use crate::budget::{Budget, Cancelled, Watch, Work};
@@ -98,8 +98,8 @@ pub fn truth(
     budget: &Budget,
     watch: Watch,
 ) -> Result<Truth, DesignError> {
-    let (laid, model) = simulated.ground.truth(&simulated.laid, watch)?;
-    let mesh = simulated.ground.touched_surface(&laid);
+    let (meshed, model) = simulated.meshed.truth(watch)?;
+    let mesh = meshed.touched_surface();
     let seed = inputs.project.budget.seed.wrapping_add(TEST_SEED);
     let touches = touches_on(&mesh, inputs, budget.test_touches, seed, false)?;
     let grid = grid(&inputs.project);
@@ -109,7 +109,7 @@ pub fn truth(
     }
     let work = model.system().work();
     truth.work += work;
-    truth.element_mm = Ground::element_mm(&laid);
+    truth.element_mm = meshed.element_mm();
     Ok(truth)
 }
 

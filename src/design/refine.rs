@@ -172,7 +172,7 @@ fn search(
         watch,
     )?;
     let confirming = Moving::new(x, &targets, &confirmed, (FINE, seats + 1), &whole, watch)?;
-    let model = simulated.ground.model(&simulated.laid, watch)?;
+    let model = simulated.meshed.model(watch)?;
     let pressed = Pressed::new(&*model, &simulated.dataset.touches);
     let sites: Vec<Site> = set.iter().map(|&s| simulated.dataset.sites[s]).collect();
     let (surveyed, solves) = survey(&pressed, &sites, watch)?;

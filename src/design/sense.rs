@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::layout::{lay_out_sites, lay_out_touches, touches_on};
-use super::{DesignError, Ground, Inputs, Laid, as_built, ground, workshop_draw};
+use super::{DesignError, Ground, Inputs, Meshed, as_built, ground, workshop_draw};
 use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
@@ -34,8 +34,7 @@ pub struct Sensing {
     pub proposed: Vec<Touch>,
     /// Mean edge of the elements (mm).
     pub element_mm: f64,
-    ground: Ground,
-    laid: Laid,
+    meshed: Meshed,
 }
 
 /// Known touches that are proposed.
@@ -109,9 +108,8 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
         off,
         drawn: Arc::new(drawn),
         proposed,
-        element_mm: Ground::element_mm(&graded.laid),
-        ground,
-        laid: graded.laid,
+        element_mm: graded.meshed.element_mm(),
+        meshed: graded.meshed,
     })
 }
 
@@ -250,7 +248,7 @@ impl Sensing {
         seed: u64,
         watch: Watch,
     ) -> Result<(Sensitivity, Vec<f64>), DesignError> {
-        let (_, model) = self.ground.truth(&self.laid, watch)?;
+        let (_, model) = self.meshed.truth(watch)?;
         let gauges: Vec<Gauge> = (self.gauges.iter().enumerate())
             .map(|(k, gauge)| glued(gauge, gluing, seed, k))
             .collect();

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::ground::{Built, Ground, Laid, ground, open_solid};
+use super::ground::{Built, ground, open_solid};
 use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches};
-use super::{DesignError, Inputs, SLOPE_TOUCHES};
+use super::{DesignError, Inputs, Meshed, SLOPE_TOUCHES};
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset, Surveyed};
 use crate::elasticity::estimate::Discretization;
@@ -28,9 +28,7 @@ pub struct Simulated {
     pub mesh: Arc<TriMesh>,
     /// Size of the elements (mm).
     pub element_mm: f64,
-    /// What they were laid on, and where.
-    pub(super) ground: Arc<Ground>,
-    pub(super) laid: Laid,
+    pub(super) meshed: Meshed,
     /// What is held at its vertices.
     pub held: Vec<Freedoms>,
     /// Where the vertices of the part that is shown lie on it.
@@ -58,7 +56,7 @@ impl Simulated {
     /// # Errors
     /// [`DesignError`] as when it was built first.
     pub fn model(&self) -> Result<Box<dyn Model>, DesignError> {
-        self.ground.model(&self.laid, &crate::budget::unwatched)
+        self.meshed.model(&crate::budget::unwatched)
     }
 
     /// Whether two are of one simulation, whatever gauges were moved off its lattice.
@@ -79,7 +77,7 @@ impl Simulated {
         let Some(known) = &self.surroundings else {
             return Ok(None);
         };
-        let found = self.ground.surroundings(points, watch)?;
+        let found = self.meshed.ground().surroundings(points, watch)?;
         // What is closed was opened for all of it.
         let opened = known.room.iter().all(|room| room.is_infinite());
         Ok(found.map(|found| if opened { found.open() } else { found }))
@@ -136,7 +134,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     let built = ground.build(&touches, &places, &budget.elements, watch)?;
     let checks = Checks::of(&built);
     let Built {
-        laid,
+        meshed,
         model,
         estimate,
         linearity,
@@ -145,8 +143,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         ..
     } = built;
     let known = Elements {
-        ground: Arc::new(ground),
-        laid,
+        meshed,
         estimate,
         linearity,
         checks,
@@ -176,7 +173,7 @@ pub fn simulate_again(
 ) -> Result<Simulated, DesignError> {
     let project = &inputs.project;
     project.check()?;
-    let layout = last.ground.site_layout(&inputs.part);
+    let layout = last.meshed.ground().site_layout(&inputs.part);
     let sites = lay_out_sites(&layout, inputs)?;
     check_memory(
         sites.len(),
@@ -185,13 +182,12 @@ pub fn simulate_again(
     )?;
     let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
     let known = Elements {
-        ground: Arc::clone(&last.ground),
-        laid: last.laid.clone(),
+        meshed: last.meshed.clone(),
         estimate: last.discretization,
         linearity: last.linearity,
         checks: last.checks,
     };
-    let model = last.ground.model(&last.laid, watch)?;
+    let model = last.meshed.model(watch)?;
     let touches = last.dataset.touches.clone();
     let before = Work::default();
     read(
@@ -201,8 +197,7 @@ pub fn simulate_again(
 
 /// Elements with what is known of them.
 struct Elements {
-    ground: Arc<Ground>,
-    laid: Laid,
+    meshed: Meshed,
     estimate: Discretization,
     linearity: Option<Linearity>,
     checks: Checks,
@@ -224,8 +219,7 @@ fn read(
     watch: Watch,
 ) -> Result<Simulated, DesignError> {
     let Elements {
-        ground,
-        laid,
+        meshed,
         estimate,
         linearity,
         checks,
@@ -250,12 +244,13 @@ fn read(
     };
     let mut cautious = checks.distrust();
     cautious.extend(cautions(&estimate, linearity.as_ref(), project, budget));
-    cautious.extend(ground.cautions(&laid, project.tip().1));
+    cautious.extend(meshed.cautions(project.tip().1));
     cautious.extend(open_solid(inputs));
     cautious.extend(on_supports(inputs, &dataset.touches)?);
-    let (mesh, held) = ground.gauge_surface(&laid);
+    let (mesh, held) = meshed.gauge_surface();
     let index = SurfaceIndex::new(&mesh);
     let points: Vec<SurfacePoint> = places.iter().map(|&p| index.nearest(p).0).collect();
+    let ground = meshed.ground();
     let surroundings = ground.surroundings(&points, watch)?;
     notes.extend(ground.left_out(surroundings.as_ref()));
     let surroundings = surroundings.map(Surroundings::opened);
@@ -273,10 +268,9 @@ fn read(
             cautions: cautious,
             notes,
         },
-        element_mm: Ground::element_mm(&laid),
+        element_mm: meshed.element_mm(),
         mesh,
-        ground,
-        laid,
+        meshed,
         held,
         carried,
         discretization: estimate,
@@ -295,7 +289,7 @@ impl Simulated {
     /// How thick the walls of a solid usually are, as measured (m).
     #[must_use]
     pub fn usual_wall(&self) -> Option<f64> {
-        self.ground.usual_wall()
+        self.meshed.ground().usual_wall()
     }
 }
 

@@ -550,7 +550,7 @@ fn bent_edges_are_straightened_and_said() {
     let loaded = parsed("dat", text.as_bytes()).unwrap();
     let said = notes(&loaded);
     let shift = a.distance(b) * (0.5 - 0.125);
-    assert!(said.contains("1 edges were straightened"), "{said}");
+    assert!(said.contains("1 edge was straightened"), "{said}");
     assert!(
         said.contains(&format!("by {shift:.2} mm at most")),
         "{said}"

@@ -404,7 +404,7 @@ fn an_idle_window_rests() {
 }
 
 /// Pictures that were looked at and found right, at half size: a change in them is to be looked at again
-/// (`HAPDEF_REVIEW=1 cargo test --test session reviewed` writes them anew).
+/// (`HAPDEF_REVIEW=1 cargo test --test studio reviewed` writes them anew).
 #[test]
 fn reviewed_pictures_stay_as_they_are() {
     let mut w = Window::open();

@@ -82,8 +82,8 @@ impl ByMatching<'_> {
         let heard = self.heard();
         let middle = &heard[self.forces.middle()];
         let model = self.simulated.model()?;
-        let ground = &self.simulated.ground;
-        let mesh = ground.of_size(map_size(ground, self.tip_radius()));
+        let ground = self.simulated.meshed.ground();
+        let mesh = ground.of_size(map_size(&ground, self.tip_radius()));
         let mut work = model.system().work();
         let (mut found, mut failures) = (Vec::new(), Vec::new());
         for group in groups(sets) {

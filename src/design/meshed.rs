@@ -1,0 +1,101 @@
+//! A part with elements on it.
+
+use std::sync::Arc;
+
+use super::{DesignError, Ground};
+use crate::budget::Watch;
+use crate::elasticity::solid::ground::SolidGround;
+use crate::elasticity::solid::immersed::Fineness;
+use crate::elasticity::{Freedoms, Model, grade};
+use crate::mesh::TriMesh;
+use crate::mesh::remesh::Remeshed;
+
+/// Elements together with what they were laid on: triangles of a shell, cells or tetrahedra of a solid.
+#[derive(Clone)]
+pub enum Meshed {
+    Shell(Arc<grade::Ground>, Remeshed),
+    Solid(Arc<SolidGround>, Fineness),
+}
+
+impl Meshed {
+    /// What they were laid on.
+    #[must_use]
+    pub fn ground(&self) -> Ground {
+        match self {
+            Self::Shell(shell, _) => Ground::Shell(Arc::clone(shell)),
+            Self::Solid(solid, _) => Ground::Solid(Arc::clone(solid)),
+        }
+    }
+
+    /// The surface that gauges are glued to, and what is held at its vertices.
+    #[must_use]
+    pub fn gauge_surface(&self) -> (Arc<TriMesh>, Vec<Freedoms>) {
+        match self {
+            Self::Shell(shell, laid) => (Arc::clone(&laid.mesh), shell.held(laid)),
+            Self::Solid(solid, _) => (Arc::clone(&solid.inside), solid.inside_held.clone()),
+        }
+    }
+
+    /// The surface that touches press on.
+    #[must_use]
+    pub fn touched_surface(&self) -> Arc<TriMesh> {
+        match self {
+            Self::Shell(_, laid) => Arc::clone(&laid.mesh),
+            Self::Solid(solid, _) => Arc::clone(&solid.outside),
+        }
+    }
+
+    /// Where the theory is off for this part, these elements and a tip of this radius (m).
+    #[must_use]
+    pub fn cautions(&self, tip_radius: f64) -> Vec<String> {
+        match self {
+            Self::Shell(shell, _) => shell.cautions(tip_radius),
+            Self::Solid(solid, fineness) => solid.cautions(fineness),
+        }
+    }
+
+    /// Size of the elements (mm): mean edge of triangles, largest side of cells.
+    #[must_use]
+    pub fn element_mm(&self) -> f64 {
+        match self {
+            Self::Shell(_, laid) => laid.mesh.mean_edge() * 1e3,
+            Self::Solid(_, fineness) => fineness.size * 1e3 / f64::from(1 << fineness.halvings),
+        }
+    }
+
+    /// Finer elements, for the truth: half as large for a shell, two thirds for a solid, its own tetrahedra one order
+    /// higher.
+    fn finer(&self) -> Self {
+        match self {
+            Self::Shell(shell, laid) => Self::Shell(Arc::clone(shell), shell.halved(laid)),
+            Self::Solid(solid, fineness) => Self::Solid(Arc::clone(solid), solid.finer(fineness)),
+        }
+    }
+
+    /// The model on these elements.
+    ///
+    /// # Errors
+    /// [`DesignError`] for what cannot be computed.
+    pub fn model(&self, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
+        Ok(match self {
+            Self::Shell(shell, laid) => Box::new(shell.model(laid, watch)?),
+            Self::Solid(solid, fineness) => Box::new(solid.model(fineness, watch)?),
+        })
+    }
+
+    /// The model that others are judged by, with its elements: finer ones, or where those do not fit into memory
+    /// the same.
+    ///
+    /// # Errors
+    /// [`DesignError`] for what cannot be computed.
+    pub fn truth(&self, watch: Watch) -> Result<(Self, Box<dyn Model>), DesignError> {
+        let finer = self.finer();
+        match finer.model(watch) {
+            Ok(model) => Ok((finer, model)),
+            Err(DesignError::Elastic(error)) if error.is_memory() => {
+                Ok((self.clone(), self.model(watch)?))
+            }
+            Err(error) => Err(error),
+        }
+    }
+}
