@@ -304,7 +304,7 @@ fn errors(text: &mut String, designs: &[(Quality, Signal, Design)]) {
             line(selector, 5);
             line(selector, 10);
         }
-        line("all-candidates", design.reduced.sites.len());
+        line("all-candidates", design.candidate_count());
     }
     text.push('\n');
 }
@@ -386,9 +386,9 @@ fn reduction(text: &mut String, designs: &[(Quality, Signal, Design)]) {
     );
     for (quality, signal, d) in designs {
         let share = d
-            .reduced
             .candidates
-            .unexplained
+            .as_ref()
+            .and_then(|c| c.unexplained)
             .map_or("–".to_owned(), |u| format!("{:.2} %", 100.0 * u));
         let _ = writeln!(
             text,
@@ -396,7 +396,7 @@ fn reduction(text: &mut String, designs: &[(Quality, Signal, Design)]) {
             quality.name(),
             signal.name(),
             d.reduced.feasible.len(),
-            d.reduced.sites.len()
+            d.candidate_count()
         );
     }
     text.push('\n');

@@ -52,6 +52,37 @@ impl SelectorKind {
         Self::MutualInformation,
     ];
 
+    /// Whether it chooses among candidates that the feasible sites are reduced to; the others among all of them.
+    #[must_use]
+    pub fn wants_candidates(self) -> bool {
+        self == Self::GreedySvr
+    }
+
+    /// Whether it weighs what is left of a set where a gauge is lost.
+    #[must_use]
+    pub fn weighs_losses(self) -> bool {
+        matches!(self, Self::ExpectedError | Self::GreedySvr)
+    }
+
+    /// Whether it weighs that several gauges are lost together.
+    #[must_use]
+    pub fn weighs_losses_together(self) -> bool {
+        self == Self::ExpectedError
+    }
+
+    /// Whether it exchanges gauges where it is asked to: expected error does in any case, and PCA-QR has no criterion of
+    /// a set.
+    #[must_use]
+    pub fn exchanges_if_asked(self) -> bool {
+        !matches!(self, Self::ExpectedError | Self::PcaQr)
+    }
+
+    /// Whether it can begin sets from several first gauges.
+    #[must_use]
+    pub fn has_starts(self) -> bool {
+        self != Self::PcaQr
+    }
+
     /// As in files and on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -33,8 +33,8 @@ pub use live::{GluedKeys, LiveKeys};
 pub use masks::Masks;
 pub use part::{Elements, MaterialKeys, Part, PartModel, SupportKeys, SupportKind, Unit};
 pub use ranges::{
-    ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCE_OFF, FORCES, GAIN_OFF, GAUGES, LENGTH,
-    PLACE_OFF, TIP_OFF, TOUCHES,
+    ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCE_OFF, FORCES, GAIN_OFF, GAUGES, LENGTH, LOST,
+    PLACE_OFF, STARTS, TIP_OFF, TOUCHES,
 };
 pub use selection::{ChosenSite, CostKeys, GaussianProcessKeys, SelectionKeys};
 
@@ -449,6 +449,15 @@ impl Project {
             .into_iter()
             .filter(|&k| self.selection.compare && k != first);
         std::iter::once(first).chain(others).collect()
+    }
+
+    /// Whether the feasible sites are reduced to candidates where some selectors choose: one of them chooses among
+    /// these, the judge compares sets with all of them together, or so many of them are asked for.
+    #[must_use]
+    pub fn wants_candidates(&self, selectors: &[SelectorKind]) -> bool {
+        selectors.iter().any(|k| k.wants_candidates())
+            || self.judging() == Judging::Svr
+            || self.candidates.count.is_some()
     }
 
     #[must_use]

@@ -169,7 +169,7 @@ fn attempt(
         workshop_mm: judged.workshop_mm,
         own_error_mm: own,
         model_percent: design.simulated.discretization.displacement_percent,
-        candidates: design.reduced.sites.len(),
+        candidates: design.candidate_count(),
         sites_mm: (design.chosen().iter())
             .map(|&s| (sites[s].position * 1e3).to_array())
             .collect(),

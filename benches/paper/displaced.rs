@@ -37,7 +37,7 @@ impl Displaced {
         let simulated = design::simulate(&inputs, &budget, &unwatched)?;
         stages.end("simulating displacements");
         let feasibility = design::filter(&inputs, &simulated);
-        let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, &budget, &unwatched)?;
+        let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, &budget)?;
         stages.end("filtering and reducing sites");
         let mut selections = Vec::new();
         for kind in SelectorKind::PAPER {

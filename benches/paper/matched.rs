@@ -21,7 +21,7 @@ pub fn judged(displaced: &Displaced, stages: &mut Stages) -> Result<Evaluation, 
     let simulated = design::simulate_again(&inputs, budget, &displaced.simulated, &unwatched)?;
     stages.end("simulating strain");
     let feasibility = design::filter(&inputs, &simulated);
-    let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, budget, &unwatched)?;
+    let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, budget)?;
     stages.end("filtering and reducing sites");
     // Each number of gauges is chosen for by itself: gauges are exchanged at the end.
     let mut select = |gauges: usize| -> Result<Selection, DesignError> {

@@ -11,6 +11,7 @@ use crate::evaluation::{BASELINE, EstimatorKind, EvaluationRow};
 use crate::io::artifacts::{self, Provenance};
 use crate::io::together::Together;
 use crate::placement::{SelectorKind, SensorSet};
+use crate::plain;
 use crate::project::Project;
 
 #[derive(Args, Debug, Clone)]
@@ -103,11 +104,14 @@ fn as_in_the_paper(project: &mut Project) -> Vec<SelectorKind> {
 }
 
 fn print_summary(design: &Design) -> anyhow::Result<()> {
+    let candidates = design.candidates.as_ref().map_or_else(
+        || "all of them candidates".to_owned(),
+        |c| plain::count(c.rows.len(), "candidate"),
+    );
     out::line(&format!(
-        "{} inside sites, {} feasible, {} candidates, {} touches",
+        "{} inside sites, {} feasible, {candidates}, {} touches",
         design.simulated.lattice,
         design.reduced.feasible.len(),
-        design.reduced.sites.len(),
         design.simulated.dataset.touches.len()
     ))?;
     for (filter, count) in design.feasibility.taken() {

@@ -304,8 +304,7 @@ fn choose_sites(
     let budget = Quality::Draft.budget();
     let simulated = crate::design::simulate(&inputs, &budget, &unwatched)?;
     let feasibility = crate::design::filter(&inputs, &simulated);
-    let reduced =
-        crate::design::reduce_sites(&inputs, &simulated, &feasibility, &budget, &unwatched)?;
+    let reduced = crate::design::reduce_sites(&inputs, &simulated, &feasibility, &budget)?;
     let selection = crate::design::select(
         &inputs,
         &simulated,

@@ -25,7 +25,8 @@ pub struct SelectArgs {
     pub data: DataArgs,
     #[command(flatten)]
     pub criterion: CriterionArgs,
-    /// How sites are chosen.
+    /// How sites are chosen. Left out it is greedy SVR, whatever a design would choose by: that needs nothing but the data,
+    /// where a choice by expected error rests on the noise of the gauges (--noise), which no default can know.
     #[arg(long, value_enum, default_value = "greedy-svr")]
     pub selector: SelectorArg,
     /// Most gauges.
@@ -248,12 +249,8 @@ impl SelectArgs {
             ("--landmarks", self.landmarks.is_some(), svr),
             ("--audit", self.audit > 0, svr),
             ("--forces-n", !self.forces_n.is_empty(), expected),
-            ("--exchange", self.exchange, svr || geometric),
-            (
-                "--starts",
-                self.starts.is_some(),
-                svr || geometric || expected,
-            ),
+            ("--exchange", self.exchange, kind.exchanges_if_asked()),
+            ("--starts", self.starts.is_some(), kind.has_starts()),
             ("--no-criterion", self.no_criterion, !svr && !expected),
         ];
         // Nothing is trained for a choice by expected error, and nothing held out.

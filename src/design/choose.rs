@@ -1,27 +1,22 @@
 //! Which sites gauges may have, and which they get.
 
-use std::borrow::Cow;
 use std::cell::LazyCell;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::known::{Known, detail};
-use super::{DesignError, HEARD_SEED, Inputs, LEAST_TOUCHES, Shortage, Simulated};
-use crate::budget::{Budget, Cancelled, Watch};
-use crate::dataset::{Signal, SignalMatrix, Site};
+use super::reduce::{Located, Reduced, heard};
+use super::{DesignError, Inputs, Shortage, Simulated};
+use crate::budget::{Budget, Watch};
+use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::support::supported_vertices;
-use crate::evaluation;
 use crate::feasible::{Feasibility, FeasibleInput, blame, feasible};
-use crate::gaussian_process::{self, Covariance, Distances, GpKernel};
+use crate::mesh::TriMesh;
 use crate::mesh::locate::SurfaceIndex;
-use crate::mesh::{SurfacePoint, TriMesh, geodesic};
-use crate::pca::Pca;
-use crate::placement::candidates::{Candidates, reduce};
 use crate::placement::entropy::Entropy;
 use crate::placement::expected_error::{self, ExpectedError};
 use crate::placement::greedy_svr::{self, GreedySvr};
-use crate::placement::information::Geometry;
 use crate::placement::mutual_information::MutualInformation;
 use crate::placement::wishes::Thorough;
 use crate::placement::{
@@ -41,7 +36,7 @@ pub fn filter(inputs: &Inputs, simulated: &Simulated) -> Feasibility {
 }
 
 /// Why so many gauges have no room.
-fn shortage(
+pub(super) fn shortage(
     inputs: &Inputs,
     simulated: &Simulated,
     feasibility: &Feasibility,
@@ -102,186 +97,6 @@ pub(super) fn painted_sites(
         .iter()
         .map(|site| part.mostly_in(mask, index.nearest(site.position).0))
         .collect()
-}
-
-/// The reduction stage: candidates among the feasible sites, and the components they came from.
-pub struct Reduced {
-    pub feasible: Vec<usize>,
-    /// Signals of the feasible sites.
-    pub x: SignalMatrix,
-    pub pca: Pca,
-    pub candidates: Candidates,
-    /// Made when a selector first asks for it.
-    geometry: OnceLock<Located>,
-    /// Candidates as numbered in the dataset, in the order of the pivots.
-    pub sites: Vec<usize>,
-}
-
-/// A Gaussian process and where its locations are.
-pub struct Located {
-    pub geometry: Geometry,
-    /// The feasible ones among them, which come first: rows of the reduced signals.
-    pub rows: Vec<usize>,
-    /// All of them, as numbered in the dataset.
-    pub sites: Vec<usize>,
-}
-
-impl Reduced {
-    /// The Gaussian process, where a selector asked for it.
-    #[must_use]
-    pub fn geometry(&self) -> Option<&Geometry> {
-        self.located().map(|g| &g.geometry)
-    }
-
-    /// The same with where its locations are.
-    #[must_use]
-    pub fn located(&self) -> Option<&Located> {
-        self.geometry.get()
-    }
-
-    /// What the Gaussian process leaves uncertain (σ², 1 where nothing is known) at each of its locations
-    /// (dataset sites) when there are gauges at some positions (m); each counts at the nearest location.
-    #[must_use]
-    pub fn uncertainty(&self, all: &[Site], gauges: &[DVec3]) -> Option<(Vec<usize>, Vec<f64>)> {
-        let located = self.geometry.get()?;
-        let away = |l: usize, p: DVec3| all[located.sites[l]].position.distance_squared(p);
-        let measured: Vec<usize> = (gauges.iter())
-            .filter_map(|&p| {
-                (0..located.sites.len()).min_by(|&a, &b| away(a, p).total_cmp(&away(b, p)))
-            })
-            .collect();
-        let variances = located.geometry.variances_given(&measured);
-        Some((located.sites.clone(), variances))
-    }
-}
-
-/// Reduces the feasible sites to candidates.
-///
-/// # Errors
-/// [`DesignError`] where less is feasible than is asked for, and for too few touches.
-pub fn reduce_sites(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    feasibility: &Feasibility,
-    budget: &Budget,
-    watch: Watch,
-) -> Result<Reduced, DesignError> {
-    let feasible = feasibility.sites();
-    let sensors = inputs.project.selection.sensors;
-    if sensors.max(1) > feasible.len() {
-        return Err(shortage(inputs, simulated, feasibility, sensors).into());
-    }
-    enough_touches(inputs, simulated, budget)?;
-    let x = simulated.dataset.x.select_rows(&feasible);
-    let scored = budget.selection_candidates.max(sensors);
-    let pca = Pca::new(&x, scored, watch).map_err(PlacementError::from)?;
-    let limit = budget.candidates.max(sensors);
-    let mut candidates = reduce(&x, inputs.project.reduction(), limit, watch)?;
-    if candidates.rows.len() < sensors {
-        // The variance asked for needs fewer sites than there are gauges to place.
-        candidates.rows = pca.pivots(sensors.min(pca.reach()));
-        candidates.notes.push(format!(
-            "Kept {} candidates, one a gauge: the variance asked for needs fewer.",
-            candidates.rows.len()
-        ));
-    }
-    let sites = candidates.rows.iter().map(|&r| feasible[r]).collect();
-    Ok(Reduced {
-        feasible,
-        x,
-        pca,
-        candidates,
-        geometry: OnceLock::new(),
-        sites,
-    })
-}
-
-/// Refuses to learn from next to nothing, saying what took the touches.
-fn enough_touches(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    budget: &Budget,
-) -> Result<(), DesignError> {
-    let touches = simulated.dataset.touches.len();
-    if touches >= LEAST_TOUCHES {
-        return Ok(());
-    }
-    let asked = &inputs.project.touch;
-    let remedy = if asked.count < LEAST_TOUCHES {
-        format!(
-            "raise touch.count from {} to at least {LEAST_TOUCHES}",
-            asked.count
-        )
-    } else if budget.touches < LEAST_TOUCHES {
-        format!(
-            "raise budget.limits.touches from {} to at least {LEAST_TOUCHES}",
-            budget.touches
-        )
-    } else {
-        format!(
-            "hardly any place that was tried may be touched. Widen touch.region if there is one, or lower touch.edge_margin_mm ({} mm) or touch.reach_mm ({} mm)",
-            asked.edge_margin_mm, asked.reach_mm
-        )
-    };
-    Err(DesignError::TooFewTouches {
-        touches,
-        least: LEAST_TOUCHES,
-        remedy,
-    })
-}
-
-/// The Gaussian process over the feasible sites (first) and all others.
-///
-/// # Errors
-/// [`Cancelled`] when the watch asks for it.
-pub fn geometry(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    reduced: &Reduced,
-    budget: &Budget,
-    watch: Watch,
-) -> Result<Located, Cancelled> {
-    /// Locations nearer than this are one (m).
-    const SAME: f64 = 1e-6;
-    let mut feasible = vec![false; simulated.lattice];
-    for &site in &reduced.feasible {
-        feasible[site] = true;
-    }
-    let others: Vec<usize> = (0..feasible.len()).filter(|&s| !feasible[s]).collect();
-    let rows = evenly(reduced.feasible.len(), budget.locations);
-    let mut order: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
-    let elsewhere = evenly(others.len(), budget.locations / 2);
-    order.extend(elsewhere.iter().map(|&k| others[k]));
-    let count = order.len();
-    let places: Vec<SurfacePoint> = order.iter().map(|&s| simulated.points[s]).collect();
-    let measured = geodesic::between(&simulated.mesh, &places, watch)?;
-    let distances = Distances::new(count, "over the surface (fast marching)", &measured);
-    let keys = &inputs.project.selection.gaussian_process;
-    let noise = keys.noise;
-    let (kernel, map) = if let Some((length_m, power)) = keys.given() {
-        let kernel = GpKernel {
-            length_m,
-            power,
-            noise,
-        };
-        (kernel, Vec::new())
-    } else {
-        let x = heard(inputs, reduced).select_rows(&rows);
-        let map = gaussian_process::search(&x, &distances, noise, watch)?;
-        (gaussian_process::best(&map).unwrap_or_default(), map)
-    };
-    let geometry = Geometry {
-        covariance: Covariance::new(&distances, &kernel, watch)?,
-        kernel,
-        distance: distances.kind,
-        coinciding: distances.coinciding(SAME),
-        map,
-    };
-    Ok(Located {
-        geometry,
-        rows,
-        sites: order,
-    })
 }
 
 /// Sites that a selector may choose from, with what the project asks of the choice.
@@ -364,18 +179,6 @@ pub(super) fn costs(boxes: &[CostKeys], positions: &[DVec3]) -> Vec<f64> {
         inside.map_or(1.0, |b| b.cost)
     };
     positions.iter().map(cost).collect()
-}
-
-/// The signals of the feasible sites that selectors choose from, with noise where that is asked for.
-fn heard<'a>(inputs: &Inputs, reduced: &'a Reduced) -> Cow<'a, SignalMatrix> {
-    let project = &inputs.project;
-    let noise = if project.selection.with_noise && project.gauge.signal == Signal::Strain {
-        project.gauge.noise_microstrain * 1e-6
-    } else {
-        0.0
-    };
-    let seed = project.budget.seed.wrapping_add(HEARD_SEED);
-    evaluation::add_noise(&reduced.x, noise, seed)
 }
 
 /// Told of every set as soon as it is found, with the sites it counts in.
@@ -477,7 +280,7 @@ fn select_by_pivots(
         if with_noise {
             pca_qr::PcaQr.select(pool, request)
         } else {
-            pca_qr::from_components(&reduced.pca, pool, request)
+            pca_qr::from_components(reduced.components(telling.0)?, pool, request)
         }
     })?;
     Ok(selection)
@@ -491,12 +294,7 @@ fn select_by_geometry(
     budget: &Budget,
     telling: Telling,
 ) -> Result<Selection, DesignError> {
-    let located = if let Some(known) = reduced.geometry.get() {
-        known
-    } else {
-        let made = geometry(inputs, simulated, reduced, budget, telling.0)?;
-        reduced.geometry.get_or_init(|| made)
-    };
+    let located = reduced.locate(inputs, simulated, budget, telling.0)?;
     let Located { geometry, rows, .. } = located;
     let known: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
     let offer = Offer::new(inputs, simulated, &known)?;
@@ -560,10 +358,11 @@ fn select_by_svr(
     let all = simulated.dataset.targets_mm();
     let sensors = inputs.project.selection.sensors;
     let limit = budget.selection_candidates.max(sensors);
-    let mut rows = if reduced.sites.len() > limit {
-        reduced.pca.pivots(limit)
+    let candidates = reduced.candidates(telling.0)?;
+    let mut rows = if candidates.rows.len() > limit {
+        reduced.components(telling.0)?.pivots(limit)
     } else {
-        reduced.candidates.rows.clone()
+        candidates.rows.clone()
     };
     // A place that must have a gauge is a candidate whether or not the reduction kept it.
     for row in required_rows(inputs, simulated, reduced) {
@@ -593,13 +392,13 @@ fn select_by_svr(
     let mut selection = offer.choose(&x, &targets, telling, |pool, request| {
         selector.select(pool, request)
     })?;
-    if touches.len() < all.len() || sites.len() < reduced.sites.len() {
+    if touches.len() < all.len() || sites.len() < candidates.rows.len() {
         selection.achieved.notes.push(format!(
             "Scored on {} of {} touches and {} of {} candidates.",
             touches.len(),
             all.len(),
             sites.len(),
-            reduced.sites.len()
+            candidates.rows.len()
         ));
     }
     Ok(selection)

@@ -286,7 +286,8 @@ fn regions(project: &Project, touches: &[Touch]) -> Vec<Region> {
         .collect()
 }
 
-/// Judges selections on the truth by the project's estimator; by regression with all candidates as the baseline.
+/// Judges selections on the truth by the project's estimator; by regression with all candidates as the baseline, where
+/// there are any.
 ///
 /// # Errors
 /// [`DesignError`] when the watch asks for a stop, and as for the design's simulation.
@@ -310,10 +311,11 @@ pub fn evaluate(
             });
         }
     }
-    if inputs.project.judging() == Judging::Svr {
+    let all = reduced.candidate_sites();
+    if inputs.project.judging() == Judging::Svr && !all.is_empty() {
         sets.push(Candidate {
             selector: evaluation::BASELINE.to_owned(),
-            rows: reduced.sites.iter().filter_map(row_of).collect(),
+            rows: all.iter().filter_map(row_of).collect(),
             hyper: None,
         });
     }
@@ -464,15 +466,16 @@ pub fn sites_to_judge(
     reduced: &Reduced,
     selections: &[Selection],
 ) -> Vec<usize> {
-    let baseline: &[usize] = match by {
-        EstimatorKind::Svr => &reduced.sites,
-        EstimatorKind::Matching => &[],
+    let mut sites = match by {
+        EstimatorKind::Svr => reduced.candidate_sites(),
+        EstimatorKind::Matching => Vec::new(),
     };
     let chosen = selections
         .iter()
         .flat_map(|s| &s.sets)
         .flat_map(|s| &s.sites);
-    baseline.iter().chain(chosen).copied().collect()
+    sites.extend(chosen);
+    sites
 }
 
 #[cfg(test)]

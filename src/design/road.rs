@@ -13,6 +13,7 @@ use crate::budget::{Budget, Watch, Work};
 use crate::evaluation::{Evaluation, EvaluationRow, Matched, MatchedRow};
 use crate::feasible::Feasibility;
 use crate::mesh::{TriMesh, scatter};
+use crate::placement::candidates::Candidates;
 use crate::placement::{Selection, SelectorKind, SensorSet};
 
 /// Everything a design produced; what it shares with another costs nothing.
@@ -22,6 +23,8 @@ pub struct Design {
     pub simulated: Arc<Simulated>,
     pub feasibility: Arc<Feasibility>,
     pub reduced: Arc<Reduced>,
+    /// What the feasible sites were reduced to; absent where nobody asked for that, and all of them are candidates.
+    pub candidates: Option<Arc<Candidates>>,
     pub selections: Arc<Vec<Selection>>,
     /// Whose sites are shown and reported.
     pub lead: SelectorKind,
@@ -151,6 +154,13 @@ impl Design {
         design
     }
 
+    /// How many sites are candidates: all feasible ones where they were not reduced.
+    #[must_use]
+    pub fn candidate_count(&self) -> usize {
+        let reduced = self.candidates.as_ref();
+        reduced.map_or(self.reduced.feasible.len(), |c| c.rows.len())
+    }
+
     /// The selection that is shown and reported.
     #[must_use]
     pub fn led(&self) -> Option<&Selection> {
@@ -245,7 +255,7 @@ impl Design {
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes = self.simulated.achieved.notes.clone();
-        notes.extend(self.reduced.candidates.notes.iter().cloned());
+        notes.extend(self.candidates.iter().flat_map(|c| c.notes.clone()));
         for selection in self.selections.iter() {
             if selection.selector != self.lead {
                 notes.extend(named(selection, &selection.achieved.cautions));
@@ -352,11 +362,11 @@ pub fn run_step_by_step(
         known
     } else {
         let feasibility = filter(inputs, &simulated);
+        let reduced = reduce_sites(inputs, &simulated, &feasibility, budget)?;
         times.lap("filter");
-        let reduced = reduce_sites(inputs, &simulated, &feasibility, budget, watch)?;
-        times.lap("reduce");
         (Arc::new(feasibility), Arc::new(reduced))
     };
+    let candidates = candidates(inputs, &reduced, kinds, &mut times, watch)?;
     (hooks.entered)(Step::Select);
     let (simulated, selections) = if let Some(known) = known.selections {
         (simulated, known)
@@ -404,6 +414,7 @@ pub fn run_step_by_step(
         simulated,
         feasibility,
         reduced,
+        candidates,
         lead,
         by_hand: false,
         selections,
@@ -411,6 +422,25 @@ pub fn run_step_by_step(
         evaluation: Arc::new(evaluation),
         seconds: times.stages,
     })
+}
+
+/// The candidates, where somebody asks for them.
+fn candidates(
+    inputs: &Inputs,
+    reduced: &Reduced,
+    kinds: &[SelectorKind],
+    times: &mut Stopwatch,
+    watch: Watch,
+) -> Result<Option<Arc<Candidates>>, DesignError> {
+    if !inputs.project.wants_candidates(kinds) {
+        return Ok(None);
+    }
+    let known = !reduced.candidate_sites().is_empty();
+    let candidates = Arc::clone(reduced.candidates(watch)?);
+    if !known {
+        times.lap("reduce");
+    }
+    Ok(Some(candidates))
 }
 
 fn select_all(

@@ -14,6 +14,7 @@ use crate::evaluation::{BASELINE, EstimatorKind, Failures};
 use crate::gaussian_process::GpTrial;
 use crate::mesh::flatten::Flat;
 use crate::placement::SelectorKind;
+use crate::placement::candidates::Candidates;
 use crate::project::PartModel;
 use crate::regression::Hyper;
 
@@ -95,8 +96,14 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
     }
     let inside = design.simulated.lattice.to_string();
     number(page, &inside, "inside sites");
-    number(page, &design.reduced.feasible.len().to_string(), "feasible");
-    number(page, &design.reduced.sites.len().to_string(), "candidates");
+    let feasible = design.reduced.feasible.len().to_string();
+    match &design.candidates {
+        Some(candidates) => {
+            number(page, &feasible, "feasible");
+            number(page, &candidates.rows.len().to_string(), "candidates");
+        }
+        None => number(page, &feasible, "feasible, all of them candidates"),
+    }
     page.push_str("</div>");
     matched::by_force(page, design);
     certificate::line(page, design);
@@ -287,12 +294,15 @@ fn plots(page: &mut String, design: &Design) {
             520.0,
         ));
     }
-    let points = design
-        .reduced
-        .candidates
-        .curve
-        .iter()
-        .map(|p| (p.sites as f64, 100.0 * p.unexplained));
+    if let Some(candidates) = &design.candidates {
+        reduction(page, candidates);
+    }
+    page.push_str("</div>");
+}
+
+/// What the feasible sites were reduced by.
+fn reduction(page: &mut String, candidates: &Candidates) {
+    let points = (candidates.curve.iter()).map(|p| (p.sites as f64, 100.0 * p.unexplained));
     page.push_str(&svg::plot(
         "Variance of all feasible sites left unexplained",
         "sites kept",
@@ -303,7 +313,6 @@ fn plots(page: &mut String, design: &Design) {
         }],
         520.0,
     ));
-    page.push_str("</div>");
 }
 
 /// Where on the part touches are found well and where not.

@@ -70,6 +70,15 @@ impl LostBy {
             Self::Worst => "worst",
         }
     }
+
+    /// As read by people.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Expected => "The mean of all",
+            Self::Worst => "The worst",
+        }
+    }
 }
 
 /// How far a choice goes beyond gauge after gauge.

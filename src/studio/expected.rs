@@ -27,6 +27,11 @@ struct Question {
     /// The same as sites of the simulation.
     set: Vec<usize>,
     moves: usize,
+    /// Counts the questions that want an answer.
+    number: u64,
+    /// Whether the answer is known: the gauge is only taken in hand, so that its first move is answered as soon as all
+    /// others.
+    known: bool,
 }
 
 impl Question {
@@ -43,6 +48,8 @@ impl Question {
 pub(super) struct Answer {
     of: Arc<InHand>,
     sites: Vec<ChosenSite>,
+    /// Of the question.
+    number: u64,
     pub expected: Expected,
     /// Where the colours of its map end (mm).
     pub top_mm: f64,
@@ -55,7 +62,10 @@ pub(super) struct Expecting {
     /// Whether that is the simulation and the project as they are.
     holds: bool,
     worker: Option<Latest<Question, Answer>>,
-    asked: Option<(Arc<InHand>, Vec<ChosenSite>)>,
+    /// What was asked last: of what, which sites, and which gauge of them moves.
+    asked: Option<(Arc<InHand>, Vec<ChosenSite>, usize)>,
+    /// How many questions wanted an answer.
+    questions: u64,
     answer: Option<Answer>,
     /// Counts answers, so that the view knows when to build its field anew.
     pub version: u64,
@@ -100,13 +110,16 @@ fn serve(first: Question, desk: &Desk<Question, Answer>) -> Option<Question> {
     }
     let hand = in_hand.hand(&question.set, question.moves);
     loop {
-        let expected = in_hand.expected(&hand, &question.set, question.moves);
-        desk.answer(Ok(Answer {
-            of: Arc::clone(&in_hand),
-            sites: question.sites.clone(),
-            top_mm: robust_top(&expected.map_mm),
-            expected,
-        }));
+        if !question.known {
+            let expected = in_hand.expected(&hand, &question.set, question.moves);
+            desk.answer(Ok(Answer {
+                of: Arc::clone(&in_hand),
+                sites: question.sites.clone(),
+                number: question.number,
+                top_mm: robust_top(&expected.map_mm),
+                expected,
+            }));
+        }
         let next = desk.wait()?;
         let next = desk.latest(next);
         if !next.continues(&question) {
@@ -195,24 +208,35 @@ impl Studio {
 
     fn ask_expected(&mut self, ctx: &Context, in_hand: &Arc<InHand>) {
         let sites = &self.document.state.project.selection.sites;
-        let asked = self.expected.asked.as_ref();
-        if asked.is_some_and(|(of, asked)| Arc::ptr_eq(of, in_hand) && asked == sites) {
-            return;
-        }
-        let sites = sites.clone();
-        self.expected.asked = Some((Arc::clone(in_hand), sites.clone()));
-        let Some(set) = self.simulated_sites() else {
-            return;
-        };
         let moves = match self.view.gesture {
             Gesture::Gauge(_, number, _) => number,
             _ => self.picked.first().copied().unwrap_or(0),
         };
+        let moves = moves.min(sites.len().saturating_sub(1));
+        let asked = self.expected.asked.as_ref();
+        if asked.is_some_and(|(of, asked, number)| {
+            Arc::ptr_eq(of, in_hand) && asked == sites && *number == moves
+        }) {
+            return;
+        }
+        // The last answer, that is: one that is still to come would take its place.
+        let (answer, questions) = (self.expected.answer.as_ref(), self.expected.questions);
+        let known = answer.is_some_and(|a| {
+            a.number == questions && Arc::ptr_eq(&a.of, in_hand) && a.sites == *sites
+        });
+        let sites = sites.clone();
+        self.expected.asked = Some((Arc::clone(in_hand), sites.clone(), moves));
+        let Some(set) = self.simulated_sites() else {
+            return;
+        };
+        self.expected.questions += u64::from(!known);
         let question = Question {
             in_hand: Arc::clone(in_hand),
-            moves: moves.min(set.len().saturating_sub(1)),
+            moves,
             sites,
             set,
+            number: self.expected.questions,
+            known,
         };
         let worker = &mut self.expected.worker;
         let worker = worker.get_or_insert_with(|| Latest::start(ctx, BROKEN, serve));
@@ -298,6 +322,8 @@ mod tests {
             sites: Vec::new(),
             set: [0, 1, 2 + k, 3, 4].map(|n| n * count / 12).to_vec(),
             moves: 2,
+            number: 0,
+            known: false,
         };
         assert!(question(5).continues(&question(0)));
         let other = Question {
@@ -332,5 +358,22 @@ mod tests {
             assert!((0.0..=1.0).contains(&expected.blind));
             assert!(answer.top_mm > 0.0);
         }
+        // Taking another gauge in hand tells nothing new; its first move does.
+        let taken = |k: usize, known: bool| Question {
+            moves: 3,
+            known,
+            ..question(k)
+        };
+        assert!(worker.ask(taken(4, true)) && worker.ask(taken(5, false)));
+        let answer = loop {
+            if let Some(reply) = worker.answers().next() {
+                break reply.unwrap();
+            }
+            std::thread::yield_now();
+        };
+        let set = question(5).set;
+        let alone = in_hand.expected(&in_hand.hand(&set, 3), &set, 3);
+        assert_eq!(answer.expected, alone);
+        assert!(worker.answers().next().is_none());
     }
 }

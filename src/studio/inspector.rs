@@ -6,6 +6,7 @@ use egui::{DragValue, RichText, Ui};
 use glam::DVec3;
 
 use super::form::{choice, count, number, percentage, rows};
+use super::results::NOBODY_REDUCES;
 use super::{Stage, Studio, quality_name};
 use crate::budget::{Limits, Quality};
 use crate::cli::examples::Example;
@@ -15,12 +16,12 @@ use crate::evaluation::EstimatorKind;
 use crate::limb::BoxMm;
 use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::unroll::Axis;
-use crate::placement::SelectorKind;
+use crate::placement::{LostBy, SelectorKind};
 use crate::plain;
 use crate::project::{
-    ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCES, GAIN_OFF, GAUGES, Lattice, PLACE_OFF,
-    PartAxis, PartModel, Project, RegionKeys, SupportKeys, SupportKind, TIP_OFF, TOUCHES,
-    ToleranceKeys,
+    ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCES, GAIN_OFF, GAUGES, LOST, Lattice,
+    PLACE_OFF, PartAxis, PartModel, Project, RegionKeys, STARTS, SupportKeys, SupportKind, TIP_OFF,
+    TOUCHES, ToleranceKeys,
 };
 
 impl Studio {
@@ -759,6 +760,11 @@ fn candidates(ui: &mut Ui, project: &mut Project) {
             "How many of the feasible sites are kept",
         );
     }
+    if !project.wants_candidates(&project.selectors()) {
+        ui.label("Feasible sites");
+        ui.weak("all are candidates").on_hover_text(NOBODY_REDUCES);
+        ui.end_row();
+    }
 }
 
 /// Places that must have a gauge, and the way to be rid of them.
@@ -809,14 +815,16 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         "Chance of failure",
         &mut project.selection.failure,
         0.0..=100.0,
-        "That one gauge has failed when it is needed: greedy SVR then chooses sites that can do without each other",
+        "That gauges are lost when they are needed: expected error and greedy SVR then choose sites that can do without each other",
     );
+    losses(ui, project);
     let name = ui.label("Compare selectors");
     ui.checkbox(&mut project.selection.compare, "")
         .on_hover_text("Let the other selectors choose too: four curves of errors instead of one, for the time that they take")
         .labelled_by(name.id)
         .accessible_name("Compare selectors");
     ui.end_row();
+    beyond_greedy(ui, project);
     let name = ui.label("With noise");
     ui.checkbox(&mut project.selection.with_noise, "")
         .on_hover_text("Choose from signals with the gauge's noise added")
@@ -829,6 +837,57 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         .labelled_by(name.id)
         .accessible_name("Refine places");
     ui.end_row();
+}
+
+/// Which gauges may be lost, where that is weighed.
+fn losses(ui: &mut Ui, project: &mut Project) {
+    let selectors = project.selectors();
+    let keys = &mut project.selection;
+    let some = |weighs: fn(SelectorKind) -> bool| selectors.iter().any(|&k| weighs(k));
+    if keys.failure <= 0.0 || !some(SelectorKind::weighs_losses) {
+        return;
+    }
+    // What a selector refuses is shown too: else nobody could take it back.
+    if some(SelectorKind::weighs_losses_together) || keys.lost > 1 {
+        count(
+            ui,
+            "Gauges lost",
+            &mut keys.lost,
+            LOST,
+            "How many are lost together, any of them. Greedy SVR weighs the loss of one only",
+        );
+    }
+    choice(
+        ui,
+        "Which loss counts",
+        &mut keys.lost_by,
+        &LostBy::ALL,
+        LostBy::title,
+        "Of all the gauges that may be lost: the mean over them, or those whose loss is the worst",
+    );
+}
+
+/// How far a choice goes beyond gauge after gauge, where a selector does so when it is asked to.
+fn beyond_greedy(ui: &mut Ui, project: &mut Project) {
+    let selectors = project.selectors();
+    let keys = &mut project.selection;
+    if selectors.iter().any(|k| k.exchanges_if_asked()) {
+        let name = ui.label("Exchange gauges");
+        ui.checkbox(&mut keys.exchange, "")
+            .on_hover_text("Exchange gauges one at a time after all are chosen, while that makes the set better. Expected error always does, PCA-QR never")
+            .labelled_by(name.id)
+            .accessible_name("Exchange gauges");
+        ui.end_row();
+    }
+    if selectors.iter().any(|k| k.has_starts()) {
+        count(
+            ui,
+            "First gauges",
+            &mut keys.starts,
+            STARTS,
+            "From how many first gauges a set is begun; the best set is kept, for the time that each of them takes",
+        );
+    }
 }
 
 fn regression(ui: &mut Ui, project: &mut Project) {

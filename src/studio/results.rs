@@ -297,7 +297,14 @@ impl Studio {
         let Some(result) = &self.design else {
             return;
         };
-        let candidates = &result.design.reduced.candidates;
+        let Some(candidates) = &result.design.candidates else {
+            let feasible = result.design.reduced.feasible.len();
+            empty(
+                ui,
+                &format!("All {feasible} feasible sites are candidates. {NOBODY_REDUCES}"),
+            );
+            return;
+        };
         let points: Vec<(f64, f64)> = (candidates.curve.iter())
             .map(|p| (p.sites as f64, 100.0 * p.unexplained))
             .collect();
@@ -435,6 +442,9 @@ enum Row {
     Frame,
     Pin,
 }
+
+/// Where no sites are left out as candidates, and what would leave some out.
+pub(super) const NOBODY_REDUCES: &str = "Nobody asks for fewer: greedy SVR chooses among candidates, a judge by regression compares sets with all of them together, and a fixed number may be asked for";
 
 pub(super) fn empty(ui: &mut Ui, text: &str) {
     ui.add_space(12.0);

@@ -4,7 +4,7 @@ use egui::{RichText, Ui};
 
 use super::jobs::Task;
 use super::{Command, Studio, quality_name, theme};
-use crate::design::{Simulated, Step};
+use crate::design::{Design, Simulated, Step};
 
 /// The stages, in the order of the road.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -279,19 +279,10 @@ impl Studio {
                     .chain(taken.map(|(by, n)| format!("− {n}  {}", by.label().to_lowercase())))
                     .collect()
             }),
-            Stage::Candidates => self.design.as_ref().map_or_else(Vec::new, |d| {
-                let reduced = &d.design.reduced;
-                let left = reduced.candidates.unexplained;
-                let left = left.map(|u| format!("{:.2} % of the variance unexplained", 100.0 * u));
-                std::iter::once(format!(
-                    "{} of {} sites{}",
-                    reduced.sites.len(),
-                    reduced.feasible.len(),
-                    self.took("reduce")
-                ))
-                .chain(left)
-                .collect()
-            }),
+            Stage::Candidates => {
+                let design = self.design.as_ref().map(|d| &d.design);
+                design.map_or_else(Vec::new, |design| self.candidate_lines(design))
+            }
             Stage::Selection => self.selection_lines(),
             Stage::Evaluation => self.evaluation_lines(),
             Stage::Report => Vec::new(),
@@ -390,6 +381,21 @@ impl Studio {
     }
 
     /// ", 1.2 s" of a stage of the last design, where it was run for it.
+    fn candidate_lines(&self, design: &Design) -> Vec<String> {
+        let feasible = design.reduced.feasible.len();
+        let Some(candidates) = &design.candidates else {
+            return vec![format!("all {feasible} feasible sites")];
+        };
+        let kept = format!(
+            "{} of {feasible} sites{}",
+            candidates.rows.len(),
+            self.took("reduce")
+        );
+        let left = candidates.unexplained;
+        let left = left.map(|u| format!("{:.2} % of the variance unexplained", 100.0 * u));
+        std::iter::once(kept).chain(left).collect()
+    }
+
     fn took(&self, stage: &str) -> String {
         let stages = self.design.iter().flat_map(|d| &d.design.seconds);
         let found = { stages }.find(|s| s.stage == stage);

@@ -59,8 +59,7 @@ impl Trial {
         inputs.project.touch.edge_margin_mm = 0.0;
         let simulated = design::simulate(&inputs, &budget(), &unwatched).unwrap();
         let feasibility = design::filter(&inputs, &simulated);
-        let reduced =
-            design::reduce_sites(&inputs, &simulated, &feasibility, &budget(), &unwatched).unwrap();
+        let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, &budget()).unwrap();
         let kind = SelectorKind::ExpectedError;
         let selection =
             design::select(&inputs, &simulated, &reduced, kind, &budget(), &unwatched).unwrap();

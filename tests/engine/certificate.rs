@@ -241,8 +241,7 @@ fn the_chosen_gauges_of_a_limb_carry_their_bound() {
     };
     let simulated = design::simulate(&inputs, &budget, &unwatched).unwrap();
     let feasibility = design::filter(&inputs, &simulated);
-    let reduced =
-        design::reduce_sites(&inputs, &simulated, &feasibility, &budget, &unwatched).unwrap();
+    let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, &budget).unwrap();
     for kind in [SelectorKind::ExpectedError, SelectorKind::PcaQr] {
         let selection =
             design::select(&inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap();

@@ -50,8 +50,7 @@ fn selected(inputs: &Inputs) -> (Simulated, Vec<Selection>) {
     let budget = budget();
     let simulated = design::simulate(inputs, &budget, &unwatched).unwrap();
     let feasibility = design::filter(inputs, &simulated);
-    let reduced =
-        design::reduce_sites(inputs, &simulated, &feasibility, &budget, &unwatched).unwrap();
+    let reduced = design::reduce_sites(inputs, &simulated, &feasibility, &budget).unwrap();
     let select =
         |kind| design::select(inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap();
     // Expected error is judged on a sample of presses, whose own scatter is more than elements leave open.

@@ -3,6 +3,7 @@
 
 use crate::coarse;
 
+use std::path::Path;
 use std::sync::Arc;
 
 use coarse::limb;
@@ -11,8 +12,11 @@ use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::dataset::Signal;
 use hapdef::design::{self, Design, DesignError, Inputs};
 use hapdef::elasticity::Touch;
+use hapdef::evaluation::EstimatorKind;
 use hapdef::feasible::Filter;
 use hapdef::given::{self, GivenSite};
+use hapdef::io::artifacts::{self, Provenance};
+use hapdef::io::report;
 use hapdef::mesh::TriMesh;
 use hapdef::placement::SelectorKind;
 use hapdef::project::{Elements, Lattice, Masks, Project, SupportKeys, SupportKind};
@@ -170,7 +174,7 @@ fn one_feasible_site_is_taken_and_a_second_is_refused() {
     let mut inputs = one.expect("a triangle with one site");
     let design = sound("one site", &inputs);
     assert_eq!(design.chosen().len(), 1);
-    assert_eq!(design.reduced.sites, design.chosen());
+    assert_eq!(design.reduced.candidate_sites(), design.chosen());
     inputs.project.selection.sensors = 2;
     let refused = run(&inputs).err();
     assert!(
@@ -580,4 +584,48 @@ fn a_million_triangles_are_taken_in_and_computed_on() {
     let vertices = simulated.mesh.positions().len();
     assert!((1500..8000).contains(&vertices), "{vertices}");
     assert!(simulated.dataset.x.values().iter().all(|x| x.is_finite()));
+}
+
+#[test]
+fn sites_are_reduced_only_where_somebody_asks_for_candidates() {
+    let inputs = limb();
+    assert_eq!(inputs.project.evaluation.estimator, EstimatorKind::Matching);
+    let simulated = Arc::new(design::simulate(&inputs, &budget(), &unwatched).unwrap());
+    let chosen = |inputs: &Inputs, kind: SelectorKind| {
+        let simulated = Arc::clone(&simulated);
+        design::run_from(inputs, simulated, &[kind], &budget(), &|| 0.0, &unwatched).unwrap()
+    };
+    let reduces = |design: &Design| design.seconds.iter().any(|s| s.stage == "reduce");
+    // Expected error chooses among all feasible sites, and matching compares with no others.
+    let all = chosen(&inputs, SelectorKind::ExpectedError);
+    let feasible = all.reduced.feasible.len();
+    assert!(all.candidates.is_none() && all.reduced.candidate_sites().is_empty());
+    assert!(!reduces(&all) && all.candidate_count() == feasible);
+    let summary = artifacts::summary(&inputs, &all);
+    assert_eq!(summary["counts"]["candidates"], feasible);
+    assert!(summary["unexplained"].is_null());
+    let written = Provenance {
+        mesh_path: Path::new("limb.obj"),
+        version: "",
+        taken_in: None,
+    };
+    let page = report::html(&inputs, &all, &written);
+    assert!(page.contains("feasible, all of them candidates"));
+    assert!(!page.contains("left unexplained"));
+    // Greedy SVR asks for candidates, and so does a judge by regression or a number of them.
+    let mut trained = inputs.clone();
+    trained.project.evaluation.estimator = EstimatorKind::Svr;
+    let mut counted = inputs.clone();
+    counted.project.candidates.count = Some(9);
+    for (inputs, kind, count) in [
+        (&inputs, SelectorKind::GreedySvr, None),
+        (&trained, SelectorKind::PcaQr, None),
+        (&counted, SelectorKind::ExpectedError, Some(9)),
+    ] {
+        let design = chosen(inputs, kind);
+        let kept = design.candidates.as_ref().unwrap().rows.len();
+        assert!(reduces(&design) && kept < feasible && kept == design.candidate_count());
+        assert!(count.is_none_or(|count| count == kept), "{kept}");
+        assert!(report::html(inputs, &design, &written).contains("left unexplained"));
+    }
 }

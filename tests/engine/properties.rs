@@ -471,8 +471,7 @@ fn what_the_project_asks_of_a_choice_is_kept() {
         assert!(pair[0].rms_strain >= pair[1].rms_strain);
     }
     let feasibility = design::filter(&inputs, &simulated);
-    let reduced =
-        design::reduce_sites(&inputs, &simulated, &feasibility, &budget, &unwatched).unwrap();
+    let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, &budget).unwrap();
     for kind in SelectorKind::ALL {
         let chosen =
             design::select(&inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap();

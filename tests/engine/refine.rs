@@ -70,8 +70,7 @@ fn chosen(asked: &Inputs, threads: usize) -> (Arc<Simulated>, Selection) {
         let budget = budget();
         let simulated = Arc::new(design::simulate(asked, &budget, &unwatched).unwrap());
         let feasibility = design::filter(asked, &simulated);
-        let reduced =
-            design::reduce_sites(asked, &simulated, &feasibility, &budget, &unwatched).unwrap();
+        let reduced = design::reduce_sites(asked, &simulated, &feasibility, &budget).unwrap();
         let mut selection =
             design::select(asked, &simulated, &reduced, KINDS[0], &budget, &unwatched).unwrap();
         let refined = design::refine(

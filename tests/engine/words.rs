@@ -40,7 +40,7 @@ fn refused(change: impl Fn(&mut Inputs)) -> (Option<Filter>, String) {
     let mut inputs = limb();
     change(&mut inputs);
     let verdicts = design::filter(&inputs, simulated());
-    let result = design::reduce_sites(&inputs, simulated(), &verdicts, &budget(), &unwatched);
+    let result = design::reduce_sites(&inputs, simulated(), &verdicts, &budget());
     match result.err() {
         Some(DesignError::Shortage(s)) => (s.blamed, s.to_string()),
         other => panic!("{other:?}"),
@@ -148,7 +148,7 @@ fn too_few_touches_are_told_where_they_went() {
     inputs.project.touch.count = 11;
     let few = design::simulate(&inputs, &budget(), &unwatched).unwrap();
     let verdicts = design::filter(&inputs, &few);
-    let error = design::reduce_sites(&inputs, &few, &verdicts, &budget(), &unwatched).err();
+    let error = design::reduce_sites(&inputs, &few, &verdicts, &budget()).err();
     let said = error.unwrap().to_string();
     assert!(
         said.contains("touch.count from 11 to at least 20"),

@@ -12,6 +12,8 @@ use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;
 use hapdef::budget::Quality;
 use hapdef::document::{Brush, Layer};
+use hapdef::placement::{LostBy, SelectorKind};
+use hapdef::project::SelectionKeys;
 use hapdef::studio::{Command, Field, Studio};
 use image::RgbaImage;
 use window::Window;
@@ -588,4 +590,81 @@ fn one_key_finds_the_gauge_that_helps_least() {
     assert_eq!(gauges(&w), left);
     w.key(Modifiers::COMMAND, egui::Key::Z);
     assert_eq!(gauges(&w), sites);
+}
+
+/// Whether a control of the form is there, by its role and its name.
+fn offers(w: &Window, role: egui::Role, name: &str) -> bool {
+    w.harness.query_by_role_and_label(role, name).is_some()
+}
+
+/// Changes what is asked of the choice, as one step.
+fn ask(w: &mut Window, how: impl FnOnce(&mut SelectionKeys)) {
+    let document = &mut w.harness.state_mut().document;
+    how(&mut document.state.project.selection);
+    document.settle();
+    w.harness.run_ok();
+}
+
+#[test]
+fn losses_exchange_and_starts_are_offered_where_they_are_heeded() {
+    use egui::Role::{CheckBox, ComboBox, SpinButton};
+    let mut w = Window::open();
+    w.stage("Selection");
+    let lost = (SpinButton, "Gauges lost");
+    let counts = (ComboBox, "Which loss counts");
+    let exchange = (CheckBox, "Exchange gauges");
+    let starts = (SpinButton, "First gauges");
+    for (selector, failure, [several, loss, exchanges, begins]) in [
+        (
+            SelectorKind::ExpectedError,
+            0.0,
+            [false, false, false, true],
+        ),
+        (SelectorKind::ExpectedError, 0.3, [true, true, false, true]),
+        (SelectorKind::GreedySvr, 0.3, [false, true, true, true]),
+        (SelectorKind::Entropy, 0.0, [false, false, true, true]),
+        (SelectorKind::PcaQr, 0.0, [false; 4]),
+    ] {
+        ask(&mut w, |keys| {
+            (keys.selector, keys.failure, keys.compare) = (selector, failure, false);
+        });
+        for ((role, name), offered) in [
+            (lost, several),
+            (counts, loss),
+            (exchange, exchanges),
+            (starts, begins),
+        ] {
+            assert_eq!(offers(&w, role, name), offered, "{selector:?}: {name}");
+        }
+    }
+    // What greedy SVR refuses can be taken back.
+    ask(&mut w, |keys| {
+        (keys.selector, keys.failure, keys.lost) = (SelectorKind::GreedySvr, 0.3, 2);
+    });
+    assert!(offers(&w, lost.0, lost.1));
+    w.assert_named("the losses");
+    // As the rows beside them, they change the project and are undone.
+    let keys = |w: &Window| w.harness.state().document.state.project.selection.clone();
+    let ticks = w.harness.get_by_role_and_label(exchange.0, exchange.1);
+    ticks.click();
+    w.harness.run_ok();
+    assert!(keys(&w).exchange);
+    w.key(Modifiers::COMMAND, egui::Key::Z);
+    assert!(!keys(&w).exchange);
+    w.harness.get_by_role_and_label(counts.0, counts.1).click();
+    w.harness.run_ok();
+    w.click_label(LostBy::Worst.title());
+    assert_eq!(keys(&w).lost_by, LostBy::Worst);
+    w.key(Modifiers::COMMAND, egui::Key::Z);
+    assert_eq!(keys(&w).lost_by, LostBy::Expected);
+}
+
+#[test]
+fn the_stage_of_candidates_says_where_all_sites_are_some() {
+    let mut w = Window::open();
+    w.stage("Candidates");
+    let said = |w: &Window| w.harness.query_by_label("all are candidates").is_some();
+    assert!(said(&w));
+    ask(&mut w, |keys| keys.selector = SelectorKind::GreedySvr);
+    assert!(!said(&w));
 }

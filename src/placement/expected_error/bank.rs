@@ -103,23 +103,24 @@ impl<'a> Bank<'a> {
                 vec![(deviation * deviation) as f32; count],
             ],
         };
+        // The same for all presses: there are hundreds of them, and a hand waits for this.
+        let unlikely = padded(&|p| -p.mass.max(1e-12).ln(), NEVER);
         let presses = scene.presses.iter().map(|press| {
             let own = |p: &Place| p.position.distance(press.position) <= OWN * p.reach;
             let mut own_mass: f64 = scene.places.iter().filter(|p| own(p)).map(|p| p.mass).sum();
             if own_mass <= 0.0 {
                 own_mass = press.mass;
             }
-            let cost = |p: &Place| {
-                if own(p) {
-                    f64::from(NEVER)
-                } else {
-                    -p.mass.max(1e-12).ln()
+            let mut costs = unlikely.clone();
+            for (cost, place) in costs.iter_mut().zip(&scene.places) {
+                if own(place) {
+                    *cost = NEVER;
                 }
-            };
+            }
             let known = prior(scene, press);
             Press {
                 estimates: [vec![0.0; count], vec![0.0; count], vec![mean as f32; count]],
-                costs: padded(&cost, NEVER),
+                costs,
                 blocks: (0..(count / LANES) as u32).collect(),
                 covariance: Matrix3::from_diagonal(&known.component_mul(&known)),
                 estimate: Vector3::new(0.0, 0.0, mean),
