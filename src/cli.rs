@@ -14,6 +14,7 @@ pub mod ranges;
 pub mod render;
 pub mod select;
 pub mod simulate;
+pub mod spared;
 pub mod trade;
 
 use std::path::{Path, PathBuf};

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use crate::budget::{Budget, Watch};
 use crate::design::{self, Built, Checks, DesignError, Inputs};
-use crate::elasticity::estimate::Discretization;
+use crate::elasticity::estimate::{BEYOND, Discretization};
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::observe::{Face, Observer, SiteFrame};
 use crate::elasticity::respond::{Reading, Responses, respond};
@@ -54,6 +54,8 @@ pub struct Pair {
 
 /// A given normal further than this from the surface's is worth a word (cos 45°).
 const ASKEW: f64 = 0.707;
+/// A given normal nearer to the surface itself than this (cos 80°) is of neither side.
+const SIDEWAYS: f64 = 0.174;
 
 /// Answers for every touch at every site.
 ///
@@ -117,13 +119,13 @@ pub fn answer_sifted(
         &inputs.project,
         budget,
     ));
-    let smallest = touches
-        .iter()
-        .map(|t| t.tip_radius)
-        .fold(f64::INFINITY, f64::min);
+    let tips = || touches.iter().map(|t| t.tip_radius);
+    let smallest = tips().fold(f64::INFINITY, f64::min);
     notes.extend(meshed.cautions(smallest));
+    notes.extend(design::wide_tip(&inputs.part, tips().fold(0.0, f64::max)));
     let (observer, angles) = observed(&*model, sites, &mut rows);
     rows.check()?;
+    notes.extend(under_tips(&touches, sites, &rows.sites));
     let reading = Reading::GaugeAndDisplacement(&angles);
     let responses = respond(&*model, &touches, &observer, reading, watch)?;
     Ok(Answer {
@@ -208,6 +210,22 @@ impl Answer {
     }
 }
 
+/// What has to be known of gauges beneath a tip: no estimate speaks of their strain, which changes there within a cell.
+fn under_tips(touches: &[Touch], sites: &[GivenSite], rows: &[usize]) -> Option<String> {
+    let beneath = |touch: &Touch| {
+        let near = (BEYOND * touch.tip_radius).powi(2);
+        let of = |&&row: &&usize| sites[row].position.distance_squared(touch.position) < near;
+        rows.iter().filter(of).count()
+    };
+    let count: usize = touches.iter().map(beneath).sum();
+    (count > 0).then(|| {
+        format!(
+            "{count} of {} pairs of touch and gauge lie within two tip radii of each other: the error in strain is not estimated there, and may be many times what is estimated farther out.",
+            touches.len() * rows.len()
+        )
+    })
+}
+
 /// Touches come from outside: an open part that winds the other way is turned over.
 fn facing_touches(
     inputs: &Inputs,
@@ -216,15 +234,16 @@ fn facing_touches(
     notes: &mut Vec<String>,
 ) -> Inputs {
     let part = &inputs.part;
-    let against = touches
-        .iter()
-        .filter(|t| {
-            let at = index.nearest(t.position).0;
-            part.facet_normal(at.triangle).dot(t.normal) < 0.0
-        })
-        .count();
+    let facing = |touch: &Touch| {
+        let at = index.nearest(touch.position).0;
+        part.facet_normal(at.triangle).dot(touch.normal)
+    };
+    // Normals along the surface say nothing about its sides.
+    let facing: Vec<f64> = touches.iter().map(facing).collect();
+    let along = facing.iter().filter(|&&f| f > SIDEWAYS).count();
+    let against = facing.iter().filter(|&&f| f < -SIDEWAYS).count();
     let mut inputs = inputs.clone();
-    if 2 * against > touches.len() && part.boundary_edges().next().is_some() {
+    if against > along && part.boundary_edges().next().is_some() {
         notes.push(format!(
             "The mesh faces away from {against} of {} touches: it was turned over, so that its outside is where the touches are.",
             touches.len()

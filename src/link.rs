@@ -12,7 +12,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 pub use host::{Doorway, Entrance, Hosted, host};
-pub use recorded::record;
+pub use recorded::{check_length, record};
 pub use recording::{Recorder, old_note};
 pub use serial::{PortInfo, ports};
 pub use session::{Command, Connection, Heard, Listener, State, Timing};

@@ -12,6 +12,7 @@ use serde_json::json;
 
 use super::ranges::{between, whole};
 use super::simulate::in_file;
+use super::spared::Spared;
 use super::{Common, out, progress::Bar};
 use crate::board::{
     ChannelFault, Fault, Faults, GivenPress, Options, PRESSES, Press, Script, SimulatedBoard,
@@ -23,7 +24,7 @@ use crate::elasticity::Touch;
 use crate::given;
 use crate::inference::Chain;
 use crate::io::points;
-use crate::link::{Doorway, Entrance, Recorder, host, ports, record};
+use crate::link::{Doorway, Entrance, Recorder, check_length, host, ports, record};
 use crate::mesh::TriMesh;
 use crate::plain;
 use crate::wire::MOST_CHANNELS;
@@ -111,6 +112,9 @@ pub fn run(args: &BoardArgs) -> anyhow::Result<()> {
     }
     let loaded = args.common.load()?;
     // All that may be wrong is found before the model is computed.
+    Spared::of(&loaded)
+        .and("the script", args.script.as_deref())
+        .check("--truth", args.truth.as_deref())?;
     let plan = Plan::new(args, &loaded.inputs)?;
     let (failed, failures) = channel();
     let mut truth = match &args.truth {
@@ -159,6 +163,8 @@ impl Outlet {
         let seconds = args.seconds.or(last).context(
             "--record: nobody knows how long it goes on. Say so with --seconds, or give the touches with --script",
         )?;
+        check_length(seconds, args.rate, plan.channels, args.bits)
+            .map_err(|why| anyhow::anyhow!("--record: {why}"))?;
         Ok(Self::Recording {
             recorder: Recorder::create(path).map_err(anyhow::Error::msg)?,
             seconds,

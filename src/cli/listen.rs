@@ -11,6 +11,7 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::ranges::between;
+use super::spared::Spared;
 use super::{Common, out, progress::Bar};
 use crate::design;
 use crate::io::project_file::LoadedProject;
@@ -64,8 +65,9 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     let pace = if args.fast { Pace::Fast } else { Pace::Real };
     let address = Address::parse(&args.port, args.baud, pace);
     // All that may be wrong is found before the model is computed.
+    spared(&loaded, &address).check("--csv", args.csv.as_deref())?;
     address.check().map_err(anyhow::Error::msg)?;
-    let mut output = Output::new(args, &address)?;
+    let mut output = Output::new(args)?;
     let recorder = args.record.as_deref().map(Recorder::create).transpose();
     let recorder = recorder.map_err(anyhow::Error::msg)?;
     let listener = Listener::new(address, pipeline(args, &loaded)?)
@@ -106,6 +108,15 @@ fn load(args: &ListenArgs) -> anyhow::Result<LoadedProject> {
     Ok(loaded)
 }
 
+/// What is read, a recording too.
+fn spared(loaded: &LoadedProject, address: &Address) -> Spared {
+    let recording = match address {
+        Address::Recording { path, .. } => Some(path.as_path()),
+        _ => None,
+    };
+    Spared::of(loaded).and("the recording itself", recording)
+}
+
 fn pipeline(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Pipeline> {
     let project = &loaded.inputs.project;
     let bar = Bar::default();
@@ -143,14 +154,7 @@ struct Output {
 }
 
 impl Output {
-    fn new(args: &ListenArgs, address: &Address) -> anyhow::Result<Self> {
-        if let (Some(csv), Address::Recording { path, .. }) = (&args.csv, address) {
-            anyhow::ensure!(
-                !is_same_file(csv, path),
-                "--csv {}: this is the recording itself. Choose another name for the table",
-                csv.display()
-            );
-        }
+    fn new(args: &ListenArgs) -> anyhow::Result<Self> {
         Ok(Self {
             served: args.serve.as_deref().map(serve).transpose()?,
             csv: args.csv.as_deref().map(Table::create).transpose()?,
@@ -257,11 +261,6 @@ fn serve(address: &str) -> anyhow::Result<(TcpListener, Vec<TcpStream>)> {
     })?;
     listener.set_nonblocking(true)?;
     Ok((listener, Vec::new()))
-}
-
-fn is_same_file(a: &Path, b: &Path) -> bool {
-    let whole = |p: &Path| std::fs::canonicalize(p).ok();
-    whole(a).is_some_and(|a| whole(b) == Some(a))
 }
 
 /// A table of samples, with the truth where a simulated board has told it. Each file has as many columns in every

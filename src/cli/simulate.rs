@@ -8,6 +8,7 @@ use anyhow::ensure;
 use clap::Args;
 use serde_json::json;
 
+use super::spared::Spared;
 use super::{Common, out, progress::Bar};
 use crate::design::{self, DesignError};
 use crate::given;
@@ -56,6 +57,11 @@ pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
         check_output(path, &["vtu"])?;
     }
     let loaded = args.common.load()?;
+    let spared = Spared::of(&loaded)
+        .and("the table of touches", args.touches.as_deref())
+        .and("the table of gauges", args.sites.as_deref());
+    spared.check("--out", Some(&args.out))?;
+    spared.check("--vtu", args.vtu.as_deref())?;
     match given {
         Some((touches, sites)) => at_points(args, &loaded, touches, sites),
         None => everywhere(args, &loaded),
@@ -205,8 +211,9 @@ fn estimated_error(summary: &serde_json::Value) -> String {
     let under = number("/discretization/displacement_mm")
         .zip(number("/discretization/displacement_percent"))
         .map(|(mm, percent)| format!("{mm:.2e} mm ({percent:.1} %) under the touch"));
-    let strain = number("/discretization/strain_percent")
-        .map(|percent| format!("{percent:.1} % of a load's largest strain"));
+    let strain = number("/discretization/strain_percent").map(|percent| {
+        format!("{percent:.1} % of a load's largest strain (beyond two tip radii from it)")
+    });
     let parts: Vec<String> = under.into_iter().chain(strain).collect();
     let of_mesh = if parts.is_empty() {
         "not known".to_owned()

@@ -18,6 +18,7 @@ use crate::feasible::Surroundings;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::walls::Side;
 use crate::mesh::{SurfacePoint, TriMesh};
+use crate::plain;
 use crate::project::{Elements as ElementKind, PartModel, Project};
 
 /// A part with its supports, ready to have elements laid on it or cells around it.
@@ -77,6 +78,19 @@ pub(super) fn solid_ground(inputs: &Inputs, watch: Watch) -> Result<SolidGround,
     let solid =
         SolidGround::touched_by(fingertip, &inputs.part, material, &supports, &told, watch)?;
     Ok(solid)
+}
+
+/// What has to be known of a tip (its radius, m) that is larger than the part: nobody means that, but it can be computed.
+#[must_use]
+pub fn wide_tip(part: &TriMesh, tip_radius: f64) -> Option<String> {
+    let size = size_mm(part);
+    (tip_radius * 1e3 > size).then(|| {
+        format!(
+            "A tip of {} in radius is larger than the part, which is {} across: it presses all that faces it. Check the unit of the mesh and the tip's radius (mm).",
+            plain::mm(tip_radius * 1e3),
+            plain::mm(size)
+        )
+    })
 }
 
 /// What has to be known of a solid whose surface is not closed; its inside is guessed at there.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::ground::{Built, ground, open_solid};
+use super::ground::{Built, ground, open_solid, wide_tip};
 use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches};
 use super::{DesignError, Inputs, Meshed, SLOPE_TOUCHES};
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
@@ -245,6 +245,7 @@ fn read(
     let mut cautious = checks.distrust();
     cautious.extend(cautions(&estimate, linearity.as_ref(), project, budget));
     cautious.extend(meshed.cautions(project.tip().1));
+    cautious.extend(wide_tip(&inputs.part, project.tip().1));
     cautious.extend(open_solid(inputs));
     cautious.extend(on_supports(inputs, &dataset.touches)?);
     let (mesh, held) = meshed.gauge_surface();

@@ -20,7 +20,7 @@ const STRAIN: f64 = 2.0;
 /// A load is judged by what it moves, but by no less than this share of what the middle one moves.
 const LEAST_MOVED: f64 = 0.05;
 /// Strains are judged farther than this from the touch, in tip radii.
-const BEYOND: f64 = 2.0;
+pub const BEYOND: f64 = 2.0;
 
 /// Estimated discretization error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

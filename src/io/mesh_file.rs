@@ -194,6 +194,27 @@ pub fn parse_mesh(
 
 fn parsed(bytes: &[u8], ending: &str, folder: Option<&Path>) -> Result<Soup, String> {
     let parse = || match ending {
+        "stl" if stl::is_binary(bytes) => stl::read(bytes),
+        _ => unmarked(bytes).and_then(|bytes| by_ending(bytes, ending, folder)),
+    };
+    quietly(parse)
+        .unwrap_or_else(|| Err("the file is damaged".into()))
+        .map_err(|m| format!("{m}. Export the mesh again"))
+}
+
+/// What stands behind the mark of UTF-8 that some editors write in front of a text.
+fn unmarked(bytes: &[u8]) -> Result<&[u8], String> {
+    match bytes {
+        [0xef, 0xbb, 0xbf, text @ ..] => Ok(text),
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => {
+            Err("the file is text in UTF-16: save it as UTF-8".into())
+        }
+        _ => Ok(bytes),
+    }
+}
+
+fn by_ending(bytes: &[u8], ending: &str, folder: Option<&Path>) -> Result<Soup, String> {
+    match ending {
         "obj" => obj::read(bytes),
         "ply" => ply::read(bytes),
         "stl" => stl::read(bytes),
@@ -201,10 +222,7 @@ fn parsed(bytes: &[u8], ending: &str, folder: Option<&Path>) -> Result<Soup, Str
         "inp" => inp::read(bytes),
         "cdb" | "dat" => ansys::read(bytes),
         _ => gltf::read(bytes, folder),
-    };
-    quietly(parse)
-        .unwrap_or_else(|| Err("the file is damaged".into()))
-        .map_err(|m| format!("{m}. Export the mesh again"))
+    }
 }
 
 /// One body of what a file holds, in a unit of so many metres.

@@ -155,6 +155,15 @@ impl Arrays {
                 format!("the array {} cannot be read: {what}", quote(name)),
             )
         };
+        let method = self.archive.by_index_raw(index).map(|m| m.compression());
+        let method = method.map_err(|e| unreadable(&e))?;
+        if !matches!(
+            method,
+            CompressionMethod::Stored | CompressionMethod::Deflated
+        ) {
+            let what = "it is compressed in a way that is not read here. Write it with numpy.savez or numpy.savez_compressed";
+            return Err(unreadable(&what));
+        }
         let bytes = self.archive.by_index(index);
         let bytes = bytes.map_err(|e| unreadable(&e))?;
         npy::read(bytes).map_err(|e| unreadable(&e))

@@ -182,8 +182,27 @@ fn unreadable(text: &str, error: &toml::de::Error) -> String {
     });
     format!(
         "this is not a readable project file{place}: {}",
-        ends(error.message())
+        ends(&in_words(error.message()))
     )
+}
+
+/// Types as the library names them, in the words of whoever writes a project.
+fn in_words(message: &str) -> String {
+    const WHOLE: &str = "expected a whole number from 0 on";
+    [
+        (" as i128", ""),
+        (" as u128", ""),
+        ("expected usize", WHOLE),
+        ("expected u64", WHOLE),
+        ("expected u32", WHOLE),
+        ("expected u16", WHOLE),
+        ("expected u8", WHOLE),
+        ("expected f64", "expected a number"),
+    ]
+    .iter()
+    .fold(message.to_owned(), |said, (from, to)| {
+        said.replace(from, to)
+    })
 }
 
 /// Saves a project atomically, one backup kept, its masks beside it. Paths in it are taken as they are:

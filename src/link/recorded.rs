@@ -2,13 +2,35 @@
 
 use std::collections::VecDeque;
 
-use super::Recorder;
+use super::{Recorder, replay};
 use crate::board::{SimulatedBoard, Truth};
 use crate::live::{Input, Receiver, Sample};
 use crate::wire::{Message, encode};
+use crate::{memory, plain};
 
 /// The board's time between two looks at it (µs), about as often as a port is looked at.
 const TURN_US: u64 = 4000;
+
+/// Refuses a recording that could not be read again: of so many seconds, from a board of this rate, with so many
+/// channels of so many bits.
+///
+/// # Errors
+/// A message that says how large it would become, and what to change.
+pub fn check_length(seconds: f64, rate_hz: u16, channels: usize, bits: u8) -> Result<(), String> {
+    let mut sample = Vec::new();
+    encode(&Message::Data(vec![0; channels]), 0, 0, bits, &mut sample);
+    let bytes = seconds * f64::from(rate_hz) * sample.len() as f64;
+    let most = replay::most_bytes();
+    if bytes <= most {
+        return Ok(());
+    }
+    Err(format!(
+        "{seconds} s at {rate_hz} Hz would be a recording of {}, and at most {} are read again with {} of memory. Lower --seconds or --rate, or allow more with --memory-gb",
+        plain::needed_gb(bytes / 1e9),
+        plain::allowed_gb(most / 1e9),
+        plain::allowed_gb(memory::allowed_gb())
+    ))
+}
 
 /// Writes into a recording what a simulated board sends in so many seconds of its own time, and where it is really
 /// touched. `tell` hears what really happened at every sample. How many samples there are.

@@ -40,6 +40,11 @@ pub(super) fn open(path: &Path, pace: Pace) -> Result<Box<dyn Port>, String> {
     }))
 }
 
+/// The largest recording that is read.
+pub(super) fn most_bytes() -> f64 {
+    memory::allowed() / GROWTH
+}
+
 /// All of an ordinary file that memory has room for: a pipe or a device could be waited for without an end.
 fn whole(path: &Path) -> Result<Vec<u8>, String> {
     let unreadable = |e: std::io::Error| format!("the recording cannot be read ({e})");
@@ -48,7 +53,7 @@ fn whole(path: &Path) -> Result<Vec<u8>, String> {
         return Err("this is no file that a recording could be in".to_owned());
     }
     let size = about.len() as f64;
-    if GROWTH * size > memory::allowed() {
+    if size > most_bytes() {
         return Err(format!(
             "the recording has {}, and at most {} are read with {} of memory. Allow more with --memory-gb",
             plain::needed_gb(size / 1e9),

@@ -10,6 +10,7 @@ use super::Studio;
 use super::drive::Finished;
 use super::jobs::Task;
 use crate::cli::render::{RenderArgs, ViewArg};
+use crate::cli::spared::Spared;
 use crate::io::atomic;
 use crate::io::project_file::LoadedProject;
 use crate::job::Stop;
@@ -48,7 +49,9 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         },
         transparent: args.transparent,
     };
-    let png = png(args.common().load()?, &picture).map_err(anyhow::Error::msg)?;
+    let loaded = args.common().load()?;
+    Spared::of(&loaded).check("--out", Some(&args.out))?;
+    let png = png(loaded, &picture).map_err(anyhow::Error::msg)?;
     atomic::write(&args.out, &png).context("the picture could not be written")
 }
 

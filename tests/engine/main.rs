@@ -40,5 +40,6 @@ mod solid;
 mod solid_extremes;
 mod solids;
 mod study;
+mod tried;
 mod volumes;
 mod words;

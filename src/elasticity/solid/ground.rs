@@ -312,8 +312,11 @@ impl SolidGround {
         let (tip, away) = self.nearest(&touches);
         let mut grids = Grids::default();
         let mut size = shape.first(tip, away, least);
+        let solve = |size: f64| Solved::new(self, size, &touches, &places, watch);
         let estimate = loop {
-            grids.push(Solved::new(self, size, &touches, &places, watch)?);
+            if !grids.go_on(size, solve)? {
+                break self.left(&grids, &touches, &places);
+            }
             let next = sizing::next(size, least);
             if let Some(finer) = next
                 && grids.sizes.len() < LEAST_GRIDS as usize
@@ -455,6 +458,29 @@ struct Grids {
 }
 
 impl Grids {
+    /// Solves on a grid of the next size (m). Where memory does not hold it, but grids enough to say how far they are
+    /// off are there, the one before stays the last: false.
+    fn go_on(
+        &mut self,
+        size: f64,
+        solve: impl Fn(f64) -> Result<Solved, ElasticError>,
+    ) -> Result<bool, ElasticError> {
+        // The factor before goes first: memory is asked for one of them.
+        self.last = None;
+        match (solve(size), self.sizes.last()) {
+            (Err(error), Some(&fits))
+                if error.is_memory() && self.sizes.len() >= LEAST_GRIDS as usize =>
+            {
+                self.last = Some(solve(fits)?);
+                Ok(false)
+            }
+            (solved, _) => {
+                self.push(solved?);
+                Ok(true)
+            }
+        }
+    }
+
     fn push(&mut self, mut solved: Solved) {
         self.sizes.push(solved.fineness.size);
         self.samples.push(std::mem::take(&mut solved.sample));
@@ -532,6 +558,68 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     use super::*;
+    use crate::budget::unwatched;
+    use crate::elasticity::Region;
+    use crate::mesh::oriented_box::OrientedBox;
+
+    /// A cube of 20 mm that is held at its foot.
+    fn cube() -> SolidGround {
+        let corner = |i: u32| [i & 1, i >> 1 & 1, i >> 2].map(|x| 0.02 * f64::from(x));
+        let positions = (0..8).map(|i| DVec3::from_array(corner(i))).collect();
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+        let part = TriMesh::from_checked(positions, quads.into_iter().flat_map(halves).collect());
+        let foot = Support {
+            region: Region::Box(OrientedBox::of_file(
+                DVec3::NEG_ONE,
+                DVec3::new(1.0, 1.0, 1e-6),
+            )),
+            held: Freedoms::ALL,
+        };
+        let material = Material {
+            youngs_modulus: 2e9,
+            poissons_ratio: 0.3,
+        };
+        SolidGround::new(&Arc::new(part), material, &[foot], &|_| None, &unwatched).unwrap()
+    }
+
+    #[test]
+    fn what_memory_does_not_hold_leaves_the_grid_before() {
+        const WANTING: f64 = 4e-3;
+        let ground = cube();
+        let touch = Touch {
+            position: DVec3::new(0.01, 0.01, 0.02),
+            normal: DVec3::Z,
+            force: 1.0,
+            tip_radius: 3e-3,
+        };
+        let solve = |size: f64| {
+            if size < WANTING {
+                return Err(ElasticError::OutOfMemory);
+            }
+            Solved::new(&ground, size, &[touch], &[DVec3::ZERO], &unwatched)
+        };
+        let mut grids = Grids::default();
+        for size in [9e-3, 7e-3, 5e-3] {
+            assert!(grids.go_on(size, solve).unwrap());
+        }
+        assert!(!grids.go_on(3e-3, solve).unwrap());
+        assert_eq!(grids.sizes, [9e-3, 7e-3, 5e-3]);
+        assert_eq!(grids.last.as_ref().unwrap().fineness.size, 5e-3);
+        let left = ground.left(&grids, &[touch], &[DVec3::ZERO]);
+        assert!(left.displacement_percent.is_finite());
+        // Of fewer grids nothing is known: that is refused.
+        let mut few = Grids::default();
+        few.go_on(9e-3, solve).unwrap();
+        assert!(few.go_on(3e-3, solve).is_err());
+    }
 
     #[test]
     fn behind_many_facets_is_looked_as_often_as_behind_fewer() {

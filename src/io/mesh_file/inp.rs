@@ -62,6 +62,9 @@ const SILENT: [&str; 9] = [
     "END STEP",
 ];
 
+/// Keywords whose lines are read, and which may have them in another file.
+const WITH_DATA: [&str; 6] = ["NODE", "ELEMENT", "NSET", "ELSET", "ELASTIC", "BOUNDARY"];
+
 /// Reads nodes, tetrahedra and sets of nodes.
 ///
 /// # Errors
@@ -104,6 +107,9 @@ impl Reader {
         self.element_is_whole()?;
         self.elastic.notice(keyword);
         let line = keyword.line;
+        if WITH_DATA.contains(&keyword.name.as_str()) {
+            no_input(keyword)?;
+        }
         self.reading = match keyword.name.as_str() {
             "NODE" => self.begin_nodes(keyword)?,
             "ELEMENT" => self.begin_elements(keyword)?,
@@ -142,7 +148,6 @@ impl Reader {
     }
 
     fn begin_nodes(&mut self, keyword: &Keyword) -> Result<Reading, String> {
-        no_input(keyword)?;
         let curved = |system: &str| !system.is_empty() && !system.eq_ignore_ascii_case("R");
         if keyword.option("SYSTEM").is_some_and(curved) {
             return Err(format!(
@@ -155,7 +160,6 @@ impl Reader {
     }
 
     fn begin_elements(&mut self, keyword: &Keyword) -> Result<Reading, String> {
-        no_input(keyword)?;
         let line = keyword.line;
         let kind = keyword.required("TYPE")?.to_uppercase();
         let set = keyword.option("ELSET").filter(|name| !name.is_empty());

@@ -12,18 +12,14 @@ const TRIANGLE: usize = 50;
 
 /// Reads all triangles of a file.
 pub fn read(bytes: &[u8]) -> Result<Soup, String> {
-    // Headers lie: a binary file is known by its length, whatever its first word.
-    let announced = bytes
-        .get(HEADER - 4..HEADER)
-        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
-    if announced.is_some_and(|count| bytes.len() == HEADER + TRIANGLE * count) {
+    if is_binary(bytes) {
         return binary(&bytes[HEADER..]);
     }
     // Text holds no zero bytes.
     if is_solid(bytes) && !bytes.contains(&0) {
         return text(&String::from_utf8_lossy(bytes));
     }
-    Err(match announced {
+    Err(match announced(bytes) {
         Some(count) => format!(
             "the STL file is truncated or damaged: its header announces {count} triangles ({} bytes), and it has {} bytes",
             HEADER + TRIANGLE * count,
@@ -31,6 +27,17 @@ pub fn read(bytes: &[u8]) -> Result<Soup, String> {
         ),
         None => "the STL file is truncated: it is shorter than its header".into(),
     })
+}
+
+/// Headers lie: a binary file is known by its length, whatever its first word.
+pub fn is_binary(bytes: &[u8]) -> bool {
+    announced(bytes).is_some_and(|count| bytes.len() == HEADER + TRIANGLE * count)
+}
+
+/// Triangles that the header of a binary file has.
+fn announced(bytes: &[u8]) -> Option<usize> {
+    let count = bytes.get(HEADER - 4..HEADER)?;
+    Some(u32::from_le_bytes([count[0], count[1], count[2], count[3]]) as usize)
 }
 
 fn is_solid(bytes: &[u8]) -> bool {
