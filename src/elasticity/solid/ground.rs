@@ -559,7 +559,7 @@ mod tests {
 
     use super::*;
     use crate::budget::unwatched;
-    use crate::elasticity::Region;
+    use crate::elasticity::support::Region;
     use crate::mesh::oriented_box::OrientedBox;
 
     /// A cube of 20 mm that is held at its foot.
