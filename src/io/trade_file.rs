@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::fingerprint::Fingerprint;
 use super::svg::escape;
@@ -111,14 +112,32 @@ pub fn without_knobs(project: &Project) -> Project {
 }
 
 /// What a point's figures depend on beside its setting, as a key: the part to the last bit, and every key of the
-/// project that is no knob.
+/// project that is no knob and not at its default: a key that a later version adds leaves what was measured standing.
 #[must_use]
 pub fn inputs_key(inputs: &Inputs) -> String {
-    let project = without_knobs(&inputs.project);
+    let value = |project: &Project| serde_json::to_value(without_knobs(project)).ok();
+    let said = value(&inputs.project);
+    let defaults = value(&Project::around("", None)).unwrap_or_default();
+    let said = said.and_then(|said| beside_defaults(said, &defaults));
     let mut key = Fingerprint::default();
-    key.add(serde_json::to_string(&project).unwrap_or_default().bytes());
+    key.add(said.unwrap_or_default().to_string().bytes());
     key.add_part(inputs);
     key.hex()
+}
+
+/// What of a value is not as in `defaults`; nothing where all of it is. Lists are one whole.
+fn beside_defaults(value: Value, defaults: &Value) -> Option<Value> {
+    if value == *defaults {
+        return None;
+    }
+    let Value::Object(table) = value else {
+        return Some(value);
+    };
+    let others = table.into_iter().filter_map(|(name, value)| {
+        let value = beside_defaults(value, defaults.get(&name).unwrap_or(&Value::Null))?;
+        Some((name, value))
+    });
+    Some(Value::Object(others.collect()))
 }
 
 /// Reads what [`write`] left in a folder; nothing where there is nothing.
@@ -491,6 +510,15 @@ mod tests {
         let old = r#"{ "format": 1, "points": [{ "setting": { "estimator": "regression" } }] }"#;
         let said = Record::parse(old).unwrap_err();
         assert_eq!(said, "it is of format 1, this version reads 2");
+    }
+
+    #[test]
+    fn a_key_at_its_default_is_none() {
+        let defaults = serde_json::json!({ "a": 1, "b": { "c": 2, "d": [3, 4] }, "e": null });
+        let said = serde_json::json!({ "a": 1, "b": { "c": 2, "d": [3], "new": null }, "e": 5 });
+        let kept = serde_json::json!({ "b": { "d": [3] }, "e": 5 });
+        assert_eq!(beside_defaults(said, &defaults), Some(kept));
+        assert_eq!(beside_defaults(defaults.clone(), &defaults), None);
     }
 
     #[test]

@@ -387,7 +387,7 @@ fn a_share_of_noise_or_a_dead_site_is_never_chosen_for_its_rounding() {
     strip.x = SignalMatrix::new(120, values);
     let chosen = choose(&svr(TUNED), &strip, &Wishes::count(19)).unwrap();
     assert!(chosen.sets.iter().all(|s| !s.sites.contains(&5)));
-    assert!(chosen.achieved.notes[0].contains("1 sites report the same"));
+    assert!(chosen.achieved.notes[0].contains("1 site with the same report"));
     let pca = choose(&PcaQr, &strip, &Wishes::count(6)).unwrap();
     assert!(pca.sets.iter().all(|s| !s.sites.contains(&5)));
 }

@@ -38,7 +38,7 @@ fn the_mark_that_editors_put_before_text_is_no_part_of_a_mesh() {
         ("ply", PLY, 3),
         ("stl", STL, 3),
         ("msh", MSH, 3),
-        ("inp", INP, 4),
+        ("inp", INP, 10),
     ] {
         assert_eq!(vertices(ending, text.as_bytes()), Ok(count), "{ending}");
         let marked = format!("\u{feff}{text}");
