@@ -14,7 +14,7 @@ use std::time::Instant;
 use glam::DVec3;
 use hapdef::board::{Faults, Script};
 use hapdef::budget::{Quality, unwatched};
-use hapdef::cli::board;
+use hapdef::design::simulated_board as board;
 use hapdef::design::{self, Inputs, Sensing, Workshop};
 use hapdef::elasticity::Touch;
 use hapdef::elasticity::sensitivity::Sensitivity;

@@ -236,7 +236,7 @@ fn stroke(window: &mut Window) -> f64 {
     window.studio.view.take(Tool::Paint);
     let mut taken = 0.0;
     for _ in 0..STROKES {
-        window.studio.document.clear(Layer::Feasible);
+        window.studio.session.document.clear(Layer::Feasible);
         let from = on_the_part(window, 0);
         window.hover(from);
         window.step();
@@ -250,7 +250,7 @@ fn stroke(window: &mut Window) -> f64 {
         let to = on_the_part(window, 39);
         window.button(to, false);
         window.step();
-        let painted = window.studio.document.layer(Layer::Feasible);
+        let painted = window.studio.session.document.layer(Layer::Feasible);
         assert!(painted.is_some_and(|m| m.iter().filter(|&&m| m).count() > 20));
     }
     taken / STROKES as f64
@@ -259,13 +259,13 @@ fn stroke(window: &mut Window) -> f64 {
 /// A box around a part of what is seen, from pressing to letting go.
 fn boxes(window: &mut Window) -> f64 {
     window.studio.view.take(Tool::Box);
-    let vertices = window.studio.document.part.positions().len();
+    let vertices = window.studio.session.document.part.positions().len();
     // About a thousand vertices of the wall in front.
     let side = (1000.0 / vertices as f32).sqrt().min(0.4) * 200.0;
     let from = window.studio.view.rect.center();
     let to = from + egui::vec2(side, side);
     let taken = milliseconds(40, |_| {
-        window.studio.document.clear(Layer::Feasible);
+        window.studio.session.document.clear(Layer::Feasible);
         window.hover(from);
         window.button(from, true);
         window.step();
@@ -273,14 +273,14 @@ fn boxes(window: &mut Window) -> f64 {
         window.button(to, false);
         window.step();
     });
-    window.studio.document.clear(Layer::Feasible);
+    window.studio.session.document.clear(Layer::Feasible);
     window.step();
     taken / 2.0
 }
 
 /// A frame with the plots of what was kept.
 fn plots(window: &mut Window) -> f64 {
-    let state = &mut window.studio.document.state;
+    let state = &mut window.studio.session.document.state;
     state.project.kept = (0..8)
         .map(|k| Kept {
             name: format!("selection {k}"),
@@ -304,7 +304,7 @@ fn plots(window: &mut Window) -> f64 {
     window.studio.show_kept(0..8);
     window.step();
     milliseconds(400, |k| {
-        let kept = &mut window.studio.document.state.project.kept[0];
+        let kept = &mut window.studio.session.document.state.project.kept[0];
         kept.errors[k % 20].mean_mm += 0.1;
         window.step();
     })

@@ -128,6 +128,16 @@ impl Quality {
         }
     }
 
+    /// As it is shown.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Draft => "Draft",
+            Self::Standard => "Standard",
+            Self::Reference => "Reference",
+        }
+    }
+
     /// The most each stage may spend. Counts in the project below these are kept.
     #[must_use]
     pub fn budget(self) -> Budget {

@@ -5,7 +5,6 @@ pub mod board;
 pub mod data;
 pub mod design;
 pub mod evaluate;
-pub mod examples;
 pub mod limb;
 pub mod listen;
 pub mod out;
@@ -18,21 +17,21 @@ pub mod spared;
 pub mod trade;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use self::examples::{Example, write_bundled_mesh};
 use crate::budget::Quality;
 use crate::dataset::Signal;
-use crate::design::Inputs;
-use crate::io::mesh_file::read_mesh;
-use crate::io::project_file::{self, LoadedProject};
+use crate::io::examples::write_bundled_mesh;
+use crate::io::project_file::LoadedProject;
 use crate::io::source;
 use crate::placement::SelectorKind;
 use crate::plain;
-use crate::project::{Project, Unit};
+use crate::project::Unit;
+
+pub use crate::io::examples;
+pub use crate::io::opening::{bundled, open};
 
 /// Decides where a handful of strain gauges go inside a flexible robot limb.
 ///
@@ -115,48 +114,6 @@ named!(QualityArg, Quality, Draft => Quality::Draft, Standard => Quality::Standa
 named!(SignalArg, Signal, Displacement => Signal::Displacement, NormalDisplacement => Signal::NormalDisplacement, Strain => Signal::Strain);
 named!(SelectorArg, SelectorKind, GreedySvr => SelectorKind::GreedySvr, PcaQr => SelectorKind::PcaQr, Entropy => SelectorKind::Entropy, MutualInformation => SelectorKind::MutualInformation, ExpectedError => SelectorKind::ExpectedError);
 named!(UnitArg, Unit, Mm => Unit::Millimetre, Cm => Unit::Centimetre, M => Unit::Metre, In => Unit::Inch);
-
-/// The limb that opens where nothing else is named, as a loaded project.
-///
-/// # Errors
-/// None for the files this program was built with.
-pub fn bundled() -> anyhow::Result<LoadedProject> {
-    Example::Tube.open()
-}
-
-/// Opens a project or a mesh, by the file's ending.
-///
-/// # Errors
-/// A message naming the file and the remedy.
-pub fn open(path: &Path, unit: Option<Unit>) -> anyhow::Result<LoadedProject> {
-    if project_file::is_project(path) {
-        return Ok(project_file::load(path)?);
-    }
-    let file_name = path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
-    let mut project = Project::around(&file_name, unit);
-    let mut loaded = read_mesh(path, unit, project.part.body, project.part.repair())?;
-    let taken = loaded.found.answer(&mut project, |_| false);
-    project
-        .check()
-        .with_context(|| path.display().to_string())?;
-    loaded.repairs.notes.extend(taken);
-    Ok(LoadedProject {
-        inputs: Inputs {
-            project,
-            part: Arc::new(loaded.mesh),
-            painted: None,
-            masks: loaded.groups,
-        },
-        repairs: loaded.repairs,
-        path: path.with_extension("hapdef.toml"),
-        mesh_path: path.to_owned(),
-        bundled: false,
-    })
-}
 
 /// Gigabytes that can be meant.
 fn memory_gb(text: &str) -> Result<f64, String> {

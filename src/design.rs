@@ -18,6 +18,7 @@ mod road;
 mod sense;
 mod shortage;
 mod simulate;
+pub mod simulated_board;
 mod walled;
 
 use std::sync::Arc;

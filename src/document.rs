@@ -1,23 +1,22 @@
 //! The open project as the window edits it: plain data, with undo and redo.
 
+mod inputs;
 mod paint;
 
-use std::cell::RefCell;
 use std::path::PathBuf;
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 
-use crate::budget::Quality;
 use crate::design::{Inputs, check_shape};
 use crate::io::project_file::LoadedProject;
 use crate::mesh::geodesic::{March, Scratch};
 use crate::mesh::repair::Repair;
 use crate::mesh::{RepairReport, TriMesh};
-use crate::placement::SelectorKind;
-use crate::project::{
-    ChosenSite, GaugeKeys, Masks, PartModel, Project, SelectionKeys, SupportKeys, ToleranceKeys,
-    TouchKeys,
-};
+use crate::project::{ChosenSite, Masks, PartModel, Project};
 
+pub use inputs::{
+    DesignInputs, ElementInputs, ExpectedInputs, FilterInputs, ModelInputs, PaintInputs,
+    ReductionInputs, SelectionInputs, SensingInputs, SimulationInputs, TradeInputs, WallInputs,
+};
 pub use paint::{Brush, Layer};
 
 /// What undo brings back. The mesh is not part of it: opening a file begins a new history.
@@ -46,17 +45,12 @@ pub struct Document {
     taken_in: (usize, Repair),
     /// Why nothing can be computed on the part, whatever its project, where that is so.
     misshapen: Option<String>,
-    fingerprints: Fingerprints,
     saved: State,
     /// The state at the last finished gesture.
     settled: State,
     past: Vec<State>,
     future: Vec<State>,
 }
-
-/// What is painted on all layers and what is held: equal when these are.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PaintKey([Option<u64>; 6], Vec<(SupportKeys, Option<u64>)>);
 
 /// Undo steps kept.
 const DEPTH: usize = 200;
@@ -80,7 +74,6 @@ impl Document {
             path,
             mesh_path: loaded.mesh_path,
             bundled: loaded.bundled,
-            fingerprints: Fingerprints::default(),
             saved: state.clone(),
             settled: state.clone(),
             state,
@@ -197,236 +190,11 @@ impl Document {
             .into_owned()
     }
 
-    /// The part without the path of its mesh: the mesh itself is known by its place in memory, and saving
-    /// under another name changes nothing that was computed.
-    fn part_key(&self) -> crate::project::Part {
-        crate::project::Part {
-            mesh: String::new(),
-            ..self.state.project.part.clone()
-        }
-    }
-
-    /// The supports with what the masks they name hold.
-    fn supports_key(&self) -> Vec<(SupportKeys, Option<u64>)> {
-        let mask = |s: &SupportKeys| self.mask_key(s.vertices.as_ref()?);
-        let supports = &self.state.project.supports;
-        supports.iter().map(|s| (s.clone(), mask(s))).collect()
-    }
-
-    fn mask_key(&self, name: &str) -> Option<u64> {
-        let mask = self.state.masks.get(name)?;
-        Some(self.fingerprints.of(mask))
-    }
-
-    /// What the simulation depends on, as a key.
-    #[must_use]
-    pub fn simulation_key(&self) -> String {
-        self.simulation_key_at(self.state.project.budget.quality)
-    }
-
-    /// As [`Self::simulation_key`], of a quality that need not be the project's.
-    #[must_use]
-    pub fn simulation_key_at(&self, quality: Quality) -> String {
-        let gauge = &self.state.project.gauge;
-        let report = (gauge.signal, gauge.directions);
-        format!("{} {report:?}", self.elements_key_at(quality))
-    }
-
-    /// What the simulation depends on beside what gauges report: its elements, sites and touches.
-    #[must_use]
-    pub fn elements_key_at(&self, quality: Quality) -> String {
-        let p = &self.state.project;
-        // How hard touches come is for whoever chooses and judges: signals grow with the force. Nor is any touch
-        // simulated with another tip.
-        let touch = TouchKeys {
-            forces_n: TouchKeys::default().forces_n,
-            tip_tolerance_mm: TouchKeys::default().tip_tolerance_mm,
-            ..p.touch.clone()
-        };
-        format!(
-            "{} {touch:?} {:?} {:?} {:?} {:?}",
-            self.model_key(),
-            p.touch.region.as_ref().map(|name| self.mask_key(name)),
-            p.sites,
-            (quality, p.budget.seed, p.budget.limits_at(quality)),
-            // A region that is not there cannot be computed with.
-            p.feasible
-                .keep_out
-                .as_ref()
-                .is_some_and(|name| !self.state.masks.contains_key(name))
-        )
-    }
-
-    /// What a measured trade of speed against accuracy holds for: everything but its knobs.
-    #[must_use]
-    pub fn trade_key(&self) -> String {
-        let project = crate::io::trade_file::without_knobs(&self.state.project);
-        let (part, paint) = (Arc::as_ptr(&self.part), self.paint_key());
-        format!("{part:p} {project:?} {paint:?}")
-    }
-
-    /// What is painted on all layers, and what is held.
-    #[must_use]
-    pub fn paint_key(&self) -> PaintKey {
-        let of = |layer| self.layer(layer).map(|mask| self.fingerprints.of(mask));
-        PaintKey(Layer::ALL.map(of), self.supports_key())
-    }
-
-    /// What the elastic model alone depends on.
-    #[must_use]
-    pub fn model_key(&self) -> String {
-        let p = &self.state.project;
-        format!(
-            "{:p} {:?} {:?} {:?}",
-            Arc::as_ptr(&self.part),
-            self.part_key(),
-            p.material,
-            self.supports_key()
-        )
-    }
-
     /// Whether the part is taken as a solid.
     #[must_use]
     pub fn is_solid(&self) -> bool {
         self.state.project.part.model == PartModel::Solid
     }
-
-    /// What is known of the part's walls depends on.
-    #[must_use]
-    pub fn walls_key(&self) -> String {
-        let p = &self.state.project;
-        let mask = |layer| self.layer(layer).map(|m| self.fingerprints.of(m));
-        format!(
-            "{:p} {} {} {} {:?} {} {:?} {:?}",
-            Arc::as_ptr(&self.part),
-            p.part.thickness_mm,
-            p.touch.tip_radius_mm,
-            p.touch.reach_mm,
-            (p.budget.quality, p.budget.limits),
-            p.touch.count,
-            mask(Layer::Inside),
-            mask(Layer::Outside)
-        )
-    }
-
-    /// What the feasible region depends on, beside the simulation.
-    #[must_use]
-    pub fn feasible_key(&self) -> String {
-        self.feasible_key_at(self.state.project.budget.quality)
-    }
-
-    /// As [`Self::feasible_key`], of a quality that need not be the project's.
-    #[must_use]
-    pub fn feasible_key_at(&self, quality: Quality) -> String {
-        let p = &self.state.project;
-        let painted = self.state.painted.as_ref().map(|m| self.fingerprints.of(m));
-        // How far off gauges are glued, or drift, decides nothing of where they can go.
-        let gauge = GaugeKeys {
-            tolerance: ToleranceKeys::default(),
-            drift_microstrain: GaugeKeys::default().drift_microstrain,
-            ..p.gauge.clone()
-        };
-        format!(
-            "{} {gauge:?} {:?} {painted:?} {:?}",
-            self.simulation_key_at(quality),
-            p.feasible,
-            p.feasible.keep_out.as_ref().map(|name| self.mask_key(name)),
-        )
-    }
-
-    /// What the candidates depend on, and the Gaussian process over them.
-    #[must_use]
-    pub fn candidates_key_at(&self, quality: Quality) -> String {
-        let p = &self.state.project;
-        let selection = &p.selection;
-        format!(
-            "{} {:?} {:?}",
-            self.feasible_key_at(quality),
-            p.candidates,
-            (
-                selection.sensors,
-                selection.with_noise,
-                &selection.gaussian_process
-            )
-        )
-    }
-
-    /// What the selections depend on: everything that is asked for, but neither the answer nor which
-    /// selector's answer is shown.
-    #[must_use]
-    pub fn selection_key_at(&self, quality: Quality) -> String {
-        let keys = &self.state.project.selection;
-        let asked = SelectionKeys {
-            sites: Vec::new(),
-            // Where all of them choose, another in the lead changes nothing.
-            selector: if keys.compare {
-                SelectorKind::default()
-            } else {
-                keys.selector
-            },
-            ..keys.clone()
-        };
-        // One selector knows how hard touches come, and how far off gauges are glued.
-        let (p, knowing) = (&self.state.project, SelectorKind::ExpectedError);
-        let knows = p.selectors().contains(&knowing);
-        let gauge = (p.gauge.tolerance, p.gauge.drift_microstrain);
-        let known = knows.then_some((p.touch.forces_n, gauge));
-        format!("{} {asked:?} {known:?}", self.candidates_key_at(quality))
-    }
-
-    /// What a whole design depends on.
-    #[must_use]
-    pub fn design_key(&self) -> String {
-        self.design_key_at(self.state.project.budget.quality)
-    }
-
-    /// As [`Self::design_key`], of a quality that need not be the project's.
-    #[must_use]
-    pub fn design_key_at(&self, quality: Quality) -> String {
-        let Project {
-            evaluation,
-            gauge,
-            touch,
-            calibration,
-            ..
-        } = &self.state.project;
-        let off = (gauge.tolerance, gauge.drift_microstrain, calibration);
-        let judged = (evaluation, off, touch.tip_tolerance_mm);
-        // One estimator knows how hard anybody presses.
-        let judging = self.state.project.judging();
-        format!("{} {judged:?} {judging:?}", self.selection_key_at(quality))
-    }
-}
-
-/// Hashes of masks that are asked for many times a frame.
-///
-/// A mask that is known here has a weak reference, so that whoever changes it in place is given a new
-/// allocation: the same place in memory means the same values.
-#[derive(Default)]
-struct Fingerprints(RefCell<Vec<(Weak<Vec<bool>>, u64)>>);
-
-impl Fingerprints {
-    fn of(&self, mask: &Arc<Vec<bool>>) -> u64 {
-        let mut known = self.0.borrow_mut();
-        known.retain(|(weak, _)| weak.strong_count() > 0);
-        let place = Arc::as_ptr(mask);
-        if let Some((_, hash)) = known.iter().find(|(weak, _)| weak.as_ptr() == place) {
-            return *hash;
-        }
-        let value = hash(mask);
-        known.push((Arc::downgrade(mask), value));
-        value
-    }
-}
-
-fn hash(mask: &[bool]) -> u64 {
-    use std::hash::{DefaultHasher, Hasher};
-    let mut hasher = DefaultHasher::new();
-    hasher.write_usize(mask.len());
-    for chunk in mask.chunks(64) {
-        hasher.write_u64(chunk.iter().fold(0, |bits, &m| bits << 1 | u64::from(m)));
-    }
-    hasher.finish()
 }
 
 #[cfg(test)]
@@ -434,9 +202,10 @@ mod tests {
     use super::*;
     use crate::evaluation::EstimatorKind;
     use crate::mesh::SurfacePoint;
+    use crate::placement::SelectorKind;
 
     fn document() -> Document {
-        Document::new(crate::cli::bundled().unwrap(), None)
+        Document::new(crate::io::opening::bundled().unwrap(), None)
     }
 
     fn at(document: &Document) -> SurfacePoint {
@@ -498,30 +267,40 @@ mod tests {
     #[test]
     fn only_what_depends_on_a_change_goes_stale() {
         let mut d = document();
-        let keys = |d: &Document| {
+        let before = document();
+        let quality = before.state.project.budget.quality;
+        let changed = |d: &Document| {
             [
-                d.model_key(),
-                d.simulation_key(),
-                d.feasible_key(),
-                d.design_key(),
+                d.model_inputs() != before.model_inputs(),
+                d.simulation_inputs(quality) != before.simulation_inputs(quality),
+                d.filter_inputs(quality) != before.filter_inputs(quality),
+                d.design_inputs(quality) != before.design_inputs(quality),
             ]
         };
-        let before = keys(&d);
-        let changed = |d: &Document, expected: [bool; 4]| {
-            let now = keys(d);
-            let changed: Vec<bool> = now.iter().zip(&before).map(|(a, b)| a != b).collect();
-            assert_eq!(changed, expected);
-        };
+        d.state.project.part.mesh = "elsewhere/limb.glb".into();
+        assert_eq!(changed(&d), [false; 4]);
         d.state.project.selection.sensors = 5;
-        changed(&d, [false, false, false, true]);
-        d = document();
-        let before = keys(&d);
+        assert_eq!(changed(&d), [false, false, false, true]);
         d.state.project.feasible.edge_radius_mm = 1.0;
-        let now = keys(&d);
-        assert_eq!(now[1], before[1]);
-        assert_ne!(now[2], before[2]);
+        assert_eq!(changed(&d), [false, false, true, true]);
         d.state.project.part.thickness_mm = 2.0;
-        assert_ne!(keys(&d)[0], before[0]);
+        assert_eq!(changed(&d), [true; 4]);
+    }
+
+    #[test]
+    fn a_stroke_that_is_taken_back_leaves_what_depends_on_the_mask() {
+        let mut d = document();
+        let before = d.paint_inputs();
+        d.fill(Layer::KeepOut);
+        assert_ne!(d.paint_inputs(), before);
+        let filled = d.paint_inputs();
+        let place = at(&d);
+        d.dab(Layer::KeepOut, Brush::Erase, place, 6e-3);
+        assert_ne!(d.paint_inputs(), filled, "changed in place");
+        d.fill(Layer::KeepOut);
+        assert_eq!(d.paint_inputs(), filled, "the same values in another place");
+        d.clear(Layer::KeepOut);
+        assert_eq!(d.paint_inputs(), before);
     }
 
     /// Which of candidates, selections and design go stale when a project with one selector is changed.
@@ -529,18 +308,15 @@ mod tests {
         let mut d = document();
         d.state.project.selection.selector = selector;
         d.state.project.selection.compare = false;
-        let keys = |d: &Document| {
-            let quality = d.state.project.budget.quality;
-            [
-                d.candidates_key_at(quality),
-                d.selection_key_at(quality),
-                d.design_key(),
-            ]
-        };
-        let before = keys(&d);
+        let quality = d.state.project.budget.quality;
+        let before = d.design_inputs(quality);
         change(&mut d.state.project);
-        let now = keys(&d);
-        std::array::from_fn(|k| now[k] != before[k])
+        let now = d.design_inputs(quality);
+        [
+            now.selection.reduction != before.selection.reduction,
+            now.selection != before.selection,
+            now != before,
+        ]
     }
 
     #[test]
@@ -567,8 +343,9 @@ mod tests {
         assert_eq!(stale(SelectorKind::PcaQr, trained), [false, false, true]);
         let mut d = document();
         d.state.project.evaluation.estimator = EstimatorKind::Matching;
-        let before = d.design_key();
+        let quality = d.state.project.budget.quality;
+        let before = d.design_inputs(quality);
         d.state.project.live.largest_force_n = 200.0;
-        assert_ne!(d.design_key(), before);
+        assert_ne!(d.design_inputs(quality), before);
     }
 }

@@ -3,11 +3,13 @@
 pub mod artifacts;
 pub mod atomic;
 pub mod dataset_file;
+pub mod examples;
 pub mod fingerprint;
 pub mod glb;
 pub mod mesh_file;
 pub mod npy;
 pub mod npz;
+pub mod opening;
 pub mod points;
 pub mod project_file;
 pub mod report;

@@ -56,8 +56,6 @@ impl Reporter {
 /// A running job and the way to its result.
 pub struct Job<T> {
     pub name: String,
-    /// Identifies the inputs it was started on: a result for others is dropped by the caller.
-    pub key: String,
     shared: Arc<Shared>,
     result: Receiver<Outcome<T>>,
     started: Instant,
@@ -68,7 +66,6 @@ impl<T: Send + 'static> Job<T> {
     #[must_use]
     pub fn start(
         name: &str,
-        key: String,
         wake: impl Fn() + Send + Sync + 'static,
         work: impl FnOnce(&Reporter) -> Result<T, Stop> + Send + 'static,
     ) -> Self {
@@ -99,7 +96,6 @@ impl<T: Send + 'static> Job<T> {
         }
         Self {
             name: name.to_owned(),
-            key,
             shared,
             result,
             started: Instant::now(),
@@ -176,7 +172,6 @@ mod tests {
     fn a_job_reports_and_returns() {
         let job = Job::start(
             "count",
-            String::new(),
             || (),
             |r| {
                 let _ = r.report(step(42));
@@ -191,7 +186,6 @@ mod tests {
     fn cancel_is_heard_at_the_next_report() {
         let job = Job::<()>::start(
             "spin",
-            String::new(),
             || (),
             |r| {
                 for k in 0.. {
@@ -209,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_panic_is_a_message() {
-        let job = Job::<()>::start("fall", String::new(), || (), |_| panic!("over a stone"));
+        let job = Job::<()>::start("fall", || (), |_| panic!("over a stone"));
         let Outcome::Failed(message) = wait(&job) else {
             panic!("a panic must fail the job")
         };

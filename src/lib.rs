@@ -1,6 +1,6 @@
 //! `HapDef`: where a handful of strain gauges go inside a flexible robot limb.
 //!
-//! The core (everything but `io`, `job`, `document`, `cli`, `render` and `studio`) is pure: no file, no
+//! The core (everything but `io`, `job`, `link`, `document`, `render`, `session`, `cli` and `studio`) is pure: no file, no
 //! clock, no thread of its own, no global random state. SI units throughout (m, N, Pa, strain as a ratio).
 
 pub mod board;
@@ -32,6 +32,7 @@ pub mod plain;
 pub mod project;
 pub mod regression;
 pub mod render;
+pub mod session;
 #[cfg(feature = "studio")]
 pub mod studio;
 pub mod study;

@@ -7,6 +7,7 @@ mod replay;
 mod serial;
 mod session;
 mod socket;
+mod table;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -16,6 +17,7 @@ pub use recorded::{check_length, record};
 pub use recording::{Recorder, old_note};
 pub use serial::{PortInfo, ports};
 pub use session::{Command, Connection, Heard, Listener, State, Timing};
+pub use table::{Table, write_table};
 
 /// What one look at a port brought.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

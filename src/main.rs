@@ -6,6 +6,8 @@ mod parting;
 
 use std::process::ExitCode;
 
+#[cfg(feature = "studio")]
+use anyhow::Context as _;
 use clap::Parser;
 use hapdef::cli::{self, Cli, Command, out};
 
@@ -63,7 +65,27 @@ fn open_studio(cli: &Cli) -> anyhow::Result<()> {
 
 #[cfg(feature = "studio")]
 fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
-    hapdef::studio::picture::run(args)
+    use cli::render::ViewArg;
+    use hapdef::render::camera::Preset;
+    use hapdef::studio::picture::{Picture, png};
+
+    let picture = Picture {
+        size: args.size.0,
+        view: match args.view {
+            ViewArg::Oblique => None,
+            ViewArg::Front => Some(Preset::Front),
+            ViewArg::Back => Some(Preset::Back),
+            ViewArg::Left => Some(Preset::Left),
+            ViewArg::Right => Some(Preset::Right),
+            ViewArg::Top => Some(Preset::Top),
+            ViewArg::Bottom => Some(Preset::Bottom),
+        },
+        transparent: args.transparent,
+    };
+    let loaded = args.common().load()?;
+    cli::spared::Spared::of(&loaded).check("--out", Some(&args.out))?;
+    let png = png(loaded, &picture).map_err(anyhow::Error::msg)?;
+    hapdef::io::atomic::write(&args.out, &png).context("the picture could not be written")
 }
 
 #[cfg(not(feature = "studio"))]

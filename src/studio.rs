@@ -7,49 +7,41 @@ mod commands;
 mod confusions;
 mod dialogs;
 mod display;
-mod drive;
 mod expected;
 mod fields;
 mod form;
 mod gauges;
-mod helping;
 mod inspector;
 mod jobs;
 mod kept;
 mod labels;
-mod latest;
 mod live;
 mod measure;
-mod opening;
 mod overlay;
 mod palette;
 pub mod picture;
 mod recent;
 mod recovery;
 mod results;
-mod saving;
 mod stages;
 mod theme;
 mod toolbar;
 mod tools;
-mod touching;
 mod trade;
 mod viewport;
 
 use std::cell::Cell;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use eframe::egui_wgpu::RenderState;
 use egui::{CentralPanel, Panel};
 
-use crate::budget::Quality;
-use crate::cli;
-use crate::design::{self, Design, Simulated};
 use crate::document::Document;
-use crate::feasible::Feasibility;
+use crate::io::examples::Example;
+use crate::io::opening;
 use crate::io::project_file::{self, LoadedProject};
+use crate::session::{Attention, Event, Session, Wake};
 
 pub use commands::Command;
 pub use display::last_words;
@@ -57,80 +49,29 @@ pub use fields::Field;
 pub use gauges::Way;
 pub use stages::{Stage, Standing};
 pub use tools::Tool;
-pub use trade::Promise;
 pub use viewport::{Pane, Section};
-
-/// Something to tell the user that stays until it is read.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Message {
-    pub text: String,
-    pub error: bool,
-}
-
-/// A finished simulation and the inputs it holds for.
-#[derive(Clone)]
-pub struct SimulationResult {
-    pub simulated: Arc<Simulated>,
-    pub key: String,
-    /// What its elements, sites and touches hold for.
-    elements: String,
-    /// Read again from elements that were there.
-    again: bool,
-    pub quality: Quality,
-    pub seconds: f64,
-}
-
-/// A finished design and the inputs it holds for.
-#[derive(Clone)]
-pub struct DesignResult {
-    pub design: Arc<Design>,
-    /// What it was computed from.
-    pub inputs: design::Inputs,
-    pub key: String,
-    /// What its candidates and its selections hold for.
-    keys: [String; 2],
-    pub quality: Quality,
-    pub seconds: f64,
-}
 
 /// The application.
 pub struct Studio {
-    pub document: Document,
-    pub simulation: Option<SimulationResult>,
-    /// Verdicts of the filters, and the inputs they hold for.
-    pub feasibility: Option<(String, Arc<Feasibility>)>,
-    pub design: Option<DesignResult>,
-    pub messages: Vec<Message>,
+    pub session: Session,
     pub view: viewport::Viewport,
-    touching: touching::Touching,
     dialog: Option<dialogs::Dialog>,
     /// The example to open once its user has said that changes may go.
-    ask_example: Option<cli::examples::Example>,
+    ask_example: Option<Example>,
     palette: Option<palette::Palette>,
     recovery: Option<recovery::Recovery>,
     recent: recent::Recent,
-    jobs: jobs::Jobs,
-    live: live::Live,
-    drive: drive::Drive,
-    /// The last results of each quality: what is asked for again after a change is often there.
-    last: BTreeMap<Quality, drive::Last>,
     /// Numbers of the gauges that are picked, from zero.
     pub picked: Vec<usize>,
-    by_hand: gauges::ByHand,
-    expected: expected::Expecting,
-    confusions: confusions::Confusions,
+    /// The confusion that was clicked.
+    looked_at: Option<usize>,
     /// Names of the kept selections that are shown.
     shown_kept: BTreeSet<String>,
-    slow: fields::Slow,
-    /// What was measured of the walls, and what for.
-    advice: Option<(String, std::sync::Arc<crate::design::Advice>)>,
-    /// Speed against accuracy, as measured.
-    trade: trade::Trade,
+    trade: trade::Dial,
+    live_form: live::LiveForm,
     /// The stage whose settings are shown.
     pub stage: Stage,
     results: results::Tab,
-    /// Where to save once what is being saved is.
-    save_next: Option<PathBuf>,
     ask_quit: bool,
     quit: bool,
     title: String,
@@ -163,57 +104,105 @@ impl Studio {
     ) -> Self {
         crate::render::gpu::install(state);
         theme::apply(ctx);
-        Self::around(Document::new(loaded, path))
+        let waker = ctx.clone();
+        let wake = Wake::new(move |wait| waker.request_repaint_after(wait));
+        Self::around(Session::new(Document::new(loaded, path), wake))
+    }
+
+    /// The window around a session that nobody has looked at yet.
+    fn around(session: Session) -> Self {
+        Self {
+            view: viewport::Viewport::new(&session.document, &session.shape),
+            session,
+            dialog: None,
+            ask_example: None,
+            palette: None,
+            recovery: None,
+            recent: recent::Recent::default(),
+            picked: Vec::new(),
+            looked_at: None,
+            shown_kept: BTreeSet::new(),
+            trade: trade::Dial::default(),
+            live_form: live::LiveForm::default(),
+            stage: Stage::default(),
+            results: results::Tab::default(),
+            ask_quit: false,
+            quit: false,
+            title: String::new(),
+            focused: None,
+        }
+    }
+
+    /// What hands and eyes are at.
+    fn attention(&self, ctx: &egui::Context) -> Attention {
+        let expected = self.view.field == Field::Expected;
+        let confusions = expected || self.results == results::Tab::Confusions;
+        Attention {
+            hand: ctx.input(|i| i.pointer.any_down()) || !self.view.is_idle(),
+            moved: self.view.moved_gauge(),
+            picked: self.picked.first().copied(),
+            expected: confusions || self.view.tool == Tool::Gauges,
+            confusions,
+            pointed: self.view.hover.filter(|_| expected),
+        }
+    }
+
+    /// Has the session go on, and follows what has happened in it.
+    fn advance(&mut self, ctx: &egui::Context) {
+        let attention = self.attention(ctx);
+        self.session.advance(&attention);
+        self.follow();
+    }
+
+    fn follow(&mut self) {
+        for event in self.session.news.take_events() {
+            match event {
+                Event::Opened { file, recovered } => self.show_opened(file.as_deref(), recovered),
+                Event::Saved(file) => self.recent.push(&file),
+                Event::Designed => self.results = results::Tab::Error,
+                Event::GaugesReplaced => self.picked.clear(),
+                Event::GaugeFound(number) => {
+                    self.view.take(Tool::Gauges);
+                    self.picked = vec![number];
+                }
+                Event::Connected => self.results = results::Tab::Live,
+            }
+        }
+    }
+
+    /// Another project is open: nothing that is shown or asked of the one before stays.
+    fn show_opened(&mut self, file: Option<&Path>, recovered: bool) {
+        self.view = viewport::Viewport::new(&self.session.document, &self.session.shape);
+        self.picked.clear();
+        self.looked_at = None;
+        self.shown_kept.clear();
+        self.dialog = None;
+        self.ask_example = None;
+        self.ask_quit = false;
+        self.quit = false;
+        self.live_form.record_to.clear();
+        self.title.clear();
+        if let Some(file) = file {
+            self.recent.push(file);
+        }
+        if recovered {
+            self.drop_left();
+        }
     }
 
     /// Whether a job is running that somebody waits for.
     #[must_use]
     pub fn busy(&self) -> bool {
-        !self.jobs.running.is_empty()
-    }
-
-    /// The strain and displacement under the applied touch, once computed.
-    #[must_use]
-    pub fn touched(&self) -> Option<&touching::Touched> {
-        self.touching.result()
-    }
-
-    pub(crate) fn tell(&mut self, text: impl Into<String>) {
-        self.messages.push(Message {
-            text: text.into(),
-            error: false,
-        });
-    }
-
-    pub(crate) fn complain(&mut self, text: impl Into<String>) {
-        self.messages.push(Message {
-            text: text.into(),
-            error: true,
-        });
-    }
-
-    /// Takes in what jobs have brought, and starts what is next.
-    fn collect(&mut self, ctx: &egui::Context) {
-        self.collect_jobs(ctx);
-        if let Some(error) = self.touching.collect(&self.document) {
-            self.complain(error);
-        }
-        self.advance(ctx);
-        self.refresh_feasibility(ctx);
-        self.refresh_by_hand(ctx);
-        self.refresh_expected(ctx);
-        self.refresh_confusions(ctx);
-        self.refresh_live(ctx);
-        self.refresh_trade(ctx);
+        self.session.busy()
     }
 
     fn update_title(&mut self, ctx: &egui::Context) {
-        let dirty = if self.document.is_dirty() {
+        let dirty = if self.session.document.is_dirty() {
             " · not saved"
         } else {
             ""
         };
-        let title = format!("{}{dirty} – HapDef Studio", self.document.name());
+        let title = format!("{}{dirty} – HapDef Studio", self.session.document.name());
         if title != self.title {
             self.title.clone_from(&title);
             ctx.send_viewport_cmd(egui::ViewportCommand::Title(title));
@@ -221,7 +210,10 @@ impl Studio {
     }
 
     fn guard_close(&mut self, ctx: &egui::Context) {
-        if ctx.input(|i| i.viewport().close_requested()) && self.document.is_dirty() && !self.quit {
+        if ctx.input(|i| i.viewport().close_requested())
+            && self.session.document.is_dirty()
+            && !self.quit
+        {
             ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
             self.ask_quit = true;
         }
@@ -230,7 +222,7 @@ impl Studio {
     fn accept_drops(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|i| i.raw.dropped_files.first().map(|f| f.path().to_owned()));
         if let Some(path) = dropped {
-            self.open_or_ask(ctx, &path);
+            self.open_or_ask(&path);
         }
     }
 }
@@ -239,7 +231,7 @@ impl eframe::App for Studio {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
         self.accept_drops(&ctx);
-        self.collect(&ctx);
+        self.advance(&ctx);
         self.shortcuts(&ctx);
         Panel::top("menu").show(ui, |ui| self.menu(ui));
         Panel::bottom("messages")
@@ -263,13 +255,14 @@ impl eframe::App for Studio {
         self.palette(&ctx);
         self.recovery_dialog(&ctx);
         // Another selector and its gauges are one step of undo.
-        self.follow_lead();
+        self.session.follow_lead();
+        self.follow();
         // A gesture has ended when nothing is held down any more.
         let focused = ctx.memory(egui::Memory::focused);
         let typing = ctx.egui_wants_keyboard_input() && focused == self.focused;
         self.focused = focused;
         if !ctx.input(|i| i.pointer.any_down()) && !typing {
-            self.document.settle();
+            self.session.document.settle();
         }
         self.update_title(&ctx);
         self.keep_unsaved(&ctx);
@@ -295,11 +288,11 @@ impl eframe::App for Studio {
 pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::Result<()> {
     let (loaded, path) = match file {
         Some(path) => {
-            let loaded = cli::open(path, unit)?;
+            let loaded = opening::open(path, unit)?;
             let is_project = project_file::is_project(path);
             (loaded, is_project.then(|| path.to_owned()))
         }
-        None => (cli::bundled()?, None),
+        None => (opening::bundled()?, None),
     };
     let display = display::Display::named();
     let opened = Cell::new(false);
@@ -321,7 +314,7 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
         if let Some(home) = eframe::storage_dir("hapdef-studio") {
             studio.keep_unsaved_in(&home.join("unsaved"));
             studio.keep_recent_in(&home);
-            studio.keep_trades_in(&home.join("trades"));
+            studio.session.keep_trades_in(&home.join("trades"));
             if let Some(path) = file {
                 studio.recent.push(path);
             }
@@ -337,13 +330,4 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
             display.refusal(&error)
         })
     })
-}
-
-/// Qualities by their shown names.
-pub(crate) fn quality_name(quality: Quality) -> &'static str {
-    match quality {
-        Quality::Draft => "Draft",
-        Quality::Standard => "Standard",
-        Quality::Reference => "Reference",
-    }
 }

@@ -1,7 +1,6 @@
 //! `hapdef listen`: live touch without a window.
 
-use std::fs::File;
-use std::io::{BufWriter, ErrorKind, Write};
+use std::io::{BufWriter, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,7 +14,7 @@ use super::spared::Spared;
 use super::{Common, out, progress::Bar};
 use crate::design;
 use crate::io::project_file::LoadedProject;
-use crate::link::{Address, BAUD, Heard, Listener, Pace, Recorder, State};
+use crate::link::{Address, BAUD, Heard, Listener, Pace, Recorder, State, Table};
 use crate::live::{Pipeline, Sample, Update};
 use crate::plain;
 use crate::wire::Hello;
@@ -263,175 +262,6 @@ fn serve(address: &str) -> anyhow::Result<(TcpListener, Vec<TcpStream>)> {
     Ok((listener, Vec::new()))
 }
 
-/// A table of samples, with the truth where a simulated board has told it. Each file has as many columns in every
-/// row: one for each number of channels.
-struct Table {
-    /// The last one is being written.
-    paths: Vec<PathBuf>,
-    file: BufWriter<File>,
-    truth: Option<(glam::DVec3, f64)>,
-    channels: Option<usize>,
-}
-
-impl Table {
-    fn create(path: &Path) -> anyhow::Result<Self> {
-        let file = File::create(path)
-            .with_context(|| format!("{}: the table cannot be written there", path.display()))?;
-        Ok(Self {
-            paths: vec![path.to_owned()],
-            file: BufWriter::new(file),
-            truth: None,
-            channels: None,
-        })
-    }
-
-    fn path(&self) -> &Path {
-        self.paths.last().map_or(Path::new(""), PathBuf::as_path)
-    }
-
-    fn unwritten(&self) -> String {
-        let path = self.path().display();
-        format!("{path}: the table ends here, because it can be written no more")
-    }
-
-    /// Takes a sample in; the file that the table goes on in where the number of channels has changed.
-    fn take(&mut self, sample: &Sample, update: &Update) -> anyhow::Result<Option<PathBuf>> {
-        let channels = sample.counts.len();
-        let before = self.channels.replace(channels);
-        let moved = before.is_some_and(|b| b != channels);
-        if moved {
-            self.go_on(channels)?;
-        }
-        let head = if before == Some(channels) {
-            Ok(())
-        } else {
-            self.head(channels)
-        };
-        head.and_then(|()| self.row(sample, update))
-            .with_context(|| self.unwritten())?;
-        Ok(moved.then(|| self.path().to_owned()))
-    }
-
-    /// Another file beside the first, never over an older one.
-    fn go_on(&mut self, channels: usize) -> anyhow::Result<()> {
-        /// A board that changes its mind more often is ill.
-        const MOST: usize = 99;
-        self.flush()?;
-        let first = self.paths[0].clone();
-        let ordinary = self.file.get_ref().metadata().is_ok_and(|m| m.is_file());
-        anyhow::ensure!(
-            ordinary && self.paths.len() < MOST,
-            "{}: the board has {channels} channels now, and the rows of a table are all alike: it ends here. Listen again for another table",
-            self.path().display()
-        );
-        let (path, file) = another(&first)?;
-        self.file = BufWriter::new(file);
-        self.paths.push(path);
-        Ok(())
-    }
-
-    fn flush(&mut self) -> anyhow::Result<()> {
-        let flushed = self.file.flush();
-        flushed.with_context(|| self.unwritten())
-    }
-
-    fn head(&mut self, channels: usize) -> std::io::Result<()> {
-        write!(self.file, "t_us")?;
-        for k in 0..channels {
-            write!(self.file, ",count_{k}")?;
-        }
-        writeln!(
-            self.file,
-            ",x_mm,y_mm,z_mm,force_n,uncertainty_mm,channels_ok,true_x_mm,true_y_mm,true_z_mm,true_force_n"
-        )
-    }
-
-    fn row(&mut self, sample: &Sample, update: &Update) -> std::io::Result<()> {
-        write!(self.file, "{}", sample.time_us)?;
-        for count in &sample.counts {
-            write!(self.file, ",{count}")?;
-        }
-        match update.contact {
-            Some(c) => {
-                let (p, radius) = (c.position * 1e3, c.region.radius * 1e3);
-                write!(
-                    self.file,
-                    ",{:.3},{:.3},{:.3},{:.4},{radius:.3}",
-                    p.x, p.y, p.z, c.force
-                )?;
-            }
-            None => write!(self.file, ",,,,,")?,
-        }
-        write!(self.file, ",{}", update.good)?;
-        match self.truth {
-            Some((p, force)) => {
-                let p = p * 1e3;
-                writeln!(self.file, ",{:.3},{:.3},{:.3},{force:.4}", p.x, p.y, p.z)
-            }
-            None => writeln!(self.file, ",,,,"),
-        }
-    }
-}
-
-/// The first file after this one that is not there yet.
-fn another(first: &Path) -> anyhow::Result<(PathBuf, File)> {
-    let mut number = 2;
-    loop {
-        let path = numbered(first, number);
-        match File::create_new(&path) {
-            Ok(file) => return Ok((path, file)),
-            Err(e) if e.kind() == ErrorKind::AlreadyExists => number += 1,
-            Err(e) => {
-                let what = format!("{}: the table cannot go on there", path.display());
-                return Err(anyhow::Error::new(e).context(what));
-            }
-        }
-    }
-}
-
-/// `touches.csv`, `touches-2.csv`, …
-fn numbered(first: &Path, number: usize) -> PathBuf {
-    let mut name = first.file_stem().unwrap_or_default().to_owned();
-    name.push(format!("-{number}"));
-    if let Some(ending) = first.extension() {
-        name.push(".");
-        name.push(ending);
-    }
-    first.with_file_name(name)
-}
-
-/// Replays a recording into a table; the files that it takes, more than one where the number of channels changes.
-///
-/// # Errors
-/// When the one cannot be read or the other not written.
-pub fn write_table(
-    recording: &Path,
-    table: &Path,
-    pipeline: Pipeline,
-) -> anyhow::Result<Vec<PathBuf>> {
-    let address = Address::Recording {
-        path: recording.to_owned(),
-        pace: Pace::Fast,
-    };
-    let mut rows = Table::create(table)?;
-    let (_commands, inbox) = channel();
-    let stop = AtomicBool::new(false);
-    let mut written: anyhow::Result<Option<PathBuf>> = Ok(None);
-    Listener::new(address, pipeline)
-        .run(&stop, &inbox, |heard| match heard {
-            Heard::Truth(touch) => rows.truth = touch,
-            Heard::Sample { sample, update, .. } if written.is_ok() => {
-                written = rows.take(sample, update);
-                stop.store(written.is_err(), Ordering::Relaxed);
-            }
-            _ => {}
-        })
-        .map_err(anyhow::Error::msg)?;
-    written?;
-    rows.flush()?;
-    Ok(rows.paths)
-}
-
 /// One sample as JSON: nulls where nothing touches. `uncertainty_mm` is the radius within which the touch lies
 /// with a probability of 90 %. Written by hand, because a thousand of them come in a second.
 fn line(update: &Update) -> String {
@@ -451,58 +281,4 @@ fn line(update: &Update) -> String {
         c.force,
         c.region.radius * 1e3
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn sample(time_us: u64, channels: usize) -> (Sample, Update) {
-        let counts = vec![7.0; channels];
-        let update = Update {
-            time_us,
-            strain: None,
-            contact: None,
-            guesses: [None; 2],
-            good: 0,
-        };
-        (Sample { time_us, counts }, update)
-    }
-
-    /// Rows never stand under a head of another number of channels, and no file is written over.
-    #[test]
-    fn a_table_goes_on_in_another_file_where_the_channels_change() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        std::fs::write(at("a-2.csv"), "older").unwrap();
-        let mut table = Table::create(&at("a.csv")).unwrap();
-        let mut moved = Vec::new();
-        for (time, channels) in [(1, 2), (2, 2), (3, 4), (4, 4), (5, 2)] {
-            let (sample, update) = sample(time, channels);
-            moved.push(table.take(&sample, &update).unwrap());
-        }
-        table.flush().unwrap();
-        let next = [None, None, Some(at("a-3.csv")), None, Some(at("a-4.csv"))];
-        assert_eq!(moved, next);
-        for (name, rows) in [("a.csv", 3), ("a-3.csv", 3), ("a-4.csv", 2)] {
-            let text = std::fs::read_to_string(at(name)).unwrap();
-            let columns: Vec<usize> = text.lines().map(|l| l.split(',').count()).collect();
-            assert_eq!(columns.len(), rows, "{text}");
-            assert!(columns.iter().all(|c| *c == columns[0]), "{text}");
-        }
-        assert_eq!(std::fs::read_to_string(at("a-2.csv")).unwrap(), "older");
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn a_table_on_a_full_disk_says_so() {
-        let mut table = Table::create(Path::new("/dev/full")).unwrap();
-        let (first, update) = sample(1, 2);
-        table.take(&first, &update).unwrap();
-        let said = format!("{:#}", table.flush().unwrap_err());
-        assert!(
-            said.contains("/dev/full") && said.contains("space"),
-            "{said}"
-        );
-    }
 }

@@ -52,11 +52,11 @@ fn reach_through(support: &mut SupportKeys, part: &TriMesh, half: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli;
+    use crate::io::opening;
 
     #[test]
     fn the_bundled_limb_is_held_through_its_wall() {
-        let inputs = cli::bundled().unwrap().inputs;
+        let inputs = opening::bundled().unwrap().inputs;
         let solid = walled(&inputs).unwrap();
         assert_eq!(solid.project.part.model, PartModel::Solid);
         assert!(walled(&solid).is_none());

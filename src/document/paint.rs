@@ -329,9 +329,10 @@ impl Document {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::Quality;
 
     fn document() -> Document {
-        Document::new(crate::cli::bundled().unwrap(), None)
+        Document::new(crate::io::opening::bundled().unwrap(), None)
     }
 
     fn at(document: &Document) -> SurfacePoint {
@@ -389,14 +390,14 @@ mod tests {
         assert_eq!(count(&d, Layer::Feasible), None);
         let supports = d.state.project.supports.len();
         assert!(d.state.project.supports[supports - 1].vertices.is_some());
-        let key = d.simulation_key();
+        let key = d.simulation_inputs(Quality::Draft);
         d.dab(Layer::Touch, Brush::Erase, place, 20e-3);
         d.settle();
         assert_eq!(count(&d, Layer::Touch), None);
         assert!(d.state.project.touch.region.is_none());
-        assert_ne!(d.simulation_key(), key);
+        assert_ne!(d.simulation_inputs(Quality::Draft), key);
         d.undo();
-        assert_eq!(d.simulation_key(), key);
+        assert_eq!(d.simulation_inputs(Quality::Draft), key);
         d.clear(Layer::Support);
         assert_eq!(d.state.project.supports.len(), supports - 1);
         d.clear(Layer::KeepOut);

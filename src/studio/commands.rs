@@ -7,8 +7,8 @@ use super::gauges::Way;
 use super::palette::Palette;
 use super::tools::Tool;
 use super::{Stage, Studio};
-use crate::cli::examples::Example;
 use crate::document::Layer;
+use crate::io::examples::Example;
 use crate::render::camera::Preset;
 
 /// By how much a key makes the brush wider.
@@ -355,17 +355,26 @@ impl Studio {
     #[must_use]
     pub fn enabled(&self, command: Command) -> bool {
         match command {
-            Command::Undo => self.document.can_undo(),
-            Command::Redo => self.document.can_redo(),
+            Command::Undo => self.session.document.can_undo(),
+            Command::Redo => self.session.document.can_redo(),
             Command::GrowPaint | Command::ShrinkPaint => {
-                self.document.layer(self.view.layer).is_some()
+                self.session.document.layer(self.view.layer).is_some()
             }
-            Command::Cancel => self.busy(),
-            Command::Tare | Command::Record | Command::Disconnect => self.live.is_connected(),
-            Command::Export => self.design.is_some(),
-            Command::MeasureTrade => !self.jobs.runs(super::jobs::Task::Trade),
-            Command::Keep => !self.document.state.project.selection.sites.is_empty(),
-            Command::Paint(layer) if layer.is_face() => self.document.is_solid(),
+            Command::Cancel => self.session.busy(),
+            Command::Tare | Command::Record | Command::Disconnect => {
+                self.session.live.is_connected()
+            }
+            Command::Export => self.session.results.design.is_some(),
+            Command::MeasureTrade => !self.session.jobs.runs(crate::session::Task::Trade),
+            Command::Keep => !self
+                .session
+                .document
+                .state
+                .project
+                .selection
+                .sites
+                .is_empty(),
+            Command::Paint(layer) if layer.is_face() => self.session.document.is_solid(),
             Command::Pin | Command::RemoveGauges | Command::FramePicked | Command::Nudge(_) => {
                 !self.picked.is_empty()
             }
@@ -374,10 +383,19 @@ impl Studio {
         }
     }
 
+    /// Why one of the commands that look for a gauge cannot be given now.
+    pub(super) fn no_help(&self, command: Command) -> Option<&'static str> {
+        match command {
+            Command::AddHelpful => self.session.no_helpful(),
+            Command::FindSpare => self.session.no_spare(),
+            _ => None,
+        }
+    }
+
     /// Whether a command that turns something on or off has it on.
     pub(super) fn is_on(&self, command: Command) -> bool {
         match command {
-            Command::Follow => self.drive.follow,
+            Command::Follow => self.session.desk.follow,
             Command::SeeThrough => self.view.see_through,
             Command::Section => self.view.section.is_some(),
             Command::Unrolled => self.view.unrolled_shown,
@@ -395,60 +413,71 @@ impl Studio {
             command,
             Command::Simulate | Command::Select | Command::Export | Command::Save | Command::SaveAs
         );
-        if needs_part && self.document.asks_for_another_part() {
-            self.complain(
+        if needs_part && self.session.document.asks_for_another_part() {
+            self.session.complain(
                 "The body or the repairs were changed, but the mesh was not read again: press “Read the mesh again” (right side, Part and material), or undo",
             );
             return;
         }
         match command {
-            Command::Open => self.dialog = Some(Dialog::open(&self.document)),
-            Command::Example(example) => self.open_example_or_ask(ctx, example),
-            Command::Save => match self.document.path.clone() {
-                Some(path) => self.save_to(ctx, &path),
-                None => self.dialog = Some(Dialog::save_as(&self.document)),
+            Command::Open => self.dialog = Some(Dialog::open(&self.session.document)),
+            Command::Example(example) => self.open_example_or_ask(example),
+            Command::Save => match self.session.document.path.clone() {
+                Some(path) => self.session.save_to(&path),
+                None => self.dialog = Some(Dialog::save_as(&self.session.document)),
             },
-            Command::SaveAs => self.dialog = Some(Dialog::save_as(&self.document)),
-            Command::Export => self.dialog = Some(Dialog::export(&self.document)),
+            Command::SaveAs => self.dialog = Some(Dialog::save_as(&self.session.document)),
+            Command::Export => self.dialog = Some(Dialog::export(&self.session.document)),
             Command::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
-            Command::Undo => {
-                self.document.undo();
-                self.drive.take = self.as_designed();
-            }
-            Command::Redo => {
-                self.document.redo();
-                self.drive.take = self.as_designed();
-            }
-            Command::SavePicture => self.dialog = Some(Dialog::picture(&self.document)),
-            Command::ClearPaint => self.document.clear(self.view.layer),
-            Command::FillPaint => self.document.fill(self.view.layer),
-            Command::InvertPaint => self.document.invert(self.view.layer),
-            Command::GrowPaint => self.document.grow(self.view.layer, self.view.brush / 4.0),
-            Command::ShrinkPaint => self.document.shrink(self.view.layer, self.view.brush / 4.0),
+            Command::Undo => self.session.undo(),
+            Command::Redo => self.session.redo(),
+            Command::SavePicture => self.dialog = Some(Dialog::picture(&self.session.document)),
+            Command::ClearPaint => self.session.document.clear(self.view.layer),
+            Command::FillPaint => self.session.document.fill(self.view.layer),
+            Command::InvertPaint => self.session.document.invert(self.view.layer),
+            Command::GrowPaint => self
+                .session
+                .document
+                .grow(self.view.layer, self.view.brush / 4.0),
+            Command::ShrinkPaint => self
+                .session
+                .document
+                .shrink(self.view.layer, self.view.brush / 4.0),
             Command::WiderBrush => self.view.brush *= BRUSH_STEP,
             Command::NarrowerBrush => self.view.brush /= BRUSH_STEP,
             Command::Palette => self.palette = Some(Palette::default()),
-            Command::Simulate => self.simulate(ctx),
-            Command::Select => self.select(ctx),
-            Command::Keep => self.keep(),
+            Command::Simulate => self.session.simulate(),
+            Command::Select => self.session.select(),
+            Command::Keep => {
+                if let Some(name) = self.session.keep() {
+                    self.shown_kept.insert(name);
+                    self.results = super::results::Tab::Compare;
+                }
+            }
             Command::Advise => {
                 self.stage = Stage::Part;
-                self.start_advising(ctx);
+                self.session.measure_walls();
             }
-            Command::MeasureTrade => self.measure_trade(ctx),
-            Command::Cancel => self.cancel(),
+            Command::MeasureTrade => {
+                self.results = super::results::Tab::Trade;
+                self.session.measure_trade(self.trade.count);
+            }
+            Command::Cancel => self.session.cancel(),
             Command::SimulatedBoard => {
                 self.stage = Stage::Live;
-                self.start_simulated_board(ctx);
+                self.session.start_simulated_board();
             }
-            Command::Tare => self.tare(),
-            Command::Record => self.toggle_recording(),
-            Command::Disconnect => self.disconnect(),
-            Command::Follow => self.drive.follow = !self.drive.follow,
-            Command::Pin => self.pin_picked(),
-            Command::RemoveGauges => self.remove_picked(),
-            Command::AddHelpful => self.add_helpful(ctx),
-            Command::FindSpare => self.find_spare(ctx),
+            Command::Tare => self.session.tare(),
+            Command::Record => self.session.toggle_recording(&self.live_form.record_to),
+            Command::Disconnect => self.session.disconnect(),
+            Command::Follow => self.session.desk.follow = !self.session.desk.follow,
+            Command::Pin => self.session.pin_gauges(&self.picked),
+            Command::RemoveGauges => {
+                let picked = std::mem::take(&mut self.picked);
+                self.session.remove_gauges(&picked);
+            }
+            Command::AddHelpful => self.session.add_helpful(),
+            Command::FindSpare => self.session.find_spare(),
             Command::Nudge(way) => self.nudge(way),
             command => self.change_view(ctx, command),
         }
@@ -457,15 +486,15 @@ impl Studio {
     /// Commands that change only how things are shown.
     fn change_view(&mut self, ctx: &Context, command: Command) {
         match command {
-            Command::Frame => self.view.frame(&self.document),
+            Command::Frame => self.view.frame(&self.session.document),
             Command::FramePicked => {
-                let all = self.gauge_places();
+                let all = self.session.gauge_places();
                 let picked: Vec<_> = self
                     .picked
                     .iter()
                     .filter_map(|&n| all.get(n).copied())
                     .collect();
-                self.view.frame_points(&picked, &self.document);
+                self.view.frame_points(&picked, &self.session.document);
             }
             Command::SeeThrough => self.view.see_through = !self.view.see_through,
             Command::Section => self.view.toggle_section(),
@@ -473,7 +502,7 @@ impl Studio {
                 self.view.unrolled_shown = !self.view.unrolled_shown;
                 // What was begun in a view that goes ends with it.
                 self.view.drop_gesture();
-                self.document.settle();
+                self.session.document.settle();
             }
             Command::DarkLight => ctx.set_theme(match ctx.theme() {
                 egui::Theme::Dark => egui::Theme::Light,
@@ -644,12 +673,12 @@ impl Studio {
             });
             ui.menu_button("Run", |ui| self.run_menu(ui));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let state = if self.document.is_dirty() {
+                let state = if self.session.document.is_dirty() {
                     "not saved"
                 } else {
                     "saved"
                 };
-                ui.weak(format!("{} · {state}", self.document.name()));
+                ui.weak(format!("{} · {state}", self.session.document.name()));
             });
         });
     }

@@ -6,8 +6,8 @@ use std::sync::mpsc::{Receiver, channel};
 use egui::Context;
 
 use super::Studio;
-use crate::cli::examples::Example;
 use crate::document::Document;
+use crate::io::examples::Example;
 use crate::io::mesh_file::{ENDINGS, may_say_unit, needs_unit};
 use crate::io::project_file;
 use crate::project::Unit;
@@ -200,11 +200,11 @@ impl Studio {
     }
 
     /// Opens an example, or asks where changes would be lost.
-    pub(super) fn open_example_or_ask(&mut self, ctx: &Context, example: Example) {
-        if self.document.is_dirty() {
+    pub(super) fn open_example_or_ask(&mut self, example: Example) {
+        if self.session.document.is_dirty() {
             self.ask_example = Some(example);
         } else {
-            self.open_example(ctx, example);
+            self.session.open_example(example);
         }
     }
 
@@ -216,13 +216,13 @@ impl Studio {
             ui.heading(example.name());
             let text = format!(
                 "{} has changes that are not saved; opening an example discards them",
-                self.document.name()
+                self.session.document.name()
             );
             ui.colored_label(super::theme::ERROR, text);
             ui.horizontal(|ui| {
                 if ui.button("Discard and open").clicked() {
                     self.ask_example = None;
-                    self.open_example(ctx, example);
+                    self.session.open_example(example);
                 }
                 if ui.button("Go back").clicked() {
                     self.ask_example = None;
@@ -272,11 +272,11 @@ impl Studio {
                     ui.checkbox(&mut dialog.transparent, "Transparent background");
                 });
             }
-            let discards = dialog.purpose == Purpose::Open && self.document.is_dirty();
+            let discards = dialog.purpose == Purpose::Open && self.session.document.is_dirty();
             if discards {
                 let text = format!(
                     "{} has changes that are not saved; opening another file discards them",
-                    self.document.name()
+                    self.session.document.name()
                 );
                 ui.colored_label(super::theme::ERROR, text);
             }
@@ -314,10 +314,10 @@ impl Studio {
         let path = PathBuf::from(dialog.path.trim());
         match dialog.purpose {
             Purpose::Open => {
-                self.open_path(ctx, &path, dialog.chosen_unit());
+                self.session.open_path(&path, dialog.chosen_unit());
             }
-            Purpose::SaveAs => self.save_to(ctx, &path),
-            Purpose::Export => self.export(ctx, path),
+            Purpose::SaveAs => self.session.save_to(&path),
+            Purpose::Export => self.session.export(path),
             Purpose::Picture => {
                 let path = path.with_extension("png");
                 self.save_picture(ctx, path, dialog.size, dialog.transparent);
@@ -333,7 +333,7 @@ impl Studio {
             ui.heading("Save before closing?");
             ui.label(format!(
                 "{} has changes that are not saved.",
-                self.document.name()
+                self.session.document.name()
             ));
             ui.horizontal(|ui| {
                 if ui.button("Save and keep open").clicked() {

@@ -1,10 +1,9 @@
 //! The display that the window is on: which it is, whether it still answers, and what to say where it does not.
 
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
-
-use crate::cli::out;
 
 /// What a window needs that a bare system lacks.
 const NEEDS: &str =
@@ -25,11 +24,16 @@ pub fn last_words() {
     let Some(display) = taken() else { return };
     for _ in 0..LOOKS {
         if !display.answers() {
-            out::say(&format!("hapdef: {}", display.farewell()));
+            say(&format!("hapdef: {}", display.farewell()));
             return;
         }
         std::thread::sleep(PAUSE);
     }
+}
+
+/// Prints a remark on stderr. Where that is closed nobody reads it.
+fn say(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
 /// The display of the window that was open; from now on none is.
@@ -172,7 +176,7 @@ impl Display {
                 others(panic);
             } else {
                 Self::closed();
-                out::say(&format!("hapdef: {}", self.farewell()));
+                say(&format!("hapdef: {}", self.farewell()));
                 std::process::exit(1);
             }
         }));

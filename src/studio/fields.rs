@@ -3,18 +3,15 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use egui::Context;
-use glam::DVec3;
-
 use super::Studio;
-use super::drive::Finished;
-use super::jobs::Task;
 use super::tools::Tool;
 use crate::colormap::ColorMap;
-use crate::document::{Layer, PaintKey};
+use crate::document::{Layer, PaintInputs, WallInputs};
 use crate::elasticity::support::held_freedoms;
+use crate::feasible::Feasibility;
 use crate::io::report::{robust_top, round_up};
 use crate::render::gpu::Shown;
+use crate::session::{self, FieldKind};
 
 /// What colours the limb.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -86,14 +83,50 @@ impl Ranges {
 /// Faces are ±1 on colours that reach this far, so that both are bright.
 pub(super) const FACE_RANGE: f64 = 1.7;
 
-/// What the regions were built from: the verdicts by their place in memory, and what is painted.
-type RegionKey = (Option<usize>, PaintKey);
+/// What the regions were built from.
+#[derive(Clone, PartialEq)]
+struct RegionInputs {
+    verdicts: Option<Arc<Feasibility>>,
+    paint: PaintInputs,
+}
+
+/// What a field was built from.
+#[derive(Clone, PartialEq)]
+struct FieldInputs {
+    field: Field,
+    range: Option<(f64, f64)>,
+    /// Counts touches, and results of the project.
+    touch: u64,
+    results: u64,
+    of_field: OfField,
+}
+
+/// What only some fields are built from.
+#[derive(Clone, PartialEq)]
+enum OfField {
+    Nothing,
+    Noise(f64),
+    /// Counts answers; whether the last is of the gauges as they are.
+    Expected(u64, bool),
+    Slow(Option<Box<session::FieldInputs>>),
+    Walls(Box<OfWalls>),
+}
+
+/// What a field of the walls is built from.
+#[derive(Clone, PartialEq)]
+struct OfWalls {
+    /// What is known of them, whether it still holds, and whether a hand is painting.
+    known: Option<WallInputs>,
+    holds: bool,
+    stroking: bool,
+    paint: PaintInputs,
+}
 
 /// A field ready to be shown, and the legend that goes with it.
 pub(super) struct Built {
     /// What the field and the regions were built from.
-    field: String,
-    region: RegionKey,
+    field: FieldInputs,
+    region: RegionInputs,
     pub shown: Arc<Vec<Shown>>,
     /// The same for the unrolled part when that is shown, and what it was made from.
     pub flat: Option<FlatShown>,
@@ -113,14 +146,12 @@ pub(super) struct FlatShown {
     pub shown: Arc<Vec<Shown>>,
 }
 
-/// A field that took a job to compute: what from, and its values a vertex of the part.
-pub(super) type Slow = Option<(String, Arc<Vec<f64>>)>;
-
 impl Studio {
     /// Builds what is shown a vertex, where anything it depends on has changed.
-    pub(super) fn build_field(&mut self, ctx: &Context) {
-        let field = self.field_key();
-        let region = self.region_key();
+    pub(super) fn build_field(&mut self) {
+        let slow = self.slow_field();
+        let field = self.field_inputs();
+        let region = self.region_inputs();
         let last = self.view.built.take();
         let same_field = last.as_ref().is_some_and(|b| b.field == field);
         let same_region = last.as_ref().is_some_and(|b| b.region == region);
@@ -133,7 +164,7 @@ impl Studio {
                 built
             }
             _ => {
-                let (mut shown, legend) = self.field_shown(ctx, &field);
+                let (mut shown, legend) = self.field_shown(slow.as_deref());
                 self.colour_regions(&mut shown);
                 Built {
                     field,
@@ -168,63 +199,77 @@ impl Studio {
         self.view.built.as_ref().is_some_and(|b| b.legend.is_some())
     }
 
-    fn field_key(&self) -> String {
+    fn field_inputs(&self) -> FieldInputs {
         let field = self.view.field;
-        let slow = self.slow.as_ref().map(|(_, values)| Arc::as_ptr(values));
-        format!(
-            "{field:?} {:?} {:?} {:?} {} {:?} {:?} {:?} {:?} {slow:?}",
-            (field == Field::Expected)
-                .then(|| (self.expected.version, self.expected_shown().is_some())),
-            matches!(field, Field::Faces | Field::Thickness).then(|| {
-                (
-                    self.advice.as_ref().map(|(_, a)| Arc::as_ptr(a)),
-                    self.current_advice().is_some(),
-                    // What is painted is seen at once, and measured when the hand lets go.
-                    self.view.is_stroking(),
-                    self.document.paint_key(),
-                )
-            }),
-            self.view.ranges.of(field),
-            self.touching.version,
-            self.simulation.as_ref().map(|s| Arc::as_ptr(&s.simulated)),
-            self.design.as_ref().map(|d| Arc::as_ptr(&d.design)),
-            self.document.state.project.gauge.noise_microstrain,
-            (field == Field::Uncertainty).then(|| self.gauge_places()),
-        )
+        let of_field = match field {
+            Field::Region | Field::Strain | Field::Displacement => OfField::Nothing,
+            Field::SignalToNoise => {
+                OfField::Noise(self.session.document.state.project.gauge.noise_microstrain)
+            }
+            Field::Expected => {
+                let version = self.session.caches.expected.version;
+                OfField::Expected(version, self.expected_shown().is_some())
+            }
+            Field::Error | Field::Uncertainty => {
+                let shown = self.session.caches.field.as_ref();
+                OfField::Slow(shown.map(|f| Box::new(f.inputs.clone())))
+            }
+            Field::Faces | Field::Thickness => OfField::Walls(Box::new(OfWalls {
+                known: (self.session.caches.walls.as_ref()).map(|w| w.inputs.clone()),
+                holds: self.session.advice().is_some(),
+                // What is painted is seen at once, and measured when the hand lets go.
+                stroking: self.view.is_stroking(),
+                paint: self.session.document.paint_inputs(),
+            })),
+        };
+        FieldInputs {
+            field,
+            range: self.view.ranges.of(field),
+            touch: self.session.caches.touching.version,
+            results: self.session.results.version,
+            of_field,
+        }
     }
 
-    fn region_key(&self) -> RegionKey {
-        let verdicts = self.current_verdicts().map(|v| Arc::as_ptr(v) as usize);
-        (verdicts, self.document.paint_key())
+    fn region_inputs(&self) -> RegionInputs {
+        RegionInputs {
+            verdicts: self.verdicts_shown().cloned(),
+            paint: self.session.document.paint_inputs(),
+        }
     }
 
     /// The filters' verdicts while they hold and no stroke changes them.
-    fn current_verdicts(&self) -> Option<&Arc<crate::feasible::Feasibility>> {
-        let (key, verdicts) = self.feasibility.as_ref()?;
-        let holds = !self.view.is_stroking() && self.shown_feasible_key().as_ref() == Some(key);
-        holds.then_some(verdicts)
+    fn verdicts_shown(&self) -> Option<&Arc<Feasibility>> {
+        let verdicts = self.session.current_verdicts();
+        verdicts.filter(|_| !self.view.is_stroking())
     }
 
-    /// Positions (m) of the project's gauges.
-    pub(super) fn gauge_places(&self) -> Vec<DVec3> {
-        let sites = &self.document.state.project.selection.sites;
-        let places = sites
-            .iter()
-            .map(|s| DVec3::from_array(s.position_mm) / 1000.0);
-        places.collect()
+    /// A field that is computed in the background, once it is there.
+    fn slow_field(&mut self) -> Option<Arc<Vec<f64>>> {
+        let kind = match self.view.field {
+            Field::Error => FieldKind::Error,
+            Field::Uncertainty => FieldKind::Uncertainty,
+            _ => return None,
+        };
+        self.session.field(kind)
     }
 
     /// The field over its range, a vertex, with the shape that is shown.
-    fn field_shown(&mut self, ctx: &Context, key: &str) -> (Vec<Shown>, Option<Legend>) {
+    fn field_shown(&mut self, slow: Option<&Vec<f64>>) -> (Vec<Shown>, Option<Legend>) {
         let field = self.view.field;
-        let found = self.field_values(ctx, key).map(|(values, mut legend)| {
+        let found = self.field_values(slow).map(|(values, mut legend)| {
             if let Some((low, high)) = self.view.ranges.of(field) {
                 (legend.low, legend.high) = (low, high);
             }
             (values, legend)
         });
-        let moved = self.touching.result().map(|t| &t.displacement);
-        let shown = (0..self.document.part.positions().len()).map(|v| Shown {
+        let moved = self
+            .session
+            .caches
+            .touching
+            .result()
+            .map(|t| &t.displacement);
+        let shown = (0..self.session.document.part.positions().len()).map(|v| Shown {
             displacement: moved.map_or([0.0; 3], |d| d[v].as_vec3().to_array()),
             value: found.as_ref().map_or(0.0, |(values, legend)| {
                 ((values[v] - legend.low) / (legend.high - legend.low)) as f32
@@ -235,7 +280,7 @@ impl Studio {
     }
 
     /// The chosen field a vertex of the part, in the units of its legend.
-    fn field_values(&mut self, ctx: &Context, key: &str) -> Option<(Vec<f64>, Legend)> {
+    fn field_values(&mut self, slow: Option<&Vec<f64>>) -> Option<(Vec<f64>, Legend)> {
         let legend = |title: &str, low, high, map| Legend {
             title: title.to_owned(),
             low,
@@ -245,36 +290,41 @@ impl Studio {
         match self.view.field {
             Field::Region => None,
             Field::Strain => {
-                let touched = self.touching.result()?;
+                let touched = self.session.caches.touching.result()?;
                 let micro: Vec<f64> = touched.strain.iter().map(|e| e * 1e6).collect();
                 let top = robust_top(&micro);
                 let map = ColorMap::BlueOrange;
                 Some((micro, legend("strain (microstrain)", -top, top, map)))
             }
             Field::Displacement => {
-                let touched = self.touching.result()?;
+                let touched = self.session.caches.touching.result()?;
                 let top = round_up(touched.largest * 1000.0);
                 let mm = touched.displacement.iter().map(|d| d.length() * 1000.0);
                 let map = ColorMap::Viridis;
                 Some((mm.collect(), legend("displacement (mm)", 0.0, top, map)))
             }
             Field::SignalToNoise => {
-                let noise = self.document.state.project.gauge.noise_microstrain * 1e-6;
-                let simulation = self.simulation.as_ref().filter(|_| noise > 0.0)?;
-                let sites = simulation.simulated.dataset.sites.iter();
+                let noise = self.session.document.state.project.gauge.noise_microstrain * 1e-6;
+                let simulation = self
+                    .session
+                    .results
+                    .simulation
+                    .as_ref()
+                    .filter(|_| noise > 0.0)?;
+                let sites = simulation.value.simulated.dataset.sites.iter();
                 let rms: Vec<f64> = sites.map(|s| s.rms_strain / noise).collect();
-                let ratio = self.carried_from_sites(&rms);
+                let ratio = self.session.carried_from_sites(&rms);
                 let top = robust_top(&ratio);
                 let map = ColorMap::Viridis;
                 Some((ratio, legend("signal to noise (rms)", 0.0, top, map)))
             }
             Field::Faces => {
-                let sides = self.wall_values(ctx, true)?;
+                let sides = self.wall_values(true)?;
                 let map = ColorMap::BlueOrange;
                 Some((sides, legend("faces", -FACE_RANGE, FACE_RANGE, map)))
             }
             Field::Thickness => {
-                let mm = self.wall_values(ctx, false)?;
+                let mm = self.wall_values(false)?;
                 let top = robust_top(&mm);
                 Some((
                     mm,
@@ -282,66 +332,27 @@ impl Studio {
                 ))
             }
             Field::Error => {
-                let errors = self.slow_field(ctx, key)?;
-                let top = robust_top(&errors);
+                let errors = slow?;
+                let top = robust_top(errors);
                 let map = ColorMap::Viridis;
-                Some((errors.to_vec(), legend("error (mm)", 0.0, top, map)))
+                Some((errors.clone(), legend("error (mm)", 0.0, top, map)))
             }
             Field::Expected => {
-                let vertices = self.document.part.positions().len();
+                let vertices = self.session.document.part.positions().len();
                 let answer = self.expected_shown()?;
                 let values = answer.expected.map_mm.clone();
-                let [lightest, hardest] = self.expected.in_hand()?.forces_n;
+                let [lightest, hardest] = self.session.in_hand()?.forces_n;
                 let title = format!("expected error (mm), {lightest}–{hardest} N");
                 let found = legend(&title, 0.0, answer.top_mm, ColorMap::Viridis);
                 (values.len() == vertices).then_some((values, found))
             }
             Field::Uncertainty => {
-                let variances = self.slow_field(ctx, key)?;
+                let variances = slow?;
                 let map = ColorMap::Viridis;
                 let title = "variance left";
-                Some((variances.to_vec(), legend(title, 0.0, 1.0, map)))
+                Some((variances.clone(), legend(title, 0.0, 1.0, map)))
             }
         }
-    }
-
-    /// A field that is computed in the background, once it is there.
-    fn slow_field(&mut self, ctx: &Context, key: &str) -> Option<Arc<Vec<f64>>> {
-        // What the values came from: the key without the values.
-        let asked = key.rsplit_once(' ').map_or(key, |k| k.0).to_owned();
-        if let Some((known, values)) = &self.slow
-            && *known == asked
-        {
-            return Some(Arc::clone(values));
-        }
-        let vertices = self.document.part.positions().len();
-        let design = Arc::clone(&self.design.as_ref()?.design);
-        let under_way =
-            (self.jobs.running.iter()).any(|r| r.task == Task::Field && r.job.key == asked);
-        // Until the new one is there the last of its kind stays.
-        let kind = |key: &str| key.split(' ').next().map(str::to_owned);
-        let last = (self.slow.as_ref())
-            .filter(|(known, values)| kind(known) == kind(&asked) && values.len() == vertices)
-            .map(|(_, values)| Arc::clone(values));
-        if under_way || design.simulated.carried.len() != vertices {
-            return last;
-        }
-        let uncertain = self.view.field == Field::Uncertainty;
-        let gauges = self.gauge_places();
-        self.jobs.start(ctx, Task::Field, asked, move |_| {
-            // On the mesh that was computed on, whose size has a limit, and carried from there.
-            let mesh = &design.simulated.mesh;
-            let map = if uncertain {
-                design.uncertainty_map(mesh, &gauges)
-            } else {
-                design.error_map(mesh)
-            };
-            let map = map.unwrap_or_else(|| vec![0.0; mesh.positions().len()]);
-            let carried = design.simulated.carried.iter();
-            let values = carried.map(|&at| mesh.interpolate(&map, at)).collect();
-            Ok(Finished::Field(values))
-        });
-        last
     }
 
     /// What the gauges are blind to, a vertex of the part, where that is marked.
@@ -360,23 +371,24 @@ impl Studio {
             }
             return;
         }
-        let verdicts = self.current_verdicts().map(|verdicts| {
+        let verdicts = self.verdicts_shown().map(|verdicts| {
             let passed = verdicts
                 .verdicts
                 .iter()
                 .map(|v| f64::from(u8::from(v.is_none())));
-            self.carried_from_sites(&passed.collect::<Vec<_>>())
+            self.session.carried_from_sites(&passed.collect::<Vec<_>>())
         });
-        let mask = |layer| self.document.layer(layer).map(|m| m.as_slice());
+        let mask = |layer| self.session.document.layer(layer).map(|m| m.as_slice());
         let painted = mask(Layer::Feasible);
         let (touch, out) = (mask(Layer::Touch), mask(Layer::KeepOut));
         let supports = self
+            .session
             .document
             .state
             .project
-            .supports(&self.document.state.masks);
+            .supports(&self.session.document.state.masks);
         let held = supports
-            .map(|s| held_freedoms(&self.document.part, &s))
+            .map(|s| held_freedoms(&self.session.document.part, &s))
             .unwrap_or_default();
         let set =
             |mask: Option<&[bool]>, v: usize| if mask.is_some_and(|m| m[v]) { 255 } else { 0 };
@@ -390,55 +402,11 @@ impl Studio {
         }
     }
 
-    /// Carries values of sites to the part's vertices, by the sites' places in their triangles.
-    fn carried_from_sites(&self, values: &[f64]) -> Vec<f64> {
-        let vertices = self.document.part.positions().len();
-        let Some(simulation) = self.simulation.as_ref() else {
-            return vec![0.0; vertices];
-        };
-        let mesh = &simulation.simulated.mesh;
-        let (mut sum, mut weight) = (
-            vec![0.0; mesh.positions().len()],
-            vec![0.0; mesh.positions().len()],
-        );
-        for (at, value) in simulation.simulated.points.iter().zip(values) {
-            for (v, w) in mesh.triangles()[at.triangle as usize]
-                .into_iter()
-                .zip(at.barycentric)
-            {
-                sum[v as usize] += w * value;
-                weight[v as usize] += w;
-            }
-        }
-        // On a mesh finer than the sites some vertices have none beside them: take the neighbours'.
-        for _ in 0..4 {
-            let (old_sum, old_weight) = (sum.clone(), weight.clone());
-            for edge in mesh.edges() {
-                for (a, b) in [(edge.a, edge.b), (edge.b, edge.a)] {
-                    if old_weight[a as usize] == 0.0 && old_weight[b as usize] > 0.0 {
-                        sum[a as usize] += old_sum[b as usize] / old_weight[b as usize];
-                        weight[a as usize] += 1.0;
-                    }
-                }
-            }
-        }
-        let values: Vec<f64> = sum
-            .iter()
-            .zip(&weight)
-            .map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 })
-            .collect();
-        let carried = &simulation.simulated.carried;
-        carried
-            .iter()
-            .map(|&at| mesh.interpolate(&values, at))
-            .collect()
-    }
-
     /// How much the deformation is exaggerated; nothing without a touch, nor with other tools: they work
     /// on the limb at rest.
     #[must_use]
     pub fn exaggeration(&self) -> Option<f64> {
-        let touched = self.touching.result()?;
+        let touched = self.session.caches.touching.result()?;
         touched
             .exaggeration
             .filter(|_| self.view.tool == Tool::Touch)

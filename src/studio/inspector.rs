@@ -7,12 +7,12 @@ use glam::DVec3;
 
 use super::form::{choice, count, number, percentage, rows};
 use super::results::NOBODY_REDUCES;
-use super::{Stage, Studio, quality_name};
+use super::{Stage, Studio};
 use crate::budget::{Limits, Quality};
-use crate::cli::examples::Example;
 use crate::dataset::Signal;
 use crate::document::Layer;
 use crate::evaluation::EstimatorKind;
+use crate::io::examples::Example;
 use crate::limb::BoxMm;
 use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::unroll::Axis;
@@ -38,24 +38,24 @@ impl Studio {
                     Stage::Part => self.part_form(ui),
                     Stage::Supports => self.supports_form(ui),
                     Stage::Simulation => {
-                        let project = &mut self.document.state.project;
+                        let project = &mut self.session.document.state.project;
                         quality(ui, project);
                         self.quality_promises(ui);
-                        let project = &mut self.document.state.project;
+                        let project = &mut self.session.document.state.project;
                         rows(ui, "Touch", |ui| touch(ui, project));
                         rows(ui, "Signal and sites", |ui| sites(ui, project));
                     }
                     Stage::Feasible => {
-                        let project = &mut self.document.state.project;
+                        let project = &mut self.session.document.state.project;
                         rows(ui, "Gauge", |ui| gauge(ui, project));
                         rows(ui, "Room", |ui| feasible(ui, project));
                     }
                     Stage::Candidates => {
-                        let project = &mut self.document.state.project;
+                        let project = &mut self.session.document.state.project;
                         rows(ui, "Reduction", |ui| candidates(ui, project));
                     }
                     Stage::Selection => {
-                        let project = &mut self.document.state.project;
+                        let project = &mut self.session.document.state.project;
                         rows(ui, "Gauges", |ui| selection(ui, project));
                         pins(ui, project);
                         rows(ui, "Regression of greedy SVR", |ui| regression(ui, project));
@@ -70,8 +70,8 @@ impl Studio {
     /// What each quality was measured to cost and achieve.
     fn quality_promises(&mut self, ui: &mut Ui) {
         for quality in Quality::ALL {
-            let chosen = quality == self.quality();
-            let text = RichText::new(self.prediction_in_words(quality)).size(11.5);
+            let chosen = quality == self.session.quality();
+            let text = RichText::new(self.session.prediction_in_words(quality)).size(11.5);
             ui.add(egui::Label::new(if chosen { text } else { text.weak() }).wrap());
         }
         if ui.button("Speed against accuracy…").clicked() {
@@ -80,14 +80,14 @@ impl Studio {
     }
 
     fn part_form(&mut self, ui: &mut Ui) {
-        let from_file = !self.document.bundled;
-        let bodies = self.document.repairs.bodies;
-        let again = from_file && self.document.asks_for_another_part();
-        let mesh = &self.document.mesh_path;
+        let from_file = !self.session.document.bundled;
+        let bodies = self.session.document.repairs.bodies;
+        let again = from_file && self.session.document.asks_for_another_part();
+        let mesh = &self.session.document.mesh_path;
         let example = Example::of_mesh(mesh).filter(|_| !from_file);
         let file = || mesh.display().to_string();
         ui.weak(example.map_or_else(file, |example| example.name().to_owned()));
-        let project = &mut self.document.state.project;
+        let project = &mut self.session.document.state.project;
         let mut pressed = false;
         let up = self.view.camera.stance.up();
         rows(ui, "Model", |ui| part(ui, project, up));
@@ -97,17 +97,16 @@ impl Studio {
             });
         }
         if pressed {
-            let ctx = ui.ctx().clone();
-            self.take_in_again(&ctx);
+            self.session.take_in_again();
         }
         self.button(ui, super::Command::Advise);
         self.advice_lines(ui);
     }
 
     fn supports_form(&mut self, ui: &mut Ui) {
-        let part = Arc::clone(&self.document.part);
+        let part = Arc::clone(&self.session.document.part);
         let stance = self.view.camera.stance;
-        let project = &mut self.document.state.project;
+        let project = &mut self.session.document.state.project;
         rows(ui, "Material", |ui| material(ui, project));
         // A slice at the lower end: a start that holds something on any part.
         let start = || stance.lower_end(&part, 0.05);
@@ -116,16 +115,16 @@ impl Studio {
             .button("Paint a support")
             .on_hover_text("Another support, on the vertices that you paint next");
         if paint.clicked() {
-            self.document.add_painted_support();
+            self.session.document.add_painted_support();
             self.view.layer = Layer::Support;
             self.view.take(super::Tool::Paint);
         }
     }
 
     fn evaluation_form(&mut self, ui: &mut Ui) {
-        let (low, high) = self.document.part.bounds();
+        let (low, high) = self.session.document.part.bounds();
         let bounds = [low, high].map(|p| (p * 1000.0).to_array());
-        let evaluation = &mut self.document.state.project.evaluation;
+        let evaluation = &mut self.session.document.state.project.evaluation;
         rows(ui, "Judge", |ui| {
             choice(
                 ui,
@@ -219,7 +218,7 @@ fn quality(ui: &mut Ui, project: &mut Project) {
     ui.horizontal(|ui| {
         ui.label("Quality");
         for quality in Quality::ALL {
-            ui.selectable_value(&mut project.budget.quality, quality, quality_name(quality));
+            ui.selectable_value(&mut project.budget.quality, quality, quality.title());
         }
     })
     .response

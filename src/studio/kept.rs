@@ -5,12 +5,11 @@ use std::collections::BTreeSet;
 use egui::{Color32, Painter, Stroke, TextEdit, Ui, vec2};
 use glam::DVec3;
 
-use super::gauges::BY_HAND;
+use super::Studio;
 use super::viewport::Pane;
-use super::{Studio, quality_name};
-use crate::evaluation::{EVERYWHERE, Evaluation};
-use crate::placement::SelectorKind;
-use crate::project::{Kept, KeptError, KeptFailure};
+use crate::evaluation::EVERYWHERE;
+use crate::project::Kept;
+use crate::session::chooser_title;
 
 /// Colours of kept selections, apart from each other for colour-blind eyes and from the selectors' own
 /// (M. Okabe and K. Ito, 2008; P. Tol, 2021).
@@ -27,82 +26,10 @@ pub(super) fn colour(k: usize) -> Color32 {
     COLOURS[k % COLOURS.len()]
 }
 
-/// A selector's name as read by people.
-fn title(selector: &str) -> &str {
-    let kind = SelectorKind::ALL.into_iter().find(|k| k.name() == selector);
-    kind.map_or("By hand", SelectorKind::title)
-}
-
 impl Studio {
-    /// Keeps the gauges as they are, with what is known of them.
-    pub(super) fn keep(&mut self) {
-        let project = &self.document.state.project;
-        let sites = project.selection.sites.clone();
-        if sites.is_empty() {
-            self.complain("There are no gauges to keep yet. Press “Select gauges” first");
-            return;
-        }
-        let cost = sites
-            .iter()
-            .map(|s| self.cost_of(DVec3::from_array(s.position_mm)))
-            .sum();
-        let designed = self.as_designed() && self.design_holds() == Some(true);
-        let known = self.knows_hand();
-        let (selector, evaluation, seconds): (_, Option<&Evaluation>, f64) = match &self.design {
-            Some(d) if designed => {
-                let name = d.design.lead.name();
-                let stage = format!("select {name}");
-                let took = d.design.seconds.iter().find(|s| s.stage == stage);
-                (
-                    name,
-                    Some(&d.design.evaluation),
-                    took.map_or(0.0, |s| s.seconds),
-                )
-            }
-            _ if known => (BY_HAND, self.by_hand.exact.as_deref(), 0.0),
-            _ => (BY_HAND, None, 0.0),
-        };
-        let quality = self.design.as_ref().map_or(self.quality(), |d| d.quality);
-        let kept = Kept {
-            name: self.free_name(&format!("{}, {} gauges", title(selector), sites.len())),
-            selector: selector.into(),
-            quality,
-            cost,
-            seconds: (seconds * 10.0).round() / 10.0,
-            sites,
-            errors: evaluation.map_or_else(Vec::new, |e| errors_of(e, selector)),
-            failures: evaluation.map_or_else(Vec::new, |e| failures_of(e, selector)),
-        };
-        self.shown_kept.insert(kept.name.clone());
-        self.document.state.project.kept.push(kept);
-        self.document.settle();
-        self.results = super::results::Tab::Compare;
-    }
-
-    fn cost_of(&self, at_mm: DVec3) -> f64 {
-        let costs = self.document.state.project.selection.costs.iter().rev();
-        { costs }
-            .find(|c| c.contains(at_mm))
-            .map_or(1.0, |c| c.cost)
-    }
-
-    fn free_name(&self, wanted: &str) -> String {
-        let taken = |name: &str| {
-            self.document
-                .state
-                .project
-                .kept
-                .iter()
-                .any(|k| k.name == name)
-        };
-        let numbered = (2..).map(|k| format!("{wanted} ({k})"));
-        let mut names = std::iter::once(wanted.to_owned()).chain(numbered);
-        names.find(|n| !taken(n)).unwrap_or_default()
-    }
-
     /// The tab: what is kept, side by side.
     pub(super) fn compare_tab(&mut self, ui: &mut Ui) {
-        if self.document.state.project.kept.is_empty() {
+        if self.session.document.state.project.kept.is_empty() {
             super::results::empty(
                 ui,
                 "Nothing kept yet. Press “Keep this selection”, change what you like, and keep the next to see both side by side",
@@ -133,7 +60,15 @@ impl Studio {
                     }
                     ui.end_row();
                     let shown = &mut self.shown_kept;
-                    for (k, kept) in self.document.state.project.kept.iter_mut().enumerate() {
+                    for (k, kept) in self
+                        .session
+                        .document
+                        .state
+                        .project
+                        .kept
+                        .iter_mut()
+                        .enumerate()
+                    {
                         kept_row(ui, k, kept, shown, &mut asked);
                     }
                 });
@@ -141,23 +76,20 @@ impl Studio {
         match asked {
             Asked::None => {}
             Asked::Use(k) => {
-                let sites = self.document.state.project.kept[k].sites.clone();
-                self.document.state.project.selection.sites = sites;
-                self.picked.clear();
-                self.drive.take = false;
-                self.document.settle();
+                let sites = self.session.document.state.project.kept[k].sites.clone();
+                self.session.use_gauges(sites);
             }
             Asked::Delete(k) => {
                 // Its name stays among those shown: when the deletion is taken back, so is this.
-                self.document.state.project.kept.remove(k);
-                self.document.settle();
+                self.session.document.state.project.kept.remove(k);
+                self.session.document.settle();
             }
         }
     }
 
     /// Shows kept selections by their numbers, beside those that are shown already.
     pub fn show_kept(&mut self, numbers: impl IntoIterator<Item = usize>) {
-        let kept = &self.document.state.project.kept;
+        let kept = &self.session.document.state.project.kept;
         let names = numbers
             .into_iter()
             .filter_map(|n| Some(kept.get(n)?.name.clone()));
@@ -166,7 +98,7 @@ impl Studio {
 
     /// Kept selections that are shown, with their numbers.
     pub(super) fn compared(&self) -> impl Iterator<Item = (usize, &Kept)> {
-        let kept = self.document.state.project.kept.iter().enumerate();
+        let kept = self.session.document.state.project.kept.iter().enumerate();
         kept.filter(|(_, kept)| self.shown_kept.contains(&kept.name))
     }
 
@@ -177,7 +109,7 @@ impl Studio {
             for site in &kept.sites {
                 let position = DVec3::from_array(site.position_mm) / 1000.0;
                 let (on, _) = self.view.index.nearest(position);
-                let away = self.document.part.normal(on).dot(toward) < 0.0;
+                let away = self.session.document.part.normal(on).dot(toward) < 0.0;
                 let Some(at) = self.view.place_in(pane, position) else {
                     continue;
                 };
@@ -228,8 +160,8 @@ fn kept_row(
     if kept.name != name && shown.remove(&name) {
         shown.insert(kept.name.clone());
     }
-    ui.label(title(&kept.selector));
-    ui.label(quality_name(kept.quality));
+    ui.label(chooser_title(&kept.selector));
+    ui.label(kept.quality.title());
     ui.monospace(format!("{:>3}", kept.sites.len()));
     let last = (kept.errors.iter()).rev().find(|e| e.region == EVERYWHERE);
     let number = |value: Option<f64>| value.map_or("–".into(), |v| format!("{v:6.2}"));
@@ -252,31 +184,4 @@ fn kept_row(
         }
     });
     ui.end_row();
-}
-
-fn errors_of(evaluation: &Evaluation, selector: &str) -> Vec<KeptError> {
-    let rows = evaluation.rows.iter().filter(|r| r.selector == selector);
-    let round = |x: f64| (x * 1e4).round() / 1e4;
-    rows.map(|r| KeptError {
-        region: r.region.clone(),
-        sensors: r.sensors,
-        mean_mm: round(r.error_mm),
-        median_mm: round(r.median_mm),
-        p95_mm: round(r.p95_mm),
-    })
-    .collect()
-}
-
-fn failures_of(evaluation: &Evaluation, selector: &str) -> Vec<KeptFailure> {
-    let sets = evaluation
-        .failures
-        .iter()
-        .filter(|f| f.selector == selector);
-    sets.flat_map(|set| &set.rows)
-        .map(|r| KeptFailure {
-            failed: r.failed,
-            retrained: r.retrained,
-            mean_mm: (r.error_mm * 1e4).round() / 1e4,
-        })
-        .collect()
 }

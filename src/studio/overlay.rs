@@ -27,7 +27,7 @@ impl Studio {
     /// The limb with all that belongs to it, for a picture.
     pub(super) fn scene(&mut self, ui: &Ui, rect: Rect, transparent: bool) {
         self.view.rect = rect;
-        self.build_field(ui.ctx());
+        self.build_field();
         self.paint_limb(ui, rect, transparent);
         let painter = ui.painter_at(rect);
         self.paint_kept(&painter, Pane::Limb);
@@ -143,7 +143,7 @@ impl Studio {
 
     pub(super) fn paint_touch(&self, painter: &Painter, pane: Pane) {
         let shown = self.view.tool == Tool::Touch;
-        let Some(touched) = self.touching.result().filter(|_| shown) else {
+        let Some(touched) = self.session.caches.touching.result().filter(|_| shown) else {
             return;
         };
         let touch = touched.touch;
@@ -165,18 +165,24 @@ impl Studio {
     /// How far a point of the limb is drawn from where it is at rest.
     fn shift_at(&self, position: DVec3) -> DVec3 {
         let deformation = self.exaggeration().unwrap_or(0.0);
-        let Some(touched) = self.touching.result().filter(|_| deformation > 0.0) else {
+        let Some(touched) = self
+            .session
+            .caches
+            .touching
+            .result()
+            .filter(|_| deformation > 0.0)
+        else {
             return DVec3::ZERO;
         };
         let (at, _) = self.view.index.nearest(position);
-        let corners = self.document.part.triangles()[at.triangle as usize];
+        let corners = self.session.document.part.triangles()[at.triangle as usize];
         let moved = |(v, w): (u32, f64)| touched.displacement[v as usize] * w;
         let shift: DVec3 = corners.into_iter().zip(at.barycentric).map(moved).sum();
         shift * deformation
     }
 
     pub(super) fn paint_gauges(&self, painter: &Painter, pane: Pane) {
-        let sites = self.gauges();
+        let sites = self.session.gauges();
         let rect = self.view.rect_of(pane);
         let marks: Vec<Mark> = (0..)
             .zip(&sites)
@@ -193,7 +199,7 @@ impl Studio {
     fn mark(&self, pane: Pane, number: usize, site: &ChosenSite) -> Option<Mark> {
         let position = DVec3::from_array(site.position_mm) / 1000.0;
         let direction = DVec3::from_array(site.direction);
-        let half = self.document.state.project.gauge.grid_length_mm * 0.5e-3;
+        let half = self.session.document.state.project.gauge.grid_length_mm * 0.5e-3;
         let (ends, at, near) = match pane {
             Pane::Unrolled => {
                 let at = self.view.flat_place(position)?;
@@ -207,7 +213,7 @@ impl Studio {
                     return None;
                 }
                 let (on, _) = self.view.index.nearest(position);
-                let normal = self.document.part.normal(on);
+                let normal = self.session.document.part.normal(on);
                 let centre = position + self.shift_at(position);
                 let ends = [-half, half].map(|h| self.view.place(centre + direction * h));
                 let [Some(a), Some(b)] = ends else {
@@ -223,7 +229,7 @@ impl Studio {
             at,
             near,
             picked: self.picked.contains(&number),
-            pinned: self.pin_of(number).is_some(),
+            pinned: self.session.pin_of(number).is_some(),
         })
     }
 
@@ -231,7 +237,7 @@ impl Studio {
         let Some(at) = self.view.hover else {
             return;
         };
-        let centre = self.document.part.point(at);
+        let centre = self.session.document.part.point(at);
         if !self.view.tool.is_brush() {
             // What is pointed at in one view shows in the other.
             let other = !self
@@ -246,7 +252,7 @@ impl Studio {
         let mut centres = vec![centre];
         if let Some(image) = self.view.image(centre) {
             let (image, _) = self.view.index.nearest(image);
-            centres.push(self.document.part.point(image));
+            centres.push(self.session.document.part.point(image));
         }
         let colour = if self.view.tool == Tool::Paint {
             Color32::WHITE
@@ -263,7 +269,7 @@ impl Studio {
     /// The brush around a point of the part, as a line in a view.
     fn ring(&self, pane: Pane, centre: DVec3) -> Vec<Pos2> {
         let (at, _) = self.view.index.nearest(centre);
-        let normal = self.document.part.normal(at);
+        let normal = self.session.document.part.normal(at);
         let frame = crate::elasticity::observe::tangent_frame(normal);
         let around = (0..=48).map(|k| {
             let a = f64::from(k) / 48.0 * std::f64::consts::TAU;
@@ -366,7 +372,7 @@ impl Studio {
 
     pub(super) fn paint_hint(&self, painter: &Painter, rect: Rect) {
         let text = match self.view.tool {
-            _ if self.touching.is_waiting() => "Computing the touch …",
+            _ if self.session.caches.touching.is_waiting() => "Computing the touch …",
             Tool::Paint => {
                 "Drag over the limb: paint   ·   Ctrl: erase   ·   [ ]: radius   ·   right-drag: look around"
             }
@@ -405,28 +411,29 @@ impl Studio {
             return face_key(painter, rect);
         }
         if self.view.field == Field::Expected && self.shows_field() {
-            let force = self.document.state.project.touch.force_n;
+            let force = self.session.document.state.project.touch.force_n;
             let blind = format!("Blind at {force} N");
             return colour_key(painter, rect, std::iter::once((&*blind, BLIND_KEY)));
         }
         if self.view.field != Field::Region {
             return;
         }
-        let verdicts = self.feasibility.is_some() || self.document.layer(Layer::Feasible).is_some();
+        let verdicts = self.session.results.feasibility.is_some()
+            || self.session.document.layer(Layer::Feasible).is_some();
         let rows = [
             (verdicts, "Gauges may go", Color32::from_rgb(107, 191, 173)),
             (
-                self.document.layer(Layer::KeepOut).is_some(),
+                self.session.document.layer(Layer::KeepOut).is_some(),
                 "Keep out",
                 Color32::from_rgb(219, 115, 92),
             ),
             (
-                !self.document.state.project.supports.is_empty(),
+                !self.session.document.state.project.supports.is_empty(),
                 "Held",
                 Color32::from_rgb(219, 189, 87),
             ),
             (
-                self.document.layer(Layer::Touch).is_some(),
+                self.session.document.layer(Layer::Touch).is_some(),
                 "Touches come",
                 Color32::from_rgb(128, 153, 230),
             ),
@@ -438,29 +445,40 @@ impl Studio {
     /// What is missing before a field can be seen, or how to look around.
     fn field_hint(&self) -> &'static str {
         match self.view.field {
-            Field::Strain | Field::Displacement if self.touching.result().is_none() => {
+            Field::Strain | Field::Displacement
+                if self.session.caches.touching.result().is_none() =>
+            {
                 "Click on the limb to press it and see this field"
             }
-            Field::SignalToNoise if self.simulation.is_none() => {
+            Field::SignalToNoise if self.session.results.simulation.is_none() => {
                 "Press “Simulate” to see the signal at each site"
             }
-            Field::Error if self.design.is_none() => {
+            Field::Error if self.session.results.design.is_none() => {
                 "Press “Select gauges” to see where touches are found well and where not"
             }
-            Field::Expected if self.simulation_holds() != Some(true) => {
+            Field::Expected if self.session.simulation_holds() != Some(true) => {
                 "Press “Simulate” to see where touches are expected to be found well and where not"
             }
-            Field::Expected if self.document.state.project.selection.sites.is_empty() => {
+            Field::Expected
+                if self
+                    .session
+                    .document
+                    .state
+                    .project
+                    .selection
+                    .sites
+                    .is_empty() =>
+            {
                 "Put gauges to see what is expected of them: tool “Gauges”, Ctrl-click"
             }
             Field::Expected if self.expected_shown().is_some() => {
                 "Point at the limb: what a touch there is taken for   ·   drag gauges with the tool “Gauges”"
             }
             Field::Expected => "Preparing the expected error …",
-            Field::Uncertainty if self.design.is_none() => {
+            Field::Uncertainty if self.session.results.design.is_none() => {
                 "Press “Select gauges” to see what the gauges leave uncertain"
             }
-            Field::Faces | Field::Thickness if self.advice.is_some() => {
+            Field::Faces | Field::Thickness if self.session.caches.walls.is_some() => {
                 if self.view.built.as_ref().is_some_and(|b| b.legend.is_some()) {
                     "Paint the layer “Inside face” or “Outside face” where this is wrong"
                 } else {

@@ -2,20 +2,16 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use eframe::egui_wgpu::RenderState;
 use egui::{Context, FullOutput, Pos2, RawInput, Rect, vec2};
 
 use super::Studio;
-use super::drive::Finished;
-use super::jobs::Task;
-use crate::cli::render::{RenderArgs, ViewArg};
-use crate::cli::spared::Spared;
 use crate::io::atomic;
 use crate::io::project_file::LoadedProject;
-use crate::job::Stop;
+use crate::job::{Reporter, Stop};
 use crate::render::camera::Preset;
 use crate::render::offscreen;
+use crate::session::Task;
 
 /// What is asked of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,30 +26,6 @@ pub struct Picture {
 
 /// Height of the window, in points, that a picture is drawn like: gauges and letters grow with the pixels.
 const POINTS: f32 = 720.0;
-
-/// `hapdef render`.
-///
-/// # Errors
-/// A message in the user's terms.
-pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
-    let picture = Picture {
-        size: args.size.0,
-        view: match args.view {
-            ViewArg::Oblique => None,
-            ViewArg::Front => Some(Preset::Front),
-            ViewArg::Back => Some(Preset::Back),
-            ViewArg::Left => Some(Preset::Left),
-            ViewArg::Right => Some(Preset::Right),
-            ViewArg::Top => Some(Preset::Top),
-            ViewArg::Bottom => Some(Preset::Bottom),
-        },
-        transparent: args.transparent,
-    };
-    let loaded = args.common().load()?;
-    Spared::of(&loaded).check("--out", Some(&args.out))?;
-    let png = png(loaded, &picture).map_err(anyhow::Error::msg)?;
-    atomic::write(&args.out, &png).context("the picture could not be written")
-}
 
 /// A picture of a project with its gauges, as a PNG file.
 ///
@@ -121,14 +93,18 @@ impl Studio {
         let rect = self.view.rect;
         let mut output = self.drawn(&own, &picture);
         self.view.rect = rect;
-        self.jobs
-            .start(ctx, Task::Picture, String::new(), move |_| {
-                let state = offscreen::adapter().inspect_err(|_| output.textures_delta.clear());
-                let state = state.map_err(Stop::Failed)?;
-                crate::render::gpu::install(&state);
-                let png = finish(&state, &own, output, size).map_err(Stop::Failed)?;
-                atomic::write(&path, &png).map_err(|e| Stop::Failed(e.to_string()))?;
-                Ok(Finished::Pictured(path))
+        let work = move |_: &Reporter| {
+            let state = offscreen::adapter().inspect_err(|_| output.textures_delta.clear());
+            let state = state.map_err(Stop::Failed)?;
+            crate::render::gpu::install(&state);
+            let png = finish(&state, &own, output, size).map_err(Stop::Failed)?;
+            atomic::write(&path, &png).map_err(|e| Stop::Failed(e.to_string()))?;
+            Ok(path)
+        };
+        self.session
+            .jobs
+            .start(Task::Picture, (), work, |s, (), path| {
+                s.tell(format!("The picture is in {}", path.display()));
             });
     }
 }
@@ -140,7 +116,7 @@ fn fit(studio: &mut Studio, aspect: f32) {
     // Perspective: what is nearer grows more, so the second time corrects the first.
     for _ in 0..4 {
         let projection = studio.view.camera.projection(aspect);
-        let reach = (studio.document.part.positions().iter())
+        let reach = (studio.session.document.part.positions().iter())
             .filter_map(|&p| projection.place(p))
             .map(|(at, _)| 2.0 * (at - 0.5).abs().max_element())
             .fold(0.0, f64::max);

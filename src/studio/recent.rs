@@ -74,22 +74,21 @@ impl Studio {
             }
         });
         if let Some(path) = chosen {
-            let ctx = ui.ctx().clone();
-            self.open_or_ask(&ctx, &path);
+            self.open_or_ask(&path);
         }
     }
 
     /// Opens a file, or asks where something would be lost or is not known.
-    pub(super) fn open_or_ask(&mut self, ctx: &egui::Context, path: &Path) {
+    pub(super) fn open_or_ask(&mut self, path: &Path) {
         if path.extension().is_some_and(|e| e == crate::link::ENDING) {
             self.stage = super::Stage::Live;
-            return self.connect(ctx, &path.display().to_string());
+            return self.session.connect(&path.display().to_string());
         }
         let dialog = Dialog::open_dropped(path);
-        if dialog.needs_unit() || self.document.is_dirty() {
+        if dialog.needs_unit() || self.session.document.is_dirty() {
             self.dialog = Some(dialog);
         } else {
-            self.open_path(ctx, path, None);
+            self.session.open_path(path, None);
         }
     }
 }

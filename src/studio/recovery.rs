@@ -13,8 +13,8 @@ use egui::{Context, Id, Modal};
 use serde::{Deserialize, Serialize};
 
 use super::Studio;
-use crate::cli::examples::write_bundled_mesh;
 use crate::document::{Document, State};
+use crate::io::examples::write_bundled_mesh;
 use crate::io::{atomic, project_file};
 
 /// How long a change may go unkept.
@@ -185,22 +185,22 @@ impl Studio {
             _ => None,
         };
         recovery.writing = None;
-        if self.document.asks_for_another_part() {
+        if self.session.document.asks_for_another_part() {
             // Masks of this mesh beside settings for another would be read by nobody.
-        } else if !self.document.is_dirty() {
+        } else if !self.session.document.is_dirty() {
             if recovery.kept.is_some() {
                 recovery.forget();
             }
-        } else if recovery.kept.as_ref() != Some(&self.document.state) {
+        } else if recovery.kept.as_ref() != Some(&self.session.document.state) {
             let since = recovery.written.elapsed();
             if since >= EVERY {
-                recovery.write(&self.document);
+                recovery.write(&self.session.document);
             } else {
                 ctx.request_repaint_after(EVERY.saturating_sub(since));
             }
         }
         if let Some(message) = failed {
-            self.complain(format!(
+            self.session.complain(format!(
                 "Unsaved changes could not be kept aside: {message}"
             ));
         }
@@ -237,13 +237,13 @@ impl Studio {
             });
         });
         if recover {
-            self.recover(ctx);
+            self.recover();
         } else if discard {
             self.drop_left();
         }
     }
 
-    fn recover(&mut self, ctx: &Context) {
+    fn recover(&mut self) {
         let Some(recovery) = &mut self.recovery else {
             return;
         };
@@ -252,7 +252,7 @@ impl Studio {
         if let Some(left) = recovery.left.first() {
             let (folder, path) = (left.folder.clone(), left.origin.path.clone());
             let project = folder.join(PROJECT);
-            self.open_kept(ctx, folder, project, path);
+            self.session.open_kept(folder, project, path);
         }
     }
 

@@ -113,7 +113,7 @@ impl Studio {
             for tab in Tab::ALL {
                 ui.selectable_value(&mut self.results, tab, tab.name());
             }
-            if self.design_holds() == Some(false) && self.results.is_of_design() {
+            if self.session.design_holds() == Some(false) && self.results.is_of_design() {
                 ui.colored_label(super::theme::STALE, "of settings that have changed since");
             }
             self.by_hand_label(ui);
@@ -121,11 +121,11 @@ impl Studio {
             self.doubt_label(ui);
         });
         ui.separator();
-        let nothing = self.design.is_none() && self.compared().next().is_none();
+        let nothing = self.session.results.design.is_none() && self.compared().next().is_none();
         if nothing && self.results.is_of_design() {
             let press =
                 "Press “Select gauges” to choose the sites and judge them on unseen touches";
-            let shown = self.gauges_before_selection();
+            let shown = self.session.gauges_before_selection();
             empty(
                 ui,
                 &shown.map_or_else(
@@ -151,9 +151,11 @@ impl Studio {
     /// Beside every figure of a design that cannot be trusted: that it cannot, and why.
     fn doubt_label(&self, ui: &mut Ui) {
         let doubts = self
+            .session
+            .results
             .design
             .as_ref()
-            .map_or_else(Vec::new, |d| d.design.doubts());
+            .map_or_else(Vec::new, |d| d.value.design.doubts());
         if doubts.is_empty() || !self.results.is_of_design() {
             return;
         }
@@ -166,9 +168,16 @@ impl Studio {
 
     /// How far the selected gauges are at most from the best ones, while they stand as they were selected.
     fn certificate_label(&self, ui: &mut Ui) {
-        let set = self.design.as_ref().and_then(|d| d.design.chosen_set());
+        let set = self
+            .session
+            .results
+            .design
+            .as_ref()
+            .and_then(|d| d.value.design.chosen_set());
         let words = set.and_then(SensorSet::certified);
-        if let Some(words) = words.filter(|_| self.results.is_of_design() && self.as_designed()) {
+        if let Some(words) =
+            words.filter(|_| self.results.is_of_design() && self.session.as_designed())
+        {
             ui.separator();
             // Cut rather than make the panel wider than the window.
             let label = egui::Label::new(words).truncate();
@@ -178,18 +187,18 @@ impl Studio {
 
     /// What gauges that were moved by hand do to the error.
     fn by_hand_label(&self, ui: &mut Ui) {
-        let sites = &self.document.state.project.selection.sites;
-        if !self.knows_hand() || sites.is_empty() || self.as_designed() {
+        let sites = &self.session.document.state.project.selection.sites;
+        if !self.session.knows_hand() || sites.is_empty() || self.session.as_designed() {
             return;
         }
-        let text = match self.by_hand_error() {
+        let text = match self.session.by_hand_error() {
             (_, Some(mm)) => format!("by hand: {mm:.2} mm on unseen touches"),
             (Some(mm), None) => format!("by hand: about {mm:.2} mm, judging …"),
             (None, None) => "by hand: …".into(),
         };
-        let chosen = self.design.as_ref().and_then(|d| {
-            let (lead, count) = (d.design.lead.name(), d.design.chosen().len());
-            let mut rows = d.design.evaluation.rows.iter();
+        let chosen = self.session.results.design.as_ref().and_then(|d| {
+            let (lead, count) = (d.value.design.lead.name(), d.value.design.chosen().len());
+            let mut rows = d.value.design.evaluation.rows.iter();
             rows.find(|r| r.selector == lead && r.sensors == count && r.region == EVERYWHERE)
         });
         let beside = chosen.map_or(String::new(), |r| {
@@ -200,7 +209,12 @@ impl Studio {
     }
 
     fn regions(&self) -> Vec<String> {
-        let designed = self.design.iter().flat_map(|d| &d.design.evaluation.rows);
+        let designed = self
+            .session
+            .results
+            .design
+            .iter()
+            .flat_map(|d| &d.value.design.evaluation.rows);
         let kept = self.compared().flat_map(|(_, k)| &k.errors);
         let mut regions: Vec<String> = Vec::new();
         for region in designed.map(|r| &r.region).chain(kept.map(|e| &e.region)) {
@@ -227,7 +241,13 @@ impl Studio {
     }
 
     fn error_curves(&self, plot: &mut PlotUi<'_>, region: &str) {
-        if let Some(design) = self.design.as_ref().map(|d| &d.design) {
+        if let Some(design) = self
+            .session
+            .results
+            .design
+            .as_ref()
+            .map(|d| &d.value.design)
+        {
             for (k, selection) in design.selections.iter().enumerate() {
                 let points = curve(design, selection.selector, region);
                 let colour = COLOURS[k % COLOURS.len()];
@@ -248,7 +268,12 @@ impl Studio {
 
     fn failure_plots(&self, ui: &mut Ui) {
         let height = ui.available_height() - 26.0;
-        let design = self.design.as_ref().map(|d| &d.design);
+        let design = self
+            .session
+            .results
+            .design
+            .as_ref()
+            .map(|d| &d.value.design);
         let by = design.map_or(EstimatorKind::Svr, |d| d.evaluation.judging.estimator());
         let ways = failure_ways(by);
         ui.columns(ways.len(), |columns| {
@@ -270,9 +295,11 @@ impl Studio {
 
     fn failure_curves(&self, plot: &mut PlotUi<'_>, retrained: bool) {
         let sets = self
+            .session
+            .results
             .design
             .iter()
-            .flat_map(|d| &d.design.evaluation.failures);
+            .flat_map(|d| &d.value.design.evaluation.failures);
         for (k, set) in sets.enumerate() {
             let colour = COLOURS[k % COLOURS.len()];
             draw(
@@ -294,11 +321,11 @@ impl Studio {
     }
 
     fn reduction_plot(&self, ui: &mut Ui) {
-        let Some(result) = &self.design else {
+        let Some(result) = &self.session.results.design else {
             return;
         };
-        let Some(candidates) = &result.design.candidates else {
-            let feasible = result.design.reduced.feasible.len();
+        let Some(candidates) = &result.value.design.candidates else {
+            let feasible = result.value.design.reduced.feasible.len();
             empty(
                 ui,
                 &format!("All {feasible} feasible sites are candidates. {NOBODY_REDUCES}"),
@@ -309,7 +336,7 @@ impl Studio {
             .map(|p| (p.sites as f64, 100.0 * p.unexplained))
             .collect();
         let height = ui.available_height() - 4.0;
-        let target = 100.0 * result.inputs.project.candidates.unexplained;
+        let target = 100.0 * result.value.snapshot.project.candidates.unexplained;
         let shown = Plot::new("reduction")
             .height(height)
             .legend(Legend::default().position(Corner::RightTop))
@@ -326,7 +353,7 @@ impl Studio {
 
     /// The project's gauges; with a design also what they will report.
     fn gauge_table(&mut self, ui: &mut Ui) {
-        let sites = self.document.state.project.selection.sites.clone();
+        let sites = self.session.document.state.project.selection.sites.clone();
         if sites.is_empty() {
             empty(
                 ui,
@@ -334,7 +361,7 @@ impl Studio {
             );
             return;
         }
-        let designed = self.as_designed();
+        let designed = self.session.as_designed();
         let mut asked = None;
         egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
             egui::Grid::new("gauges")
@@ -345,8 +372,8 @@ impl Studio {
                     for title in ["Gauge", "Pinned", "x (mm)", "y (mm)", "z (mm)", "Direction"] {
                         ui.strong(title);
                     }
-                    if let Some(d) = self.design.as_ref().filter(|_| designed) {
-                        let unit = signal_unit(d.design.simulated.dataset.signal);
+                    if let Some(d) = self.session.results.design.as_ref().filter(|_| designed) {
+                        let unit = signal_unit(d.value.design.simulated.dataset.signal);
                         ui.strong(format!("Signal, from – to ({unit})"));
                         ui.strong("Rms strain (µε)");
                         ui.strong("Signal to noise");
@@ -377,7 +404,7 @@ impl Studio {
             }
             Some((k, Row::Pin)) => {
                 self.picked = vec![k];
-                self.pin_picked();
+                self.session.pin_gauges(&self.picked);
             }
         }
     }
@@ -397,7 +424,7 @@ impl Studio {
             (_, true) => Some(Row::Pick),
             _ => None,
         };
-        let mut pinned = self.pin_of(k).is_some();
+        let mut pinned = self.session.pin_of(k).is_some();
         let tick = ui
             .checkbox(&mut pinned, "")
             .on_hover_text("Selections must have a gauge here");
@@ -417,11 +444,11 @@ impl Studio {
 
     /// What a gauge of the design will report.
     fn report_cells(&self, ui: &mut Ui, k: usize) {
-        let Some(d) = &self.design else {
+        let Some(d) = &self.session.results.design else {
             return;
         };
-        let dataset = &d.design.simulated.dataset;
-        let index = d.design.chosen()[k];
+        let dataset = &d.value.design.simulated.dataset;
+        let index = d.value.design.chosen()[k];
         let (low, high) = range(dataset, index);
         let rms = dataset.sites[index].rms_strain;
         let decimals = if signal_unit(dataset.signal) == "mm" {
@@ -431,7 +458,9 @@ impl Studio {
         };
         ui.monospace(format!("{low:8.decimals$} – {high:8.decimals$}"));
         ui.monospace(format!("{:7.0}", rms * 1e6));
-        ui.monospace(signal_to_noise(&d.inputs, rms).map_or("–".into(), |r| format!("{r:7.0}")));
+        ui.monospace(
+            signal_to_noise(&d.value.snapshot, rms).map_or("–".into(), |r| format!("{r:7.0}")),
+        );
     }
 }
 

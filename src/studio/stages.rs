@@ -2,9 +2,9 @@
 
 use egui::{RichText, Ui};
 
-use super::jobs::Task;
-use super::{Command, Studio, quality_name, theme};
+use super::{Command, Studio, theme};
 use crate::design::{Design, Simulated, Step};
+use crate::session::Task;
 
 /// The stages, in the order of the road.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -96,7 +96,7 @@ impl Studio {
                     self.stage_row(ui, stage);
                 }
                 ui.add_space(8.0);
-                ui.checkbox(&mut self.drive.follow, Command::Follow.name())
+                ui.checkbox(&mut self.session.desk.follow, Command::Follow.name())
                     .on_hover_text(Command::Follow.tooltip());
             });
     }
@@ -151,18 +151,20 @@ impl Studio {
     pub fn standing(&self, stage: Stage) -> Standing {
         match stage {
             Stage::Part => self.part_standing(),
-            Stage::Supports if self.document.state.project.supports.is_empty() => Standing::Open,
+            Stage::Supports if self.session.document.state.project.supports.is_empty() => {
+                Standing::Open
+            }
             Stage::Supports => Standing::Current,
             Stage::Simulation => {
-                let held = (self.simulation.as_ref()).map(|s| s.quality);
-                self.standing_of(&Task::Simulate, self.simulation_holds(), held, None)
+                let held = (self.session.results.simulation.as_ref()).map(|s| s.value.quality);
+                self.standing_of(&Task::Simulate, self.session.simulation_holds(), held, None)
             }
             Stage::Feasible => self.feasible_standing(),
             Stage::Candidates => self.design_standing(Step::Reduce),
             Stage::Selection => self.design_standing(Step::Select),
             Stage::Evaluation => self.design_standing(Step::Evaluate),
             Stage::Live => self.live_standing(),
-            Stage::Report if self.design.is_none() => Standing::Open,
+            Stage::Report if self.session.results.design.is_none() => Standing::Open,
             Stage::Report => match self.design_standing(Step::Evaluate) {
                 Standing::Failed(_) | Standing::Running => Standing::Stale,
                 other => other,
@@ -171,8 +173,8 @@ impl Studio {
     }
 
     fn part_standing(&self) -> Standing {
-        match self.document.misshapen() {
-            _ if self.document.asks_for_another_part() => Standing::Stale,
+        match self.session.document.misshapen() {
+            _ if self.session.document.asks_for_another_part() => Standing::Stale,
             Some(why) => Standing::Failed(why.to_owned()),
             None => Standing::Current,
         }
@@ -180,10 +182,10 @@ impl Studio {
 
     fn live_standing(&self) -> Standing {
         use crate::link::State;
-        match self.live_state() {
+        match self.session.live.state() {
             _ if [Task::Sense, Task::Board]
                 .iter()
-                .any(|t| self.jobs.runs(*t)) =>
+                .any(|t| self.session.jobs.runs(*t)) =>
             {
                 Standing::Running
             }
@@ -196,25 +198,28 @@ impl Studio {
     }
 
     fn feasible_standing(&self) -> Standing {
-        let running = self.jobs.runs(Task::Filter);
-        match (&self.feasibility, self.shown_feasible_key()) {
-            _ if running => Standing::Running,
-            (None, _) => Standing::Open,
-            (Some((key, _)), Some(now)) if *key == now => {
-                let draft = (self.simulation.as_ref()).is_some_and(|s| s.quality < self.quality());
-                if draft {
-                    Standing::Draft
-                } else {
-                    Standing::Current
-                }
-            }
-            _ => Standing::Stale,
+        let shown = self.session.results.simulation.as_ref();
+        if self.session.jobs.runs(Task::Filter) {
+            Standing::Running
+        } else if self.session.results.feasibility.is_none() {
+            Standing::Open
+        } else if self.session.current_verdicts().is_none() {
+            Standing::Stale
+        } else if shown.is_some_and(|s| s.value.quality < self.session.quality()) {
+            Standing::Draft
+        } else {
+            Standing::Current
         }
     }
 
     fn design_standing(&self, step: Step) -> Standing {
-        let held = self.design.as_ref().map(|d| d.quality);
-        self.standing_of(&Task::Design, self.design_holds(), held, Some(step))
+        let held = self
+            .session
+            .results
+            .design
+            .as_ref()
+            .map(|d| d.value.quality);
+        self.standing_of(&Task::Design, self.session.design_holds(), held, Some(step))
     }
 
     /// `holds` says whether there is a result and whether it is of the project as it is; `step` which step
@@ -227,25 +232,19 @@ impl Studio {
         step: Option<Step>,
     ) -> Standing {
         let qualities = crate::budget::Quality::ALL;
-        let running = qualities.iter().any(|&q| self.jobs.runs(task(q)));
-        let at = (self.drive.making.lock().ok()).and_then(|making| making.step);
+        let running = qualities.iter().any(|&q| self.session.jobs.runs(task(q)));
+        let at = self.session.drive.step();
         if running && (step.is_none() || step == at) {
             return Standing::Running;
         }
-        let failed = qualities.iter().find_map(|&q| {
-            let key = match task(q) {
-                Task::Simulate(_) => self.document.simulation_key_at(q),
-                _ => self.document.design_key_at(q),
-            };
-            self.drive.failure(task(q), &key)
-        });
+        let failed = (qualities.iter()).find_map(|&q| self.session.pipeline_failure(task(q)));
         if let Some(message) = failed.filter(|_| step.is_none() || step == at) {
             return Standing::Failed(message.to_owned());
         }
         match holds {
             None => Standing::Open,
             Some(false) => Standing::Stale,
-            Some(true) if held < Some(self.quality()) => Standing::Draft,
+            Some(true) if held < Some(self.session.quality()) => Standing::Draft,
             Some(true) => Standing::Current,
         }
     }
@@ -255,14 +254,14 @@ impl Studio {
         match stage {
             Stage::Part => self.part_lines(),
             Stage::Supports => {
-                let project = &self.document.state.project;
+                let project = &self.session.document.state.project;
                 vec![
                     match project.supports.len() {
                         0 => "nothing is held yet".into(),
                         1 => "1 support".into(),
                         n => format!("{n} supports"),
                     },
-                    if self.document.is_solid() {
+                    if self.session.document.is_solid() {
                         format!("solid, {} GPa", project.material.youngs_modulus_gpa)
                     } else {
                         format!(
@@ -273,15 +272,26 @@ impl Studio {
                 ]
             }
             Stage::Simulation => self.simulation_lines(),
-            Stage::Feasible => self.feasibility.as_ref().map_or_else(Vec::new, |(_, f)| {
-                let taken = f.taken().into_iter().filter(|(_, n)| *n > 0);
-                std::iter::once(format!("{} of {} sites", f.sites().len(), f.verdicts.len()))
-                    .chain(taken.map(|(by, n)| format!("− {n}  {}", by.label().to_lowercase())))
-                    .collect()
-            }),
+            Stage::Feasible => {
+                self.session
+                    .results
+                    .feasibility
+                    .as_ref()
+                    .map_or_else(Vec::new, |f| {
+                        let f = &f.value;
+                        let taken = f.taken().into_iter().filter(|(_, n)| *n > 0);
+                        std::iter::once(format!(
+                            "{} of {} sites",
+                            f.sites().len(),
+                            f.verdicts.len()
+                        ))
+                        .chain(taken.map(|(by, n)| format!("− {n}  {}", by.label().to_lowercase())))
+                        .collect()
+                    })
+            }
             Stage::Candidates => {
-                let design = self.design.as_ref().map(|d| &d.design);
-                design.map_or_else(Vec::new, |design| self.candidate_lines(design))
+                let design = self.session.results.design.as_ref();
+                design.map_or_else(Vec::new, |d| self.candidate_lines(&d.value.design))
             }
             Stage::Selection => self.selection_lines(),
             Stage::Evaluation => self.evaluation_lines(),
@@ -292,7 +302,7 @@ impl Studio {
     }
 
     fn part_lines(&self) -> Vec<String> {
-        let part = &self.document.part;
+        let part = &self.session.document.part;
         let (lower, upper) = part.bounds();
         let size = (upper - lower) * 1000.0;
         vec![
@@ -302,21 +312,21 @@ impl Studio {
     }
 
     fn simulation_lines(&self) -> Vec<String> {
-        let Some(s) = &self.simulation else {
-            if self.document.misshapen().is_some() {
+        let Some(s) = self.session.results.simulation.as_ref().map(|s| &s.value) else {
+            if self.session.document.misshapen().is_some() {
                 // What will be refused has no size to foresee.
                 return Vec::new();
             }
-            let budget = self.budget();
+            let budget = self.session.budget();
             let (sites, touches, gigabytes) =
-                crate::design::expected_size(&self.document.inputs(), &budget);
+                crate::design::expected_size(&self.session.document.inputs(), &budget);
             return vec![format!(
                 "about {sites} sites × {touches} touches, {}",
                 memory(gigabytes)
             )];
         };
         let dataset = &s.simulated.dataset;
-        let quality = quality_name(s.quality);
+        let quality = s.quality.title();
         let mut lines = vec![
             format!(
                 "{} sites × {} touches",
@@ -333,54 +343,53 @@ impl Studio {
     }
 
     fn selection_lines(&self) -> Vec<String> {
-        let Some(d) = &self.design else {
-            return self.gauges_before_selection().into_iter().collect();
+        let Some(d) = &self.session.results.design else {
+            return self.session.gauges_before_selection().into_iter().collect();
         };
-        let seconds: f64 = (d.design.seconds.iter())
+        let seconds: f64 = (d.value.design.seconds.iter())
             .filter(|s| s.stage.starts_with("select"))
             .map(|s| s.seconds)
             .sum();
         let mut lines = vec![format!(
             "{}: {} gauges by {}, {seconds:.1} s{}",
-            quality_name(d.quality),
-            d.design.chosen().len(),
-            d.design.lead.title(),
-            if d.design.selections.len() > 1 {
+            d.value.quality.title(),
+            d.value.design.chosen().len(),
+            d.value.design.lead.title(),
+            if d.value.design.selections.len() > 1 {
                 " for all"
             } else {
                 ""
             }
         )];
-        if !self.drive.take && self.design_holds() == Some(true) {
+        if !self.session.drive.take && self.session.design_holds() == Some(true) {
             lines.push("Gauges were moved by hand".into());
         }
         lines
     }
 
     fn evaluation_lines(&self) -> Vec<String> {
-        let Some(d) = &self.design else {
+        let Some(d) = &self.session.results.design else {
             return Vec::new();
         };
-        let (lead, chosen) = (d.design.lead.name(), d.design.chosen().len());
-        let rows = d.design.evaluation.rows.iter();
+        let (lead, chosen) = (d.value.design.lead.name(), d.value.design.chosen().len());
+        let rows = d.value.design.evaluation.rows.iter();
         let mut lines: Vec<String> = rows
             .filter(|r| r.sensors == chosen && r.selector == lead)
             .map(|r| format!("{:.2} mm, {}", r.error_mm, r.region))
             .collect();
-        let judging = &d.design.evaluation.judging;
+        let judging = &d.value.design.evaluation.judging;
         lines.push(format!(
             "{} unseen touches{}{}",
-            d.design.truth.touches.len(),
+            d.value.design.truth.touches.len(),
             judging
                 .middle_n()
                 .map_or(String::new(), |f| format!(" of {f} N, matched")),
             self.took("evaluate")
         ));
-        lines.extend(self.promise_line());
+        lines.extend(self.session.promise_line());
         lines
     }
 
-    /// ", 1.2 s" of a stage of the last design, where it was run for it.
     fn candidate_lines(&self, design: &Design) -> Vec<String> {
         let feasible = design.reduced.feasible.len();
         let Some(candidates) = &design.candidates else {
@@ -396,19 +405,29 @@ impl Studio {
         std::iter::once(kept).chain(left).collect()
     }
 
+    /// ", 1.2 s" of a stage of the last design, where it was run for it.
     fn took(&self, stage: &str) -> String {
-        let stages = self.design.iter().flat_map(|d| &d.design.seconds);
+        let stages = self
+            .session
+            .results
+            .design
+            .iter()
+            .flat_map(|d| &d.value.design.seconds);
         let found = { stages }.find(|s| s.stage == stage);
         found.map_or_else(String::new, |s| format!(", {:.1} s", s.seconds))
     }
 
     /// What cannot be trusted, in the open.
     fn doubts_of(&self, ui: &mut Ui, stage: Stage) {
-        let doubts = match (stage, &self.simulation, &self.design) {
-            (Stage::Simulation, Some(s), _) => s.simulated.doubts(),
+        let doubts = match (
+            stage,
+            &self.session.results.simulation,
+            &self.session.results.design,
+        ) {
+            (Stage::Simulation, Some(s), _) => s.value.simulated.doubts(),
             (Stage::Evaluation, _, Some(d)) => {
-                let of_model = d.design.simulated.doubts();
-                let doubts = d.design.doubts().into_iter();
+                let of_model = d.value.design.simulated.doubts();
+                let doubts = d.value.design.doubts().into_iter();
                 doubts.filter(|d| !of_model.contains(d)).collect()
             }
             _ => return,
@@ -421,13 +440,15 @@ impl Studio {
 
     /// What a reader must know before a result is believed, folded up.
     fn notes_of(&self, ui: &mut Ui, stage: Stage) {
-        let of_model: Vec<String> = (self.simulation.as_ref())
-            .map(|s| s.simulated.achieved.words().cloned().collect())
+        let of_model: Vec<String> = (self.session.results.simulation.as_ref())
+            .map(|s| s.value.simulated.achieved.words().cloned().collect())
             .unwrap_or_default();
-        let notes: Vec<String> = match (stage, &self.design) {
+        let notes: Vec<String> = match (stage, &self.session.results.design) {
             (Stage::Simulation, _) => of_model,
             (Stage::Evaluation, Some(d)) => {
-                let notes = [d.design.cautions(), d.design.notes()].concat().into_iter();
+                let notes = [d.value.design.cautions(), d.value.design.notes()]
+                    .concat()
+                    .into_iter();
                 notes.filter(|n| !of_model.contains(n)).collect()
             }
             _ => return,
@@ -454,7 +475,7 @@ impl Studio {
         ui.set_min_height(ui.spacing().interact_size.y + 6.0);
         self.running_jobs(ui);
         let mut read = None;
-        for (k, message) in self.messages.iter().enumerate().rev().take(4) {
+        for (k, message) in self.session.news.messages.iter().enumerate().rev().take(4) {
             ui.horizontal(|ui| {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     let name = format!("Dismiss message {}", k + 1);
@@ -474,9 +495,9 @@ impl Studio {
             });
         }
         if let Some(k) = read {
-            self.messages.remove(k);
+            self.session.news.messages.remove(k);
         }
-        if self.jobs.running.is_empty() && self.messages.is_empty() {
+        if self.session.jobs.running().is_empty() && self.session.news.messages.is_empty() {
             ui.weak("Ready");
         }
     }
@@ -523,15 +544,16 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::cli;
     use crate::design;
     use crate::document::Document;
+    use crate::io::opening;
     use crate::mesh::TriMesh;
+    use crate::session::{Session, Wake};
 
     #[test]
     fn a_vertex_far_away_is_named_at_the_part_and_nothing_is_foreseen() {
-        let usual = cli::bundled().unwrap();
-        let mut loaded = cli::bundled().unwrap();
+        let usual = opening::bundled().unwrap();
+        let mut loaded = opening::bundled().unwrap();
         let mut positions = loaded.inputs.part.positions().to_vec();
         positions[0].x = 1e4;
         let triangles = loaded.inputs.part.triangles();
@@ -539,13 +561,13 @@ mod tests {
         loaded.inputs.part = Arc::new(part);
         let refused = design::check_shape(&loaded.inputs.part).unwrap_err();
 
-        let studio = Studio::around(Document::new(loaded, None));
+        let studio = Studio::around(Session::new(Document::new(loaded, None), Wake::default()));
         let said = refused.to_string();
         assert!(said.contains("one vertex of the part"), "{said}");
         assert_eq!(studio.standing(Stage::Part), Standing::Failed(said));
         assert_eq!(studio.simulation_lines(), Vec::<String>::new());
 
-        let studio = Studio::around(Document::new(usual, None));
+        let studio = Studio::around(Session::new(Document::new(usual, None), Wake::default()));
         assert_eq!(studio.standing(Stage::Part), Standing::Current);
         assert!(studio.simulation_lines()[0].contains("sites"));
     }

@@ -98,7 +98,7 @@ impl Studio {
         if self.view.tool != Tool::Gauges {
             return;
         }
-        let all = self.document.state.project.selection.sites.len();
+        let all = self.session.document.state.project.selection.sites.len();
         ui.label(format!("{all} gauges, {} picked", self.picked.len()));
         ui.horizontal(|ui| {
             self.toggle(ui, Command::Pin);
@@ -137,7 +137,7 @@ impl Studio {
             .selected_text(self.view.layer.name())
             .width(96.0)
             .show_ui(ui, |ui| {
-                let solid = self.document.is_solid();
+                let solid = self.session.document.is_solid();
                 for layer in Layer::ALL.into_iter().filter(|l| solid || !l.is_face()) {
                     let chosen = &mut self.view.layer;
                     if ui.selectable_value(chosen, layer, layer.name()).clicked() {

@@ -131,11 +131,14 @@ impl Studio {
         let clicked = response.clicked() && at.as_ref().is_none_or(free);
         match self.view.tool {
             Tool::Touch if clicked => {
-                self.press(ui, pane, response.interact_pointer_pos());
+                self.press(pane, response.interact_pointer_pos());
             }
             Tool::Measure if clicked => {
                 let place = at.and_then(|at| self.view.pick(pane, at));
-                self.measure_to(ui.ctx(), place);
+                self.view.measure.take(place);
+                if let Some(ends) = self.view.measure.ends() {
+                    self.session.measure(ends);
+                }
             }
             _ => {}
         }
@@ -200,24 +203,24 @@ impl Studio {
             Gesture::Gauge(..) => ui.ctx().request_repaint(),
             _ => {}
         }
-        self.document.settle();
+        self.session.document.settle();
     }
 
-    fn press(&mut self, ui: &Ui, pane: Pane, at: Option<Pos2>) {
+    fn press(&mut self, pane: Pane, at: Option<Pos2>) {
         match at.and_then(|at| self.pick_shown(pane, at)) {
             Some(place) => {
-                self.touching.apply(ui.ctx(), &self.document, place);
+                self.session.press(place);
                 if !matches!(self.view.field, Field::Strain | Field::Displacement) {
                     self.view.field = Field::Strain;
                 }
             }
-            None => self.touching.clear(),
+            None => self.session.let_go(),
         }
     }
 
     /// The point of the limb under a place of the window, on the shape that is shown there.
     fn pick_shown(&self, pane: Pane, at: Pos2) -> Option<SurfacePoint> {
-        match self.touching.result() {
+        match self.session.caches.touching.result() {
             Some(touched) if pane == Pane::Limb && self.exaggeration().is_some() => {
                 self.view.pick_on(&touched.index, at)
             }
@@ -251,12 +254,16 @@ impl Studio {
             let Some(place) = self.view.pick(pane, at) else {
                 continue;
             };
-            self.document.dab(self.view.layer, brush, place, radius);
-            if let Some(image) = self.view.image(self.document.part.point(place)) {
+            self.session
+                .document
+                .dab(self.view.layer, brush, place, radius);
+            if let Some(image) = self.view.image(self.session.document.part.point(place)) {
                 let (image, off) = self.view.index.nearest(image);
                 // A part that is not its own mirror image has nothing there.
                 if off < radius {
-                    self.document.dab(self.view.layer, brush, image, radius);
+                    self.session
+                        .document
+                        .dab(self.view.layer, brush, image, radius);
                 }
             }
         }
@@ -271,7 +278,7 @@ impl Studio {
                 let Some(place) = self.view.pick(pane, at) else {
                     return 0.0;
                 };
-                let p = self.document.part.point(place);
+                let p = self.session.document.part.point(place);
                 let side = self.view.camera.side() * self.view.brush * 0.5;
                 let ends = [self.view.place(p), self.view.place(p + side)];
                 match ends {
@@ -291,7 +298,7 @@ impl Studio {
             return;
         }
         let brush = self.brush(ui);
-        let part = std::sync::Arc::clone(&self.document.part);
+        let part = std::sync::Arc::clone(&self.session.document.part);
         let bounds = egui::Rect::from_points(&outline);
         let place = self.view.placing(pane);
         let inside: Vec<u32> = (0..part.positions().len() as u32)
@@ -304,7 +311,7 @@ impl Studio {
         let inside: Vec<u32> = (inside.into_par_iter())
             .filter(|&v| through || is_seen(&self.view, &part, v))
             .collect();
-        self.document.mark(self.view.layer, brush, inside);
+        self.session.document.mark(self.view.layer, brush, inside);
     }
 }
 

@@ -1,482 +1,321 @@
-//! Speed against accuracy: what was measured of this project, what it predicts, and whether that came true.
+//! The tab “Trade”: the front as a plot that is clicked in, the dial, and the front as a table.
 
-mod tab;
+use egui::{Color32, DragValue, RichText, Role, Ui, WidgetInfo};
+use egui_plot::{GridMark, Line, Plot, PlotPoint, PlotPoints, PlotTransform, Points};
 
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use super::{Studio, theme};
+use crate::session::{Promise, Task};
+use crate::trade::{Asked, Setting, knobs};
 
-use egui::Context;
+const FRONT: Color32 = Color32::from_rgb(86, 180, 233);
+const OTHER: Color32 = Color32::from_rgb(125, 133, 143);
+/// How near (points) the pointer must be to what it picks.
+const NEAR: f32 = 16.0;
+const SIDE: f32 = 430.0;
 
-use super::drive::{Finished, stop};
-use super::jobs::{Shared, Task, duration};
-use super::{Studio, quality_name};
-use crate::budget::{Progress, Quality};
-use crate::design::{Design, Finest, Inputs};
-use crate::io::ProcessMeter;
-use crate::io::atomic;
-use crate::io::trade_file::{Judge, Record};
-use crate::job::{Reporter, Stop};
-use crate::project::Project;
-use crate::trade::{
-    Asked, Knob, Measured, Point, Setting, Sweep, answer, clock, front, measure, standards,
-};
-
-/// The trade of the bundled limb, measured where this program was made.
-const BUNDLED: &str = include_str!("../../assets/trade/trade.json");
-/// Beyond this factor a prediction was wrong.
-const WRONG: f64 = 2.0;
-
-/// A stage that took less (s) was known already.
-const KNOWN_S: f64 = 1e-4;
-
-/// Where a trade was measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Place {
-    Here,
-    /// With the bundled limb.
-    Elsewhere,
-}
-
-/// What is known of the open project.
-pub(super) struct Trade {
-    record: Option<(Arc<Record>, Place)>,
-    /// What it was looked up for.
-    key: String,
-    /// Where trades are kept between runs.
-    home: Option<PathBuf>,
-    /// What the measurement that is running, or was ended, has so far.
-    coming: Shared<Option<Record>>,
-    /// How much longer things take here than where the trade was measured.
-    pace: f64,
-    /// The dial.
+/// The dial, as it stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dial {
     asked_s: f64,
     asked_mm: f64,
     /// Settings to have measured in the end.
-    count: usize,
-    /// How the last prediction came out.
-    promise: Option<Promise>,
+    pub count: usize,
 }
 
-impl Default for Trade {
+impl Default for Dial {
     fn default() -> Self {
         Self {
-            record: None,
-            key: String::new(),
-            home: None,
-            coming: Arc::default(),
-            pace: 1.0,
             asked_s: 10.0,
             asked_mm: 1.0,
             count: 40,
-            promise: None,
         }
     }
 }
 
-impl Trade {
-    /// As it is for another project: where trades are kept, how quick this machine is, and what was asked for.
-    pub fn for_another_part(self) -> Self {
-        Self {
-            home: self.home,
-            pace: self.pace,
-            asked_s: self.asked_s,
-            asked_mm: self.asked_mm,
-            count: self.count,
-            ..Self::default()
-        }
-    }
-}
-
-/// What was predicted of a run, and what it achieved.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Promise {
-    pub quality: Quality,
-    /// By the clock, of the stages that ran anew and were measured.
-    pub predicted_s: f64,
-    pub achieved_s: f64,
-    /// Mean errors (mm) as a design states its own.
-    pub predicted_mm: f64,
-    pub achieved_mm: f64,
-}
-
-impl Promise {
-    /// Whether either was off by more than a factor of two.
-    #[must_use]
-    pub fn is_broken(&self) -> bool {
-        let off = |a: f64, b: f64| (a / b).ln().abs() > WRONG.ln();
-        off(self.achieved_s, self.predicted_s) || off(self.achieved_mm, self.predicted_mm)
-    }
-
-    fn in_words(&self) -> String {
-        format!(
-            "predicted {:.2} mm in {:.1} s, achieved {:.2} mm in {:.1} s",
-            self.predicted_mm, self.predicted_s, self.achieved_mm, self.achieved_s
-        )
-    }
+/// A measured point as it is drawn: seconds by the clock here, and mean error (mm).
+struct Drawn {
+    at: [f64; 2],
+    setting: Setting,
+    on_front: bool,
+    words: String,
 }
 
 impl Studio {
-    /// Keeps measured trades in a folder from now on.
-    pub fn keep_trades_in(&mut self, home: &Path) {
-        self.trade.home = Some(home.to_owned());
-        self.trade.key.clear();
-    }
-
-    /// Looks up what was measured of the project, when it has become another.
-    pub(super) fn refresh_trade(&mut self, ctx: &Context) {
-        self.take_ended();
-        let key = self.document.trade_key();
-        if key == self.trade.key || ctx.input(|i| i.pointer.any_down()) {
-            return;
-        }
-        self.trade.key = key;
-        self.trade.promise = None;
-        let inputs = self.document.inputs();
-        let kept = self
-            .trade
-            .home
-            .as_deref()
-            .and_then(|home| kept(home, &inputs));
-        let bundled = || Record::parse(BUNDLED).ok().filter(|r| r.is_of(&inputs));
-        self.trade.record = kept
-            .map(|record| (Arc::new(record), Place::Here))
-            .or_else(|| bundled().map(|record| (Arc::new(record), Place::Elsewhere)));
-    }
-
-    /// Takes in what a measurement had when it was ended.
-    fn take_ended(&mut self) {
-        if self.jobs.runs(Task::Trade) {
-            return;
-        }
-        let ended = self
-            .trade
-            .coming
-            .lock()
-            .ok()
-            .and_then(|mut coming| coming.take());
-        if let Some(record) = ended
-            && record.is_of(&self.document.inputs())
-        {
-            self.trade.record = Some((Arc::new(record), Place::Here));
-        }
-    }
-
-    /// What was measured of the project as it is, at a quality.
-    fn measured_at(&self, quality: Quality) -> Option<&Measured> {
-        let budget = &self.document.state.project.budget;
-        let (record, _) = self.trade.record.as_ref()?;
-        let limits = budget.limits_at(quality);
-        let is_it = |p: &&Point| {
-            p.setting
-                .is_at(&self.document.state.project, quality, &limits)
-        };
-        record.points.iter().find(is_it)?.measured()
-    }
-
-    /// Predicted seconds by the clock and mean error (mm) of a quality on this machine.
-    #[must_use]
-    pub fn predicted(&self, quality: Quality) -> Option<(f64, f64)> {
-        let m = self.measured_at(quality)?;
-        Some((m.cpu_seconds * self.clock(), m.error_mm))
-    }
-
-    /// Whether what is being measured is of the project as it is.
-    fn measures_this(&self) -> bool {
-        let mut running = self.jobs.running.iter();
-        running.any(|r| r.task == Task::Trade && r.job.key == self.trade.key)
-    }
-
-    /// Seconds by the clock here a processor second where it was measured.
-    fn clock(&self) -> f64 {
-        let pace = match self.trade.record {
-            Some((_, Place::Elsewhere)) if !self.measures_this() => self.trade.pace,
-            _ => 1.0,
-        };
-        clock(&self.points()) * pace
-    }
-
-    /// How the last prediction came out.
-    #[must_use]
-    pub fn promise(&self) -> Option<&Promise> {
-        self.trade.promise.as_ref()
-    }
-
-    /// What the quality control says of a quality.
-    pub(super) fn prediction_in_words(&self, quality: Quality) -> String {
-        let one = if self.document.state.project.selection.compare {
-            " for one selector"
-        } else {
-            ""
-        };
-        match self.predicted(quality) {
-            Some((seconds, mm)) => {
-                let elsewhere = matches!(self.trade.record, Some((_, Place::Elsewhere)));
-                let place = if elsewhere && self.trade.pace == 1.0 {
-                    " (measured elsewhere)"
-                } else {
-                    ""
-                };
-                let name = quality_name(quality);
-                let time = duration(seconds as f32);
-                format!("{name}: {mm:.2} mm in about {time}{one}{place}")
-            }
-            None => format!("{}: not measured yet", quality_name(quality)),
-        }
-    }
-
-    /// Holds a finished design against what was predicted of it.
-    pub(super) fn hold_to_promise(&mut self, design: &Design, quality: Quality) {
-        let compared = self.document.state.project.selection.compare;
-        let Some(m) = self.measured_at(quality) else {
-            self.trade.promise = None;
-            return;
-        };
-        let (mut predicted_s, mut achieved_s) = (0.0, 0.0);
-        for stage in &m.stages {
-            // Where others were compared, more was evaluated than was measured.
-            let more = compared && stage.stage == "evaluate";
-            // Of what was there already, or was only read again, the time says nothing.
-            let again = self.simulation.as_ref().is_some_and(|s| s.again);
-            let more = more || (again && stage.stage == "simulate");
-            let ran = design
-                .seconds
-                .iter()
-                .find(|s| s.stage == stage.stage && s.seconds > KNOWN_S);
-            if let Some(ran) = ran.filter(|_| !more) {
-                predicted_s += stage.seconds;
-                achieved_s += ran.seconds;
-            }
-        }
-        let select = format!("select {}", design.lead.name());
-        if design.seconds.iter().all(|s| s.stage != select) {
-            // What was there already took no time.
-            self.trade.promise = None;
-            return;
-        }
-        // As much of the whole as these stages took when it was measured.
-        let share = predicted_s / m.seconds;
-        let predicted_s = share * m.cpu_seconds * self.clock();
-        let promise = Promise {
-            quality,
-            predicted_s,
-            achieved_s,
-            predicted_mm: m.own_error_mm,
-            achieved_mm: design.chosen_row().map_or(f64::NAN, |r| r.error_mm),
-        };
-        let elsewhere = matches!(self.trade.record, Some((_, Place::Elsewhere)));
-        // Of another machine's times nothing was promised here before the first run.
-        if promise.is_broken() && !(elsewhere && self.trade.pace == 1.0) {
-            self.tell(format!(
-                "The prediction was off by more than a factor of two: {}. Other work may run on this machine; “Measure the trade” measures it anew",
-                promise.in_words()
-            ));
-        }
-        if elsewhere && predicted_s > 0.0 {
-            self.trade.pace *= achieved_s / predicted_s;
-        }
-        self.trade.promise = Some(promise);
-    }
-
-    /// What is shown is no longer what was predicted last.
-    pub(super) fn forget_promise(&mut self) {
-        self.trade.promise = None;
-    }
-
-    /// The line of the evaluation: predicted beside achieved.
-    pub(super) fn promise_line(&self) -> Option<String> {
-        let quality = self.design.as_ref()?.quality;
-        let promise = self.trade.promise.as_ref()?;
-        (promise.quality == quality).then(|| promise.in_words())
-    }
-
-    /// Measures the trade of the project in the background, going on from what is known of it.
-    pub fn measure_trade(&mut self, ctx: &Context) {
-        self.results = super::results::Tab::Trade;
-        if self.jobs.runs(Task::Trade) {
-            return;
-        }
-        self.refresh_trade(ctx);
-        let inputs = self.document.inputs();
-        let threads = rayon::current_num_threads();
-        let here = self.trade.record.as_ref();
-        let here = here.filter(|r| r.1 == Place::Here && r.0.is_of(&inputs));
-        let record = here.map_or_else(|| Record::new(&inputs, threads), |r| (*r.0).clone());
-        let coming = Shared::<Option<Record>>::default();
-        self.trade.coming = Arc::clone(&coming);
-        let (count, home) = (self.trade.count, self.trade.home.clone());
-        let key = self.trade.key.clone();
-        self.jobs.start(ctx, Task::Trade, key, move |r| {
-            sweep(&inputs, record, count, home.as_deref(), &coming, r)
-                .map(|record| Finished::Traded(Box::new(record)))
+    pub(super) fn trade_tab(&mut self, ui: &mut Ui) {
+        let drawn = self.drawn_points();
+        ui.horizontal_top(|ui| {
+            let width = (ui.available_width() - SIDE).max(220.0);
+            let height = ui.available_height();
+            ui.allocate_ui(egui::vec2(width, height), |ui| {
+                if drawn.is_empty() {
+                    super::results::empty(
+                        ui,
+                        "Nothing is measured of this project yet. “Measure the trade” runs it at many settings and judges each by one model finer than all of them",
+                    );
+                } else if let Some(setting) = self.trade_plot(ui, &drawn) {
+                    self.session.apply_setting(&setting);
+                }
+            });
+            ui.separator();
+            egui::ScrollArea::vertical()
+                .id_salt("trade")
+                .auto_shrink(false)
+                .show(ui, |ui| ui.vertical(|ui| self.trade_side(ui, &drawn)));
         });
     }
 
-    /// Takes in a finished measurement, and of one that was ended what it had.
-    pub(super) fn take_trade(&mut self, record: Record, key: &str) {
-        if key == self.trade.key {
-            self.trade.pace = 1.0;
-            self.trade.record = Some((Arc::new(record), Place::Here));
-        }
+    fn drawn_points(&self) -> Vec<Drawn> {
+        let project = &self.session.document.state.project;
+        let points = self.session.measured_points();
+        let best = crate::trade::front(project, &points);
+        let clock = self.session.trade_clock();
+        let drawn = points.iter().filter(|p| p.setting.answers(project));
+        drawn
+            .filter_map(|p| {
+                let m = p.measured()?;
+                let seconds = m.cpu_seconds * clock;
+                (seconds > 0.0 && m.error_mm > 0.0).then(|| Drawn {
+                    at: [seconds, m.error_mm],
+                    setting: p.setting,
+                    on_front: best.iter().any(|b| std::ptr::eq(*b, p)),
+                    words: format!(
+                        "{:.2} mm mean, {:.2} mm median, {seconds:.1} s\n{}",
+                        m.error_mm,
+                        m.median_mm,
+                        p.setting.in_words()
+                    ),
+                })
+            })
+            .collect()
     }
 
-    /// Sets the project to a measured setting; what is kept computed follows.
-    pub fn apply_setting(&mut self, setting: &Setting) {
-        setting.apply(&mut self.document.state.project);
-        self.document.settle();
+    /// The plot; the setting that was clicked on.
+    fn trade_plot(&self, ui: &mut Ui, drawn: &[Drawn]) -> Option<Setting> {
+        let project = &self.session.document.state.project;
+        let marks = |on: bool| -> PlotPoints<'static> {
+            let some = drawn.iter().filter(|d| d.on_front == on);
+            some.map(|d| d.at.map(f64::log10)).collect()
+        };
+        let mut front: Vec<[f64; 2]> = (drawn.iter().filter(|d| d.on_front))
+            .map(|d| d.at.map(f64::log10))
+            .collect();
+        front.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let now = drawn.iter().find(|d| d.setting.is_of(project));
+        let shown = Plot::new("trade")
+            .height(ui.available_height() - 4.0)
+            .x_axis_label("seconds to the judged answer")
+            .y_axis_label("mean error (mm)")
+            .x_axis_formatter(|mark, _| round(mark.value))
+            .y_axis_formatter(|mark, _| round(mark.value))
+            .x_grid_spacer(|input| decades(input.bounds))
+            .y_grid_spacer(|input| decades(input.bounds))
+            .show_x(false)
+            .show_y(false)
+            .label_formatter(|_| None)
+            .allow_scroll(false)
+            .allow_drag(false)
+            .allow_zoom(false)
+            .allow_boxed_zoom(false)
+            .allow_double_click_reset(false)
+            .show(ui, |plot| {
+                plot.points(
+                    Points::new("measured", marks(false))
+                        .color(OTHER)
+                        .radius(3.5),
+                );
+                plot.line(
+                    Line::new("front line", PlotPoints::from(front))
+                        .color(FRONT)
+                        .width(2.0),
+                );
+                plot.points(Points::new("front", marks(true)).color(FRONT).radius(5.0));
+                if let Some(now) = now {
+                    let here: PlotPoints = vec![now.at.map(f64::log10)].into();
+                    let ring = Points::new("now", here).color(theme::CHOSEN).radius(9.0);
+                    plot.points(ring.filled(false));
+                }
+            });
+        shown.response.widget_info(|| {
+            WidgetInfo::labeled(
+                Role::Figure,
+                true,
+                "Error against time of all measured settings",
+            )
+        });
+        let pointer = shown.response.hover_pos()?;
+        let near = nearest(drawn, &shown.transform, pointer)?;
+        let clicked = shown.response.clicked();
+        let ctx = ui.ctx().clone();
+        ctx.set_cursor_icon(egui::CursorIcon::PointingHand);
+        shown
+            .response
+            .on_hover_text_at_pointer(format!("{}\nClick to set the project to this", near.words));
+        clicked.then_some(near.setting)
     }
 
-    /// Turns the dial: the setting of the front that keeps the promise, at once.
-    pub fn ask_for(&mut self, ctx: &Context, asked: Asked) {
-        let points = self.points();
-        if points.is_empty() {
-            return self.complain(
-                "Nothing is measured of this project yet. Press “Measure the trade” first",
+    fn trade_side(&mut self, ui: &mut Ui, drawn: &[Drawn]) {
+        let running = self.session.jobs.runs(Task::Trade);
+        ui.horizontal(|ui| {
+            let button = ui.add_enabled(!running, egui::Button::new("Measure the trade"));
+            let button = button.on_hover_text("Runs this project at many settings on this machine, in the background; ended on the way, it keeps what it has");
+            if button.clicked() {
+                self.session.measure_trade(self.trade.count);
+            }
+            let name = ui.label("settings");
+            ui.add(DragValue::new(&mut self.trade.count).range(8..=400))
+                .labelled_by(name.id);
+        });
+        ui.weak(self.session.trade_in_words());
+        if let Some(line) = self.session.promise_line() {
+            let broken = self.session.promise().is_some_and(Promise::is_broken);
+            let text = RichText::new(format!("Last run: {line}"));
+            ui.add(
+                egui::Label::new(if broken {
+                    text.color(theme::STALE)
+                } else {
+                    text
+                })
+                .wrap(),
             );
         }
-        let best = front(&self.document.state.project, &points);
-        let clock = self.clock();
-        let Some((point, m)) = answer(&best, asked, clock).and_then(|p| Some((p, p.measured()?)))
-        else {
-            let quickest = best.first().and_then(|p| p.measured());
-            return self.complain(quickest.map_or_else(
-                || "No setting that was measured could be computed. Measure more of them".to_owned(),
-                |m| {
-                    format!(
-                        "No measured setting answers as quickly: the quickest took {:.1} s. Ask for more time, or measure more settings",
-                        m.cpu_seconds * clock
-                    )
-                },
+        if drawn.is_empty() {
+            return;
+        }
+        ui.add_space(4.0);
+        self.dial(ui);
+        ui.add_space(4.0);
+        self.front_table(ui, drawn);
+        self.knob_table(ui);
+    }
+
+    fn dial(&mut self, ui: &mut Ui) {
+        let mut asked = None;
+        egui::Grid::new("dial").num_columns(3).show(ui, |ui| {
+            let name = ui.label("An answer within");
+            let seconds = &mut self.trade.asked_s;
+            ui.add(
+                DragValue::new(seconds)
+                    .range(0.1..=1e5)
+                    .speed(0.5)
+                    .suffix(" s"),
+            )
+            .labelled_by(name.id);
+            if ui.button("Answer in time").clicked() {
+                asked = Some(Asked::Within(self.trade.asked_s));
+            }
+            ui.end_row();
+            let name = ui.label("Of the best within");
+            let mm = &mut self.trade.asked_mm;
+            ui.add(
+                DragValue::new(mm)
+                    .range(0.0..=1e3)
+                    .speed(0.05)
+                    .suffix(" mm"),
+            )
+            .labelled_by(name.id);
+            if ui.button("Answer as good").clicked() {
+                asked = Some(Asked::OfTheBest(self.trade.asked_mm));
+            }
+            ui.end_row();
+        });
+        if let Some(asked) = asked {
+            self.session.ask_for(asked);
+        }
+    }
+
+    /// The front as rows, for those who do not point.
+    fn front_table(&mut self, ui: &mut Ui, drawn: &[Drawn]) {
+        let mut rows: Vec<&Drawn> = drawn.iter().filter(|d| d.on_front).collect();
+        rows.sort_by(|a, b| a.at[0].total_cmp(&b.at[0]));
+        let mut chosen = None;
+        egui::Grid::new("front")
+            .num_columns(3)
+            .striped(true)
+            .show(ui, |ui| {
+                ui.strong("time");
+                ui.strong("mean error");
+                ui.end_row();
+                for row in rows {
+                    ui.monospace(format!("{:6.1} s", row.at[0]));
+                    ui.monospace(format!("{:6.2} mm", row.at[1]));
+                    let now = row.setting.is_of(&self.session.document.state.project);
+                    let button =
+                        ui.add_enabled(!now, egui::Button::new(if now { "In use" } else { "Use" }));
+                    let name = format!("Use {:.1} s, {:.2} mm", row.at[0], row.at[1]);
+                    if button
+                        .on_hover_text(&row.words)
+                        .accessible_name(name)
+                        .clicked()
+                    {
+                        chosen = Some(row.setting);
+                    }
+                    ui.end_row();
+                }
+            });
+        if let Some(setting) = chosen {
+            self.session.apply_setting(&setting);
+        }
+    }
+
+    /// What a step of each knob brings.
+    fn knob_table(&self, ui: &mut Ui) {
+        egui::CollapsingHeader::new("What each knob buys").show(ui, |ui| {
+            let (reports, spread) = knobs(&self.session.measured_points());
+            ui.weak(format!(
+                "One step each; with another seed alone the error moves by {spread:.0} %"
             ));
-        };
-        self.tell(format!(
-            "Set to {:.2} mm in about {:.1} s: {}",
-            m.error_mm,
-            m.cpu_seconds * clock,
-            point.setting.in_words()
-        ));
-        self.apply_setting(&point.setting);
-        self.select(ctx);
+            egui::Grid::new("knobs")
+                .num_columns(3)
+                .striped(true)
+                .show(ui, |ui| {
+                    for r in reports {
+                        ui.label(r.knob.name());
+                        ui.monospace(format!("time {:+.0} %", r.cpu_percent));
+                        ui.monospace(format!("error {:+.0} %", r.error_percent));
+                        ui.end_row();
+                    }
+                });
+        });
     }
 }
 
-/// What an earlier run has kept of these inputs.
-fn kept(home: &Path, inputs: &Inputs) -> Option<Record> {
-    let text = std::fs::read_to_string(file(home, inputs)).ok()?;
-    let record = Record::parse(&text).ok()?;
-    let threads = rayon::current_num_threads();
-    (record.is_of(inputs) && record.threads == threads).then_some(record)
+/// What is nearest to the pointer, where it is near.
+fn nearest<'a>(
+    drawn: &'a [Drawn],
+    transform: &PlotTransform,
+    pointer: egui::Pos2,
+) -> Option<&'a Drawn> {
+    let away = |d: &Drawn| {
+        let [x, y] = d.at.map(f64::log10);
+        transform
+            .position_from_point(&PlotPoint::new(x, y))
+            .distance(pointer)
+    };
+    let found = drawn.iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
+    (away(found) < NEAR).then_some(found)
 }
 
-fn file(home: &Path, inputs: &Inputs) -> PathBuf {
-    home.join(format!(
-        "{}.json",
-        crate::io::trade_file::inputs_key(inputs)
-    ))
-}
-
-/// Qualities that are measured by their names: at Standard regressions alone would take a quarter of an hour.
-fn qualities(project: &Project) -> Vec<Quality> {
-    if Setting::centre(project).hears(Knob::Folds) {
-        vec![Quality::Draft]
+/// A power of ten as it is read.
+fn round(log: f64) -> String {
+    let value = 10f64.powf(log);
+    if value < 0.95 {
+        format!("{value:.2}")
+    } else if value < 9.5 {
+        format!("{value:.1}").trim_end_matches(".0").to_owned()
     } else {
-        standards()
+        format!("{value:.0}")
     }
 }
 
-/// Measures until so many points are known. What there is when it is ended is kept on disk and in `coming`.
-fn sweep(
-    inputs: &Inputs,
-    mut record: Record,
-    count: usize,
-    home: Option<&Path>,
-    coming: &Mutex<Option<Record>>,
-    r: &Reporter,
-) -> Result<Record, Stop> {
-    let show = |record: &Record| {
-        if let Ok(mut coming) = coming.lock() {
-            *coming = Some(record.clone());
-        }
-    };
-    let walk = Sweep::new(&inputs.project, qualities(&inputs.project));
-    let left = |record: &Record| count.saturating_sub(record.points.len());
-    if walk.next(&record.points, left(&record)).is_none() {
-        return Err(Stop::Failed(format!(
-            "all {} settings are measured already. Ask for more of them",
-            record.points.len()
-        )));
-    }
-    let laying = |p: Progress| {
-        r.report(Progress {
-            stage: "Laying the judge's elements",
-            ..p
+/// Grid lines at 1, 2 and 5 of every decade.
+fn decades((low, high): (f64, f64)) -> Vec<GridMark> {
+    (-3..7)
+        .flat_map(|decade| [1.0, 2.0, 5.0].map(|r: f64| r.log10() + f64::from(decade)))
+        .filter(|v| (low..=high).contains(v))
+        .map(|value| GridMark {
+            value,
+            // Every one of them has room for its label.
+            step_size: 10.0,
         })
-    };
-    let judge = Finest::new(inputs, &laying).map_err(|e| stop(&e))?;
-    record.judge = Judge {
-        element_mm: judge.element_mm(),
-        unknowns: judge.unknowns(),
-        touches: judge.touches(),
-    };
-    let meter = ProcessMeter::default();
-    while let Some(setting) = walk.next(&record.points, left(&record)) {
-        let done = record.points.len();
-        let watch = |_: Progress| {
-            r.report(Progress {
-                stage: "Measuring settings",
-                done,
-                total: count.max(done + 1),
-            })
-        };
-        let point = measure(inputs, &setting, &judge, &meter, &watch).map_err(|e| stop(&e))?;
-        record.points.push(point);
-        show(&record);
-        if let Some(home) = home {
-            // What is measured is kept for the next time; where that cannot be, it is still shown.
-            let _ = std::fs::create_dir_all(home);
-            let _ = atomic::write(&file(home, inputs), record.to_json().as_bytes());
-        }
-    }
-    Ok(record)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn standard_is_measured_where_no_regression_is_trained() {
-        let mut project = Project::around("a.stl", None);
-        assert_eq!(qualities(&project), standards());
-        project.evaluation.estimator = crate::evaluation::EstimatorKind::Svr;
-        assert_eq!(qualities(&project), [Quality::Draft]);
-    }
-
-    #[test]
-    fn a_prediction_off_by_more_than_two_is_broken() {
-        let kept = Promise {
-            quality: Quality::Draft,
-            predicted_s: 10.0,
-            achieved_s: 19.0,
-            predicted_mm: 4.0,
-            achieved_mm: 2.1,
-        };
-        assert!(!kept.is_broken());
-        let slow = Promise {
-            achieved_s: 21.0,
-            ..kept.clone()
-        };
-        let quick = Promise {
-            achieved_s: 4.9,
-            ..kept.clone()
-        };
-        let wrong = Promise {
-            achieved_mm: 8.1,
-            ..kept.clone()
-        };
-        assert!(slow.is_broken() && quick.is_broken() && wrong.is_broken());
-        assert_eq!(
-            slow.in_words(),
-            "predicted 4.00 mm in 10.0 s, achieved 2.10 mm in 21.0 s"
-        );
-    }
+        .collect()
 }

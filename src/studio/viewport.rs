@@ -10,14 +10,15 @@ use super::fields::{Built, Field, Ranges};
 use super::measure::Measure;
 use super::tools::{Gesture, Tool};
 use crate::document::{Document, Layer};
+use crate::mesh::SurfacePoint;
 use crate::mesh::flatten::Flat;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::stance::{Direction, Stance};
-use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::PartAxis;
 use crate::render::camera::Camera;
 use crate::render::gpu::{Solid, Vertex};
+use crate::session::Shape;
 
 /// One of the views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,14 +67,13 @@ impl Section {
 
 /// The part laid flat, as it is drawn and picked.
 pub(super) struct Unrolled {
-    pub flat: Flat,
+    pub flat: Arc<Flat>,
     pub solid: Arc<Solid>,
     stance: Stance,
 }
 
 impl Unrolled {
-    fn of(mesh: &TriMesh, stance: Stance) -> Self {
-        let flat = Flat::of(mesh, stance);
+    fn of(flat: Arc<Flat>, stance: Stance) -> Self {
         let up = [0.0, 0.0, 1.0];
         let stretch = flat.stretch_at_vertices();
         let vertices = flat.positions.iter().zip(stretch).map(|(p, off)| Vertex {
@@ -133,11 +133,11 @@ pub struct Viewport {
 
 impl Viewport {
     #[must_use]
-    pub fn new(document: &Document) -> Self {
+    pub fn new(document: &Document, shape: &Shape) -> Self {
         let (lower, upper) = document.part.bounds();
         let axis = document.state.project.part.axis;
         let stance = axis.stance(&document.part);
-        let unrolled = Unrolled::of(&document.part, stance);
+        let unrolled = Unrolled::of(Arc::clone(&shape.flat), stance);
         Self {
             camera: Camera::framing(lower, upper, stance),
             axis,
@@ -151,7 +151,7 @@ impl Viewport {
             see_through: false,
             unrolled_shown: false,
             ranges: Ranges::default(),
-            index: Arc::new(SurfaceIndex::new(&document.part)),
+            index: Arc::clone(&shape.index),
             solid: Arc::new(Solid::of(&document.part)),
             flat_view: (unrolled.centre(), 0.0),
             unrolled,
@@ -229,6 +229,14 @@ impl Viewport {
     /// Whether no hand is at work in the views.
     pub(super) fn is_idle(&self) -> bool {
         self.gesture == Gesture::None
+    }
+
+    /// The gauge that follows the pointer, by its number from zero.
+    pub(super) fn moved_gauge(&self) -> Option<usize> {
+        match self.gesture {
+            Gesture::Gauge(_, number, _) => Some(number),
+            _ => None,
+        }
     }
 
     #[must_use]
@@ -365,7 +373,7 @@ impl Studio {
             panes.push((Pane::Unrolled, shown));
         }
         ui.advance_cursor_after_rect(all);
-        self.build_field(ui.ctx());
+        self.build_field();
         // Drawn after all that happened in either: what is hovered in one shows in the other.
         for (pane, rect) in panes {
             self.draw(ui, pane, rect);
@@ -379,19 +387,22 @@ impl Studio {
 
     /// Has the views follow the part's axis where that has changed.
     fn stand_upright(&mut self) {
-        let axis = self.document.state.project.part.axis;
+        let axis = self.session.document.state.project.part.axis;
         if self.view.axis != axis {
-            let stance = axis.stance(&self.document.part);
+            let stance = axis.stance(&self.session.document.part);
             self.view.axis = axis;
             self.view.camera.stance = stance;
-            self.view.around = OrientedBox::around(&self.document.part, stance);
+            self.view.around = OrientedBox::around(&self.session.document.part, stance);
             let around = &self.view.around;
             self.view.section =
                 (self.view.section).map(|cut| Section::halving(around, cut.side, cut.flip));
         }
         let stance = self.view.camera.stance;
         if self.view.unrolled_shown && self.view.unrolled.stance != stance {
-            self.view.unrolled = Unrolled::of(&self.document.part, stance);
+            self.view.unrolled = Unrolled::of(
+                Arc::new(Flat::of(&self.session.document.part, stance)),
+                stance,
+            );
             self.view.flat_view.1 = 0.0;
             self.view.built = None;
         }

@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use hapdef::board::{ChannelFault, Faults, Illness, Press, Script, SimulatedBoard, Truth};
 use hapdef::budget::{Quality, unwatched};
-use hapdef::cli::board;
+use hapdef::design::simulated_board as board;
 use hapdef::design::{self, Inputs, Sensing, Workshop};
 use hapdef::elasticity::Touch;
 use hapdef::inference::{

@@ -28,20 +28,23 @@ const ORDER: [&[&str]; 14] = [
     &["project"],
     &["design", "study"],
     &["given", "trade"],
-    &["io", "job", "link", "document", "render", "cli", "studio"],
+    &[
+        "io", "job", "link", "document", "render", "session", "cli", "studio",
+    ],
 ];
 
 /// Among the outer modules, who may use whom.
-const OUTER: [(&str, &[&str]); 7] = [
+const OUTER: [(&str, &[&str]); 8] = [
     ("io", &[]),
     ("job", &[]),
     ("link", &[]),
     ("render", &[]),
     ("document", &["io"]),
-    ("cli", &["io", "link"]),
+    ("session", &["io", "job", "link", "document"]),
+    ("cli", &["io", "link", "session"]),
     (
         "studio",
-        &["io", "job", "link", "document", "render", "cli"],
+        &["io", "job", "link", "document", "render", "session"],
     ),
 ];
 

@@ -36,6 +36,7 @@ mod refine;
 mod regions;
 mod remesh;
 mod same_part;
+mod session_core;
 mod solid;
 mod solid_extremes;
 mod solids;

@@ -23,8 +23,8 @@ use window::Window;
 fn next_touch(w: &mut Window, after: Option<DVec3>) -> (Update, DVec3, f64) {
     let found = std::cell::RefCell::new(None);
     w.wait("a touch", 40, |s: &Studio| {
-        let truth = s.live_truth();
-        if let (Some((place, force)), Some(update)) = (truth, s.live_update())
+        let truth = s.session.live.truth();
+        if let (Some((place, force)), Some(update)) = (truth, s.session.live.update())
             && Some(place) != after
             && (12e-3..108e-3).contains(&place.z)
             && update.contact.is_some_and(|c| c.force > 0.25 * force)
@@ -53,24 +53,27 @@ fn a_simulated_board_from_start_to_replay() {
     let folder = tempfile::tempdir().unwrap();
     w.stage("Live");
     w.press("Start a simulated board");
-    w.wait("the board", 120, |s| s.live_state() == Some(State::Live));
+    w.wait("the board", 120, |s| {
+        s.session.live.state() == Some(State::Live)
+    });
     w.wait("the tare", 20, |s| {
-        s.live_update().is_some_and(|u| u.strain.is_some())
+        s.session.live.update().is_some_and(|u| u.strain.is_some())
     });
     w.press("Tare");
     w.wait("another tare", 20, |s| {
-        s.live_update().is_some_and(|u| u.strain.is_none())
+        s.session.live.update().is_some_and(|u| u.strain.is_none())
     });
     w.wait("its end", 20, |s| {
-        s.live_update().is_some_and(|u| u.strain.is_some())
+        s.session.live.update().is_some_and(|u| u.strain.is_some())
     });
 
     // As drawn, the gauges are known as well as a workshop glues; known touches show how they really are.
-    w.harness.state_mut().calibrate_from_board();
+    w.session_mut().calibrate_from_board();
     w.wait("known touches", 90, |s| {
-        s.known_touches() >= 12 && !s.document.state.project.live.glued.is_empty()
+        s.session.live.known_touches() >= 12
+            && !s.session.document.state.project.live.glued.is_empty()
     });
-    let off = w.harness.state().document.state.project.live.model_error;
+    let off = w.session().document.state.project.live.model_error;
     assert!(off < 0.1, "still off by {off}");
     let (mut errors, mut held, mut before) = (Vec::new(), 0, None);
     for _ in 0..6 {
@@ -107,7 +110,9 @@ fn compare(w: &mut Window) {
     w.harness.get_by_label("Known touches").click();
     w.harness.run_ok();
     w.wait("the trained ones", 120, |s| {
-        s.live_update()
+        s.session
+            .live
+            .update()
             .is_some_and(|u| u.guesses.iter().all(Option::is_some))
     });
     if let Some(path) = std::env::var_os("HAPDEF_PICTURES") {
@@ -123,7 +128,7 @@ fn compare(w: &mut Window) {
 /// Noticed, and found again once it is plugged in.
 fn unplug(w: &mut Window) {
     {
-        let hosted = w.harness.state().simulated_board().unwrap();
+        let hosted = w.session().live.simulated_board().unwrap();
         let now = hosted.seconds();
         hosted
             .board
@@ -133,33 +138,38 @@ fn unplug(w: &mut Window) {
             .unplugged
             .push((now, now + 1.5));
     }
-    w.wait("the unplug", 10, |s| s.live_state() == Some(State::Gone));
+    w.wait("the unplug", 10, |s| {
+        s.session.live.state() == Some(State::Gone)
+    });
     assert!(
-        w.harness.state().live_update().is_none(),
+        w.session().live.update().is_none(),
         "no touch is shown of a board that is gone"
     );
-    w.wait("the plug", 10, |s| s.live_state() == Some(State::Live));
+    w.wait("the plug", 10, |s| {
+        s.session.live.state() == Some(State::Live)
+    });
     // The rest is still known.
     w.wait("strains", 5, |s| {
-        s.live_update().is_some_and(|u| u.strain.is_some())
+        s.session.live.update().is_some_and(|u| u.strain.is_some())
     });
 }
 
 /// What the window saw while it was recording.
 fn record(w: &mut Window, path: &Path) -> BTreeMap<u64, Update> {
     w.wait("no touch", 20, |s| {
-        s.live_update().is_some_and(|u| u.contact.is_none()) && s.live_truth().is_none()
+        s.session.live.update().is_some_and(|u| u.contact.is_none())
+            && s.session.live.truth().is_none()
     });
-    w.harness.state_mut().record(path);
+    w.session_mut().record(path);
     let seen = std::cell::RefCell::new(BTreeMap::new());
     let begun = Instant::now();
     w.wait("a few touches", 30, |s| {
-        if let Some(update) = s.live_update() {
+        if let Some(update) = s.session.live.update() {
             seen.borrow_mut().insert(update.time_us, update);
         }
         begun.elapsed().as_secs_f64() > 4.0
     });
-    w.harness.state_mut().stop_recording();
+    w.session_mut().stop_recording();
     w.wait("the file", 10, |_| {
         std::fs::metadata(path).is_ok_and(|m| m.len() > 50_000)
     });
@@ -168,7 +178,7 @@ fn record(w: &mut Window, path: &Path) -> BTreeMap<u64, Update> {
 
 /// The recording says the very same, in the window's own thread and in another.
 fn replay(w: &mut Window, path: &Path, seen: &BTreeMap<u64, Update>) {
-    let inputs = w.harness.state().document.inputs();
+    let inputs = w.session().document.inputs();
     let budget = inputs.project.budget.budget();
     let sensing = design::sense(&inputs, &budget, &unwatched).unwrap();
     let live = &inputs.project.live;
@@ -201,16 +211,13 @@ fn replay(w: &mut Window, path: &Path, seen: &BTreeMap<u64, Update>) {
         "{compared} compared, {touches} of them touches, {truths} truths"
     );
 
-    let ctx = w.harness.ctx.clone();
-    w.harness.state_mut().write_table(&ctx, path);
+    w.session_mut().write_table(path);
     w.wait("the table", 60, |s| !s.busy());
     let table = std::fs::read_to_string(path.with_extension("csv")).unwrap();
     assert_eq!(table.lines().count(), again.len() + 1);
-    w.harness
-        .state_mut()
-        .connect(&ctx, &path.display().to_string());
+    w.session_mut().connect(&path.display().to_string());
     w.wait("the replay", 60, |s| {
-        s.live_update().is_some_and(|u| u.contact.is_some())
+        s.session.live.update().is_some_and(|u| u.contact.is_some())
     });
-    w.wait("its end", 60, |s| s.live_state().is_none());
+    w.wait("its end", 60, |s| s.session.live.state().is_none());
 }

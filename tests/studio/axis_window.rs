@@ -20,7 +20,7 @@ fn views_follow_the_axis_of_the_part() {
         (PartAxis::Coordinate(Axis::Y), DVec3::Y, DVec3::Z),
         (PartAxis::Along([0.0, 0.0, -1.0]), DVec3::NEG_Z, DVec3::X),
     ] {
-        w.harness.state_mut().document.state.project.part.axis = axis;
+        w.session_mut().document.state.project.part.axis = axis;
         w.harness.run_ok();
         w.press("Front");
         let camera = w.harness.state().view.camera;
@@ -29,12 +29,12 @@ fn views_follow_the_axis_of_the_part() {
         w.assert_named("the axis");
     }
     // Where lengths are off the unrolled view is hatched: about a wrong axis everywhere.
-    w.harness.state_mut().document.state.project.part.axis = PartAxis::Auto;
+    w.session_mut().document.state.project.part.axis = PartAxis::Auto;
     let ctx = w.harness.ctx.clone();
     w.harness.state_mut().execute(&ctx, Command::Unrolled);
     w.harness.run_ok();
     let kept = w.picture();
-    w.harness.state_mut().document.state.project.part.axis = PartAxis::Coordinate(Axis::X);
+    w.session_mut().document.state.project.part.axis = PartAxis::Coordinate(Axis::X);
     w.harness.run_ok();
     let hatched = w.picture();
     let both = kept.pixels().zip(hatched.pixels());
@@ -54,7 +54,7 @@ fn sections_mirrors_and_new_boxes_follow_the_axis_of_the_part() {
         (PartAxis::Coordinate(Axis::Y), false),
         (PartAxis::Along(oblique.to_array()), true),
     ] {
-        w.harness.state_mut().document.state.project.part.axis = axis;
+        w.session_mut().document.state.project.part.axis = axis;
         w.harness.run_ok();
         let stance = w.harness.state().view.camera.stance;
         for (name, side) in [
@@ -69,11 +69,11 @@ fn sections_mirrors_and_new_boxes_follow_the_axis_of_the_part() {
         }
         let image = w.harness.state().view.image(DVec3::ZERO).unwrap();
         assert!(image.cross(stance.right()).length() < 1e-12, "{axis:?}");
-        let document = &mut w.harness.state_mut().document;
+        let document = &mut w.session_mut().document;
         document.state.project.supports.clear();
         w.harness.run_ok();
         w.press("Add support");
-        let added = &w.harness.state().document.state.project.supports;
+        let added = &w.session().document.state.project.supports;
         assert_eq!(added.len(), 1);
         assert_eq!(added[0].box_axis.is_some(), turned, "{axis:?}");
         w.assert_named("the supports");
@@ -93,7 +93,7 @@ fn an_example_goes_by_its_own_name() {
             w.harness.state_mut().execute(&ctx, open);
         }
         w.wait("the example", 60, |s| {
-            Example::of_mesh(&s.document.mesh_path) == Some(example)
+            Example::of_mesh(&s.session.document.mesh_path) == Some(example)
         });
         w.stage("Part");
         let shown = w.harness.query_all_by_label(example.name()).count();

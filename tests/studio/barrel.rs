@@ -187,8 +187,8 @@ fn the_window_opens_the_barrel_as_an_example() {
     let barrel = Command::Example(Example::Barrel);
     w.harness.state_mut().execute(&ctx, barrel);
     w.wait("the barrel", 60, |s| {
-        s.document.mesh_path == Path::new("barrel.glb")
+        s.session.document.mesh_path == Path::new("barrel.glb")
     });
-    let document = &w.harness.state().document;
+    let document = &w.session().document;
     assert!(document.bundled && document.is_solid());
 }

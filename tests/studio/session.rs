@@ -24,7 +24,7 @@ fn standings(w: &Window) -> Vec<Standing> {
 }
 
 fn gauges_of(w: &Window) -> Vec<ChosenSite> {
-    let project = &w.harness.state().document.state.project;
+    let project = &w.session().document.state.project;
     project.selection.sites.clone()
 }
 
@@ -42,7 +42,7 @@ fn the_whole_design_task() {
     w.harness.run_ok();
 
     // All selectors are to be seen beside each other.
-    let document = &mut w.harness.state_mut().document;
+    let document = &mut w.session_mut().document;
     document.state.project.selection.compare = true;
     w.harness.run_ok();
 
@@ -56,8 +56,12 @@ fn the_whole_design_task() {
     // One button leads to the answer; the stages fill in on the way.
     w.press("Touch");
     w.press("Select gauges");
-    w.wait("the simulation", 120, |s| s.simulation.is_some());
-    w.wait("the design", 300, |s| s.design.is_some() && !s.busy());
+    w.wait("the simulation", 120, |s| {
+        s.session.results.simulation.is_some()
+    });
+    w.wait("the design", 300, |s| {
+        s.session.results.design.is_some() && !s.busy()
+    });
     for (stage, standing) in Stage::ALL.into_iter().zip(standings(&w)) {
         // No board is connected.
         let expected = match stage {
@@ -68,7 +72,7 @@ fn the_whole_design_task() {
     }
     assert_eq!(gauges(&w), 10);
     let state = w.harness.state();
-    let places = state.document.state.project.selection.sites.clone();
+    let places = state.session.document.state.project.selection.sites.clone();
     for site in &places {
         // Nothing on the painted strip.
         let p = DVec3::from_array(site.position_mm);
@@ -77,7 +81,7 @@ fn the_whole_design_task() {
             "{p}"
         );
     }
-    let design = Arc::clone(&state.design.as_ref().unwrap().design);
+    let design = Arc::clone(&state.session.results.design.as_ref().unwrap().value.design);
     assert!(
         design
             .feasibility
@@ -113,7 +117,9 @@ fn press_and_paint(w: &mut Window) {
     w.press("Front");
     let hoop = w.place(31.83, 0.0, 60.0);
     w.click(hoop);
-    w.wait("the touch", 60, |s| s.touched().is_some());
+    w.wait("the touch", 60, |s| {
+        s.session.caches.touching.result().is_some()
+    });
     w.show("2-touch");
 
     // A cable runs along the front: no gauge may go there.
@@ -125,7 +131,7 @@ fn press_and_paint(w: &mut Window) {
         .collect();
     w.drag(&path);
     let kept_out = |w: &Window| {
-        let layer = w.harness.state().document.layer(Layer::KeepOut);
+        let layer = w.session().document.layer(Layer::KeepOut);
         layer.map(|m| m.iter().filter(|&&m| m).count())
     };
     let painted = kept_out(w).expect("a stroke paints");
@@ -140,34 +146,16 @@ fn compare(w: &mut Window, design: &Arc<Design>) {
     let places = gauges_of(w);
     // Another selector is there at once: all were run.
     w.press("Keep this selection");
-    w.harness
-        .state_mut()
-        .document
-        .state
-        .project
-        .selection
-        .selector = SelectorKind::PcaQr;
+    w.session_mut().document.state.project.selection.selector = SelectorKind::PcaQr;
     w.harness.run_ok();
     assert!(!w.harness.state().busy());
-    let other = &w.harness.state().document.state.project.selection.sites;
+    let other = &w.session().document.state.project.selection.sites;
     assert_ne!(*other, places);
     w.press("Keep this selection");
-    w.harness
-        .state_mut()
-        .document
-        .state
-        .project
-        .selection
-        .selector = SelectorKind::ExpectedError;
+    w.session_mut().document.state.project.selection.selector = SelectorKind::ExpectedError;
 
     // Would five do? Only what depends on the number is computed again.
-    w.harness
-        .state_mut()
-        .document
-        .state
-        .project
-        .selection
-        .sensors = 5;
+    w.session_mut().document.state.project.selection.sensors = 5;
     w.harness.run_ok();
     assert_eq!(standings(w)[5], Standing::Stale);
     assert_eq!(standings(w)[2], Standing::Current);
@@ -175,14 +163,14 @@ fn compare(w: &mut Window, design: &Arc<Design>) {
         !s.busy() && s.standing(Stage::Evaluation) == Standing::Current
     });
     assert_eq!(gauges(w), 5);
-    let five = &w.harness.state().design.as_ref().unwrap().design;
+    let five = &w.session().results.design.as_ref().unwrap().value.design;
     assert!(
         Arc::ptr_eq(&five.simulated, &design.simulated),
         "the simulation is the same one"
     );
     redo_outlives_results(w);
     w.press("Keep this selection");
-    let kept = &w.harness.state().document.state.project.kept;
+    let kept = &w.session().document.state.project.kept;
     let error = |k: usize| {
         kept[k]
             .errors
@@ -198,7 +186,7 @@ fn compare(w: &mut Window, design: &Arc<Design>) {
 
 /// What is computed after an undo is no change of the user's: redo is still there when it has come.
 fn redo_outlives_results(w: &mut Window) {
-    let sensors = |w: &Window| w.harness.state().document.state.project.selection.sensors;
+    let sensors = |w: &Window| w.session().document.state.project.selection.sensors;
     let follow = |w: &mut Window| {
         w.wait("the change to be followed", 300, |s| {
             !s.busy() && s.standing(Stage::Evaluation) == Standing::Current
@@ -208,7 +196,7 @@ fn redo_outlives_results(w: &mut Window) {
     assert_eq!(sensors(w), 10);
     follow(w);
     assert_eq!(gauges(w), 10);
-    assert!(w.harness.state().document.can_redo());
+    assert!(w.session().document.can_redo());
     w.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
     assert_eq!(sensors(w), 5);
     follow(w);
@@ -218,15 +206,7 @@ fn redo_outlives_results(w: &mut Window) {
 /// The place that the workshop cannot reach: a gauge is moved by hand and pinned.
 fn by_hand(w: &mut Window) {
     w.press("Gauges");
-    let sites = w
-        .harness
-        .state()
-        .document
-        .state
-        .project
-        .selection
-        .sites
-        .clone();
+    let sites = w.session().document.state.project.selection.sites.clone();
     // One that lies along a hoop, and along it.
     let along = sites.iter().position(|s| s.direction[2].abs() < 0.3);
     let gauge = along.expect("a gauge on a hoop");
@@ -235,18 +215,18 @@ fn by_hand(w: &mut Window) {
     let to = from + egui::vec2(24.0, 0.0);
     let path: Vec<_> = (0..=10).map(|k| from.lerp(to, k as f32 / 10.0)).collect();
     w.drag(&path);
-    let moved = w.harness.state().document.state.project.selection.sites[gauge].clone();
+    let moved = w.session().document.state.project.selection.sites[gauge].clone();
     assert_ne!(moved, sites[gauge], "the gauge follows the pointer");
     assert_eq!(w.harness.state().picked, [gauge]);
     assert_eq!(gauges(w), sites.len());
     // An estimate at once, the exact figure after it.
     let start = Instant::now();
-    w.wait("an estimate", 20, |s| s.by_hand_error().0.is_some());
+    w.wait("an estimate", 20, |s| s.session.by_hand_error().0.is_some());
     eprintln!("estimate after {:?}", start.elapsed());
     w.wait("the exact error", 120, |s| {
-        s.by_hand_error().1.is_some() && !s.busy()
+        s.session.by_hand_error().1.is_some() && !s.busy()
     });
-    let (Some(quick), Some(exact)) = w.harness.state().by_hand_error() else {
+    let (Some(quick), Some(exact)) = w.session().by_hand_error() else {
         panic!("both are known")
     };
     assert!((quick / exact - 1.0).abs() < 0.5, "{quick} {exact}");
@@ -260,8 +240,7 @@ fn by_hand(w: &mut Window) {
         "the button is over the view, not in it"
     );
     let pins = w
-        .harness
-        .state()
+        .session()
         .document
         .state
         .project
@@ -275,15 +254,15 @@ fn by_hand(w: &mut Window) {
     w.press("Select gauges");
     w.wait("the gauges", 300, |s| !s.busy());
     let at = DVec3::from_array(moved.position_mm);
-    let sites = &w.harness.state().document.state.project.selection.sites;
+    let sites = &w.session().document.state.project.selection.sites;
     let near = |s: &&ChosenSite| DVec3::from_array(s.position_mm).distance(at) < 0.01;
     assert!(sites.iter().any(|s| near(&s)), "{at} among {sites:?}");
 }
 
 /// What is moved by hand is judged by the rules of what was selected: the same set gives the same figure.
 fn judged_alike(w: &Window, by_hand: f64) {
-    let result = w.harness.state().design.as_ref().unwrap();
-    let (inputs, design) = (&result.inputs, &result.design);
+    let result = w.session().results.design.as_ref().unwrap();
+    let (inputs, design) = (&result.value.snapshot, &result.value.design);
     let chosen = design.chosen();
     let judge = |sites: &[usize]| {
         let found =
@@ -312,9 +291,9 @@ fn out(w: &mut Window, home: &std::path::Path) {
     w.type_path(&path);
     w.save_file();
     assert!(
-        !w.harness.state().document.is_dirty(),
+        !w.session().document.is_dirty(),
         "{:?}",
-        w.harness.state().messages
+        w.session().news.messages
     );
     w.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::E);
     let picture = folder.path().join("arm.png");
@@ -335,7 +314,7 @@ fn out(w: &mut Window, home: &std::path::Path) {
     assert!(report.join("report.html").exists() && report.join("sites.csv").exists());
     w.show("9-reported");
     // A change, a crash, and another window.
-    w.harness.state_mut().document.state.project.touch.force_n = 7.5;
+    w.session_mut().document.state.project.touch.force_n = 7.5;
     let start = Instant::now();
     let kept = || {
         std::fs::read_dir(home)
@@ -356,7 +335,7 @@ fn out(w: &mut Window, home: &std::path::Path) {
     again.harness.run_ok();
     again.press("Recover changes");
     again.wait("the changes", 60, |s| !s.busy());
-    let document = &again.harness.state().document;
+    let document = &again.session().document;
     assert_eq!(document.state.project.touch.force_n, 7.5);
     assert_eq!(document.state.project.kept.len(), 3);
     assert_eq!(
@@ -399,7 +378,9 @@ fn an_idle_window_rests() {
     assert!(rests(&mut w) > Duration::from_secs(1));
     let hoop = w.place(31.83, 0.0, 60.0);
     w.click(hoop);
-    w.wait("the touch", 60, |s| s.touched().is_some());
+    w.wait("the touch", 60, |s| {
+        s.session.caches.touching.result().is_some()
+    });
     assert!(rests(&mut w) > Duration::from_secs(1));
 }
 
@@ -421,7 +402,9 @@ fn reviewed_pictures_stay_as_they_are() {
     w.press("Front");
     let hoop = w.place(31.83, 0.0, 60.0);
     w.click(hoop);
-    w.wait("the touch", 60, |s| s.touched().is_some());
+    w.wait("the touch", 60, |s| {
+        s.session.caches.touching.result().is_some()
+    });
     w.harness.remove_cursor();
     reviewed(&mut w, "touch");
 }

@@ -42,7 +42,10 @@ fn a_solid_from_its_faces_to_its_report() {
     let folder = tempfile::tempdir().unwrap();
     w.open_file(&solid_limb(folder.path()), None);
     let state = w.harness.state();
-    assert_eq!(state.document.state.project.part.model, PartModel::Solid);
+    assert_eq!(
+        state.session.document.state.project.part.model,
+        PartModel::Solid
+    );
     measured(&mut w);
     corrected(&mut w);
 
@@ -50,13 +53,17 @@ fn a_solid_from_its_faces_to_its_report() {
     w.press("Touch");
     let hoop = w.place(33.3, 0.0, 60.0);
     w.click(hoop);
-    w.wait("the touch", 120, |s| s.touched().is_some());
-    assert!(w.harness.state().touched().unwrap().largest > 0.0);
+    w.wait("the touch", 120, |s| {
+        s.session.caches.touching.result().is_some()
+    });
+    assert!(w.session().caches.touching.result().unwrap().largest > 0.0);
     w.show("solid-3-touched");
 
     w.press("Select gauges");
-    w.wait("the design", 400, |s| s.design.is_some() && !s.busy());
-    let project = &w.harness.state().document.state.project;
+    w.wait("the design", 400, |s| {
+        s.session.results.design.is_some() && !s.busy()
+    });
+    let project = &w.session().document.state.project;
     assert_eq!(project.selection.sites.len(), 6);
     for site in &project.selection.sites {
         let p = DVec3::from_array(site.position_mm);
@@ -77,12 +84,12 @@ fn a_solid_from_its_faces_to_its_report() {
 fn measured(w: &mut Window) {
     w.press("Front");
     w.key(Modifiers::NONE, Key::F4);
-    let known = |s: &Studio| s.advice().is_some();
+    let known = |s: &Studio| s.session.advice().is_some();
     w.wait("the advice", 120, known);
     w.harness.state_mut().view.field = Field::Faces;
     w.harness.run_ok();
     w.wait("the faces", 60, Studio::shows_field);
-    let advice = w.harness.state().advice().unwrap();
+    let advice = w.session().advice().unwrap();
     assert!((advice.wall_mm[1] - 3.0).abs() < 0.1, "{advice:?}");
     assert_eq!(advice.fits, PartModel::Solid);
     w.show("solid-1-faces");
@@ -100,7 +107,7 @@ fn corrected(w: &mut Window) {
         .map(|k| w.place(33.3, f64::from(k) - 2.0, 60.0))
         .collect();
     w.drag(&path);
-    let known = |s: &Studio| s.advice().is_some() && !s.busy();
+    let known = |s: &Studio| s.session.advice().is_some() && !s.busy();
     w.wait("the faces anew", 120, known);
     w.harness.run_ok();
     assert!(outside(w, place) > 0.0, "the brush says it is inside");
@@ -114,10 +121,10 @@ fn corrected(w: &mut Window) {
 /// Which face the vertex of the part nearest to a place (mm) is on: -1 outside, 1 inside.
 fn side_at(studio: &Studio, place: DVec3) -> f64 {
     use hapdef::mesh::walls::Side;
-    let part = &studio.document.part;
+    let part = &studio.session.document.part;
     let distance = |v: &usize| part.positions()[*v].distance(place / 1000.0);
     let nearest = (0..part.positions().len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
-    let faces = studio.advice().unwrap().faces.as_ref().unwrap();
+    let faces = studio.session.advice().unwrap().faces.as_ref().unwrap();
     match faces.sides[nearest.unwrap()] {
         Side::Outside => -1.0,
         Side::Rim | Side::Frame => 0.0,

@@ -56,7 +56,7 @@ fn blueness(picture: &RgbaImage, center: Pos2, radius: i64) -> f64 {
 
 /// No marker of a gauge, near or far, lies over what is looked at.
 fn without_gauges(w: &mut Window) {
-    let project = &mut w.harness.state_mut().document.state.project;
+    let project = &mut w.session_mut().document.state.project;
     project.selection.sites.clear();
     w.harness.run_ok();
 }
@@ -77,8 +77,10 @@ fn the_limb_is_shown_and_bends_under_a_click() {
         "through the window it is darker: {contrast}"
     );
     w.click(hoop);
-    w.wait("the touch", 60, |s| s.touched().is_some());
-    let touched = w.harness.state().touched().unwrap();
+    w.wait("the touch", 60, |s| {
+        s.session.caches.touching.result().is_some()
+    });
+    let touched = w.session().caches.touching.result().unwrap();
     assert!(
         touched
             .touch
@@ -144,33 +146,36 @@ fn from_the_limb_to_the_report() {
     w.press("Simulate");
     w.wait("the simulation", 120, |s| !s.busy());
     assert!(
-        w.harness.state().messages.is_empty(),
+        w.session().news.messages.is_empty(),
         "{:?}",
-        w.harness.state().messages
+        w.session().news.messages
     );
     let sites = w
-        .harness
-        .state()
+        .session()
+        .results
         .simulation
         .as_ref()
         .unwrap()
+        .value
         .simulated
         .dataset
         .sites
         .len();
     assert_eq!(sites, 3039);
-    w.wait("the filters", 10, |s| s.feasibility.is_some());
-    let selection = &mut w.harness.state_mut().document.state.project.selection;
+    w.wait("the filters", 10, |s| {
+        s.session.results.feasibility.is_some()
+    });
+    let selection = &mut w.session_mut().document.state.project.selection;
     (selection.sensors, selection.compare) = (5, true);
     w.harness.run_ok();
     w.press("Select gauges");
     w.wait("the selection", 300, |s| !s.busy());
     assert!(
-        w.harness.state().messages.is_empty(),
+        w.session().news.messages.is_empty(),
         "{:?}",
-        w.harness.state().messages
+        w.session().news.messages
     );
-    let design = &w.harness.state().design.as_ref().unwrap().design;
+    let design = &w.session().results.design.as_ref().unwrap().value.design;
     assert_eq!(design.chosen().len(), 5);
     assert!(
         design
@@ -209,11 +214,13 @@ fn from_the_limb_to_the_report() {
     let target = folder.path().join("report");
     w.type_path(&target);
     w.press("Export");
-    w.wait("the export", 60, |s| !s.busy() && !s.messages.is_empty());
+    w.wait("the export", 60, |s| {
+        !s.busy() && !s.session.news.messages.is_empty()
+    });
     assert!(
         target.join("report.html").exists(),
         "{:?}",
-        w.harness.state().messages
+        w.session().news.messages
     );
     assert!(hapdef::io::project_file::load(&target.join("design.hapdef.toml")).is_ok());
 }
@@ -221,23 +228,23 @@ fn from_the_limb_to_the_report() {
 #[test]
 fn a_job_can_be_cancelled_and_bad_files_change_nothing() {
     let mut w = Window::open();
-    w.harness.state_mut().document.state.project.budget.quality = Quality::Standard;
+    w.session_mut().document.state.project.budget.quality = Quality::Standard;
     w.harness.run_ok();
     w.press("Simulate");
     w.wait("the job to report", 30, hapdef::studio::Studio::busy);
     w.press("Cancel: Simulate (draft)");
     w.wait("the cancelled job", 60, |s| !s.busy());
-    assert!(w.harness.state().simulation.is_none());
-    let ended = w.harness.state().ended_jobs();
+    assert!(w.session().results.simulation.is_none());
+    let ended = w.session().jobs.ended();
     assert!(ended.iter().any(|e| e.how == "cancelled"), "{ended:?}");
     let folder = tempfile::tempdir().unwrap();
     let bad = folder.path().join("bad.glb");
     std::fs::write(&bad, b"glTF nonsense").unwrap();
-    let before = w.harness.state().document.inputs();
+    let before = w.session().document.inputs();
     w.open_file(&bad, None);
     let error = w
-        .harness
-        .state()
+        .session()
+        .news
         .messages
         .iter()
         .find(|m| m.error)
@@ -245,30 +252,29 @@ fn a_job_can_be_cancelled_and_bad_files_change_nothing() {
         .text
         .clone();
     assert!(error.contains("bad.glb"), "{error}");
-    assert_eq!(w.harness.state().document.state.project, before.project);
+    assert_eq!(w.session().document.state.project, before.project);
     // A part that nothing holds says so, and the window lives on.
-    w.harness
-        .state_mut()
-        .document
-        .state
-        .project
-        .supports
-        .clear();
+    w.session_mut().document.state.project.supports.clear();
     w.harness.run_ok();
     w.press("Simulate");
     w.wait("the refusal", 60, |s| {
-        !s.busy() && s.messages.iter().any(|m| m.text.contains("support"))
+        !s.busy()
+            && s.session
+                .news
+                .messages
+                .iter()
+                .any(|m| m.text.contains("support"))
     });
 }
 
 #[test]
 fn results_survive_saving_and_undo_is_not_mistaken_for_them() {
     let mut w = Window::open();
-    let key = w.harness.state().document.simulation_key();
+    let key = w.session().document.simulation_inputs(Quality::Draft);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("elsewhere.hapdef.toml");
-    w.harness.state_mut().document.state.project.part.mesh = "other/limb.glb".into();
-    assert_eq!(w.harness.state().document.simulation_key(), key);
+    w.session_mut().document.state.project.part.mesh = "other/limb.glb".into();
+    assert_eq!(w.session().document.simulation_inputs(Quality::Draft), key);
     // A brush finer than the mesh leaves its mark and does not forbid everything in silence.
     w.press("Front");
     w.press("Paint");
@@ -284,13 +290,13 @@ fn results_survive_saving_and_undo_is_not_mistaken_for_them() {
     w.type_path(&path);
     w.save_file();
     assert!(
-        w.harness
-            .state()
+        w.session()
+            .news
             .messages
             .iter()
             .any(|m| m.error && m.text.contains("limb.glb"))
     );
-    assert!(w.harness.state().document.is_dirty());
+    assert!(w.session().document.is_dirty());
     assert_eq!(
         std::fs::read(folder.path().join("limb.glb")).unwrap(),
         b"mine"
@@ -313,25 +319,22 @@ fn a_saved_project_opens_again() {
     w.type_path(&path);
     w.save_file();
     assert!(
-        !w.harness.state().document.is_dirty(),
+        !w.session().document.is_dirty(),
         "{:?}",
-        w.harness.state().messages
+        w.session().news.messages
     );
-    w.harness.state_mut().document.clear(Layer::Feasible);
+    w.session_mut().document.clear(Layer::Feasible);
     w.open_file(&path, None);
     assert_eq!(
         w.painted(),
         Some(painted),
         "{:?}",
-        w.harness.state().messages
+        w.session().news.messages
     );
 }
 
-#[test]
-fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
-    let mut w = Window::open();
-    // Two plates, the smaller one with a hole.
-    let folder = tempfile::tempdir().unwrap();
+/// Two plates, the smaller one with a hole.
+fn two_plates() -> String {
     let mut obj = String::new();
     let mut base = 0;
     for (size, n, hole) in [(80.0, 8, false), (40.0, 8, true)] {
@@ -357,27 +360,44 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
         }
         base += (n + 1) * (n + 1);
     }
+    obj
+}
+
+#[test]
+fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
+    let mut w = Window::open();
+    let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("two.obj");
-    std::fs::write(&path, obj).unwrap();
+    std::fs::write(&path, two_plates()).unwrap();
     w.open_file(&path, Some(hapdef::project::Unit::Millimetre));
-    let said = &w.harness.state().messages[0].text;
+    let said = &w.session().news.messages[0].text;
     assert!(said.contains("body 0 of 2"), "{said}");
-    let triangles = |w: &Window| w.harness.state().document.part.triangles().len();
+    let triangles = |w: &Window| w.session().document.part.triangles().len();
     assert_eq!(triangles(&w), 128);
-    let part = &mut w.harness.state_mut().document.state.project.part;
+    let part = &mut w.session_mut().document.state.project.part;
     part.body = 1;
     part.fill_holes_mm = 10.0;
     w.harness.run_ok();
     // Nothing is computed on one part and labelled as another.
     w.press("Simulate");
     let state = w.harness.state();
-    assert!(!state.busy() && state.messages.last().unwrap().text.contains("read again"));
+    assert!(
+        !state.busy()
+            && state
+                .session
+                .news
+                .messages
+                .last()
+                .unwrap()
+                .text
+                .contains("read again")
+    );
     w.stage("Part");
     w.press("Read the mesh again");
     w.wait("the mesh", 60, |s| !s.busy());
-    assert!(w.harness.state().document.is_dirty());
+    assert!(w.session().document.is_dirty());
     assert_eq!(triangles(&w), 128, "126 and the two that fill the hole");
-    let document = &w.harness.state().document;
+    let document = &w.session().document;
     assert_eq!(document.repairs.filled_holes, 1);
     let (_, upper) = document.part.bounds();
     assert!((upper.x - 0.04).abs() < 1e-9 && !document.asks_for_another_part());
@@ -389,35 +409,35 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
     w.stage("Supports and material");
     w.press("Paint a support");
     assert_eq!(w.harness.state().view.layer, Layer::Support);
-    let document = &mut w.harness.state_mut().document;
+    let document = &mut w.session_mut().document;
     document.dab(Layer::Support, Brush::Paint, at, 0.02);
     document.settle();
     w.harness.run_ok();
-    let state = &w.harness.state().document.state;
+    let state = &w.session().document.state;
     assert_eq!(
         state.project.supports[0].vertices.as_deref(),
         Some("support-1")
     );
     assert!(state.painted.is_none() && state.masks.contains_key("support-1"));
-    w.harness.state_mut().document.state.project.budget.quality = Quality::Draft;
+    w.session_mut().document.state.project.budget.quality = Quality::Draft;
     w.press("Simulate");
     w.wait("the simulation", 120, |s| !s.busy());
-    assert!(w.harness.state().simulation.is_some());
+    assert!(w.session().results.simulation.is_some());
     // The quality, the stroke, and the support itself.
     for _ in 0..3 {
-        w.harness.state_mut().document.undo();
+        w.session_mut().document.undo();
     }
-    assert!(w.harness.state().document.state.project.supports.is_empty());
+    assert!(w.session().document.state.project.supports.is_empty());
 }
 
 #[test]
 fn the_palette_reaches_every_command() {
     let mut window = Window::open();
     let painted = |w: &Window| {
-        let mask = w.harness.state().document.state.painted.clone();
+        let mask = w.session().document.state.painted.clone();
         mask.map(|m| m.iter().filter(|&&m| m).count())
     };
-    let vertices = window.harness.state().document.part.positions().len();
+    let vertices = window.session().document.part.positions().len();
     for (letters, expected) in [
         ("invert", Some(0)),
         ("fill painted", Some(vertices)),
@@ -453,7 +473,7 @@ fn what_was_not_saved_is_offered_again() {
     window.harness.run_ok();
     assert!(!asks(&window), "nothing was left yet");
     {
-        let document = &mut window.harness.state_mut().document;
+        let document = &mut window.session_mut().document;
         document.state.project.selection.sensors = 7;
         document.invert(Layer::Feasible);
         document.shrink(Layer::Feasible, 0.0);
@@ -474,7 +494,7 @@ fn what_was_not_saved_is_offered_again() {
     assert!(asks(&window));
     window.press("Recover changes");
     window.wait("the changes", 60, |s| !s.busy());
-    let document = &window.harness.state().document;
+    let document = &window.session().document;
     assert_eq!(document.state.project.selection.sensors, 7);
     assert!(document.state.painted.as_ref().unwrap().iter().all(|&m| m));
     assert!(document.is_dirty() && document.bundled && document.path.is_none());
@@ -495,18 +515,22 @@ fn simulated() -> Window {
     let mut w = Window::open();
     w.press("Simulate");
     w.wait("the simulation", 120, |s| !s.busy());
-    w.wait("the filters", 20, |s| s.feasibility.is_some());
+    w.wait("the filters", 20, |s| {
+        s.session.results.feasibility.is_some()
+    });
     w
 }
 
 fn gauges(w: &Window) -> Vec<hapdef::project::ChosenSite> {
-    let project = &w.harness.state().document.state.project;
+    let project = &w.session().document.state.project;
     project.selection.sites.clone()
 }
 
 fn expected(w: &mut Window) -> f64 {
-    w.wait("what is expected", 60, |s| s.expected_error().is_some());
-    w.harness.state().expected_error().unwrap()
+    w.wait("what is expected", 60, |s| {
+        s.session.expected_error().is_some()
+    });
+    w.session().expected_error().unwrap()
 }
 
 #[test]
@@ -542,8 +566,10 @@ fn the_expected_error_and_its_map_follow_the_hand() {
     let again = expected(&mut w);
     assert!((again / before - 1.0).abs() < 0.02, "{again} {before}");
     w.click_label("Confusions");
-    w.wait("the confusions", 60, |s| s.worst_confusions().is_some());
-    let pairs = w.harness.state().worst_confusions().unwrap();
+    w.wait("the confusions", 60, |s| {
+        s.session.worst_confusions().is_some()
+    });
+    let pairs = w.session().worst_confusions().unwrap();
     if !pairs.is_empty() {
         let target = w.harness.state().view.camera.target;
         w.click_label("Confusion 1");
@@ -599,7 +625,7 @@ fn offers(w: &Window, role: egui::Role, name: &str) -> bool {
 
 /// Changes what is asked of the choice, as one step.
 fn ask(w: &mut Window, how: impl FnOnce(&mut SelectionKeys)) {
-    let document = &mut w.harness.state_mut().document;
+    let document = &mut w.session_mut().document;
     how(&mut document.state.project.selection);
     document.settle();
     w.harness.run_ok();
@@ -644,7 +670,7 @@ fn losses_exchange_and_starts_are_offered_where_they_are_heeded() {
     assert!(offers(&w, lost.0, lost.1));
     w.assert_named("the losses");
     // As the rows beside them, they change the project and are undone.
-    let keys = |w: &Window| w.harness.state().document.state.project.selection.clone();
+    let keys = |w: &Window| w.session().document.state.project.selection.clone();
     let ticks = w.harness.get_by_role_and_label(exchange.0, exchange.1);
     ticks.click();
     w.harness.run_ok();

@@ -264,20 +264,20 @@ fn the_dial_turns_in_the_window() {
             .query_by_label("Error against time of all measured settings")
             .is_some()
     );
-    assert!(w.harness.state().predicted(Quality::Draft).is_some());
+    assert!(w.session().predicted(Quality::Draft).is_some());
     w.assert_named("the tab Trade");
     // A setting of the front, from the table.
-    let before = w.harness.state().document.state.project.clone();
+    let before = w.session().document.state.project.clone();
     w.harness
         .get_all_by_label_contains("Use ")
         .next()
         .unwrap()
         .click_accesskit();
     w.harness.run_ok();
-    let applied = w.harness.state().document.state.project.clone();
+    let applied = w.session().document.state.project.clone();
     assert!(!applied.budget.limits.are_none() && !applied.selection.compare);
     w.key(egui::Modifiers::COMMAND, egui::Key::Z);
-    assert_eq!(w.harness.state().document.state.project, before);
+    assert_eq!(w.session().document.state.project, before);
     // A click on a point of the plot, wherever one is first met.
     let figure = w
         .harness
@@ -287,20 +287,19 @@ fn the_dial_turns_in_the_window() {
     let places = across.flat_map(|x| (0..24).map(move |y| egui::vec2(x, y as f32 / 23.0)));
     for place in places {
         w.click(figure.min + figure.size() * place);
-        if w.harness.state().document.state.project != before {
+        if w.session().document.state.project != before {
             break;
         }
     }
-    let clicked = w.harness.state().document.state.project.clone();
+    let clicked = w.session().document.state.project.clone();
     assert!(clicked != before && clicked.budget != before.budget);
     w.key(egui::Modifiers::COMMAND, egui::Key::Z);
     // The dial: the quickest there is, at once.
-    let ctx = w.harness.ctx.clone();
-    w.harness.state_mut().ask_for(&ctx, Asked::OfTheBest(1e3));
+    w.session_mut().ask_for(Asked::OfTheBest(1e3));
     w.wait("the answer", 120, |s| {
         !s.busy() && s.standing(Stage::Evaluation) == Standing::Current
     });
-    let promise = w.harness.state().promise().unwrap().clone();
+    let promise = w.session().promise().unwrap().clone();
     assert!(promise.achieved_s > 0.0 && promise.predicted_s > 0.0);
     // The same setting: the same error, but for rounding on another processor.
     assert!(
@@ -310,18 +309,18 @@ fn the_dial_turns_in_the_window() {
     w.click_label("Trade");
     w.show("trade-answered");
     let said = w
-        .harness
-        .state()
+        .session()
+        .news
         .messages
         .iter()
         .any(|m| m.text.starts_with("Set to "));
     assert!(said);
     // No time at all.
-    w.harness.state_mut().ask_for(&ctx, Asked::Within(0.0));
+    w.session_mut().ask_for(Asked::Within(0.0));
     w.harness.run_ok();
     let refused = w
-        .harness
-        .state()
+        .session()
+        .news
         .messages
         .iter()
         .any(|m| m.text.contains("answers as quickly"));
@@ -335,10 +334,10 @@ fn a_trade_is_measured_in_the_window_and_kept() {
     let project = small(folder.path());
     w.open_file(Path::new(&project), None);
     let home = folder.path().join("trades");
-    w.harness.state_mut().keep_trades_in(&home);
+    w.session_mut().keep_trades_in(&home);
     w.harness.run_ok();
     w.click_label("Trade");
-    assert!(w.harness.state().predicted(Quality::Draft).is_none());
+    assert!(w.session().predicted(Quality::Draft).is_none());
     w.press("Measure the trade");
     let files = || std::fs::read_dir(&home).map_or(0, Iterator::count);
     w.wait("the first point", 240, |_| files() == 1);

@@ -18,7 +18,7 @@ use window::Window;
 
 /// Changes the project as a control would.
 fn change(w: &mut Window, how: impl FnOnce(&mut Project)) {
-    let document = &mut w.harness.state_mut().document;
+    let document = &mut w.session_mut().document;
     how(&mut document.state.project);
     document.settle();
 }
@@ -37,7 +37,7 @@ fn until_it_stands(w: &mut Window) -> Tally {
         assert!(
             start.elapsed().as_secs() < 300,
             "timed out: {:?}",
-            w.harness.state().messages
+            w.session().news.messages
         );
         w.harness.step();
         std::thread::sleep(Duration::from_millis(5));
@@ -98,7 +98,7 @@ fn a_change_costs_only_what_depends_on_it() {
 
     // The painted region: what it leaves is chosen from and judged anew, on the truth and with the model's readings of
     // the new gauges; elements are not laid.
-    w.harness.state_mut().document.fill(Layer::Feasible);
+    w.session_mut().document.fill(Layer::Feasible);
     change(&mut w, |p| p.feasible.support_clearance_mm += 1.0);
     let painted = until_it_stands(&mut w);
     assert_eq!(painted.factorizations, 2, "the region: {painted:?}");

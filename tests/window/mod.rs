@@ -11,6 +11,7 @@ use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use glam::DVec3;
 use hapdef::budget::Quality;
 use hapdef::cli;
+use hapdef::session::Session;
 use hapdef::studio::Studio;
 use image::RgbaImage;
 
@@ -47,6 +48,16 @@ impl Window {
         Self { harness }
     }
 
+    /// The open project and what was computed of it.
+    pub fn session(&self) -> &Session {
+        &self.harness.state().session
+    }
+
+    /// The same, to be changed as from the outside.
+    pub fn session_mut(&mut self) -> &mut Session {
+        &mut self.harness.state_mut().session
+    }
+
     /// Presses “Save file” and waits until it is done, or refused.
     pub fn save_file(&mut self) {
         self.press("Save file");
@@ -69,8 +80,7 @@ impl Window {
 
     /// Opens a file and waits until it is there, or was refused.
     pub fn open_file(&mut self, path: &Path, unit: Option<hapdef::project::Unit>) {
-        let ctx = self.harness.ctx.clone();
-        self.harness.state_mut().open_path(&ctx, path, unit);
+        self.harness.state_mut().session.open_path(path, unit);
         self.wait("the file", 60, |s| !s.busy());
     }
 
@@ -91,7 +101,7 @@ impl Window {
             assert!(
                 start.elapsed().as_secs() < seconds,
                 "timed out waiting for {what}: {:?}",
-                self.harness.state().messages
+                self.harness.state().session.news.messages
             );
             self.harness.step();
             std::thread::sleep(Duration::from_millis(5));
@@ -159,7 +169,14 @@ impl Window {
     }
 
     pub fn painted(&self) -> Option<usize> {
-        let mask = self.harness.state().document.state.painted.as_ref()?;
+        let mask = self
+            .harness
+            .state()
+            .session
+            .document
+            .state
+            .painted
+            .as_ref()?;
         Some(mask.iter().filter(|&&m| m).count())
     }
 }

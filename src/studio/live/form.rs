@@ -4,32 +4,39 @@ use egui::{ComboBox, DragValue, RichText, TextEdit, Ui};
 
 use super::super::form::{choice, number, percentage, rows};
 use super::super::{Command, Studio, theme};
-use super::known::{LEAST, WANTED};
 use crate::board::{ChannelFault, Illness};
-use crate::link::{State, ports};
+use crate::link::{PortInfo, State, ports};
 use crate::live::Estimator;
 use crate::project::{FORCE_OFF, LiveKeys, PLACE_OFF};
+use crate::session::{LEAST_KNOWN, WANTED_KNOWN};
+
+/// What is typed at the live stage.
+#[derive(Default)]
+pub(in super::super) struct LiveForm {
+    port: String,
+    ports: Vec<PortInfo>,
+    pub record_to: String,
+}
 
 impl Studio {
     pub(in super::super) fn live_form(&mut self, ui: &mut Ui) {
         self.board_form(ui);
-        if self.live.is_connected() {
+        if self.session.live.is_connected() {
             self.connected_form(ui);
         }
-        let gauges = self.document.state.project.selection.sites.len();
-        let live = &mut self.document.state.project.live;
+        let gauges = self.session.document.state.project.selection.sites.len();
+        let live = &mut self.session.document.state.project.live;
         rows(ui, "Measurement", |ui| measurement(ui, live));
         ui.collapsing("Channels of the gauges", |ui| channels(ui, live, gauges));
         ui.collapsing("Known touches", |ui| self.known_form(ui));
     }
 
     fn board_form(&mut self, ui: &mut Ui) {
-        let ctx = ui.ctx().clone();
         let mut connect = false;
         rows(ui, "Board", |ui| {
             let name = ui.label("Port");
             ui.horizontal(|ui| {
-                let field = TextEdit::singleline(&mut self.live.port)
+                let field = TextEdit::singleline(&mut self.live_form.port)
                     .desired_width(130.0)
                     .hint_text("port, host:port or file");
                 let field = ui.add(field).labelled_by(name.id);
@@ -39,7 +46,7 @@ impl Studio {
             ui.end_row();
             let name = ui.label("Baud");
             ui.add(
-                DragValue::new(&mut self.live.baud)
+                DragValue::new(&mut self.session.desk.baud)
                     .range(300..=4_000_000)
                     .speed(100.0),
             )
@@ -49,7 +56,7 @@ impl Studio {
             ui.label("");
             connect |= ui
                 .add_enabled(
-                    !self.live.port.trim().is_empty(),
+                    !self.live_form.port.trim().is_empty(),
                     egui::Button::new("Connect"),
                 )
                 .on_hover_text(
@@ -59,8 +66,8 @@ impl Studio {
             ui.end_row();
         });
         if connect {
-            let port = self.live.port.clone();
-            self.connect(&ctx, &port);
+            let port = self.live_form.port.clone();
+            self.session.connect(&port);
         }
         self.button(ui, Command::SimulatedBoard);
         self.button(ui, Command::Disconnect);
@@ -72,10 +79,10 @@ impl Studio {
             .selected_text("")
             .width(20.0);
         let answer = shown.show_ui(ui, |ui| {
-            if self.live.ports.is_empty() {
+            if self.live_form.ports.is_empty() {
                 ui.weak("No port was found");
             }
-            for port in &self.live.ports {
+            for port in &self.live_form.ports {
                 let text = format!("{}  {}", port.path, port.product);
                 let text = if port.likely {
                     RichText::new(text).strong()
@@ -83,10 +90,10 @@ impl Studio {
                     RichText::new(text)
                 };
                 if ui
-                    .selectable_label(self.live.port == port.path, text)
+                    .selectable_label(self.live_form.port == port.path, text)
                     .clicked()
                 {
-                    self.live.port.clone_from(&port.path);
+                    self.live_form.port.clone_from(&port.path);
                 }
             }
         });
@@ -95,7 +102,7 @@ impl Studio {
             .accessible_name("Ports")
             .on_hover_text("Ports of this machine, the likeliest board first");
         if opened.clicked() {
-            self.live.ports = ports();
+            self.live_form.ports = ports();
         }
     }
 
@@ -106,7 +113,7 @@ impl Studio {
             Some(colour) => text.color(colour),
             None => text,
         });
-        let said = self.live.look(|feed| {
+        let said = self.session.live.look(|feed| {
             let hello = feed.hello.as_ref()?;
             Some(format!(
                 "{}, {} channels of {} bits, gain {}",
@@ -123,10 +130,11 @@ impl Studio {
 
     /// How the connection stands.
     pub(in super::super) fn live_in_words(&self) -> (String, Option<egui::Color32>) {
-        if self.live.wish.is_some() {
+        if self.session.live.is_preparing() {
             return ("Making the model of the gauges …".into(), None);
         }
         let (state, taring, tared, trouble) = self
+            .session
             .live
             .look(|f| (f.state.clone(), f.taring, f.tared, f.trouble.clone()))
             .unwrap_or_default();
@@ -153,11 +161,11 @@ impl Studio {
         ui.add_space(4.0);
         ui.horizontal(|ui| {
             self.button(ui, Command::Tare);
-            if self.live.hosted.is_some() {
+            if self.session.live.simulated_board().is_some() {
                 self.faults(ui);
             }
         });
-        let mut estimator = self.live.estimator;
+        let mut estimator = self.session.desk.estimator;
         rows(ui, "Touch", |ui| {
             let help = "Model matching needs no training and says how sure it is; the others learn from the model first";
             choice(
@@ -169,18 +177,18 @@ impl Studio {
                 help,
             );
             ui.label("");
-            ui.checkbox(&mut self.live.compare, "Compare all")
+            ui.checkbox(&mut self.session.desk.compare, "Compare all")
                 .on_hover_text("Show what the others say too");
             ui.end_row();
         });
-        if estimator != self.live.estimator {
-            self.show_estimator(estimator);
+        if estimator != self.session.desk.estimator {
+            self.session.show_estimator(estimator);
         }
         self.recording_form(ui);
     }
 
     fn faults(&mut self, ui: &mut Ui) {
-        let Some(hosted) = &self.live.hosted else {
+        let Some(hosted) = self.session.live.simulated_board() else {
             return;
         };
         let now = hosted.seconds();
@@ -220,28 +228,27 @@ impl Studio {
     }
 
     fn recording_form(&mut self, ui: &mut Ui) {
-        let recording = self.live.look(|f| f.recording.clone()).flatten();
+        let recording = self.session.live.look(|f| f.recording.clone()).flatten();
         rows(ui, "Recording", |ui| {
             let name = ui.label("File");
-            let field = TextEdit::singleline(&mut self.live.record_to)
+            let field = TextEdit::singleline(&mut self.live_form.record_to)
                 .desired_width(150.0)
                 .hint_text("touches.hapdrec");
             ui.add(field).labelled_by(name.id);
             ui.end_row();
         });
-        let ctx = ui.ctx().clone();
         ui.horizontal(|ui| {
             let name = if recording.is_some() { "Stop recording" } else { "Record" };
             if ui.button(name).on_hover_text(Command::Record.tooltip()).clicked() {
-                self.toggle_recording();
+                self.session.toggle_recording(&self.live_form.record_to);
             }
-            let last = self.live.recorded.clone().filter(|_| recording.is_none());
+            let last = self.session.live.recorded.clone().filter(|_| recording.is_none());
             let table = egui::Button::new("Write a table");
             let help = "The last recording as .csv beside it: counts, touches, and the truth of a simulated board";
             if ui.add_enabled(last.is_some(), table).on_hover_text(help).clicked()
                 && let Some(path) = last
             {
-                self.write_table(&ctx, &path);
+                self.session.write_table(&path);
             }
         });
         if let Some(recording) = recording {
@@ -255,51 +262,19 @@ impl Studio {
         }
     }
 
-    /// Begins to record, or ends it.
-    pub(in super::super) fn toggle_recording(&mut self) {
-        if self.live.look(|f| f.recording.is_some()) == Some(true) {
-            self.stop_recording();
-        } else {
-            let path = self.recording_path();
-            self.record(&path);
-        }
-    }
-
-    /// Where the recording goes: as typed, with the ending, or a new name beside the project.
-    fn recording_path(&self) -> std::path::PathBuf {
-        let typed = self.live.record_to.trim();
-        let folder = self
-            .document
-            .path
-            .as_ref()
-            .and_then(|p| p.parent())
-            .map_or_else(std::env::temp_dir, std::path::Path::to_path_buf);
-        if !typed.is_empty() {
-            return folder.join(typed).with_extension(crate::link::ENDING);
-        }
-        let free = |n: &usize| {
-            !folder
-                .join(format!("touches-{n}.{}", crate::link::ENDING))
-                .exists()
-        };
-        let number = (1..10_000).find(free).unwrap_or(1);
-        folder.join(format!("touches-{number}.{}", crate::link::ENDING))
-    }
-
     fn known_form(&mut self, ui: &mut Ui) {
         ui.add(egui::Label::new("Press where the limb shows a cross, as hard as it says here, and take it. The gauges then show how they are really glued.").wrap());
-        let ctx = ui.ctx().clone();
         rows(ui, "Next touch", |ui| {
             number(
                 ui,
                 "Force",
-                &mut self.live.known_force,
+                &mut self.session.desk.known_force_n,
                 0.1..=100.0,
                 0.1,
                 " N",
                 "That the next known touch is pressed with",
             );
-            let hand = &mut self.document.state.project.calibration;
+            let hand = &mut self.session.document.state.project.calibration;
             number(
                 ui,
                 "Place off",
@@ -319,26 +294,32 @@ impl Studio {
                 "How much too hard or too soft a known touch is pressed (standard deviation)",
             );
         });
-        let (count, connected) = (self.live.known.len(), self.live.is_connected());
-        ui.label(format!("{count} known touches of {WANTED}"));
+        let (count, connected) = (
+            self.session.live.known_touches(),
+            self.session.live.is_connected(),
+        );
+        ui.label(format!("{count} known touches of {WANTED_KNOWN}"));
         ui.horizontal(|ui| {
-            let waiting = self.live.gathering.at.is_some() || self.live.gathering.from_board;
+            let (waiting, _) = self.session.live.is_gathering();
             if ui
                 .add_enabled(connected && !waiting, egui::Button::new("Take this press"))
                 .clicked()
             {
-                self.take_known();
+                self.session.take_known();
             }
             if ui
-                .add_enabled(connected && count >= LEAST, egui::Button::new("Calibrate"))
+                .add_enabled(
+                    connected && count >= LEAST_KNOWN,
+                    egui::Button::new("Calibrate"),
+                )
                 .clicked()
             {
-                self.start_calibration(&ctx);
+                self.session.start_calibration();
             }
         });
-        if self.live.hosted.is_some() {
+        if self.session.live.simulated_board().is_some() {
             let help = "The next touches of the simulated board, whose places and forces are known";
-            let waiting = self.live.gathering.from_board;
+            let (_, waiting) = self.session.live.is_gathering();
             if ui
                 .add_enabled(
                     !waiting,
@@ -347,10 +328,10 @@ impl Studio {
                 .on_hover_text(help)
                 .clicked()
             {
-                self.calibrate_from_board();
+                self.session.calibrate_from_board();
             }
         }
-        let live = &mut self.document.state.project.live;
+        let live = &mut self.session.document.state.project.live;
         if !live.glued.is_empty() {
             ui.label(format!(
                 "Calibrated: still off by about {:.1} %",

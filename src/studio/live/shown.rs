@@ -8,9 +8,9 @@ use glam::DVec3;
 use super::super::overlay::label;
 use super::super::viewport::Pane;
 use super::super::{Stage, Studio, theme};
-use super::feed::{Feed, STRIPS_S, Strip};
 use crate::inference::Contact;
 use crate::live::{Estimator, Health};
+use crate::session::{Feed, STRIPS_S, Strip};
 
 /// Of the estimators, apart for colour-blind eyes too.
 const COLOURS: [Color32; 3] = [
@@ -29,21 +29,27 @@ fn colour(estimator: Estimator) -> Color32 {
 impl Studio {
     pub(in super::super) fn paint_live(&self, painter: &Painter, pane: Pane) {
         self.paint_proposed(painter, pane);
-        let Ok(feed) = self.live.feed.lock() else {
-            return;
-        };
+        self.session
+            .live
+            .look(|feed| self.paint_heard(painter, pane, feed));
+    }
+
+    fn paint_heard(&self, painter: &Painter, pane: Pane, feed: &Feed) {
         let Some(update) = &feed.update else {
             return;
         };
-        self.paint_trail(painter, pane, &feed);
+        self.paint_trail(painter, pane, feed);
         if let Some((place, _)) = feed.truth
             && let Some(at) = self.view.place_in(pane, place)
         {
             painter.circle_stroke(at, 9.0, Stroke::new(1.5, Color32::WHITE));
         }
         for estimator in Estimator::ALL {
-            let shown = estimator == self.live.estimator;
-            let Some(guess) = update.by(estimator).filter(|_| shown || self.live.compare) else {
+            let shown = estimator == self.session.desk.estimator;
+            let Some(guess) = update
+                .by(estimator)
+                .filter(|_| shown || self.session.desk.compare)
+            else {
                 continue;
             };
             let Some(at) = self.view.place_in(pane, guess.position) else {
@@ -83,7 +89,7 @@ impl Studio {
         const FULL: f64 = 30.0;
         const LENGTH: f64 = 0.22;
         let (on, _) = self.view.index.nearest(place);
-        let normal = self.document.part.normal(on);
+        let normal = self.session.document.part.normal(on);
         let share = 0.25 + 0.75 * (force / FULL).clamp(0.0, 1.0);
         let length = LENGTH * share * self.view.camera.distance;
         let ends = [place, place + normal * length].map(|p| self.view.place(p));
@@ -93,7 +99,7 @@ impl Studio {
         painter.arrow(tail, tip - tail, Stroke::new(4.0, Color32::BLACK));
         painter.arrow(tail, tip - tail, Stroke::new(2.5, colour));
         let mut text = format!("{force:.1} N");
-        if let Some(c) = contact.filter(|_| self.live.estimator == Estimator::Matching) {
+        if let Some(c) = contact.filter(|_| self.session.desk.estimator == Estimator::Matching) {
             let _ = write!(
                 text,
                 " ± {:.1} · ± {:.1} mm",
@@ -122,7 +128,7 @@ impl Studio {
             let (sin, cos) = (std::f64::consts::TAU * k as f64 / POINTS as f64).sin_cos();
             let place = contact.position + a * cos + b * sin;
             let (at, away) = self.view.index.nearest(place);
-            let shown = (away < near).then(|| self.document.part.point(at))?;
+            let shown = (away < near).then(|| self.session.document.part.point(at))?;
             self.view.place_in(pane, shown)
         };
         let points: Vec<Option<egui::Pos2>> = (0..=POINTS).map(on_surface).collect();
@@ -163,9 +169,10 @@ impl Studio {
 
     /// Where the next known touch is to be pressed.
     fn paint_proposed(&self, painter: &Painter, pane: Pane) {
-        let shown =
-            self.stage == Stage::Live && self.live.is_connected() && self.live.hosted.is_none();
-        let Some(place) = shown.then(|| self.proposed_touch()).flatten() else {
+        let shown = self.stage == Stage::Live
+            && self.session.live.is_connected()
+            && self.session.live.simulated_board().is_none();
+        let Some(place) = shown.then(|| self.session.proposed_touch()).flatten() else {
             return;
         };
         if let Some(at) = self.view.place_in(pane, place) {
@@ -179,28 +186,31 @@ impl Studio {
     /// Strips of all gauges with their health, and how the line does.
     pub(in super::super) fn live_tab(&mut self, ui: &mut Ui) {
         let (words, warning) = self.live_in_words();
-        let Ok(feed) = self.live.feed.lock() else {
-            return;
-        };
-        ui.horizontal_wrapped(|ui| {
-            let words = RichText::new(words).strong();
-            ui.label(warning.map_or(words.clone(), |c| words.color(c)));
-            facts(ui, &feed);
+        let compare = self.session.desk.compare;
+        self.session.live.look(|feed| {
+            heard(ui, feed, RichText::new(words).strong(), warning, compare);
         });
-        if self.live.compare {
-            compared(ui, &feed);
-        }
-        let gauges = feed.health.len();
-        if gauges == 0 {
-            drop(feed);
-            ui.add_space(8.0);
-            ui.weak("Start a simulated board or connect one at the stage “Live”, and every gauge is drawn here");
-            return;
-        }
-        let (rect, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::hover());
-        response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, "Strains of the gauges"));
-        strips(ui.painter(), rect, &feed, ui.visuals().weak_text_color());
     }
+}
+
+/// How the line does and what every estimator says, over the strips.
+fn heard(ui: &mut Ui, feed: &Feed, words: RichText, warning: Option<Color32>, compare: bool) {
+    ui.horizontal_wrapped(|ui| {
+        ui.label(warning.map_or(words.clone(), |c| words.color(c)));
+        facts(ui, feed);
+    });
+    if compare {
+        compared(ui, feed);
+    }
+    let gauges = feed.health.len();
+    if gauges == 0 {
+        ui.add_space(8.0);
+        ui.weak("Start a simulated board or connect one at the stage “Live”, and every gauge is drawn here");
+        return;
+    }
+    let (rect, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, "Strains of the gauges"));
+    strips(ui.painter(), rect, feed, ui.visuals().weak_text_color());
 }
 
 /// Rate, losses, delay, touch.

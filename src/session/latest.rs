@@ -4,29 +4,29 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use egui::Context;
+use super::wake::Wake;
 
 /// An answer, or why there is none in the user's terms.
-pub(super) type Reply<A> = Result<A, String>;
+pub type Reply<A> = Result<A, String>;
 
-/// The window's end.
-pub(super) struct Latest<Q, A> {
+/// The end of whoever asks.
+pub struct Latest<Q, A> {
     questions: Sender<Q>,
     replies: Receiver<Reply<A>>,
 }
 
 /// The thread's end.
-pub(super) struct Desk<Q, A> {
+pub struct Desk<Q, A> {
     inbox: Receiver<Q>,
     outbox: Sender<Reply<A>>,
-    ctx: Context,
+    wake: Wake,
 }
 
 impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
     /// `serve` answers questions from the one it is given on, keeps what they share, and returns the first that needs
     /// something else; nothing where nobody asks any more. Where it breaks, `broken` is said.
     pub fn start(
-        ctx: &Context,
+        wake: &Wake,
         broken: &'static str,
         serve: fn(Q, &Desk<Q, A>) -> Option<Q>,
     ) -> Self {
@@ -35,7 +35,7 @@ impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
         let desk = Desk {
             inbox,
             outbox,
-            ctx: ctx.clone(),
+            wake: wake.clone(),
         };
         std::thread::spawn(move || {
             let mut next = desk.wait();
@@ -63,9 +63,9 @@ impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
 
 impl<Q, A> Desk<Q, A> {
     pub fn answer(&self, reply: Reply<A>) {
-        // Nobody listens any more when the window was closed meanwhile.
+        // Nobody listens any more when the session was closed meanwhile.
         let _ = self.outbox.send(reply);
-        self.ctx.request_repaint();
+        self.wake.now();
     }
 
     /// The latest question, this one where none is newer.
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn what_is_shared_changes_with_the_question_and_a_panic_ends_nothing() {
-        let worker = Latest::start(&Context::default(), "broken", serve);
+        let worker = Latest::start(&Wake::default(), "broken", serve);
         for question in [11, 12, 27, 21] {
             assert!(worker.ask(question));
             assert_eq!(next(&worker), Ok((question / 10, question)));
@@ -127,7 +127,7 @@ mod tests {
         let desk = Desk {
             inbox,
             outbox,
-            ctx: Context::default(),
+            wake: Wake::default(),
         };
         assert_eq!(desk.latest(1), 1);
         for question in [2, 3, 4] {

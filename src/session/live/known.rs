@@ -2,15 +2,12 @@
 
 use std::sync::Arc;
 
-use egui::Context;
 use glam::DVec3;
 
-use super::super::Studio;
-use super::super::drive::Finished;
-use super::super::jobs::Task;
-use super::Brought;
 use crate::design::Sensing;
 use crate::inference::{Calibration, Known, calibrate};
+use crate::job::Reporter;
+use crate::session::{Session, Task};
 use crate::uncertainty::{Pressing, Uncertainty};
 
 /// How many are proposed, and how many a calibration takes at least.
@@ -35,9 +32,10 @@ pub struct Gathering {
     last_us: u64,
 }
 
-impl Studio {
+impl Session {
     /// Where the next known touch is proposed (m).
-    pub(super) fn proposed_touch(&self) -> Option<DVec3> {
+    #[must_use]
+    pub fn proposed_touch(&self) -> Option<DVec3> {
         let places = &self.sensing()?.proposed;
         let touch = places.get(self.live.known.len() % places.len().max(1))?;
         Some(touch.position)
@@ -66,7 +64,7 @@ impl Studio {
     }
 
     /// Takes in what is read meanwhile.
-    pub(super) fn gather_known(&mut self, ctx: &Context) {
+    pub(super) fn gather_known(&mut self) {
         let Some(sensing) = self.sensing().map(Arc::clone) else {
             return;
         };
@@ -84,18 +82,17 @@ impl Studio {
             self.live.gathering.rows.push(strain);
             if self.live.gathering.rows.len() >= FRAMES {
                 self.live.gathering.at = None;
-                let force = self.live.known_force;
+                let force = self.desk.known_force_n;
                 self.keep_known(&sensing, at, force);
             }
         } else if self.live.gathering.from_board {
-            self.gather_from_board(ctx, &sensing, strain, truth);
+            self.gather_from_board(&sensing, strain, truth);
         }
     }
 
     /// A touch whose force stands still is read as long as it does; each once.
     fn gather_from_board(
         &mut self,
-        ctx: &Context,
         sensing: &Sensing,
         strain: Vec<f64>,
         truth: Option<(DVec3, f64)>,
@@ -121,7 +118,7 @@ impl Studio {
         self.keep_known(sensing, place, force);
         if self.live.known.len() >= WANTED {
             self.live.gathering.from_board = false;
-            self.start_calibration(ctx);
+            self.start_calibration();
         }
     }
 
@@ -135,7 +132,7 @@ impl Studio {
     }
 
     /// Fits how the gauges are glued.
-    pub(super) fn start_calibration(&mut self, ctx: &Context) {
+    pub fn start_calibration(&mut self) {
         let Some(sensing) = self.sensing().map(Arc::clone) else {
             return;
         };
@@ -153,14 +150,13 @@ impl Studio {
         if self.live.gathering.exact {
             off.pressing = Pressing::EXACT;
         }
-        self.jobs
-            .start(ctx, Task::Calibrate, self.sensing_key(), move |_| {
-                let found = calibrate(&sensing.drawn, &known, &noise, &off);
-                Ok(Finished::Live(Box::new(Brought::Calibrated(found))))
-            });
+        let work = move |_: &Reporter| Ok(calibrate(&sensing.drawn, &known, &noise, &off));
+        self.start_sensing(Task::Calibrate, work, |s, _, found| {
+            s.take_calibration(&found);
+        });
     }
 
-    pub(super) fn take_calibration(&mut self, found: &Calibration) {
+    fn take_calibration(&mut self, found: &Calibration) {
         self.document.state.project.live.take(found);
         self.tell(format!(
             "Calibrated with {} known touches; what is still off is about {:.1} % of a reading",

@@ -2,10 +2,12 @@
 
 use glam::DVec3;
 
+use super::Session;
 use super::latest::{Desk, Latest};
+use super::slot::Slot;
 use crate::budget::unwatched;
 use crate::design::{self, DesignError, Inputs};
-use crate::document::Document;
+use crate::document::ModelInputs;
 use crate::elasticity::observe::{Face, Observer};
 use crate::elasticity::{Model, Touch};
 use crate::mesh::locate::SurfaceIndex;
@@ -24,7 +26,6 @@ pub struct Touched {
     pub exaggeration: Option<f64>,
     /// The part as it is shown, to be pointed at.
     pub index: SurfaceIndex,
-    key: String,
 }
 
 /// How large the largest displacement is drawn, as a share of the limb.
@@ -43,7 +44,7 @@ fn exaggeration(part: &TriMesh, largest: f64) -> Option<f64> {
 }
 
 struct Request {
-    key: String,
+    model: ModelInputs,
     inputs: Inputs,
     touch: Touch,
 }
@@ -52,77 +53,81 @@ const BROKEN: &str = "An internal error stopped this touch. Please report it";
 
 /// The touch that is shown, and the worker that computes it.
 #[derive(Default)]
-pub(super) struct Touching {
-    worker: Option<Latest<Request, Touched>>,
-    waiting: usize,
-    result: Option<Touched>,
-    /// Counts results, so that the view knows when to build its fields anew.
+pub struct Touching {
+    worker: Option<Latest<Request, Slot<ModelInputs, Touched>>>,
+    waiting: bool,
+    result: Option<Slot<ModelInputs, Touched>>,
+    /// Counts results, so that whoever draws them knows when to do so anew.
     pub version: u64,
 }
 
 impl Touching {
-    /// Applies a touch of the project's force; the answer comes later.
-    pub fn apply(&mut self, ctx: &egui::Context, document: &Document, at: SurfacePoint) {
-        let project = &document.state.project;
+    /// The touch that is shown.
+    #[must_use]
+    pub fn result(&self) -> Option<&Touched> {
+        self.result.as_ref().map(|slot| &slot.value)
+    }
+
+    /// Whether one is being computed.
+    #[must_use]
+    pub fn is_waiting(&self) -> bool {
+        self.waiting
+    }
+
+    fn show(&mut self, result: Option<Slot<ModelInputs, Touched>>) {
+        self.result = result;
+        self.version += 1;
+    }
+}
+
+impl Session {
+    /// Presses the part with the project's force; the answer comes later.
+    pub fn press(&mut self, at: SurfacePoint) {
+        let project = &self.document.state.project;
         let (force, tip_radius) = project.tip();
         let request = Request {
-            key: document.model_key(),
-            inputs: document.inputs(),
+            model: self.document.model_inputs(),
+            inputs: self.document.inputs(),
             touch: Touch {
-                position: document.part.point(at),
-                normal: document.part.normal(at),
+                position: self.document.part.point(at),
+                normal: self.document.part.normal(at),
                 force,
                 tip_radius,
             },
         };
-        let worker = (self.worker).get_or_insert_with(|| Latest::start(ctx, BROKEN, serve));
-        if worker.ask(request) {
-            self.waiting += 1;
-        }
+        let touching = &mut self.caches.touching;
+        let worker = touching
+            .worker
+            .get_or_insert_with(|| Latest::start(&self.wake, BROKEN, serve));
+        touching.waiting |= worker.ask(request);
     }
 
-    pub fn result(&self) -> Option<&Touched> {
-        self.result.as_ref()
+    /// Shows no touch any more.
+    pub fn let_go(&mut self) {
+        self.caches.touching.show(None);
     }
 
-    pub fn is_waiting(&self) -> bool {
-        self.waiting > 0
-    }
-
-    pub fn clear(&mut self) {
-        self.result = None;
-        self.version += 1;
-    }
-
-    /// Takes in answers; an error in the user's terms comes back.
-    pub fn collect(&mut self, document: &Document) -> Option<String> {
-        let mut error = None;
-        if let Some(worker) = &self.worker {
-            for reply in worker.answers() {
-                self.waiting = 0;
-                match reply {
-                    Ok(touched) => {
-                        self.result = Some(touched);
-                        self.version += 1;
-                    }
-                    Err(message) => error = Some(message),
-                }
+    /// Takes in what the worker has answered.
+    pub(super) fn collect_touches(&mut self) {
+        let touching = &mut self.caches.touching;
+        let answers: Vec<_> = touching.worker.iter().flat_map(Latest::answers).collect();
+        for answer in answers {
+            touching.waiting = false;
+            match answer {
+                Ok(touched) => touching.show(Some(touched)),
+                Err(message) => self.news.complain(message),
             }
         }
-        // What was computed for another part or support no longer shows this one.
-        if self
-            .result
-            .as_ref()
-            .is_some_and(|r| r.key != document.model_key())
-        {
-            self.clear();
+        // What was computed for another support or material no longer shows this part.
+        let stale = |slot: &Slot<_, _>| !slot.holds_for(&self.document.model_inputs());
+        if touching.result.as_ref().is_some_and(stale) {
+            touching.show(None);
         }
-        error
     }
 }
 
 /// Answers requests on one model; returns the first that needs another.
-fn serve(first: Request, desk: &Desk<Request, Touched>) -> Option<Request> {
+fn serve(first: Request, desk: &Desk<Request, Slot<ModelInputs, Touched>>) -> Option<Request> {
     let model = match build(&first.inputs) {
         Ok(model) => model,
         Err(error) => {
@@ -132,15 +137,18 @@ fn serve(first: Request, desk: &Desk<Request, Touched>) -> Option<Request> {
     };
     let vertices = design::carry(model.index(), &first.inputs.part);
     let observer = model.observer(&vertices, Face::Inside);
-    let key = first.key.clone();
+    let model_inputs = first.model.clone();
     let mut request = first;
     loop {
         // Only the latest touch matters.
         request = desk.latest(request);
-        if request.key != key {
+        if request.model != model_inputs {
             return Some(request);
         }
-        desk.answer(Ok(solve(&*model, &observer, &request)));
+        desk.answer(Ok(Slot {
+            inputs: model_inputs.clone(),
+            value: solve(&*model, &observer, &request),
+        }));
         request = desk.wait()?;
     }
 }
@@ -176,6 +184,5 @@ fn solve(model: &dyn Model, observer: &Observer, request: &Request) -> Touched {
         index: SurfaceIndex::of(shown, part.triangles()),
         displacement,
         strain,
-        key: request.key.clone(),
     }
 }

@@ -1,0 +1,342 @@
+//! What each result depends on, as plain data: equal inputs give equal results.
+//!
+//! A document has one part from its beginning to its end, so that none of them names it. Masks are shared: comparing
+//! those that nobody has painted on since costs nothing.
+
+use std::sync::Arc;
+
+use super::{Document, Layer};
+use crate::budget::{Limits, Quality};
+use crate::dataset::{Signal, Site};
+use crate::evaluation::Judging;
+use crate::io::trade_file::without_knobs;
+use crate::placement::SelectorKind;
+use crate::project::{
+    CalibrationKeys, CandidateKeys, ChosenSite, EvaluationKeys, FeasibleKeys, GaugeKeys,
+    GaussianProcessKeys, MaterialKeys, Part, Project, SelectionKeys, SiteKeys, SupportKeys,
+    ToleranceKeys, TouchKeys,
+};
+
+/// The vertices of a mask, where there is one.
+type Mask = Option<Arc<Vec<bool>>>;
+
+/// The supports, with what the masks they name hold.
+type Held = Vec<(SupportKeys, Mask)>;
+
+/// What the elastic model alone depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelInputs {
+    /// Without the path of its mesh: saving under another name changes nothing that was computed.
+    part: Part,
+    material: MaterialKeys,
+    held: Held,
+}
+
+/// What a simulation depends on beside what gauges report: its elements, sites and touches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ElementInputs {
+    model: ModelInputs,
+    /// Without how hard touches come, which is for whoever chooses and judges: signals grow with the force. Nor is any
+    /// touch simulated with another tip.
+    touch: TouchKeys,
+    region: Option<Mask>,
+    sites: SiteKeys,
+    quality: Quality,
+    seed: u64,
+    limits: Limits,
+    /// A region that is not there cannot be computed with.
+    keep_out_missing: bool,
+}
+
+/// What a simulation depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulationInputs {
+    pub elements: ElementInputs,
+    signal: Signal,
+    directions: usize,
+}
+
+/// What the verdicts of the filters depend on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilterInputs {
+    pub simulation: SimulationInputs,
+    /// Without how far off gauges are glued, or drift: that decides nothing of where they can go.
+    gauge: GaugeKeys,
+    feasible: FeasibleKeys,
+    painted: Mask,
+    keep_out: Option<Mask>,
+}
+
+/// What the candidates depend on, and the Gaussian process over them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReductionInputs {
+    pub filter: FilterInputs,
+    candidates: CandidateKeys,
+    sensors: usize,
+    with_noise: bool,
+    gaussian_process: GaussianProcessKeys,
+}
+
+/// What the selections depend on: everything that is asked for, but neither the answer nor which selector's answer is
+/// shown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SelectionInputs {
+    pub reduction: ReductionInputs,
+    asked: SelectionKeys,
+    /// One selector knows how hard touches come, and how far off gauges are glued and drift.
+    known: Option<([f64; 2], ToleranceKeys, f64)>,
+}
+
+/// What a whole design depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DesignInputs {
+    pub selection: SelectionInputs,
+    evaluation: EvaluationKeys,
+    tolerance: ToleranceKeys,
+    drift_microstrain: f64,
+    calibration: CalibrationKeys,
+    tip_tolerance_mm: f64,
+    /// One estimator knows how hard anybody presses.
+    judging: Judging,
+}
+
+/// What is painted on all layers, and what is held.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PaintInputs {
+    layers: [Mask; 6],
+    held: Held,
+}
+
+/// What a measured trade of speed against accuracy holds for: everything but its knobs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TradeInputs {
+    project: Project,
+    paint: PaintInputs,
+}
+
+/// What is known of the part's walls depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WallInputs {
+    thickness_mm: f64,
+    tip_radius_mm: f64,
+    reach_mm: f64,
+    quality: Quality,
+    limits: Limits,
+    touches: usize,
+    inside: Mask,
+    outside: Mask,
+}
+
+/// What the error that is expected of gauges is asked of: the simulation, and what is said of gauges and touches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExpectedInputs {
+    pub simulation: SimulationInputs,
+    gauge: GaugeKeys,
+    touch: TouchKeys,
+    largest_force_n: f64,
+    /// Gauges off the lattice are of one design alone.
+    off_lattice: Vec<Site>,
+}
+
+/// What the model of the gauges that live touch works with depends on: the simulation's inputs, and how the gauges are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensingInputs {
+    simulation: SimulationInputs,
+    sites: Vec<ChosenSite>,
+    grid_mm: [f64; 2],
+    tolerance: ToleranceKeys,
+    tip_tolerance_mm: f64,
+    drift_microstrain: f64,
+}
+
+impl Document {
+    fn mask(&self, name: &str) -> Mask {
+        self.state.masks.get(name).cloned()
+    }
+
+    fn held(&self) -> Held {
+        let mask = |s: &SupportKeys| self.mask(s.vertices.as_ref()?);
+        let supports = &self.state.project.supports;
+        supports.iter().map(|s| (s.clone(), mask(s))).collect()
+    }
+
+    /// What the elastic model depends on now.
+    #[must_use]
+    pub fn model_inputs(&self) -> ModelInputs {
+        let project = &self.state.project;
+        ModelInputs {
+            part: Part {
+                mesh: String::new(),
+                ..project.part.clone()
+            },
+            material: project.material.clone(),
+            held: self.held(),
+        }
+    }
+
+    /// What the elements, sites and touches of a quality depend on now.
+    #[must_use]
+    pub fn element_inputs(&self, quality: Quality) -> ElementInputs {
+        let p = &self.state.project;
+        let keep_out = p.feasible.keep_out.as_ref();
+        let usual = TouchKeys::default();
+        ElementInputs {
+            model: self.model_inputs(),
+            touch: TouchKeys {
+                forces_n: usual.forces_n,
+                tip_tolerance_mm: usual.tip_tolerance_mm,
+                ..p.touch.clone()
+            },
+            region: p.touch.region.as_ref().map(|name| self.mask(name)),
+            sites: p.sites.clone(),
+            quality,
+            seed: p.budget.seed,
+            limits: p.budget.limits_at(quality),
+            keep_out_missing: keep_out.is_some_and(|name| !self.state.masks.contains_key(name)),
+        }
+    }
+
+    /// What a simulation of a quality, which need not be the project's, depends on now.
+    #[must_use]
+    pub fn simulation_inputs(&self, quality: Quality) -> SimulationInputs {
+        let gauge = &self.state.project.gauge;
+        SimulationInputs {
+            elements: self.element_inputs(quality),
+            signal: gauge.signal,
+            directions: gauge.directions,
+        }
+    }
+
+    /// What the filters' verdicts on the simulation of a quality depend on now.
+    #[must_use]
+    pub fn filter_inputs(&self, quality: Quality) -> FilterInputs {
+        let p = &self.state.project;
+        FilterInputs {
+            simulation: self.simulation_inputs(quality),
+            gauge: GaugeKeys {
+                tolerance: ToleranceKeys::default(),
+                drift_microstrain: GaugeKeys::default().drift_microstrain,
+                ..p.gauge.clone()
+            },
+            feasible: p.feasible.clone(),
+            painted: self.state.painted.clone(),
+            keep_out: p.feasible.keep_out.as_ref().map(|name| self.mask(name)),
+        }
+    }
+
+    /// What the candidates of a quality depend on now.
+    #[must_use]
+    pub fn reduction_inputs(&self, quality: Quality) -> ReductionInputs {
+        let p = &self.state.project;
+        ReductionInputs {
+            filter: self.filter_inputs(quality),
+            candidates: p.candidates.clone(),
+            sensors: p.selection.sensors,
+            with_noise: p.selection.with_noise,
+            gaussian_process: p.selection.gaussian_process.clone(),
+        }
+    }
+
+    /// What the selections of a quality depend on now.
+    #[must_use]
+    pub fn selection_inputs(&self, quality: Quality) -> SelectionInputs {
+        let p = &self.state.project;
+        // Where all of them choose, another in the lead changes nothing.
+        let selector = if p.selection.compare {
+            SelectorKind::default()
+        } else {
+            p.selection.selector
+        };
+        let knows = p.selectors().contains(&SelectorKind::ExpectedError);
+        let known = (
+            p.touch.forces_n,
+            p.gauge.tolerance,
+            p.gauge.drift_microstrain,
+        );
+        SelectionInputs {
+            reduction: self.reduction_inputs(quality),
+            asked: SelectionKeys {
+                sites: Vec::new(),
+                selector,
+                ..p.selection.clone()
+            },
+            known: knows.then_some(known),
+        }
+    }
+
+    /// What a design of a quality depends on now.
+    #[must_use]
+    pub fn design_inputs(&self, quality: Quality) -> DesignInputs {
+        let p = &self.state.project;
+        DesignInputs {
+            selection: self.selection_inputs(quality),
+            evaluation: p.evaluation.clone(),
+            tolerance: p.gauge.tolerance,
+            drift_microstrain: p.gauge.drift_microstrain,
+            calibration: p.calibration,
+            tip_tolerance_mm: p.touch.tip_tolerance_mm,
+            judging: p.judging(),
+        }
+    }
+
+    /// What is painted, and what is held, now.
+    #[must_use]
+    pub fn paint_inputs(&self) -> PaintInputs {
+        PaintInputs {
+            layers: Layer::ALL.map(|layer| self.layer(layer).cloned()),
+            held: self.held(),
+        }
+    }
+
+    /// What a measured trade holds for now.
+    #[must_use]
+    pub fn trade_inputs(&self) -> TradeInputs {
+        TradeInputs {
+            project: without_knobs(&self.state.project),
+            paint: self.paint_inputs(),
+        }
+    }
+
+    /// What is known of the walls depends on now.
+    #[must_use]
+    pub fn wall_inputs(&self) -> WallInputs {
+        let p = &self.state.project;
+        WallInputs {
+            thickness_mm: p.part.thickness_mm,
+            tip_radius_mm: p.touch.tip_radius_mm,
+            reach_mm: p.touch.reach_mm,
+            quality: p.budget.quality,
+            limits: p.budget.limits,
+            touches: p.touch.count,
+            inside: self.layer(Layer::Inside).cloned(),
+            outside: self.layer(Layer::Outside).cloned(),
+        }
+    }
+
+    /// What is expected of gauges on a simulation of a quality, with some sites off its lattice, depends on now.
+    #[must_use]
+    pub fn expected_inputs(&self, quality: Quality, off_lattice: &[Site]) -> ExpectedInputs {
+        let p = &self.state.project;
+        ExpectedInputs {
+            simulation: self.simulation_inputs(quality),
+            gauge: p.gauge.clone(),
+            touch: p.touch.clone(),
+            largest_force_n: p.live.largest_force_n,
+            off_lattice: off_lattice.to_vec(),
+        }
+    }
+
+    /// What the model of the gauges depends on now.
+    #[must_use]
+    pub fn sensing_inputs(&self) -> SensingInputs {
+        let p = &self.state.project;
+        SensingInputs {
+            simulation: self.simulation_inputs(p.budget.quality),
+            sites: p.selection.sites.clone(),
+            grid_mm: [p.gauge.grid_length_mm, p.gauge.grid_width_mm],
+            tolerance: p.gauge.tolerance,
+            tip_tolerance_mm: p.touch.tip_tolerance_mm,
+            drift_microstrain: p.gauge.drift_microstrain,
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Fields over the part that take a while to compute.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::Session;
+use super::jobs::Task;
+use super::results::DesignMark;
+use super::slot::Slot;
+use crate::design::Simulated;
+use crate::job::Reporter;
+
+/// Which field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FieldKind {
+    /// The error (mm) that the design was found to make.
+    Error,
+    /// The share of the variance that the gauges leave.
+    Uncertainty,
+}
+
+/// What a field was computed from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FieldInputs {
+    kind: FieldKind,
+    design: DesignMark,
+    /// Gauges (m), where it depends on where they are now.
+    gauges: Vec<DVec3>,
+}
+
+/// The last field, a vertex of the part.
+pub type FieldSlot = Option<Slot<FieldInputs, Arc<Vec<f64>>>>;
+
+impl Session {
+    /// A field, a vertex of the part: until it is computed, the last of its kind. Nothing without a design.
+    pub fn field(&mut self, kind: FieldKind) -> Option<Arc<Vec<f64>>> {
+        let vertices = self.document.part.positions().len();
+        let inputs = FieldInputs {
+            kind,
+            design: self.results.design_mark()?,
+            gauges: match kind {
+                FieldKind::Error => Vec::new(),
+                FieldKind::Uncertainty => self.gauge_places(),
+            },
+        };
+        let last = self.caches.field.as_ref();
+        let last = last.filter(|f| f.inputs.kind == kind && f.value.len() == vertices);
+        let value = last.map(|f| Arc::clone(&f.value));
+        if last.is_some_and(|f| f.holds_for(&inputs)) || !self.jobs.is_new(Task::Field, &inputs) {
+            return value;
+        }
+        self.start_field(inputs, vertices);
+        value
+    }
+
+    fn start_field(&mut self, inputs: FieldInputs, vertices: usize) {
+        let Some(design) = (self.results.design.as_ref()).map(|d| Arc::clone(&d.value.design))
+        else {
+            return;
+        };
+        if design.simulated.carried.len() != vertices {
+            return;
+        }
+        let (kind, gauges) = (inputs.kind, inputs.gauges.clone());
+        let work = move |_: &Reporter| {
+            // On the mesh that was computed on, whose size has a limit, and carried from there.
+            let mesh = &design.simulated.mesh;
+            let map = match kind {
+                FieldKind::Error => design.error_map(mesh),
+                FieldKind::Uncertainty => design.uncertainty_map(mesh, &gauges),
+            };
+            let map = map.unwrap_or_else(|| vec![0.0; mesh.positions().len()]);
+            let carried = design.simulated.carried.iter();
+            let values = carried.map(|&at| mesh.interpolate(&map, at)).collect();
+            Ok(Arc::new(values))
+        };
+        self.jobs
+            .start(Task::Field, inputs, work, |s, inputs, value| {
+                s.caches.field = Some(Slot { inputs, value });
+            });
+    }
+
+    /// Carries values of the simulation's sites to the part's vertices, by the sites' places in their triangles.
+    #[must_use]
+    pub fn carried_from_sites(&self, values: &[f64]) -> Vec<f64> {
+        let vertices = self.document.part.positions().len();
+        self.results.simulation.as_ref().map_or_else(
+            || vec![0.0; vertices],
+            |simulation| carried(&simulation.value.simulated, values),
+        )
+    }
+}
+
+/// Carries values of a simulation's sites to the part's vertices, by the sites' places in their triangles.
+fn carried(simulated: &Simulated, values: &[f64]) -> Vec<f64> {
+    let mesh = &simulated.mesh;
+    let (mut sum, mut weight) = (
+        vec![0.0; mesh.positions().len()],
+        vec![0.0; mesh.positions().len()],
+    );
+    for (at, value) in simulated.points.iter().zip(values) {
+        for (v, w) in mesh.triangles()[at.triangle as usize]
+            .into_iter()
+            .zip(at.barycentric)
+        {
+            sum[v as usize] += w * value;
+            weight[v as usize] += w;
+        }
+    }
+    // On a mesh finer than the sites some vertices have none beside them: take the neighbours'.
+    for _ in 0..4 {
+        let (old_sum, old_weight) = (sum.clone(), weight.clone());
+        for edge in mesh.edges() {
+            for (a, b) in [(edge.a, edge.b), (edge.b, edge.a)] {
+                if old_weight[a as usize] == 0.0 && old_weight[b as usize] > 0.0 {
+                    sum[a as usize] += old_sum[b as usize] / old_weight[b as usize];
+                    weight[a as usize] += 1.0;
+                }
+            }
+        }
+    }
+    let values: Vec<f64> = sum
+        .iter()
+        .zip(&weight)
+        .map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 })
+        .collect();
+    let places = simulated.carried.iter();
+    places.map(|&at| mesh.interpolate(&values, at)).collect()
+}

@@ -1,0 +1,116 @@
+//! Selections that are kept: named, with what was known of them, and taken again.
+
+use glam::DVec3;
+
+use super::Session;
+use super::gauges::BY_HAND;
+use crate::evaluation::Evaluation;
+use crate::placement::SelectorKind;
+use crate::project::{Kept, KeptError, KeptFailure};
+
+/// A selector's name as read by people.
+#[must_use]
+pub fn chooser_title(selector: &str) -> &str {
+    let kind = SelectorKind::ALL.into_iter().find(|k| k.name() == selector);
+    kind.map_or("By hand", SelectorKind::title)
+}
+
+impl Session {
+    /// Keeps the gauges as they are, with what is known of them; the name that they go by.
+    pub fn keep(&mut self) -> Option<String> {
+        let project = &self.document.state.project;
+        let sites = project.selection.sites.clone();
+        if sites.is_empty() {
+            self.complain("There are no gauges to keep yet. Press “Select gauges” first");
+            return None;
+        }
+        let cost = sites
+            .iter()
+            .map(|s| self.cost_of(DVec3::from_array(s.position_mm)))
+            .sum();
+        let designed = self.as_designed() && self.design_holds() == Some(true);
+        let known = self.knows_hand();
+        let (selector, evaluation, seconds): (_, Option<&Evaluation>, f64) =
+            match self.results.design.as_ref().map(|d| &d.value) {
+                Some(d) if designed => {
+                    let name = d.design.lead.name();
+                    let stage = format!("select {name}");
+                    let took = d.design.seconds.iter().find(|s| s.stage == stage);
+                    (
+                        name,
+                        Some(&d.design.evaluation),
+                        took.map_or(0.0, |s| s.seconds),
+                    )
+                }
+                _ if known => (BY_HAND, self.caches.by_hand.exact().map(|e| &**e), 0.0),
+                _ => (BY_HAND, None, 0.0),
+            };
+        let quality = (self.results.design.as_ref()).map_or(self.quality(), |d| d.value.quality);
+        let kept = Kept {
+            name: self.free_name(&format!(
+                "{}, {} gauges",
+                chooser_title(selector),
+                sites.len()
+            )),
+            selector: selector.into(),
+            quality,
+            cost,
+            seconds: (seconds * 10.0).round() / 10.0,
+            sites,
+            errors: evaluation.map_or_else(Vec::new, |e| errors_of(e, selector)),
+            failures: evaluation.map_or_else(Vec::new, |e| failures_of(e, selector)),
+        };
+        let name = kept.name.clone();
+        self.document.state.project.kept.push(kept);
+        self.document.settle();
+        Some(name)
+    }
+
+    fn cost_of(&self, at_mm: DVec3) -> f64 {
+        let costs = self.document.state.project.selection.costs.iter().rev();
+        { costs }
+            .find(|c| c.contains(at_mm))
+            .map_or(1.0, |c| c.cost)
+    }
+
+    fn free_name(&self, wanted: &str) -> String {
+        let taken = |name: &str| {
+            self.document
+                .state
+                .project
+                .kept
+                .iter()
+                .any(|k| k.name == name)
+        };
+        let numbered = (2..).map(|k| format!("{wanted} ({k})"));
+        let mut names = std::iter::once(wanted.to_owned()).chain(numbered);
+        names.find(|n| !taken(n)).unwrap_or_default()
+    }
+}
+
+fn errors_of(evaluation: &Evaluation, selector: &str) -> Vec<KeptError> {
+    let rows = evaluation.rows.iter().filter(|r| r.selector == selector);
+    let round = |x: f64| (x * 1e4).round() / 1e4;
+    rows.map(|r| KeptError {
+        region: r.region.clone(),
+        sensors: r.sensors,
+        mean_mm: round(r.error_mm),
+        median_mm: round(r.median_mm),
+        p95_mm: round(r.p95_mm),
+    })
+    .collect()
+}
+
+fn failures_of(evaluation: &Evaluation, selector: &str) -> Vec<KeptFailure> {
+    let sets = evaluation
+        .failures
+        .iter()
+        .filter(|f| f.selector == selector);
+    sets.flat_map(|set| &set.rows)
+        .map(|r| KeptFailure {
+            failed: r.failed,
+            retrained: r.retrained,
+            mean_mm: (r.error_mm * 1e4).round() / 1e4,
+        })
+        .collect()
+}

@@ -1,0 +1,53 @@
+//! The estimators that learn from touches of the model.
+
+use std::sync::Arc;
+
+use crate::budget::{Watch, report};
+use crate::design::{DesignError, Inputs, Sensing};
+use crate::inference::{Features, Lessons, Trained};
+use crate::regression::Hyper;
+
+/// The trained estimators: normalized, raw.
+pub type Pair = [Option<Arc<Trained>>; 2];
+
+/// Both trained estimators (normalized, raw) on touches of the model, evenly spread, with forces from half a
+/// newton to the hardest of the paper.
+pub fn train(
+    sensing: &Sensing,
+    inputs: &Inputs,
+    used: &[bool],
+    noise: f64,
+    count: usize,
+    watch: Watch,
+) -> Result<Pair, DesignError> {
+    const JITTER: f64 = 0.03;
+    report(watch, "Training", 0, 3)?;
+    let lesson = sensing.lessons(inputs, count, inputs.project.budget.seed)?;
+    let lessons = Lessons {
+        x: &lesson.x,
+        places_mm: &lesson.places_mm,
+        forces: &lesson.forces,
+        used,
+        noise,
+        jitter: JITTER,
+        seed: inputs.project.budget.seed,
+    };
+    let keys = &inputs.project.selection;
+    let hyper = Hyper {
+        c: keys.c_mm,
+        epsilon: keys.epsilon_mm,
+        gamma: keys.gamma,
+    };
+    report(watch, "Training", 1, 3)?;
+    let normalized = Trained::train(Features::Normalized, &lessons, &hyper);
+    report(watch, "Training", 2, 3)?;
+    let raw = Trained::train(
+        Features::Raw,
+        &Lessons {
+            jitter: 0.0,
+            ..lessons
+        },
+        &hyper,
+    );
+    Ok([Some(Arc::new(normalized)), Some(Arc::new(raw))])
+}

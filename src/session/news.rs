@@ -1,0 +1,61 @@
+//! What a session has to say, and what has happened in it that whoever shows it may want to follow.
+
+use std::path::PathBuf;
+
+/// Something to tell the user that stays until it is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Message {
+    pub text: String,
+    pub error: bool,
+}
+
+/// Something that has happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// Another project is open; a file that it came from, and whether that was what had been kept aside.
+    Opened {
+        file: Option<PathBuf>,
+        recovered: bool,
+    },
+    Saved(PathBuf),
+    /// The first design of the project is there.
+    Designed,
+    /// Other gauges have taken the place of those that were there.
+    GaugesReplaced,
+    /// This gauge was found or added, by its number from zero.
+    GaugeFound(usize),
+    /// A board is being listened to.
+    Connected,
+}
+
+/// Messages until they are read, and events until they are taken.
+#[derive(Debug, Default)]
+pub struct News {
+    pub messages: Vec<Message>,
+    events: Vec<Event>,
+}
+
+impl News {
+    pub fn tell(&mut self, text: impl Into<String>) {
+        self.messages.push(Message {
+            text: text.into(),
+            error: false,
+        });
+    }
+
+    pub fn complain(&mut self, text: impl Into<String>) {
+        self.messages.push(Message {
+            text: text.into(),
+            error: true,
+        });
+    }
+
+    pub(super) fn happened(&mut self, event: Event) {
+        self.events.push(event);
+    }
+
+    /// What has happened since the last call, in its order.
+    pub fn take_events(&mut self) -> Vec<Event> {
+        std::mem::take(&mut self.events)
+    }
+}

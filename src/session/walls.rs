@@ -1,0 +1,40 @@
+//! Shell or solid: what was measured of the part's walls.
+
+use std::sync::Arc;
+
+use super::Session;
+use super::drive::stop;
+use super::jobs::Task;
+use super::slot::{Slot, current};
+use crate::design::{self, Advice};
+use crate::document::WallInputs;
+use crate::job::Reporter;
+
+/// What was measured of the walls.
+pub type Walls = Option<Slot<WallInputs, Arc<Advice>>>;
+
+impl Session {
+    /// What is known of the part as it is, if it was measured.
+    #[must_use]
+    pub fn advice(&self) -> Option<&Arc<Advice>> {
+        current(self.caches.walls.as_ref(), &self.document.wall_inputs())
+    }
+
+    /// Measures the walls in the background, unless that is under way.
+    pub fn measure_walls(&mut self) {
+        let inputs = self.document.wall_inputs();
+        if self.jobs.runs_on(Task::Advise, &inputs) {
+            return;
+        }
+        let snapshot = self.document.inputs();
+        let work = move |r: &Reporter| {
+            let watch = |progress| r.report(progress);
+            let advice = design::advise(&snapshot, &watch).map_err(|e| stop(&e))?;
+            Ok(Arc::new(advice))
+        };
+        self.jobs
+            .start(Task::Advise, inputs, work, |s, inputs, value| {
+                s.caches.walls = Some(Slot { inputs, value });
+            });
+    }
+}
