@@ -172,7 +172,8 @@ mod tests {
 
     use super::*;
     use crate::budget::unwatched;
-    use crate::elasticity::{Freedoms, Material, Region, Support};
+    use crate::elasticity::support::Region;
+    use crate::elasticity::{Freedoms, Material, Support};
     use crate::mesh::TriMesh;
     use crate::mesh::oriented_box::OrientedBox;
 
