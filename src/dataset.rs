@@ -1,20 +1,23 @@
 //! What every site reports under every touch, and where the touches were.
 
+mod site;
 mod slopes;
 mod survey;
-
-use std::f64::consts::PI;
 
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::budget::{Cancelled, Watch, Work};
-use crate::elasticity::observe::{Face, Observer, SiteFrame, along};
+use crate::elasticity::observe::{Face, along};
 use crate::elasticity::respond::{Reading, respond};
 use crate::elasticity::{Model, Touch};
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 
+use site::{Moments, gauges_on};
+use std::f64::consts::PI;
+
+pub use site::Site;
 pub use slopes::GluingSlopes;
 pub use survey::{Move, Surveyed, survey};
 
@@ -111,22 +114,6 @@ impl SignalMatrix {
             .collect();
         Self::new(columns.len(), values)
     }
-}
-
-/// A possible gauge position on the inside.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Site {
-    /// On the mid-surface (m).
-    pub position: DVec3,
-    /// Outward unit normal.
-    pub normal: DVec3,
-    /// Unit direction in the surface in which the gauge measures: where there is one a place, that with
-    /// the largest strain over the touches (rms).
-    pub direction: DVec3,
-    /// Rms over the touches of the strain along `direction`, inside face.
-    pub rms_strain: f64,
-    /// Largest principal strain over the touches (absolute), inside face: no direction reads more.
-    pub peak_strain: f64,
 }
 
 /// Signals of sites under touches.
@@ -331,21 +318,6 @@ pub fn measure(
     Ok((SignalMatrix::new(touches.len(), values), responses.solves))
 }
 
-/// What reads the places of gauges on a model's surface, and their angles in its frames.
-fn gauges_on(model: &dyn Model, sites: &[Site]) -> (Observer, Vec<f64>) {
-    let points: Vec<SurfacePoint> = sites
-        .iter()
-        .map(|s| model.index().nearest(s.position).0)
-        .collect();
-    let observer = model.observer(&points, Face::Inside);
-    let angles = sites
-        .iter()
-        .zip(observer.frames())
-        .map(|(s, f)| s.direction.dot(f.y_axis).atan2(s.direction.dot(f.x_axis)))
-        .collect();
-    (observer, angles)
-}
-
 /// The displacement signal from its three components by rows.
 fn read_displacement(signal: Signal, normal: DVec3, rows: &[Vec<f64>], into: &mut [f64]) {
     for (t, x) in into.iter_mut().enumerate() {
@@ -355,81 +327,6 @@ fn read_displacement(signal: Signal, normal: DVec3, rows: &[Vec<f64>], into: &mu
         } else {
             u.dot(normal)
         };
-    }
-}
-
-/// Second moments over the touches of the mean strain a, and b, c of a + b cos 2φ + c sin 2φ.
-#[derive(Clone, Copy, Debug, Default)]
-struct Moments {
-    aa: f64,
-    bb: f64,
-    cc: f64,
-    ab: f64,
-    ac: f64,
-    bc: f64,
-    peak: f64,
-}
-
-impl Moments {
-    fn of(xx: &[f64], yy: &[f64], xy: &[f64]) -> Self {
-        let mut m = Self::default();
-        for k in 0..xx.len() {
-            let (a, b, c) = (
-                f64::midpoint(xx[k], yy[k]),
-                (xx[k] - yy[k]) / 2.0,
-                xy[k] / 2.0,
-            );
-            m.aa += a * a;
-            m.bb += b * b;
-            m.cc += c * c;
-            m.ab += a * b;
-            m.ac += a * c;
-            m.bc += b * c;
-            m.peak = m.peak.max(a.abs() + (b * b + c * c).sqrt());
-        }
-        m
-    }
-
-    /// Σ strain² along φ.
-    fn along(&self, angle: f64) -> f64 {
-        let (c, s) = ((2.0 * angle).cos(), (2.0 * angle).sin());
-        self.aa
-            + self.bb * c * c
-            + self.cc * s * s
-            + 2.0 * (self.ab * c + self.ac * s + self.bc * c * s)
-    }
-
-    /// The angle in [0, π) with the largest sum: a scan, then golden section. The smallest of equals.
-    fn dominant_angle(&self) -> f64 {
-        const SCAN: usize = 90;
-        let step = PI / SCAN as f64;
-        let mut best = 0;
-        for k in 1..SCAN {
-            if self.along(k as f64 * step) > self.along(best as f64 * step) * (1.0 + 1e-9) {
-                best = k;
-            }
-        }
-        let golden = (5f64.sqrt() - 1.0) / 2.0;
-        let (mut low, mut high) = ((best as f64 - 1.0) * step, (best as f64 + 1.0) * step);
-        for _ in 0..40 {
-            let (l, h) = (high - golden * (high - low), low + golden * (high - low));
-            if self.along(l) >= self.along(h) {
-                high = h;
-            } else {
-                low = l;
-            }
-        }
-        f64::midpoint(low, high).rem_euclid(PI)
-    }
-
-    fn site(&self, position: DVec3, frame: SiteFrame, angle: f64, touches: usize) -> Site {
-        Site {
-            position,
-            normal: frame.z_axis,
-            direction: frame.x_axis * angle.cos() + frame.y_axis * angle.sin(),
-            rms_strain: (self.along(angle) / touches.max(1) as f64).max(0.0).sqrt(),
-            peak_strain: self.peak,
-        }
     }
 }
 

@@ -3,11 +3,15 @@
 //! Each stage is a pure function of the ones before it, so that a caller can keep what has not changed.
 
 mod advise;
+mod as_built;
+mod by_hand;
 mod choose;
 mod doubt;
+mod drawn;
 mod finest;
 mod ground;
 mod in_hand;
+mod inputs;
 mod judge;
 mod known;
 mod layout;
@@ -19,26 +23,26 @@ mod sense;
 mod shortage;
 mod simulate;
 pub mod simulated_board;
+mod truth;
 mod walled;
-
-use std::sync::Arc;
 
 use glam::DVec3;
 
 use crate::budget::Cancelled;
 use crate::elasticity::ElasticError;
-use crate::mesh::TriMesh;
-use crate::mesh::stance::Stance;
 use crate::placement::PlacementError;
 use crate::plain;
-use crate::project::{BadValue, Masks, Project};
+use crate::project::BadValue;
 
 pub use self::advise::*;
+pub use self::by_hand::judge_set;
 pub use self::choose::*;
 pub use self::doubt::*;
+pub use self::drawn::PROPOSED;
 pub use self::finest::*;
 pub use self::ground::*;
 pub use self::in_hand::*;
+pub use self::inputs::Inputs;
 pub use self::judge::*;
 pub use self::known::expected_errors;
 pub use self::layout::*;
@@ -49,6 +53,7 @@ pub use self::road::*;
 pub use self::sense::*;
 pub use self::shortage::*;
 pub use self::simulate::*;
+pub use self::truth::Truth;
 pub use self::walled::*;
 
 /// Why a stage ended without a result.
@@ -199,22 +204,3 @@ const NOISE_SEED: u64 = 0x0153;
 const HEARD_SEED: u64 = 0x4ea8d;
 const WORKSHOP_SEED: u64 = 0x30b0;
 const PRESS_SEED: u64 = 0x94e55;
-
-/// What a design starts from.
-#[derive(Clone)]
-pub struct Inputs {
-    pub project: Project,
-    pub part: Arc<TriMesh>,
-    /// One value a vertex of the part; absent when nothing was painted.
-    pub painted: Option<Arc<Vec<bool>>>,
-    /// Masks of the part's vertices that supports may name.
-    pub masks: Masks,
-}
-
-impl Inputs {
-    /// Which way the part stands.
-    #[must_use]
-    pub fn stance(&self) -> Stance {
-        self.project.part.axis.stance(&self.part)
-    }
-}

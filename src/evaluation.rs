@@ -4,6 +4,7 @@ pub mod estimate;
 pub mod failures;
 pub mod judging;
 pub mod matched;
+mod rows;
 
 use std::borrow::Cow;
 
@@ -14,31 +15,16 @@ use serde::Serialize;
 
 pub use self::judging::{EstimatorKind, Forces, Judging};
 pub use self::matched::{Matched, MatchedRow};
+pub use self::rows::{EVERYWHERE, EvaluationRow, Region};
 
 use self::failures::{FailureRow, FailureTrial, MOST_FAILED, failures};
+use self::rows::Said;
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Signal, SignalMatrix};
 use crate::draw::normal;
 use crate::regression::folds::evenly;
 use crate::regression::tune::{self, CrossValidation, Effort, Grid, distances};
 use crate::regression::{Grouping, Hyper, PositionModel, scale};
-
-/// A named part of the touches.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Region {
-    pub name: String,
-    /// One value a test touch.
-    pub contains: Vec<bool>,
-}
-
-impl Region {
-    /// Of one value a test touch, those inside.
-    fn within<T: Copy>(&self, values: &[T]) -> Vec<T> {
-        (values.iter().zip(&self.contains))
-            .filter_map(|(&v, &inside)| inside.then_some(v))
-            .collect()
-    }
-}
 
 /// Training on one model, judging on another: nothing here has seen the test touches.
 pub struct Trial<'a> {
@@ -57,27 +43,6 @@ pub struct Trial<'a> {
     pub noise: f64,
     pub streams: &'a [u64],
     pub seed: u64,
-}
-
-/// Errors of one set of sites in one region (mm).
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct EvaluationRow {
-    /// Selector's name, or "all-candidates" for the baseline.
-    pub selector: String,
-    pub sensors: usize,
-    pub region: String,
-    /// Mean Euclidean error.
-    pub error_mm: f64,
-    pub median_mm: f64,
-    pub p95_mm: f64,
-    /// Mean error of the set as a workshop would build it, read with the regression trained for the
-    /// ideal one, or with a model that knows no more of it than how far off gauges usually are.
-    pub workshop_mm: f64,
-    pub touches: usize,
-    /// Settings of the regression, where it was one.
-    pub hyper: Option<Hyper>,
-    /// Whether the regression met its tolerance, where it was one.
-    pub converged: Option<bool>,
 }
 
 /// Settings are searched for these set sizes and for no others; a size between two takes the settings
@@ -349,9 +314,6 @@ fn judge(
     (rows, [errors, built], model.work)
 }
 
-/// The region of all touches.
-pub const EVERYWHERE: &str = "all touches";
-
 impl Evaluation {
     /// The same errors, quoted for other regions of the same test touches.
     #[must_use]
@@ -376,59 +338,34 @@ impl Evaluation {
     }
 }
 
-/// What all rows of a set have in common.
-struct Said<'a> {
-    selector: &'a str,
-    sensors: usize,
-    hyper: Option<Hyper>,
-    converged: Option<bool>,
-}
-
-impl Said<'_> {
-    /// A row for all touches, and one for each region that has any.
-    fn rows(&self, regions: &[Region], errors: [&[f64]; 2]) -> Vec<EvaluationRow> {
-        let regions = quoted(regions, errors[0].len());
-        regions.iter().map(|r| row(self, r, errors)).collect()
-    }
-}
-
-/// What errors of so many touches are quoted for: all of them, and each region that has any.
-fn quoted(regions: &[Region], touches: usize) -> Vec<Region> {
-    let everywhere = Region {
-        name: EVERYWHERE.into(),
-        contains: vec![true; touches],
-    };
-    std::iter::once(&everywhere)
-        .chain(regions)
-        .filter(|region| region.contains.contains(&true))
-        .cloned()
-        .collect()
-}
-
 pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-fn row(set: &Said, region: &Region, [errors, built]: [&[f64]; 2]) -> EvaluationRow {
-    let (mut inside, built) = (region.within(errors), region.within(built));
-    inside.sort_by(f64::total_cmp);
-    let quantile = |q: f64| {
-        let last = inside.len().saturating_sub(1);
-        inside
-            .get((q * last as f64).round() as usize)
-            .copied()
-            .unwrap_or(f64::NAN)
-    };
-    EvaluationRow {
-        selector: set.selector.to_owned(),
-        sensors: set.sensors,
-        region: region.name.clone(),
-        error_mm: mean(&inside),
-        median_mm: quantile(0.5),
-        p95_mm: quantile(0.95),
-        workshop_mm: mean(&built),
-        touches: inside.len(),
-        hyper: set.hyper,
-        converged: set.converged,
+impl Evaluation {
+    /// Of what was found by matching: rows and errors of every set are those at the force in the middle.
+    #[must_use]
+    pub(crate) fn of_matched(judging: Judging, found: Vec<Matched>, regions: &[Region]) -> Self {
+        let middle = judging.middle_n();
+        let of_set = || found.iter().filter(move |m| Some(m.force_n) == middle);
+        Self {
+            rows: of_set()
+                .flat_map(|m| m.said().rows(regions, [&m.errors, &m.built]))
+                .collect(),
+            errors: of_set().map(|m| m.errors.clone()).collect(),
+            built: of_set().map(|m| m.built.clone()).collect(),
+            matched: found.iter().flat_map(|m| m.rows(regions)).collect(),
+            found,
+            judging,
+            ..Self::default()
+        }
+    }
+
+    /// What was found of a set by matching over all touches, a row for each force.
+    pub fn by_force(&self, selector: &str, sensors: usize) -> impl Iterator<Item = &MatchedRow> {
+        let of_set = move |r: &&MatchedRow| {
+            r.selector == selector && r.sensors == sensors && r.region == EVERYWHERE
+        };
+        self.matched.iter().filter(of_set)
     }
 }

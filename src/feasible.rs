@@ -5,9 +5,11 @@ use std::borrow::Cow;
 use glam::DVec3;
 use serde::Serialize;
 
+use crate::bounds::Bounds;
 use crate::dataset::Site;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
+use crate::statistics::median;
 
 /// What a gauge needs, lengths in metres, strains as ratios.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -368,12 +370,8 @@ fn off_centre_of(sites: &[DVec3], gauge: DVec3, neighbours: usize) -> f64 {
 /// The k nearest others of each position, by a search radius that grows for those that have not found as many: what
 /// lies far from the rest costs the rest nothing.
 fn nearest(positions: &[DVec3], k: usize) -> Vec<Vec<usize>> {
-    let (lower, upper) = positions
-        .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), &p| {
-            (l.min(p), u.max(p))
-        });
-    let size = (upper - lower).length().max(f64::MIN_POSITIVE);
+    let bounds = Bounds::around(positions.iter().copied());
+    let size = bounds.size().length().max(f64::MIN_POSITIVE);
     let mut found: Vec<Vec<usize>> = vec![Vec::new(); positions.len()];
     let mut reach = usual_reach(positions, k).max(1e-6 * size);
     loop {
@@ -401,12 +399,7 @@ fn usual_reach(positions: &[DVec3], k: usize) -> f64 {
         // The nearest is the position itself.
         *squares.select_nth_unstable_by(k, f64::total_cmp).1
     };
-    let mut squares: Vec<f64> = positions.iter().step_by(step).map(kth).collect();
-    let half = squares.len() / 2;
-    MORE * squares
-        .select_nth_unstable_by(half, f64::total_cmp)
-        .1
-        .sqrt()
+    MORE * median(positions.iter().step_by(step).map(kth)).map_or(0.0, f64::sqrt)
 }
 
 struct Footprint {

@@ -16,16 +16,7 @@ use crate::elasticity::{Model, Touch};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
-pub use sift::{LeftOut, Sifted, Table, check_reach, sift};
-
-/// A gauge at a given place.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GivenSite {
-    /// m.
-    pub position: DVec3,
-    /// The direction the gauge measures along; its part in the surface counts.
-    pub direction: DVec3,
-}
+pub use sift::{GivenSite, LeftOut, Sifted, Table, check_reach, sift};
 
 /// What the model answers.
 pub struct Answer {

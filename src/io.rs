@@ -13,6 +13,7 @@ pub mod opening;
 pub mod points;
 pub mod project_file;
 pub mod report;
+pub mod run;
 pub mod source;
 pub mod svg;
 pub mod table;
@@ -22,26 +23,22 @@ pub mod vtu;
 
 use std::path::PathBuf;
 
-/// Processor seconds of this process so far; by the clock where the system does not say.
+/// Processor seconds of this process so far.
+#[cfg(unix)]
 #[must_use]
 pub fn cpu_seconds() -> f64 {
-    /// Ticks a second of the kernel's interface, the same on every Linux.
-    const TICKS: f64 = 100.0;
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // The name may hold anything; what follows its closing parenthesis does not.
-    let fields: Vec<&str> = stat
-        .rsplit(')')
-        .next()
-        .unwrap_or("")
-        .split_whitespace()
-        .collect();
-    let ticks = |k: usize| fields.get(k).and_then(|f| f.parse::<f64>().ok());
-    match (ticks(11), ticks(12)) {
-        (Some(user), Some(system)) => (user + system) / TICKS,
-        _ => std::time::SystemTime::now()
-            .duration_since(std::time::UNIX_EPOCH)
-            .map_or(0.0, |d| d.as_secs_f64()),
-    }
+    use rustix::time::{ClockId, clock_gettime};
+    let spent = clock_gettime(ClockId::ProcessCPUTime);
+    spent.tv_sec as f64 + spent.tv_nsec as f64 * 1e-9
+}
+
+/// Seconds by the clock: the system does not say what the processor spent.
+#[cfg(not(unix))]
+#[must_use]
+pub fn cpu_seconds() -> f64 {
+    std::time::SystemTime::now()
+        .duration_since(std::time::UNIX_EPOCH)
+        .map_or(0.0, |d| d.as_secs_f64())
 }
 
 /// What this process holds and has held at most (MB, `VmRSS` and `VmHWM`), where the system says so.

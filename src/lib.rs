@@ -4,6 +4,7 @@
 //! clock, no thread of its own, no global random state. SI units throughout (m, N, Pa, strain as a ratio).
 
 pub mod board;
+mod bounds;
 pub mod budget;
 pub mod cli;
 pub mod colormap;
@@ -33,6 +34,7 @@ pub mod project;
 pub mod regression;
 pub mod render;
 pub mod session;
+mod statistics;
 #[cfg(feature = "studio")]
 pub mod studio;
 pub mod study;

@@ -6,9 +6,11 @@
 
 use glam::{DVec2, DVec3};
 
+use crate::bounds::Bounds;
 use crate::mesh::TriMesh;
 
 pub mod barrel;
+mod barrel_spec;
 mod body;
 mod frame;
 mod lattice;
@@ -275,12 +277,9 @@ impl LimbSpec {
                     let s = s0 + (s1 - s0) * f64::from(i) / f64::from(steps);
                     [z0, z1].map(|z| self.bend(DVec2::new(s, z)) * 1000.0)
                 });
-                let (low, high) = corners
-                    .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
-                        (l.min(p), h.max(p))
-                    });
+                let around = Bounds::around(corners).grown(HAIR);
                 let round = |p: DVec3| p.to_array().map(|x| (x * 1000.0).round() / 1000.0);
-                [round(low - HAIR), round(high + HAIR)]
+                [around.lower, around.upper].map(round)
             })
             .collect()
     }

@@ -1,6 +1,8 @@
 //! Ports: serial lines, sockets and recordings behind one small trait, and the thread that listens.
 
 mod host;
+mod port;
+mod ports;
 mod recorded;
 mod recording;
 mod replay;
@@ -13,42 +15,12 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 pub use host::{Doorway, Entrance, Hosted, host};
+pub use port::{Got, Pace, Port};
+pub use ports::{PortInfo, ports};
 pub use recorded::{check_length, record};
 pub use recording::{Recorder, old_note};
-pub use serial::{PortInfo, ports};
 pub use session::{Command, Connection, Heard, Listener, State, Timing};
 pub use table::{Table, write_table};
-
-/// What one look at a port brought.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Got {
-    Bytes(usize),
-    /// Not yet.
-    Nothing,
-    /// The other side is gone: unplugged, or the end of a recording.
-    Gone,
-}
-
-impl Got {
-    /// What a read says: a hang-up reads as nothing for ever, and a wait that was in vain is none.
-    fn of(read: std::io::Result<usize>) -> Self {
-        use std::io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
-        match read {
-            Ok(0) => Self::Gone,
-            Ok(count) => Self::Bytes(count),
-            Err(e) if matches!(e.kind(), TimedOut | WouldBlock | Interrupted) => Self::Nothing,
-            Err(_) => Self::Gone,
-        }
-    }
-}
-
-/// Somewhere that bytes come from and go to.
-pub trait Port: Send {
-    /// Waits a few milliseconds at most.
-    fn read(&mut self, buffer: &mut [u8]) -> Got;
-    /// Best effort: a port that takes nothing is found out by reading.
-    fn write(&mut self, bytes: &[u8]);
-}
 
 /// Where a board is found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,16 +35,6 @@ pub enum Address {
         path: PathBuf,
         pace: Pace,
     },
-}
-
-/// How fast a recording is replayed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pace {
-    /// As it was.
-    #[default]
-    Real,
-    /// As fast as it can be read.
-    Fast,
 }
 
 /// What native USB ports and most sketches are opened with; USB itself does not care.

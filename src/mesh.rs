@@ -6,6 +6,7 @@ pub mod bends;
 mod bodies;
 pub mod canonical;
 pub mod cut;
+mod error;
 pub mod flatten;
 pub mod geodesic;
 pub mod inside;
@@ -36,42 +37,15 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use crate::bounds::Bounds;
 use topology::Sides;
 use volume::VolumeMesh;
 
+pub use error::MeshError;
 pub use intake::TakenIn;
 pub use report::RepairReport;
 pub use topology::Edge;
 pub(crate) use topology::components;
-
-/// Why a mesh was refused, with the place and the remedy.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum MeshError {
-    #[error("the mesh has no triangles: export it as a triangulated surface")]
-    Empty,
-    #[error(
-        "vertex {vertex} of the mesh is not a finite point: repair the mesh in the program that wrote it"
-    )]
-    NotFinite { vertex: usize },
-    #[error(
-        "triangle {triangle} refers to vertex {vertex}, but the mesh has {count} vertices: the file is damaged"
-    )]
-    BadIndex {
-        triangle: usize,
-        vertex: u64,
-        count: usize,
-    },
-    #[error(
-        "every triangle of the mesh has zero area: check the unit and the export of the mesh file, and that part.weld_mm is small beside the part"
-    )]
-    AllDegenerate,
-    #[error("the mesh has {count} separate bodies, so body {body} does not exist: choose 0 to {}", count - 1)]
-    NoSuchBody { body: usize, count: usize },
-    #[error(
-        "the mesh has {triangles} triangles, more than the {limit} this version handles: decimate it first"
-    )]
-    TooLarge { triangles: usize, limit: usize },
-}
 
 /// A validated triangle surface with its topology. Positions in metres; normals point outward as the
 /// triangles wind.
@@ -124,12 +98,9 @@ impl TriMesh {
             (b - a).cross(c - a).length() / 2.0
         };
         let length = |e: &Edge| positions[e.a as usize].distance(positions[e.b as usize]);
+        let Bounds { lower, upper } = Bounds::around(positions.iter().copied());
         Self {
-            bounds: positions
-                .iter()
-                .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), &p| {
-                    (l.min(p), u.max(p))
-                }),
+            bounds: (lower, upper),
             area: triangles.iter().map(area).sum(),
             mean_edge: edges.iter().map(length).sum::<f64>() / edges.len() as f64,
             positions,

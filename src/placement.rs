@@ -9,16 +9,18 @@ pub mod information;
 pub mod lead;
 pub mod mutual_information;
 pub mod pca_qr;
+mod selector;
 pub mod wishes;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::budget::{Achieved, Cancelled, Watch};
+use crate::budget::{Achieved, Cancelled};
 use crate::dataset::SignalMatrix;
 use crate::pca::PcaError;
 use crate::plain;
 pub use expected_error::Certificate;
+pub use selector::{Request, Selector};
 pub use wishes::{LostBy, Wishes};
 
 /// The selectors a project can name.
@@ -120,14 +122,6 @@ pub struct Pool<'a> {
     pub positions: &'a [DVec3],
 }
 
-/// What is asked of a selector.
-pub struct Request<'a> {
-    pub wishes: &'a Wishes,
-    pub watch: Watch<'a>,
-    /// Called with each set as soon as it is known.
-    pub found: &'a (dyn Fn(&SensorSet) + Sync),
-}
-
 /// The sites chosen for one number of gauges.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SensorSet {
@@ -226,18 +220,4 @@ pub enum PlacementError {
     Signals(#[from] PcaError),
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
-}
-
-/// Anything that chooses sites from a pool.
-pub trait Selector: Sync {
-    fn kind(&self) -> SelectorKind;
-
-    /// Whether each set contains the one before it.
-    fn nested(&self) -> bool;
-
-    /// Sets for one gauge and more, as many as the wishes allow.
-    ///
-    /// # Errors
-    /// [`PlacementError`] where the pool does not allow it.
-    fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError>;
 }

@@ -91,6 +91,15 @@ pub fn lines_before(text: &[u8], byte: usize) -> usize {
     text[..byte.min(text.len())].split(|&b| b == b'\n').count() - 1
 }
 
+/// The smallest round number not below one that is above zero: one of these figures, rising from 1 to 10, times a power
+/// of ten.
+#[must_use]
+pub(crate) fn next_round(number: f64, figures: &[f64]) -> f64 {
+    let power = 10f64.powf(number.log10().floor());
+    let mut round = figures.iter().map(|figure| figure * power);
+    round.find(|&r| r >= number).unwrap_or(number)
+}
+
 /// The first three digits of a number, the third one rounded.
 fn three_digits(number: f64, rounded: impl Fn(f64) -> f64) -> String {
     /// Powers of ten between which a number is written out.

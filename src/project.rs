@@ -7,8 +7,8 @@ mod masks;
 mod part;
 mod ranges;
 mod selection;
+mod value;
 
-use std::borrow::Cow;
 use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,7 @@ use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
 use crate::uncertainty::{Gluing, Pressing, Uncertainty};
 
-use ranges::check;
+use value::MM;
 
 pub use axis::PartAxis;
 pub use kept::{Kept, KeptError, KeptFailure};
@@ -37,21 +37,12 @@ pub use ranges::{
     PLACE_OFF, STARTS, TIP_OFF, TOUCHES,
 };
 pub use selection::{ChosenSite, CostKeys, GaussianProcessKeys, SelectionKeys};
+pub use value::BadValue;
 
 /// Version of the file format this program writes and the newest it reads.
 pub const FORMAT: u32 = 1;
 
-const MM: f64 = 1e-3;
 const MICRO: f64 = 1e-6;
-
-/// A value that cannot be used, by the key it stands under.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{key} must be {rule}, but is {value}")]
-pub struct BadValue {
-    pub key: String,
-    pub rule: Cow<'static, str>,
-    pub value: String,
-}
 
 /// The whole project.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,16 +1,15 @@
 //! Choosing and judging on signals alone, without a part behind them.
 
+mod judge;
+mod question;
 mod templates;
-
-use std::borrow::Cow;
 
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::budget::{Watch, report};
+use crate::budget::Watch;
 use crate::dataset::SignalMatrix;
 use crate::evaluation::add_noise;
-use crate::evaluation::failures::{FailureRow, FailureTrial, failures};
 use crate::gaussian_process::{self, Covariance, Distances, GpKernel};
 use crate::placement::entropy::Entropy;
 use crate::placement::expected_error::{
@@ -23,9 +22,13 @@ use crate::placement::pca_qr::PcaQr;
 use crate::placement::{
     PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes,
 };
-use crate::regression::folds::{Folds, evenly, hold_out, number_of};
-use crate::regression::tune::{self, CrossValidation, Grid, distances};
-use crate::regression::{Hyper, PositionModel, Standardizer, scale};
+use crate::regression::Standardizer;
+use crate::regression::folds::{Folds, number_of};
+use crate::statistics::median;
+use std::borrow::Cow;
+
+pub use self::judge::evaluate;
+pub use self::question::{Estimator, HeldOut, Question, Verdict};
 
 /// Signals of sites under touches.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -94,9 +97,7 @@ fn knowledge<'a>(
 fn usual_forces(forces: &[f64]) -> Option<[f64; 2]> {
     /// Over the middle force.
     const COMING: [f64; 2] = [1.0 / 3.0, 3.0];
-    let mut sorted = forces.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = *sorted.get(sorted.len() / 2)?;
+    let middle = median(forces.iter().copied())?;
     Some(COMING.map(|share| share * middle))
 }
 
@@ -448,237 +449,6 @@ fn constant_notes(x: &SignalMatrix, sites: &[usize]) -> Vec<String> {
     constant.into_iter().map(said).collect()
 }
 
-/// What turns readings into places, learned from data alone.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Estimator {
-    /// A support vector regression trained for each set.
-    #[default]
-    Svr,
-    /// Readings matched to those of known touches, weighted by noise and by what the data scatter by.
-    Matching,
-    /// The mean of the nearest known touches.
-    Nearest,
-}
-
-/// What is asked about given sites.
-pub struct Question<'a> {
-    pub sites: &'a [usize],
-    pub estimator: Estimator,
-    /// The group of each touch, numbered from zero without gaps: none is divided between learning and judging. Where
-    /// nobody says, by the regression's grouping.
-    pub groups: Option<&'a [usize]>,
-    pub svr: &'a GreedySvr,
-    /// Standard deviation of the noise added to the signals, in their unit. Regression learns from noisy signals;
-    /// templates are as they were measured, and what is compared with them is noisy.
-    pub noise: f64,
-    /// Search the regression's settings for each number of gauges.
-    pub tune: bool,
-    /// Share of the touches held out.
-    pub held_out: f64,
-    pub failed: usize,
-    pub subsets: usize,
-    pub baseline: bool,
-}
-
-/// Errors on the touches held out (mm).
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct HeldOut {
-    pub sensors: usize,
-    pub error_mm: f64,
-    pub median_mm: f64,
-    pub p95_mm: f64,
-    /// Of the regression, and whether its fit ended.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub hyper: Option<Hyper>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub converged: Option<bool>,
-    /// How many nearest touches are averaged.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub neighbours: Option<usize>,
-}
-
-impl HeldOut {
-    /// Of errors (mm), at least one, by an estimator without settings.
-    fn of(sensors: usize, mut errors: Vec<f64>) -> Self {
-        errors.sort_by(f64::total_cmp);
-        let last = errors.len() - 1;
-        let quantile = |q: f64| errors[(q * last as f64).round() as usize];
-        Self {
-            sensors,
-            error_mm: errors.iter().sum::<f64>() / errors.len() as f64,
-            median_mm: quantile(0.5),
-            p95_mm: quantile(0.95),
-            hyper: None,
-            converged: None,
-            neighbours: None,
-        }
-    }
-}
-
-/// The answers: for one gauge, two, … all of them in the order given.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Verdict {
-    /// Cross-validated over all touches.
-    pub criteria_mm: Vec<f64>,
-    pub fold_of_touch: Vec<usize>,
-    pub errors: Vec<HeldOut>,
-    pub baseline: Option<HeldOut>,
-    pub failures: Vec<FailureRow>,
-    /// The touches that were held out.
-    pub test_touches: Vec<usize>,
-    /// Groups of touches that were not divided.
-    pub places: usize,
-    pub notes: Vec<String>,
-}
-
-/// What an estimator makes of a question.
-struct Judged {
-    criteria_mm: Vec<f64>,
-    errors: Vec<HeldOut>,
-    baseline: Option<HeldOut>,
-    failures: Vec<FailureRow>,
-}
-
-/// Which touches are learned from, and which are judged on.
-struct Parts<'a> {
-    groups: &'a [usize],
-    /// Of the criterion.
-    folds: &'a Folds,
-    train: &'a [usize],
-    test: &'a [usize],
-    /// The signals with noise.
-    heard: &'a SignalMatrix,
-}
-
-/// Judges given sites.
-///
-/// # Errors
-/// [`PlacementError`] for too few touches, or when the watch asks for a stop.
-pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdict, PlacementError> {
-    let svr = question.svr;
-    let groups = match question.groups {
-        Some(groups) => Cow::Borrowed(groups),
-        None => Cow::Owned(svr.grouping.of(&data.targets)),
-    };
-    let places = number_of(&groups);
-    if !question.divides(places) {
-        let least = (places..=MOST_PLACES).find(|&n| question.divides(n));
-        return Err(svr.too_few(&groups, least.unwrap_or(MOST_PLACES)));
-    }
-    let noisy = add_noise(&data.x, question.noise, svr.seed);
-    let folds = Folds::of_groups(&groups, svr.folds, svr.seed);
-    // Another draw than the folds'.
-    let draw = svr.seed.wrapping_add(0x7e57);
-    let (mut test, train) = hold_out(&groups, question.tests(places), draw);
-    let parts = Parts {
-        groups: &groups,
-        folds: &folds,
-        train: &train,
-        test: &test,
-        heard: &noisy,
-    };
-    let judged = match question.estimator {
-        Estimator::Svr => by_regression(data, question, &parts, watch)?,
-        Estimator::Matching | Estimator::Nearest => {
-            templates::judge(data, question, &parts, watch)?
-        }
-    };
-    test.sort_unstable();
-    let mut notes = constant_notes(&noisy, question.sites);
-    notes.extend(repeat_note(places, data.targets.len(), question.groups));
-    Ok(Verdict {
-        criteria_mm: judged.criteria_mm,
-        fold_of_touch: folds.of_touches(),
-        errors: judged.errors,
-        baseline: judged.baseline,
-        failures: judged.failures,
-        test_touches: test,
-        places,
-        notes,
-    })
-}
-
-/// Judges by a regression trained for each set.
-fn by_regression(
-    data: &Data,
-    question: &Question,
-    parts: &Parts,
-    watch: Watch,
-) -> Result<Judged, PlacementError> {
-    let svr = question.svr;
-    let all: Vec<usize> = (0..parts.heard.rows()).collect();
-    let prefixes: Vec<Vec<usize>> = (1..=question.sites.len())
-        .map(|k| question.sites[..k].to_vec())
-        .collect();
-    let split = Split::new(parts.heard, &data.targets, parts.train, parts.test);
-    let errors: Result<Vec<HeldOut>, PlacementError> = prefixes
-        .iter()
-        .map(|rows| split.judge(rows, question, watch))
-        .collect();
-    let errors = errors?;
-    let baseline = question
-        .baseline
-        .then(|| split.judge(&all, question, watch))
-        .transpose()?;
-    let hyper = errors.last().and_then(|e| e.hyper).unwrap_or(svr.hyper);
-    let failures = failures(
-        &FailureTrial {
-            train: &split.train.select_rows(question.sites),
-            train_targets: &split.train_targets,
-            test: &split.test.select_rows(question.sites),
-            test_targets: &split.test_targets,
-            hyper,
-            effort: svr.effort,
-            failed: question.failed,
-            subsets: question.subsets,
-            seed: svr.seed,
-        },
-        watch,
-    )?;
-    let criteria_mm = if question.groups.is_none() {
-        let pool = Pool {
-            x: parts.heard,
-            targets: &data.targets,
-            sites: &all,
-            positions: &data.positions,
-        };
-        svr.criteria(&pool, &prefixes, watch)?
-    } else {
-        cross_validated(data, question, parts, &prefixes, watch)?
-    };
-    Ok(Judged {
-        criteria_mm,
-        errors,
-        baseline,
-        failures,
-    })
-}
-
-/// The criterion (mm) of some sets with the regression as given, for folds of groups that only the user knows.
-fn cross_validated(
-    data: &Data,
-    question: &Question,
-    parts: &Parts,
-    sets: &[Vec<usize>],
-    watch: Watch,
-) -> Result<Vec<f64>, PlacementError> {
-    let folds = parts.folds;
-    let mut sums = vec![0.0; sets.len()];
-    for part in &folds.parts {
-        let (before, rest) = folds.order.split_at(part.start);
-        let (test, after) = rest.split_at(part.len());
-        let train = [before, after].concat();
-        let split = Split::new(parts.heard, &data.targets, &train, test);
-        for (k, (sum, rows)) in sums.iter_mut().zip(sets).enumerate() {
-            report(watch, "Cross-validating", k, sets.len())?;
-            *sum += split.with(rows, question.svr.hyper, question.svr).error_mm;
-        }
-    }
-    let share = (folds.parts.len() as f64).recip();
-    Ok(sums.into_iter().map(|sum| sum * share).collect())
-}
-
 /// A word on touches that are kept together by groups of the user, or because they repeat places.
 fn repeat_note(places: usize, touches: usize, given: Option<&[usize]>) -> Option<String> {
     if places == touches {
@@ -693,82 +463,4 @@ fn repeat_note(places: usize, touches: usize, given: Option<&[usize]>) -> Option
             "{touches} touches lie at {places} places: none is learned from and judged on at the same place (--split touch divides them one by one)."
         )
     })
-}
-
-/// More places than any data have.
-const MOST_PLACES: usize = 10_000_000;
-
-impl Question<'_> {
-    /// How many of so many places are held out.
-    fn tests(&self, places: usize) -> usize {
-        (self.held_out * places as f64).round() as usize
-    }
-
-    /// Whether so many places leave some to judge on and enough to learn from.
-    fn divides(&self, places: usize) -> bool {
-        let tests = self.tests(places);
-        tests > 0 && places.saturating_sub(tests) >= 2 * self.svr.folds
-    }
-}
-
-/// Touches to learn from and touches to judge on.
-struct Split {
-    train: SignalMatrix,
-    train_targets: Vec<[f64; 3]>,
-    test: SignalMatrix,
-    test_targets: Vec<[f64; 3]>,
-}
-
-impl Split {
-    fn new(x: &SignalMatrix, targets: &[[f64; 3]], train: &[usize], test: &[usize]) -> Self {
-        let pick = |touches: &[usize]| touches.iter().map(|&t| targets[t]).collect();
-        Self {
-            train: x.select_columns(train),
-            train_targets: pick(train),
-            test: x.select_columns(test),
-            test_targets: pick(test),
-        }
-    }
-
-    fn judge(
-        &self,
-        rows: &[usize],
-        question: &Question,
-        watch: Watch,
-    ) -> Result<HeldOut, PlacementError> {
-        /// Touches that settings are searched on.
-        const SEARCHED: usize = 1000;
-        let svr = question.svr;
-        let hyper = if question.tune {
-            let train = self.train.select_rows(rows);
-            let some = evenly(self.train_targets.len(), SEARCHED);
-            let targets: Vec<[f64; 3]> = some.iter().map(|&t| self.train_targets[t]).collect();
-            let validation = CrossValidation {
-                folds: 3,
-                seed: svr.seed,
-                grouping: svr.grouping,
-                effort: svr.effort,
-            };
-            let x = train.select_columns(&some);
-            let grid = Grid::default().scaled(scale::relative(&self.train_targets));
-            tune::search(&x, &targets, &grid, &validation, watch)?
-                .0
-                .best()
-        } else {
-            svr.hyper
-        };
-        Ok(self.with(rows, hyper, svr))
-    }
-
-    /// Errors of a regression with these settings.
-    fn with(&self, rows: &[usize], hyper: Hyper, svr: &GreedySvr) -> HeldOut {
-        let train = self.train.select_rows(rows);
-        let model = PositionModel::train(&train, &self.train_targets, &hyper, svr.effort);
-        let predicted = model.predict(&self.test.select_rows(rows));
-        HeldOut {
-            hyper: Some(hyper),
-            converged: Some(model.converged().0),
-            ..HeldOut::of(rows.len(), distances(&predicted, &self.test_targets))
-        }
-    }
 }

@@ -2,7 +2,8 @@
 
 use clap::Args;
 
-use super::{Common, out};
+use super::common::Common;
+use super::out;
 use crate::budget::unwatched;
 use crate::design;
 

@@ -10,10 +10,11 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 
+use super::common::Common;
 use super::ranges::{between, whole};
 use super::simulate::in_file;
 use super::spared::Spared;
-use super::{Common, out, progress::Bar};
+use super::{out, progress::Bar};
 use crate::board::{
     ChannelFault, Fault, Faults, GivenPress, Options, PRESSES, Press, Script, SimulatedBoard,
     Truth, script_seed,

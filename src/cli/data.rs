@@ -124,7 +124,7 @@ pub struct CriterionArgs {
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
     /// Worker threads; all cores when left out. The result does not depend on it.
-    #[arg(long, value_parser = super::threads)]
+    #[arg(long, value_parser = super::common::threads)]
     pub threads: Option<usize>,
     /// Standard deviation of noise added to the signals, in their unit. Expected error, and estimators with templates,
     /// take it for the noise of what is read, beside what the data themselves scatter by.
@@ -218,9 +218,9 @@ impl CriterionArgs {
         &self,
         work: impl FnOnce() -> anyhow::Result<T> + Send,
     ) -> anyhow::Result<T> {
-        super::Common {
+        super::common::Common {
             threads: self.threads,
-            ..super::Common::default()
+            ..super::common::Common::default()
         }
         .in_pool(work)
     }

@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::{Common, SelectorArg, out, prepare_folder, progress::Bar};
+use super::common::{Common, SelectorArg, prepare_folder};
+use super::{out, progress::Bar};
 use crate::design::{self, Design};
 use crate::evaluation::{BASELINE, EstimatorKind, EvaluationRow};
 use crate::io::artifacts::{self, Provenance};

@@ -9,9 +9,10 @@ use std::sync::mpsc::channel;
 use anyhow::Context as _;
 use clap::Args;
 
+use super::common::Common;
 use super::ranges::between;
 use super::spared::Spared;
-use super::{Common, out, progress::Bar};
+use super::{out, progress::Bar};
 use crate::design;
 use crate::io::project_file::LoadedProject;
 use crate::link::{Address, BAUD, Heard, Listener, Pace, Recorder, State, Table};

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 
-use super::{Common, UnitArg};
+use super::common::{Common, UnitArg};
 
 #[derive(Args, Debug, Clone)]
 pub struct RenderArgs {

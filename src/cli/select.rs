@@ -6,9 +6,11 @@ use anyhow::{Context, bail, ensure};
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::common::SelectorArg;
 use super::data::{CriterionArgs, DataArgs, criterion_json, site_json};
 use super::ranges::{between, misuse, whole};
-use super::{SelectorArg, out, progress::Bar};
+use super::{out, progress::Bar};
+use crate::bounds::Bounds;
 use crate::budget::Watch;
 use crate::gaussian_process::GpKernel;
 use crate::io::cpu_seconds;
@@ -372,11 +374,9 @@ impl SelectArgs {
             );
             let a = glam::DVec3::new(x0, y0, z0) * 1e-3;
             let b = glam::DVec3::new(x1, y1, z1) * 1e-3;
-            let (lower, upper) = (a.min(b), a.max(b));
-            out.extend((0..data.positions.len()).filter(|&s| {
-                let p = data.positions[s];
-                (p.cmpge(lower).all() && p.cmple(upper).all()) != keep_inside
-            }));
+            let bounds = Bounds::between([a, b]);
+            let is_out = |&s: &usize| bounds.contains(data.positions[s]) != keep_inside;
+            out.extend((0..data.positions.len()).filter(is_out));
         }
         Ok(out)
     }

@@ -8,8 +8,9 @@ use anyhow::ensure;
 use clap::Args;
 use serde_json::json;
 
+use super::common::Common;
 use super::spared::Spared;
-use super::{Common, out, progress::Bar};
+use super::{out, progress::Bar};
 use crate::design::{self, DesignError};
 use crate::given;
 use crate::io::artifacts::save_dataset;

@@ -7,8 +7,9 @@ use std::time::Instant;
 use anyhow::Context;
 use clap::Args;
 
+use super::common::{Common, QualityArg};
+use super::out;
 use super::progress::Bar;
-use super::{Common, QualityArg, out};
 use crate::budget::Quality;
 use crate::design::Finest;
 use crate::io::project_file::LoadedProject;
@@ -63,7 +64,7 @@ pub fn run(args: &TradeArgs) -> anyhow::Result<()> {
     };
     if let Some(asked) = asked {
         let record = known(&args.out, &loaded, threads)?;
-        super::prepare_folder(&mut loaded, &args.out)?;
+        super::common::prepare_folder(&mut loaded, &args.out)?;
         return reply(args, &loaded, &record, asked);
     }
     // To the end: two that measure into one folder would write over each other's points.

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::{Site, gauges_on};
+use super::site::{Site, gauges_on};
 use crate::budget::{Cancelled, Watch};
 use crate::elasticity::respond::{Pressed, Reading, Responses, respond};
 use crate::elasticity::{Model, Touch};

@@ -1,6 +1,7 @@
 //! Gauges anywhere on a part under the touches of a dataset: what they read where they are, and to first order beside it.
 
-use super::{GluingSlopes, Moments, Site, gauges_on, slopes};
+use super::site::{Moments, Site, gauges_on};
+use super::slopes::{self, GluingSlopes};
 use crate::budget::{Cancelled, Watch};
 use crate::elasticity::observe::along;
 use crate::elasticity::respond::{Pressed, Reading};

@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
-use super::judge::{ByMatching, grid, judge, measured_by};
+use super::judge::{ByMatching, judge, measured_by};
 use super::layout::{lay_out_sites, touches_on};
+use super::truth::grid;
 use super::{Design, DesignError, Inputs, Meshed, Simulated, Truth, ground};
 use crate::budget::{Budget, Elements, Watch};
 use crate::elasticity::{Model, Touch};

@@ -5,6 +5,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{DesignError, Inputs, LAYOUT, MOST_SITES, SaidBy};
+use crate::bounds::Bounds;
 use crate::budget::Budget;
 use crate::dataset::{self, GluingSlopes, Signal, TouchRegion};
 use crate::elasticity::load::Touch;
@@ -64,12 +65,10 @@ fn far_vertex(part: &TriMesh) -> Option<(DVec3, f64, f64)> {
     let from_mean = |v: &usize| positions[*v].distance_squared(mean);
     let farthest = (0..positions.len()).max_by(|a, b| from_mean(a).total_cmp(&from_mean(b)))?;
     let rest = positions.iter().enumerate().filter(|(v, _)| *v != farthest);
-    let (lower, upper) = rest.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), (_, &p)| {
-        (l.min(p), u.max(p))
-    });
-    let size = (upper - lower).length();
+    let bounds = Bounds::around(rest.map(|(_, &p)| p));
+    let size = bounds.size().length();
     let place = positions[farthest];
-    let distance = place.distance(place.clamp(lower, upper));
+    let distance = place.distance(place.clamp(bounds.lower, bounds.upper));
     (distance > FAR * size).then_some((place, distance, size))
 }
 

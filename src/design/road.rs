@@ -10,7 +10,7 @@ use super::{
     select_step_by_step, simulate, sites_to_judge, truth,
 };
 use crate::budget::{Budget, Watch, Work};
-use crate::evaluation::{Evaluation, EvaluationRow, Matched, MatchedRow};
+use crate::evaluation::{Evaluation, EvaluationRow};
 use crate::feasible::Feasibility;
 use crate::mesh::{TriMesh, scatter};
 use crate::placement::candidates::Candidates;
@@ -74,86 +74,6 @@ pub struct StageTime {
 }
 
 impl Design {
-    /// The same with other sites for its chosen set, put there by hand, and what they were judged to do
-    /// ([`super::judge_set`]).
-    #[must_use]
-    pub fn with_hand(&self, sites: Vec<usize>, judged: &Evaluation) -> Self {
-        let mut design = self.clone();
-        design.by_hand = true;
-        let (name, old) = (self.lead.name(), self.chosen().len());
-        let set = (self.selections.iter())
-            .flat_map(|s| s.sets.iter().map(move |set| (s.selector, set.sites.len())))
-            .position(|set| set == (self.lead, old));
-        let count = sites.len();
-        let selections = Arc::make_mut(&mut design.selections);
-        if let Some(led) = selections.iter_mut().find(|s| s.selector == self.lead) {
-            led.achieved.cautions.push(
-                "Gauges were moved by hand: the chosen set and its errors are those of the gauges as they are, not of the selector. What it says of ties and gaps is of the set that it chose.".into(),
-            );
-            // Its figures for that set say nothing of this one.
-            led.achieved.error_estimate = None;
-            if let Some(last) = led.sets.last_mut() {
-                *last = SensorSet {
-                    sites,
-                    criterion: None,
-                    criterion_mm: None,
-                    gap: None,
-                    lead: None,
-                    certificate: None,
-                };
-            }
-        }
-        let evaluation = Arc::make_mut(&mut design.evaluation);
-        let rows = judged.rows.iter().map(|r| EvaluationRow {
-            selector: name.to_owned(),
-            sensors: count,
-            ..r.clone()
-        });
-        let is_old = |selector: &str, sensors: usize| selector == name && sensors == old;
-        put_in_place(
-            &mut evaluation.rows,
-            |r| is_old(&r.selector, r.sensors),
-            rows,
-        );
-        let found = judged.found.iter().map(|m| Matched {
-            selector: name.to_owned(),
-            sensors: count,
-            ..m.clone()
-        });
-        put_in_place(
-            &mut evaluation.found,
-            |m| is_old(&m.selector, m.sensors),
-            found,
-        );
-        let matched = judged.matched.iter().map(|r| MatchedRow {
-            selector: name.to_owned(),
-            sensors: count,
-            ..r.clone()
-        });
-        put_in_place(
-            &mut evaluation.matched,
-            |r| is_old(&r.selector, r.sensors),
-            matched,
-        );
-        if let (Some(k), Some(errors), Some(built)) =
-            (set, judged.errors.first(), judged.built.first())
-        {
-            evaluation.errors[k].clone_from(errors);
-            evaluation.built[k].clone_from(built);
-        }
-        if let Some(failed) = judged.failures.first() {
-            for own in evaluation
-                .failures
-                .iter_mut()
-                .filter(|f| f.selector == name)
-            {
-                own.sensors = count;
-                own.rows.clone_from(&failed.rows);
-            }
-        }
-        design
-    }
-
     /// How many sites are candidates: all feasible ones where they were not reduced.
     #[must_use]
     pub fn candidate_count(&self) -> usize {
@@ -288,13 +208,6 @@ pub struct Words {
 fn named(selection: &Selection, words: &[String]) -> Vec<String> {
     let title = selection.selector.title();
     words.iter().map(|w| format!("{title}: {w}")).collect()
-}
-
-/// Puts others where some of a list are, which go; at its end where there are none.
-fn put_in_place<T>(all: &mut Vec<T>, old: impl Fn(&T) -> bool, new: impl Iterator<Item = T>) {
-    let at = all.iter().position(&old).unwrap_or(all.len());
-    all.retain(|t| !old(t));
-    all.splice(at..at, new);
 }
 
 /// Runs the whole road. `clock` gives seconds since any fixed moment: the core has no clock of its own.

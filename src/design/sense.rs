@@ -7,15 +7,16 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::as_built::{as_built, workshop_draw};
+use super::drawn::{drawn_on, map_size, proposed};
 use super::layout::{lay_out_sites, lay_out_touches, touches_on};
-use super::{DesignError, Ground, Inputs, Meshed, as_built, ground, workshop_draw};
-use crate::budget::{Budget, Cancelled, Watch};
+use super::{DesignError, Inputs, Meshed, ground};
+use crate::budget::{Budget, Watch};
 use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::elasticity::{Model, Touch};
 use crate::inference::{AsDrawn, ResponseMap};
 use crate::live::GaugeModel;
-use crate::mesh::TriMesh;
 use crate::project::{LiveKeys, Project};
 use crate::uncertainty::{Gluing, Uncertainty};
 
@@ -36,10 +37,6 @@ pub struct Sensing {
     pub element_mm: f64,
     meshed: Meshed,
 }
-
-/// Known touches that are proposed.
-pub const PROPOSED: usize = 12;
-const PROPOSED_SEED: u64 = 0xca11;
 
 /// Readings of the model under touches of many forces: what the trained estimators learn from.
 pub struct Lesson {
@@ -111,107 +108,6 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
         element_mm: graded.meshed.element_mm(),
         meshed: graded.meshed,
     })
-}
-
-/// Known touches as they are proposed, on the surface that touches land on.
-pub(super) fn proposed(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<Touch>, DesignError> {
-    touches_on(mesh, inputs, PROPOSED, PROPOSED_SEED, true)
-}
-
-/// Length and width (m) of the grid of a gauge that reads at a point.
-pub(super) const POINT: [f64; 2] = [1e-9, 1e-9];
-
-/// A gauge at a site of a design, with a grid of this length and width (m).
-pub(super) fn gauge_at(site: &Site, [length, width]: [f64; 2]) -> Gauge {
-    Gauge {
-        position: site.position,
-        direction: site.direction,
-        normal: site.normal,
-        length,
-        width,
-    }
-}
-
-/// What gauges read everywhere on a mesh, as drawn, as it changes with the way they are glued, and with the tip where its
-/// radius (m) may be off (its standard deviation, m).
-pub(super) fn drawn_on(
-    model: &dyn Model,
-    gauges: &[Gauge],
-    mesh: &Arc<TriMesh>,
-    (tip_radius, off): (f64, f64),
-    watch: Watch,
-) -> Result<AsDrawn, Cancelled> {
-    let moved: Vec<Gauge> = gauges.iter().flat_map(moved).collect();
-    let sensitivity = Sensitivity::new(model, &moved, watch)?;
-    let pressed = |radius: f64| ResponseMap::new(&sensitivity, Arc::clone(mesh), radius, watch);
-    let mut drawn = as_drawn(&pressed(tip_radius)?, gauges.len());
-    if off > 0.0 {
-        let larger = as_drawn(&pressed(tip_radius + off)?, gauges.len());
-        let rise = vec![[off.recip(), -off.recip()]; gauges.len()];
-        drawn.tip = Some(
-            larger
-                .map
-                .combined(std::array::from_ref(&*drawn.map), &rise),
-        );
-    }
-    Ok(drawn)
-}
-
-/// A gauge as drawn, and moved and turned either way.
-fn moved(gauge: &Gauge) -> [Gauge; MOVES] {
-    let across = gauge.normal.cross(gauge.direction);
-    let at = |along: f64, aside: f64, degrees: f64| {
-        let (sin, cos) = degrees.to_radians().sin_cos();
-        Gauge {
-            position: gauge.position + gauge.direction * along + across * aside,
-            direction: gauge.direction * cos + across * sin,
-            ..*gauge
-        }
-    };
-    let (s, t) = (STEP_MM * 1e-3, STEP_DEGREES);
-    [
-        at(0.0, 0.0, 0.0),
-        at(s, 0.0, 0.0),
-        at(-s, 0.0, 0.0),
-        at(0.0, s, 0.0),
-        at(0.0, -s, 0.0),
-        at(0.0, 0.0, t),
-        at(0.0, 0.0, -t),
-    ]
-}
-
-/// Of central differences: as far as a workshop is off.
-const STEP_MM: f64 = 0.75;
-const STEP_DEGREES: f64 = 3.0;
-pub(super) const MOVES: usize = 7;
-
-fn as_drawn(all: &ResponseMap, gauges: usize) -> AsDrawn {
-    let change = |forth: usize, step: f64| {
-        let difference = |g: usize| {
-            let first = MOVES * g + forth;
-            vec![(first, 0.5 / step), (first + 1, -0.5 / step)]
-        };
-        all.mixed(&(0..gauges).map(difference).collect::<Vec<_>>())
-    };
-    let drawn: Vec<_> = (0..gauges).map(|g| vec![(MOVES * g, 1.0)]).collect();
-    AsDrawn {
-        map: Arc::new(all.mixed(&drawn)),
-        changes: [
-            change(1, STEP_MM),
-            change(3, STEP_MM),
-            change(5, STEP_DEGREES),
-        ],
-        tip: None,
-    }
-}
-
-/// Edge length (m) of the mesh that readings are known on: fine enough for the tip, which smooths them, and
-/// no more than so many triangles.
-pub(super) fn map_size(ground: &Ground, tip_radius: f64) -> f64 {
-    const OF_THE_TIP: f64 = 0.32;
-    const TRIANGLES: f64 = 30_000.0;
-    let coarsest = (ground.area() / TRIANGLES / 0.433).sqrt();
-    (OF_THE_TIP * tip_radius).max(coarsest)
 }
 
 /// The chosen gauges on the model's own surface.

@@ -1,6 +1,6 @@
 //! Too few places for gauges: what each filter took, and which key to change to what.
 
-use super::Inputs;
+use super::inputs::Inputs;
 use crate::feasible::{Blame, Feasibility, Filter};
 use crate::plain;
 

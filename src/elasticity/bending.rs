@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix2, RowSVector, SMatrix, Vector2};
 
-use super::Section;
+use super::material::Section;
 use super::membrane::{Matrix3x9, Matrix9};
 
 /// Corners of the sides: 12, 23, 31.

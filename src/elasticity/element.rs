@@ -5,8 +5,8 @@
 use glam::{DMat3, DVec3};
 use nalgebra::SMatrix;
 
-use super::Section;
 use super::bending::Bending;
+use super::material::Section;
 use super::membrane::{Matrix3x9, Matrix9, Membrane};
 
 pub type Matrix18 = SMatrix<f64, 18, 18>;

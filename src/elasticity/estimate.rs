@@ -11,6 +11,7 @@ use super::Model;
 use super::load::Touch;
 use super::observe::{Face, turn};
 use crate::budget::Elements;
+use crate::statistics::median;
 
 /// Change from 2h to h over the error at h. Displacements and smoothed strains converge with h² where all
 /// is smooth (3), with less near corners of supports and openings: between the two.
@@ -188,7 +189,7 @@ pub fn of(
     strain: impl Fn(usize, usize) -> [f64; 3],
 ) -> Discretization {
     let (mut square, mut relative) = (0.0, 0.0);
-    let least = LEAST_MOVED * median(fine.under.iter().map(|f| f.abs()).collect());
+    let least = LEAST_MOVED * median(fine.under.iter().map(|f| f.abs())).unwrap_or(0.0);
     for (left, f) in under.iter().zip(&fine.under) {
         square += left * left;
         let moved = f.abs().max(least);
@@ -204,11 +205,6 @@ pub fn of(
         loads: touches.len(),
         places: places.len(),
     }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Rms over loads and places beyond the tip (NaN where there is none) of what strains are off by over the load's

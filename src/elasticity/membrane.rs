@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::Section;
+use super::material::Section;
 
 pub type Matrix9 = SMatrix<f64, 9, 9>;
 pub type Matrix3x9 = SMatrix<f64, 3, 9>;

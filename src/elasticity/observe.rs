@@ -9,9 +9,10 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DQuat, DVec3};
 
 use super::element::Facet;
+use super::material::Section;
 use super::rows::Rows;
 use super::solver::BLOCK;
-use super::{Model, ShellModel};
+use super::system::System;
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// A facet turned further than this from the mean normal at a corner is across a crease, where strains
@@ -54,11 +55,19 @@ pub struct Observer {
 }
 
 impl Observer {
-    #[must_use]
-    pub fn new(model: &ShellModel, points: &[SurfacePoint], face: Face) -> Self {
-        let z = face.height(model.section.thickness);
+    /// On one face of a shell.
+    pub(super) fn of_shell(
+        mesh: &TriMesh,
+        section: &Section,
+        system: &System,
+        points: &[SurfacePoint],
+        face: Face,
+    ) -> Self {
+        let z = face.height(section.thickness);
         let mut builder = CornerRows {
-            model,
+            mesh,
+            section,
+            system,
             z,
             rows: Rows::default(),
             known: BTreeMap::new(),
@@ -68,13 +77,13 @@ impl Observer {
         let mut displacements = Rows::default();
         let mut frames = Vec::with_capacity(points.len());
         for &at in points {
-            let frame = tangent_frame(model.mesh.normal(at));
+            let frame = tangent_frame(mesh.normal(at));
             let corners = builder.corners_of(at.triangle);
             for row in strain_rows(&builder.frames, corners, at, frame) {
                 strains.push(row);
             }
-            for row in displacement_rows(&model.mesh, at, frame.z_axis * z) {
-                displacements.push(placed(model, row));
+            for row in displacement_rows(mesh, at, frame.z_axis * z) {
+                displacements.push(placed(system, row));
             }
             frames.push(frame);
         }
@@ -158,42 +167,6 @@ impl Observer {
         let displacement = &mut buffer[..rows];
         self.displacements.apply(solved, displacement);
         displacement
-    }
-
-    /// Strain tensors (xx, yy, 2xy) at each point for a single solution (6 × vertices freedoms).
-    #[must_use]
-    pub fn strain_of(&self, model: &dyn Model, displacement: &[f64]) -> Vec<[f64; 3]> {
-        self.strain(&model.system().widened(&[displacement]))
-            .chunks_exact(3 * BLOCK)
-            .map(|s| [s[0], s[BLOCK], s[2 * BLOCK]])
-            .collect()
-    }
-
-    /// As [`Self::strain_of`] for several solutions.
-    #[must_use]
-    pub fn strains_of(&self, model: &dyn Model, solutions: &[Vec<f64>]) -> Vec<Vec<[f64; 3]>> {
-        let mut all = Vec::with_capacity(solutions.len());
-        for chunk in solutions.chunks(BLOCK) {
-            let strain = self.strain(&model.system().widened(chunk));
-            for k in 0..chunk.len() {
-                let points = strain.chunks_exact(3 * BLOCK);
-                all.push(
-                    points
-                        .map(|s| [s[k], s[BLOCK + k], s[2 * BLOCK + k]])
-                        .collect(),
-                );
-            }
-        }
-        all
-    }
-
-    /// Displacements (m) at each point for a single solution.
-    #[must_use]
-    pub fn displacement_of(&self, model: &dyn Model, displacement: &[f64]) -> Vec<DVec3> {
-        self.displacement(&model.system().widened(&[displacement]))
-            .chunks_exact(3 * BLOCK)
-            .map(|s| DVec3::new(s[0], s[BLOCK], s[2 * BLOCK]))
-            .collect()
     }
 }
 
@@ -292,7 +265,9 @@ fn times(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
 
 /// Builds the corner stage: one entry for each vertex in use, or for a facet's own corner at a crease.
 struct CornerRows<'m> {
-    model: &'m ShellModel,
+    mesh: &'m TriMesh,
+    section: &'m Section,
+    system: &'m System,
     z: f64,
     rows: Rows,
     known: BTreeMap<(u32, Option<u32>), u32>,
@@ -301,16 +276,16 @@ struct CornerRows<'m> {
 
 impl CornerRows<'_> {
     fn corners_of(&mut self, triangle: u32) -> [u32; 3] {
-        let tri = self.model.mesh.triangles()[triangle as usize];
+        let tri = self.mesh.triangles()[triangle as usize];
         std::array::from_fn(|corner| self.corner(triangle, tri[corner]))
     }
 
     fn corner(&mut self, triangle: u32, vertex: u32) -> u32 {
-        let normal = self.model.mesh.vertex_normals()[vertex as usize];
-        let around = &self.model.mesh.vertex_triangles()[vertex as usize];
+        let normal = self.mesh.vertex_normals()[vertex as usize];
+        let around = &self.mesh.vertex_triangles()[vertex as usize];
         let smooth = around
             .iter()
-            .all(|&t| self.model.mesh.facet_normal(t).dot(normal) > CREASE);
+            .all(|&t| self.mesh.facet_normal(t).dot(normal) > CREASE);
         let key = (vertex, (!smooth).then_some(triangle));
         if let Some(&known) = self.known.get(&key) {
             return known;
@@ -319,7 +294,7 @@ impl CornerRows<'_> {
             (tangent_frame(normal), around.clone())
         } else {
             (
-                tangent_frame(self.model.mesh.facet_normal(triangle)),
+                tangent_frame(self.mesh.facet_normal(triangle)),
                 vec![triangle],
             )
         };
@@ -332,17 +307,17 @@ impl CornerRows<'_> {
 
     /// The mean over facets, weighted by area, of their strains at the vertex.
     fn push_average(&mut self, vertex: u32, frame: SiteFrame, facets: &[u32]) {
-        let mesh = &self.model.mesh;
-        let total: f64 = facets.iter().map(|&t| self.model.mesh.facet_area(t)).sum();
+        let mesh = self.mesh;
+        let total: f64 = facets.iter().map(|&t| self.mesh.facet_area(t)).sum();
         let curved = thickened(curvature(mesh, vertex, facets, frame), self.z);
         let mut rows: [BTreeMap<u32, f64>; 3] = Default::default();
         for &t in facets {
-            let tri = self.model.mesh.triangles()[t as usize];
+            let tri = self.mesh.triangles()[t as usize];
             let zeta = std::array::from_fn(|i| if tri[i] == vertex { 1.0 } else { 0.0 });
-            let facet = Facet::new(self.model.mesh.corners(t), &self.model.section);
+            let facet = Facet::new(self.mesh.corners(t), self.section);
             let strain = facet.strain(zeta, self.z);
             let turned = times(curved, turn(facet.frame, frame));
-            let share = self.model.mesh.facet_area(t) / total;
+            let share = self.mesh.facet_area(t) / total;
             for (row, weights) in rows.iter_mut().zip(turned) {
                 for i in 0..18 {
                     let value: f64 = (0..3).map(|k| weights[k] * strain[(k, i)]).sum();
@@ -351,18 +326,18 @@ impl CornerRows<'_> {
             }
         }
         for row in rows {
-            self.rows.push(placed(self.model, row));
+            self.rows.push(placed(self.system, row));
         }
     }
 }
 
 /// A row over freedoms as a row over solved blocks: held freedoms are zero.
 fn placed(
-    model: &ShellModel,
+    system: &System,
     row: impl IntoIterator<Item = (u32, f64)>,
 ) -> impl Iterator<Item = (u32, f64)> {
     row.into_iter().filter_map(|(freedom, weight)| {
-        let (place, scale) = model.system().place(freedom as usize)?;
+        let (place, scale) = system.place(freedom as usize)?;
         Some((place, weight * scale))
     })
 }

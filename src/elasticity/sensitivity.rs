@@ -139,7 +139,6 @@ mod tests {
     use crate::budget::unwatched;
     use crate::elasticity::Freedoms;
     use crate::elasticity::ShellModel;
-    use crate::elasticity::observe::Observer;
     use crate::elasticity::respond::respond;
     use crate::limb::LimbSpec;
     use crate::mesh::sample;
@@ -160,7 +159,7 @@ mod tests {
         let section = crate::project::Project::around("", None).section();
         let model = ShellModel::new(&mesh, section, &held, &unwatched).unwrap();
         let points = sample::random(&mesh, 5, 3, |_| true);
-        let observer = Observer::new(&model, &points, Face::Inside);
+        let observer = model.observer(&points, Face::Inside);
         let gauges: Vec<Gauge> = (points.iter().zip(observer.frames()))
             .map(|(&at, frame)| Gauge {
                 position: mesh.point(at),

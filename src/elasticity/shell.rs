@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
+use super::Freedoms;
 use super::element::Facet;
+use super::error::{ElasticError, range};
 use super::load::{NodalForces, Touch, nodal_forces};
-use super::model::{ElasticError, LoadCheck, Model, range};
+use super::material::Section;
+use super::model::{LoadCheck, Model};
 use super::observe::{Face, Observer};
 use super::solver::{BLOCK, FactorError, SymmetricMatrix};
 use super::system::{HELD, System, number_unknowns};
-use super::{Freedoms, Section};
 use crate::budget::{Cancelled, Watch, report};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
@@ -153,7 +155,7 @@ impl Model for ShellModel {
     }
 
     fn observer(&self, points: &[SurfacePoint], face: Face) -> Observer {
-        Observer::new(self, points, face)
+        Observer::of_shell(&self.mesh, &self.section, &self.system, points, face)
     }
 
     fn check_all(&self, touches: &[Touch], solutions: &[Vec<f64>]) -> LoadCheck {

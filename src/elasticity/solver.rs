@@ -1,5 +1,6 @@
 //! The sparse stiffness matrix: its pattern, its scaled factor, and solves in blocks.
 
+mod matrix;
 mod numeric;
 
 use faer::linalg::matmul::matmul;
@@ -20,64 +21,10 @@ use faer::{Accum, MatMut, MatRef, Par, Side};
 use crate::budget::Watch;
 use crate::memory;
 
+pub use self::matrix::{FactorError, SymmetricMatrix};
+
 /// Right-hand sides solved together. Fixed, so that a load gives the same bytes in any company.
 pub const BLOCK: usize = 64;
-
-/// Why the factorization failed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FactorError {
-    /// A pivot that is not positive, at this row.
-    NotPositive {
-        row: usize,
-    },
-    OutOfMemory,
-    /// The matrix and its factor would take so many bytes.
-    TooLarge {
-        bytes: f64,
-    },
-    Cancelled,
-}
-
-/// The lower triangle of a symmetric matrix, by columns.
-pub struct SymmetricMatrix {
-    pub columns: Vec<usize>,
-    pub rows: Vec<usize>,
-    pub values: Vec<f64>,
-}
-
-impl SymmetricMatrix {
-    pub fn dimension(&self) -> usize {
-        self.columns.len() - 1
-    }
-
-    /// Adds to the entry (row, column) of the lower triangle, which must be in the pattern.
-    pub fn add(&mut self, row: usize, column: usize, value: f64) {
-        let range = self.columns[column]..self.columns[column + 1];
-        if let Ok(place) = self.rows[range.clone()].binary_search(&row) {
-            self.values[range.start + place] += value;
-        }
-    }
-
-    pub fn diagonal(&self, column: usize) -> f64 {
-        // The diagonal is the first entry of its column in a lower triangle.
-        self.values[self.columns[column]]
-    }
-
-    /// y = A x.
-    pub fn multiply(&self, x: &[f64]) -> Vec<f64> {
-        let mut y = vec![0.0; x.len()];
-        for column in 0..self.dimension() {
-            for k in self.columns[column]..self.columns[column + 1] {
-                let (row, value) = (self.rows[k], self.values[k]);
-                y[row] += value * x[column];
-                if row != column {
-                    y[column] += value * x[row];
-                }
-            }
-        }
-        y
-    }
-}
 
 /// L Lᵀ of the matrix scaled to a unit diagonal, its rows in the order of elimination.
 pub struct Factor {

@@ -3,7 +3,9 @@
 
 use serde::Serialize;
 
-use super::{EstimatorKind, Evaluation, Judging, Region, Said, mean, quoted, row};
+use super::judging::EstimatorKind;
+use super::rows::{Region, Said, quoted, row};
+use crate::statistics::mean;
 
 /// What was found of one set under touches of one force: errors touch by touch (mm).
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +50,7 @@ pub struct MatchedRow {
 }
 
 impl Matched {
-    fn said(&self) -> Said<'_> {
+    pub(super) fn said(&self) -> Said<'_> {
         Said {
             selector: &self.selector,
             sensors: self.sensors,
@@ -86,38 +88,11 @@ impl Matched {
     }
 }
 
-impl Evaluation {
-    /// Of what was found by matching: rows and errors of every set are those at the force in the middle.
-    #[must_use]
-    pub(crate) fn of_matched(judging: Judging, found: Vec<Matched>, regions: &[Region]) -> Self {
-        let middle = judging.middle_n();
-        let of_set = || found.iter().filter(move |m| Some(m.force_n) == middle);
-        Self {
-            rows: of_set()
-                .flat_map(|m| m.said().rows(regions, [&m.errors, &m.built]))
-                .collect(),
-            errors: of_set().map(|m| m.errors.clone()).collect(),
-            built: of_set().map(|m| m.built.clone()).collect(),
-            matched: found.iter().flat_map(|m| m.rows(regions)).collect(),
-            found,
-            judging,
-            ..Self::default()
-        }
-    }
-
-    /// What was found of a set by matching over all touches, a row for each force.
-    pub fn by_force(&self, selector: &str, sensors: usize) -> impl Iterator<Item = &MatchedRow> {
-        let of_set = move |r: &&MatchedRow| {
-            r.selector == selector && r.sensors == sensors && r.region == super::EVERYWHERE
-        };
-        self.matched.iter().filter(of_set)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::evaluation::{EVERYWHERE, Forces};
+    use crate::evaluation::{Evaluation, Judging};
 
     fn matched(sensors: usize, force_n: f64) -> Matched {
         Matched {

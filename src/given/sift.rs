@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use super::GivenSite;
 use crate::design::DesignError;
 use crate::elasticity::Touch;
 use crate::mesh::locate::SurfaceIndex;
@@ -318,4 +317,13 @@ mod tests {
         let none = sift(&corner(), &[touch(1.0)], &sites).check().unwrap_err();
         assert!(none.to_string().contains("1 touches"), "{none}");
     }
+}
+
+/// A gauge at a given place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GivenSite {
+    /// m.
+    pub position: DVec3,
+    /// The direction the gauge measures along; its part in the surface counts.
+    pub direction: DVec3,
 }

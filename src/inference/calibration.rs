@@ -30,7 +30,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
 
 use super::drawn::{AsDrawn, Doubt, covariance, doubt, upper_triangle};
-use super::map::Slope;
+use super::map::{ResponseMap, Slope};
 use super::matching::Errors;
 use crate::mesh::SurfacePoint;
 use crate::uncertainty::Uncertainty;
@@ -303,6 +303,14 @@ fn zero_of(excess: impl Fn(f64) -> f64) -> f64 {
         }
     }
     high
+}
+
+impl AsDrawn {
+    /// As the gauges really are.
+    #[must_use]
+    pub fn calibrated(&self, calibration: &Calibration) -> ResponseMap {
+        self.glued(&calibration.glued)
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::calibration::Calibration;
 use super::map::{ResponseMap, Slope};
 use crate::mesh::SurfacePoint;
 use crate::uncertainty::{Gluing, Uncertainty};
@@ -65,12 +64,6 @@ pub(super) fn upper_triangle(covariance: &Matrix4<f64>) -> Doubt {
 }
 
 impl AsDrawn {
-    /// As the gauges really are.
-    #[must_use]
-    pub fn calibrated(&self, calibration: &Calibration) -> ResponseMap {
-        self.glued(&calibration.glued)
-    }
-
     /// For gauges with these gains, moved (mm) and turned (degrees) like that.
     #[must_use]
     pub fn glued(&self, glued: &[[f64; 4]]) -> ResponseMap {

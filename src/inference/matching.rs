@@ -16,6 +16,7 @@
 //! `templates` and `modes` are what is made of it: the whole posterior, and the likeliest places.
 
 mod errors;
+mod find;
 mod kernels;
 mod modes;
 mod templates;
@@ -31,7 +32,6 @@ use crate::mesh::SurfacePoint;
 
 pub use self::errors::Errors;
 
-use self::modes::widest;
 use self::weighed::Heard;
 
 /// A touch as it was inferred.
@@ -67,11 +67,6 @@ pub struct Matching {
     highest: Vec<f32>,
 }
 
-/// Beyond this deviation, in templates, their posterior takes the place of Gauss–Newton's normal one.
-const BROAD: f64 = 1.0;
-/// Turns in which a force and the weights that depend on it settle.
-const TURNS: usize = 2;
-
 impl Matching {
     #[must_use]
     pub fn new(map: Arc<ResponseMap>, errors: Errors, most_force: f64) -> Self {
@@ -83,47 +78,6 @@ impl Matching {
             errors,
             most_force,
         }
-    }
-
-    /// The touch that explains a reading (strain, a channel each) best.
-    pub fn find(&mut self, reading: &[f64]) -> Contact {
-        self.find_with_evidence(reading).0
-    }
-
-    /// As [`Self::find`], and the logarithm of the reading's density over all touches there may be, but for a constant
-    /// that depends neither on the reading nor on the channels that are trusted.
-    pub fn find_with_evidence(&mut self, reading: &[f64]) -> (Contact, f64) {
-        let measured = Heard::new(reading, &self.errors, &self.used);
-        self.score(&measured);
-        let mut modes = self.modes(&measured);
-        modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-        let best = modes[0];
-        let over_best: f64 = (modes.iter().map(|m| m.log_evidence - best.log_evidence))
-            .map(f64::exp)
-            .sum();
-        let evidence = best.log_evidence + over_best.ln() + measured.log_density();
-        let broad = BROAD * self.map.spacing();
-        let contact = if widest(best.covariance) > broad * broad {
-            self.mean_of_templates(&measured, &best)
-        } else {
-            self.mean_of_modes(&measured, &modes)
-        };
-        (contact, evidence)
-    }
-
-    /// As [`Self::find`] for a touch that goes on: from the place where it was, without looking everywhere.
-    /// Nothing where that does not explain the reading any more, or no longer clearly.
-    #[must_use]
-    pub fn track(&self, reading: &[f64], last: &Contact) -> Option<Contact> {
-        let measured = Heard::new(reading, &self.errors, &self.used);
-        // Noise alone makes them differ by a few deviations of χ².
-        let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
-        let explained = |cost: f64| 2.0 * cost <= last.unexplained + differs;
-        let start = self.map.index.nearest(last.position).0;
-        let mode = self.follow(&measured, start, Some(last.force));
-        let broad = BROAD * self.map.spacing();
-        (explained(mode.cost) && widest(mode.covariance) <= broad * broad)
-            .then(|| self.contact_at(&measured, &mode, true))
     }
 
     /// What was found for another reading, where this one is the same but for its size and the noise of both: a

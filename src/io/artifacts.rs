@@ -1,29 +1,23 @@
 //! What a design leaves behind: the table of sites, the dataset, the summary and a project that
 //! reproduces it.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::fingerprint::Fingerprint;
 use super::npz::NpzFile;
+use super::run::as_computed;
+use super::table::Writing;
 use super::together::Together;
 use super::{FileError, atomic, project_file, report, source};
-use crate::dataset::{Dataset, Signal, Site};
+use crate::dataset::Dataset;
 use crate::design::{Design, Inputs};
 use crate::evaluation::{EstimatorKind, EvaluationRow};
 use crate::placement::expected_error::ASSUMES;
 use crate::placement::information::Geometry;
-use crate::project::{ChosenSite, Project};
+use crate::project::Project;
 
-/// Everything that stands beside the numbers: where the project came from and who computed it.
-pub struct Provenance<'a> {
-    pub mesh_path: &'a Path,
-    pub version: &'static str,
-    /// What was left out, mended and taken over when the mesh was read, in words.
-    pub taken_in: Option<String>,
-}
+pub use super::run::{Provenance, as_chosen, range, run_key, signal_to_noise, signal_unit};
 
 /// The project among the files of a design.
 const PROJECT: &str = "design.hapdef.toml";
@@ -107,21 +101,6 @@ fn bring(from: &Path, to: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Which run a file belongs to: a key of everything that its figures depend on, the same whenever the same is computed
-/// again, on whatever machine.
-#[must_use]
-pub fn run_key(inputs: &Inputs, design: &Design) -> String {
-    let mut project = as_computed(&inputs.project, design);
-    // What files are called says nothing of what is in them.
-    project.part.mesh.clear();
-    project.feasible.painted = None;
-    let mut key = Fingerprint::default();
-    key.add(env!("CARGO_PKG_VERSION").bytes());
-    key.add(serde_json::to_string(&project).unwrap_or_default().bytes());
-    key.add_part(inputs);
-    key.hex()
-}
-
 /// The project that reproduces the run, with the chosen sites in it.
 #[must_use]
 pub fn with_result(project: &Project, design: &Design, at: &Path, mesh: &Path) -> Project {
@@ -130,83 +109,50 @@ pub fn with_result(project: &Project, design: &Design, at: &Path, mesh: &Path) -
     project
 }
 
-/// The project at the quality of the design, with the sites that it chose.
-fn as_computed(project: &Project, design: &Design) -> Project {
-    let mut project = project.clone();
-    project.budget.limits = project.budget.limits_at(design.budget.quality);
-    project.budget.quality = design.budget.quality;
-    project.selection.sites = as_chosen(&design.simulated.dataset.sites, design.chosen());
-    project
-}
-
-/// The chosen sites as a project keeps them: to the micrometre and the ten-thousandth.
-#[must_use]
-pub fn as_chosen(all: &[Site], sites: &[usize]) -> Vec<ChosenSite> {
-    let round = |x: f64, unit: f64| (x * unit).round() / unit + 0.0;
-    sites
-        .iter()
-        .map(|&s| {
-            let site = &all[s];
-            ChosenSite {
-                position_mm: (site.position * 1000.0).to_array().map(|x| round(x, 1e3)),
-                direction: site.direction.to_array().map(|x| round(x, 1e4)),
-            }
-        })
-        .collect()
-}
-
 /// The table of chosen sites; what one command writes another reads.
 #[must_use]
 pub fn sites_csv(inputs: &Inputs, design: &Design) -> String {
     let dataset = &design.simulated.dataset;
     let run = run_key(inputs, design);
-    let mut text = String::from(
-        "x_mm,y_mm,z_mm,dx,dy,dz,index,gauge,rms_strain_microstrain,peak_strain_microstrain,signal_low,signal_high,signal_unit,run\n",
-    );
+    let mut table = Writing::new([
+        "x_mm",
+        "y_mm",
+        "z_mm",
+        "dx",
+        "dy",
+        "dz",
+        "index",
+        "gauge",
+        "rms_strain_microstrain",
+        "peak_strain_microstrain",
+        "signal_low",
+        "signal_high",
+        "signal_unit",
+        "run",
+    ]);
     for (k, &s) in design.chosen().iter().enumerate() {
         let site = &dataset.sites[s];
         let p = site.position * 1000.0;
         let d = site.direction;
         let (low, high) = range(dataset, s);
-        let _ = writeln!(
-            text,
-            "{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{s},{},{:.2},{:.2},{low:.4},{high:.4},{},{run}",
-            p.x,
-            p.y,
-            p.z,
-            d.x,
-            d.y,
-            d.z,
-            k + 1,
-            site.rms_strain * 1e6,
-            site.peak_strain * 1e6,
-            signal_unit(dataset.signal)
-        );
+        table.row([
+            format!("{:.4}", p.x),
+            format!("{:.4}", p.y),
+            format!("{:.4}", p.z),
+            format!("{:.6}", d.x),
+            format!("{:.6}", d.y),
+            format!("{:.6}", d.z),
+            s.to_string(),
+            (k + 1).to_string(),
+            format!("{:.2}", site.rms_strain * 1e6),
+            format!("{:.2}", site.peak_strain * 1e6),
+            format!("{low:.4}"),
+            format!("{high:.4}"),
+            signal_unit(dataset.signal).to_owned(),
+            run.clone(),
+        ]);
     }
-    text
-}
-
-/// The unit a signal is shown in.
-#[must_use]
-pub fn signal_unit(signal: Signal) -> &'static str {
-    match signal {
-        Signal::Strain => "microstrain",
-        Signal::Displacement | Signal::NormalDisplacement => "mm",
-    }
-}
-
-/// Smallest and largest signal of a site over the touches, in [`signal_unit`].
-#[must_use]
-pub fn range(dataset: &Dataset, site: usize) -> (f64, f64) {
-    let scale = match dataset.signal {
-        Signal::Strain => 1e6,
-        Signal::Displacement | Signal::NormalDisplacement => 1e3,
-    };
-    let row = dataset.x.row(site);
-    (
-        row.iter().copied().fold(f64::INFINITY, f64::min) * scale,
-        row.iter().copied().fold(f64::NEG_INFINITY, f64::max) * scale,
-    )
+    table.text()
 }
 
 /// `X` sites × touches, `p_m` touches × 3, `site_m` sites × 3, `direction`, `signal`, `force_n`.
@@ -368,11 +314,4 @@ fn judged_rows(inputs: &Inputs, design: &Design) -> Value {
         value
     };
     evaluation.rows.iter().map(with_force).collect()
-}
-
-/// Rms strain over noise; absent when the project has no noise.
-#[must_use]
-pub fn signal_to_noise(inputs: &Inputs, rms_strain: f64) -> Option<f64> {
-    let noise = inputs.project.gauge.noise_microstrain * 1e-6;
-    (noise > 0.0).then(|| rms_strain / noise)
 }

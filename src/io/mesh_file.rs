@@ -15,23 +15,22 @@ mod obj;
 mod place;
 mod ply;
 mod sets;
+mod soup;
 mod stl;
 mod tetrahedra;
 mod unread;
 mod words;
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use self::boundary::quietly;
-use self::found::Said;
-use self::held::NodeSet;
-use self::place::Origin;
+use self::soup::Soup;
 use super::{FileError, source};
-use crate::memory;
+use crate::bounds::Bounds;
 use crate::mesh::repair::Repair;
 use crate::mesh::volume::VolumeMesh;
 use crate::mesh::{MeshError, RepairReport, TriMesh};
@@ -48,70 +47,6 @@ pub struct LoadedMesh {
     pub groups: Masks,
     /// What the file says beside its mesh.
     pub found: Found,
-}
-
-/// What a file holds, unchecked, in its own unit.
-#[derive(Default)]
-struct Soup {
-    positions: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
-    /// Name, first triangle and the one after the last.
-    groups: Vec<(String, usize, usize)>,
-    /// What was left out of the file, or is not known: whole sentences without a stop.
-    notes: Vec<String>,
-    /// Tetrahedra on the positions: their surface is the mesh, whatever triangles there are.
-    volume: Option<VolumeMesh>,
-    /// Where each of the tetrahedra stands in the file.
-    origins: Vec<Origin>,
-    /// Positions by name.
-    node_sets: Vec<NodeSet>,
-    /// What it says of the part beside its mesh.
-    said: Said,
-}
-
-impl Soup {
-    /// Names the triangles from `first` on.
-    fn group(&mut self, name: &str, first: usize) {
-        if !name.is_empty() && first < self.triangles.len() {
-            self.groups
-                .push((name.to_owned(), first, self.triangles.len()));
-        }
-    }
-
-    /// Vertices of the mesh that lie in each group: `numbers` are those of the file's vertices in the mesh, which has
-    /// so many.
-    fn masks(&mut self, numbers: &[Option<u32>], vertices: usize) -> Masks {
-        let mut masks = Masks::new();
-        let of_triangles = self.groups.iter().map(|(name, ..)| name.as_str());
-        let of_nodes = self.node_sets.iter().map(|(name, _)| name.as_str());
-        let names: BTreeSet<&str> = of_triangles.chain(of_nodes).collect();
-        if (names.len() as f64) * (vertices as f64) > memory::allowed() / 4.0 {
-            let said = format!(
-                "the {} named groups of the file are too many to be kept as masks",
-                names.len()
-            );
-            self.notes.push(said);
-            return masks;
-        }
-        let mut set = |name: &str, members: &mut dyn Iterator<Item = u32>| {
-            let mask = masks
-                .entry(name.to_owned())
-                .or_insert_with(|| Arc::new(vec![false; vertices]));
-            let mask = Arc::make_mut(mask);
-            for number in members.filter_map(|v| numbers[v as usize]) {
-                mask[number as usize] = true;
-            }
-        };
-        for (name, first, last) in &self.groups {
-            let corners = self.triangles[*first..*last].iter().flatten();
-            set(name, &mut corners.copied());
-        }
-        for (name, nodes) in &self.node_sets {
-            set(name, &mut nodes.iter().copied());
-        }
-        masks.retain(|_, mask| mask.iter().any(|&m| m));
-        masks
-    }
 }
 
 /// Whether a mesh of this name does not say its unit.
@@ -353,9 +288,7 @@ fn scale(soup: &mut Soup, given: Option<Unit>, deck: bool) -> Result<f64, String
 
 /// The longest side of the box around points, in their unit.
 fn extent(points: &[DVec3]) -> f64 {
-    let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (low, high) = (points.iter()).fold(none, |(low, high), &p| (low.min(p), high.max(p)));
-    (high - low).max_element()
+    Bounds::around(points.iter().copied()).size().max_element()
 }
 
 #[cfg(test)]

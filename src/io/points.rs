@@ -1,17 +1,16 @@
 //! Given touches, sites and presses, and answers, as CSV with the units in the column names.
 
-use std::io::Write as _;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
 use glam::DVec3;
 
 use super::npz::NpzFile;
-use super::table::{Row, Table};
+use super::table::{Row, Table, Writing};
 use super::{FileError, atomic};
 use crate::board::{GivenPress, PRESSES};
 use crate::elasticity::Touch;
-use crate::given::{self, Answer, GivenSite, LeftOut};
+use crate::given::{self, Answer, GivenSite};
 use crate::project::LENGTH;
 
 const TOUCHES: [&str; 8] = [
@@ -170,36 +169,40 @@ pub fn write_answers(path: &Path, answer: &Answer) -> Result<(), FileError> {
     if path.extension().is_some_and(|e| e == "npz") {
         return write_npz(path, answer).map_err(|e| FileError::of(path, &e))?;
     }
-    let text = csv(answer).map_err(|e| FileError::of(path, &e))?;
-    atomic::write(path, &text)
+    atomic::write(path, csv(answer).as_bytes())
 }
 
-fn csv(answer: &Answer) -> std::io::Result<Vec<u8>> {
+fn csv(answer: &Answer) -> String {
     let rows = &answer.rows;
-    let mut text = Vec::new();
-    writeln!(
-        text,
-        "touch,site,ux_mm,uy_mm,uz_mm,strain,touch_distance_mm,site_distance_mm"
-    )?;
+    let mut table = Writing::new([
+        "touch",
+        "site",
+        "ux_mm",
+        "uy_mm",
+        "uz_mm",
+        "strain",
+        "touch_distance_mm",
+        "site_distance_mm",
+    ]);
     for pair in answer.pairs() {
         let u = pair.displacement * 1000.0;
-        writeln!(
-            text,
-            "{},{},{:e},{:e},{:e},{:e},{:e},{:e}",
-            pair.touch,
-            pair.site,
+        let figures = [
             u.x,
             u.y,
             u.z,
             pair.strain,
             rows.touch_distances[pair.touch] * 1000.0,
-            rows.site_distances[pair.site] * 1000.0
-        )?;
+            rows.site_distances[pair.site] * 1000.0,
+        ];
+        let numbers = [pair.touch, pair.site].map(|n| n.to_string());
+        let figures = figures.map(|f| format!("{f:e}"));
+        table.row(numbers.iter().chain(&figures));
     }
-    for LeftOut { why, .. } in &rows.left_out {
-        writeln!(text, "# left out: {why}")?;
-    }
-    Ok(text)
+    let left_out = rows
+        .left_out
+        .iter()
+        .map(|l| format!("# left out: {}\n", l.why));
+    table.text() + &left_out.collect::<String>()
 }
 
 fn write_npz(path: &Path, answer: &Answer) -> std::io::Result<Result<(), FileError>> {

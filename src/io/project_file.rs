@@ -1,6 +1,7 @@
 //! Project files: readable, commented, versioned TOML, with arrays in NPZ beside them.
 
 mod masks;
+mod names;
 mod text;
 
 use std::collections::BTreeMap;
@@ -15,6 +16,9 @@ use crate::mesh::RepairReport;
 use crate::plain::{ends, lines_before};
 use crate::project::{FORMAT, Masks, Project};
 
+use names::{marked, plain};
+
+pub use names::arrays_path;
 pub use text::to_text;
 
 /// Name of the painted mask among the arrays.
@@ -30,9 +34,6 @@ pub struct LoadedProject {
     /// The limb inside the program: its mesh lies in no file yet.
     pub bundled: bool,
 }
-
-/// Between the name of a mask and the fingerprint of its values, in a file.
-const MARK: char = '@';
 
 /// Reads a project, its mesh and its masks.
 ///
@@ -91,26 +92,6 @@ fn is_given(table: &toml::Table, key: &str) -> bool {
     inner.is_some_and(|inner| inner.contains_key(key))
 }
 
-/// The name without its fingerprint.
-fn plain(name: &str) -> &str {
-    match name.rsplit_once(MARK) {
-        Some((plain, mark)) if mark.len() == 16 && mark.bytes().all(|b| b.is_ascii_hexdigit()) => {
-            plain
-        }
-        _ => name,
-    }
-}
-
-/// The name with the fingerprint of what it names: other values stand under another name, so that arrays
-/// for the old project and for the new one can lie in a file together.
-fn marked(name: &str, mask: &[bool]) -> String {
-    // FNV-1a: the same on every machine.
-    let hash = mask.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, &set| {
-        (h ^ u64::from(set)).wrapping_mul(0x0100_0000_01b3)
-    });
-    format!("{}{MARK}{hash:016x}", plain(name))
-}
-
 /// Whether a path names a project and not a mesh, by its ending.
 #[must_use]
 pub fn is_project(path: &Path) -> bool {
@@ -127,12 +108,6 @@ pub fn with_ending(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".hapdef.toml");
     path.with_file_name(name)
-}
-
-/// Where a project's arrays lie: `limb.hapdef.toml` has `limb.hapdef.npz`.
-#[must_use]
-pub fn arrays_path(project: &Path) -> PathBuf {
-    project.with_extension("npz")
 }
 
 /// Parses and checks a project's text.
@@ -296,20 +271,14 @@ fn write_arrays(path: &Path, arrays: &BTreeMap<&str, &[bool]>) -> Result<(), Fil
 pub fn relative_to(project: &Path, target: &Path) -> String {
     let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned());
     let (from, to) = (absolute(project), absolute(target));
-    let folder = from.parent().unwrap_or(Path::new("/")).to_owned();
-    let common = folder
-        .components()
-        .zip(to.components())
-        .take_while(|(a, b)| a == b)
-        .count();
-    let up = folder.components().count() - common;
-    if common <= 1 {
-        return to.to_string_lossy().into_owned();
-    }
-    let mut relative = PathBuf::new();
-    (0..up).for_each(|_| relative.push(".."));
-    relative.extend(to.components().skip(common));
-    relative.to_string_lossy().replace('\\', "/")
+    let folder = from.parent().unwrap_or(Path::new("/"));
+    // The root, or the drive, in common is nothing in common.
+    let is_near = folder.components().take(2).eq(to.components().take(2));
+    let relative = is_near.then(|| pathdiff::diff_paths(&to, folder)).flatten();
+    relative.map_or_else(
+        || to.to_string_lossy().into_owned(),
+        |path| path.to_string_lossy().replace('\\', "/"),
+    )
 }
 
 #[cfg(test)]

@@ -3,10 +3,12 @@
 mod certificate;
 mod matched;
 mod part;
+mod words;
 
 use std::fmt::Write as _;
 
-use super::artifacts::{Provenance, range, run_key, signal_to_noise, signal_unit};
+use self::words::{judged_on, title_of};
+use super::run::{Provenance, range, run_key, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Paint, Series, escape};
 use crate::colormap::ColorMap;
 use crate::design::{Design, Inputs, Simulated};
@@ -15,6 +17,7 @@ use crate::gaussian_process::GpTrial;
 use crate::mesh::flatten::Flat;
 use crate::placement::SelectorKind;
 use crate::placement::candidates::Candidates;
+use crate::plain;
 use crate::project::PartModel;
 use crate::regression::Hyper;
 
@@ -359,12 +362,7 @@ pub fn round_up(top: f64) -> f64 {
     if !(top > 0.0 && top.is_finite()) {
         return 1.0;
     }
-    let power = 10f64.powf(top.log10().floor());
-    [1.0, 2.0, 4.0, 5.0, 8.0, 10.0]
-        .map(|m| m * power)
-        .into_iter()
-        .find(|s| *s >= top)
-        .unwrap_or(top)
+    plain::next_round(top, &[1.0, 2.0, 4.0, 5.0, 8.0, 10.0])
 }
 
 /// The cross-validated search that the Gaussian process took its kernel from.
@@ -449,17 +447,6 @@ pub fn failure_ways(by: EstimatorKind) -> &'static [(bool, &'static str)] {
 #[must_use]
 pub fn failure_name(set: &Failures) -> &str {
     title_of(&set.selector)
-}
-
-/// What a set was chosen by, as read by people.
-fn title_of(selector: &str) -> &str {
-    if selector == BASELINE {
-        return "All candidates";
-    }
-    SelectorKind::ALL
-        .into_iter()
-        .find(|k| k.name() == selector)
-        .map_or(selector, |kind| kind.title())
 }
 
 /// Error against number of failed gauges.
@@ -549,18 +536,6 @@ fn errors(page: &mut String, design: &Design) {
         );
     }
     page.push_str("</table></details>");
-}
-
-/// What the touches that judge are computed on: where a finer model would not have fitted, on one like the design's.
-fn judged_on(design: &Design) -> String {
-    /// Sizes that differ by less are the same.
-    const SAME: f64 = 0.99;
-    let (own, truth) = (design.simulated.element_mm, design.truth.element_mm);
-    if truth < SAME * own {
-        format!("drawn off the nodes of a finer model ({truth:.2} mm)")
-    } else {
-        format!("drawn off the nodes of a model with elements of the same size ({truth:.2} mm)")
-    }
 }
 
 /// C, ε and γ of a regression.

@@ -9,6 +9,7 @@ use crate::mesh::TriMesh;
 use crate::mesh::flatten::Flat;
 use crate::mesh::stance::Stance;
 use crate::mesh::stretch::KEPT;
+use crate::plain;
 
 /// A gauge to be drawn: its number, place (m) and direction.
 #[derive(Clone, Copy, Debug)]
@@ -404,12 +405,7 @@ fn ticks(top: f64) -> (f64, f64) {
         return (1.0, 1.0);
     }
     let raw = top / 5.0;
-    let power = 10f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0]
-        .map(|m| m * power)
-        .into_iter()
-        .find(|&s| s >= raw)
-        .unwrap_or(raw);
+    let step = plain::next_round(raw, &[1.0, 2.0, 5.0, 10.0]);
     (step, (top / step).ceil() * step)
 }
 

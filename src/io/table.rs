@@ -221,6 +221,36 @@ impl Row<'_> {
     }
 }
 
+/// A table that is written.
+pub struct Writing(csv::Writer<Vec<u8>>);
+
+impl Writing {
+    /// With these columns.
+    #[must_use]
+    pub fn new(columns: impl IntoIterator<Item = impl AsRef<[u8]>>) -> Self {
+        let mut table = Self(csv::Writer::from_writer(Vec::new()));
+        table.row(columns);
+        table
+    }
+
+    /// Adds a row.
+    ///
+    /// # Panics
+    /// When it has not as many cells as there are columns.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = impl AsRef<[u8]>>) {
+        self.0
+            .write_record(cells)
+            .expect("as many cells as columns, into memory");
+    }
+
+    /// What is written.
+    #[must_use]
+    pub fn text(self) -> String {
+        let bytes = self.0.into_inner().unwrap_or_default();
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::fingerprint::Fingerprint;
 use super::svg::escape;
+use super::table::Writing;
 use super::together::Together;
 use super::{FileError, atomic, source};
 use crate::dataset::Signal;
@@ -180,20 +181,17 @@ pub fn write(place: &Together, project: &Project, record: &Record) -> Result<(),
 #[must_use]
 pub fn csv(project: &Project, record: &Record) -> String {
     let best = front(project, &record.points);
-    let mut text = format!("on_front,{},{},failed\n", FIGURES.join(","), KEYS.join(","));
+    let columns = ["on_front"].into_iter().chain(FIGURES).chain(KEYS);
+    let mut table = Writing::new(columns.chain(["failed"]));
     for point in &record.points {
         let on_front = best.iter().any(|p| std::ptr::eq(*p, point));
         let figures = point.measured().map_or_else(Default::default, figures);
-        let failed = point.outcome.as_ref().err().map_or("", String::as_str);
-        let _ = writeln!(
-            text,
-            "{on_front},{},{},\"{}\"",
-            figures.join(","),
-            keys(&point.setting).join(","),
-            failed.replace('"', "'")
-        );
+        let failed = point.outcome.as_ref().err().cloned().unwrap_or_default();
+        let setting = keys(&point.setting);
+        let cells = std::iter::once(on_front.to_string()).chain(figures);
+        table.row(cells.chain(setting).chain([failed]));
     }
-    text
+    table.text()
 }
 
 const FIGURES: [&str; 11] = [

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
 
-use super::barrel::BarrelSpec;
+use super::barrel_spec::BarrelSpec;
 use super::body::{AROUND, Body, CORNERS, Ring};
 use super::lattice::{Foot, Lattice, steps};
 

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::barrel::BarrelSpec;
+use super::barrel_spec::BarrelSpec;
 use super::body::{AROUND, CORNERS};
 
 /// Cells from the lower to the upper end of a rim: those that a rod grows from, and one on either side.

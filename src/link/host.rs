@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use super::PortInfo;
 use crate::board::{SimulatedBoard, Truth};
 
 /// How often the board is looked after.
@@ -218,21 +217,14 @@ impl Door for SocketDoor {
     }
 }
 
-/// Simulated boards on this machine that have a pseudo-terminal.
+/// Where simulated boards on this machine are found that have a pseudo-terminal.
 #[cfg(unix)]
-pub(super) fn simulated() -> Vec<PortInfo> {
+pub(super) fn simulated() -> Vec<String> {
     terminal::all()
-        .into_iter()
-        .map(|path| PortInfo {
-            path,
-            product: "Simulated board".into(),
-            likely: true,
-        })
-        .collect()
 }
 
 #[cfg(not(unix))]
-pub(super) fn simulated() -> Vec<PortInfo> {
+pub(super) fn simulated() -> Vec<String> {
     Vec::new()
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use super::{Got, Pace, Port};
+use super::port::{Got, Pace, Port};
 use crate::memory;
 use crate::plain;
 use crate::wire::{Decoder, Event};

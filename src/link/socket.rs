@@ -4,7 +4,7 @@ use std::io::{Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-use super::{Got, Port};
+use super::port::{Got, Port};
 
 struct Socket(TcpStream);
 

@@ -8,6 +8,7 @@ use super::health::{Expected, Health, Watcher};
 use super::receiver::Sample;
 use super::tare::{Rest, Taring};
 use crate::inference::{Chain, Contact, Errors, Matching, ResponseMap, Trained};
+use crate::statistics::median;
 use crate::uncertainty::{UNESTIMATED, Uncertainty, rounding};
 use crate::wire::Hello;
 
@@ -391,7 +392,7 @@ impl Pipeline {
 
     fn watch(&mut self, counts: &[f64]) {
         let noise = self.rest.as_ref().map(|r| &r.noise);
-        let usual = noise.map_or(1.0, |n| median(n));
+        let usual = noise.map_or(1.0, |n| median(n.iter().copied()).unwrap_or(0.0));
         let highest = f64::from(self.settings.chain.highest_count());
         let known = self.hello.is_some();
         for (k, (watcher, &count)) in self.watchers.iter_mut().zip(counts).enumerate() {
@@ -563,12 +564,6 @@ impl Pipeline {
             *noise = (counts.max(rounding(1.0)) / per_strain).max(self.settings.least_noise);
         }
     }
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Logarithm of the normal density of a value around zero.

@@ -1,5 +1,7 @@
 //! What channels read at rest, how much they tremble, and how that drifts.
 
+use crate::statistics::{mean, median};
+
 /// Rest of every channel: counts and the standard deviation of their noise.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rest {
@@ -46,15 +48,12 @@ fn rest(rows: &[Vec<f64>]) -> Rest {
     let channels = rows[0].len();
     let column = |c: usize| rows.iter().map(move |row| row[c]);
     let level = |c: usize| {
-        let mut values: Vec<f64> = column(c).collect();
-        let middle = values.len() / 2;
-        let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-        let median = *median;
+        let middle = median(column(c)).unwrap_or(0.0);
         // Finer than a count: the mean of what lies near the median.
         let near: Vec<f64> = column(c)
-            .filter(|v| (v - median).abs() <= 4.0 * spread(rows, c).max(1.0))
+            .filter(|v| (v - middle).abs() <= 4.0 * spread(rows, c).max(1.0))
             .collect();
-        near.iter().sum::<f64>() / near.len() as f64
+        mean(&near)
     };
     Rest {
         level: (0..channels).map(level).collect(),

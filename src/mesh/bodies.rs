@@ -8,6 +8,7 @@ use super::numbers::NumberMap;
 use super::report::RepairReport;
 use super::topology::components;
 use super::{MeshError, winding};
+use crate::bounds::Bounds;
 
 /// One body of several.
 pub(super) struct Kept {
@@ -69,8 +70,7 @@ pub(super) fn keep_body(
 /// One of several surfaces.
 struct Enclosing<'t> {
     triangles: Vec<&'t [u32; 3]>,
-    lower: DVec3,
-    upper: DVec3,
+    bounds: Bounds,
     /// Six times the volume it encloses (m³), negative where it faces inward.
     volume: f64,
 }
@@ -78,16 +78,14 @@ struct Enclosing<'t> {
 impl<'t> Enclosing<'t> {
     const NOTHING: Self = Self {
         triangles: Vec::new(),
-        lower: DVec3::INFINITY,
-        upper: DVec3::NEG_INFINITY,
+        bounds: Bounds::NOTHING,
         volume: 0.0,
     };
 
     fn add(&mut self, tri: &'t [u32; 3], positions: &[DVec3], origin: DVec3) {
         let corners = tri.map(|v| positions[v as usize]);
         for p in corners {
-            self.lower = self.lower.min(p);
-            self.upper = self.upper.max(p);
+            self.bounds = self.bounds.with(p);
         }
         let [a, b, c] = corners.map(|p| p - origin);
         self.volume += a.dot(b.cross(c));
@@ -96,8 +94,7 @@ impl<'t> Enclosing<'t> {
 
     /// Whether it faces outward and a point lies within it.
     fn surrounds(&self, positions: &[DVec3], point: DVec3) -> bool {
-        let within = point.cmpge(self.lower).all() && point.cmple(self.upper).all();
-        self.volume > 0.0 && within && {
+        self.volume > 0.0 && self.bounds.contains(point) && {
             let seen =
                 |t: &&[u32; 3]| winding::solid_angle(&t.map(|v| positions[v as usize]), point);
             self.triangles.iter().map(seen).sum::<f64>() > 2.0 * std::f64::consts::PI

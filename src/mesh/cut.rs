@@ -6,8 +6,9 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::TriMesh;
-use super::oriented_box::{OrientedBox, around};
+use super::oriented_box::OrientedBox;
 use super::stance::Stance;
+use crate::bounds::Bounds;
 
 /// Points within this share of the part's size of a plane lie on it: files round their numbers, and people
 /// draw boxes a hair too large.
@@ -51,7 +52,7 @@ impl Cutter {
     fn by_box(&mut self, region: &OrientedBox) {
         let places = self.positions.iter();
         self.places = places.map(|&p| region.stance.coordinates(p)).collect();
-        let (lower, upper) = around(&self.places);
+        let Bounds { lower, upper } = Bounds::around(self.places.iter().copied());
         for axis in 0..3 {
             for value in [region.lower[axis], region.upper[axis]] {
                 if value > lower[axis] + self.slack && value < upper[axis] - self.slack {

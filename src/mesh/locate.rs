@@ -7,6 +7,7 @@ use parry3d_f64::query::{
 use parry3d_f64::shape::{CompositeShapeRef, TriMesh as ParryMesh, Triangle};
 
 use super::{SurfacePoint, TriMesh};
+use crate::bounds::Bounds;
 
 /// A bounding-volume tree over one surface; as immutable as the surface it was built from.
 ///
@@ -32,12 +33,9 @@ impl SurfaceIndex {
     /// When there are no triangles or they refer to missing vertices.
     #[must_use]
     pub fn of(mut positions: Vec<DVec3>, triangles: &[[u32; 3]]) -> Self {
-        let (lower, upper) = positions
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), &p| {
-                (l.min(p), u.max(p))
-            });
-        let (centre, size) = ((lower + upper) / 2.0, (upper - lower).max_element());
+        let bounds = Bounds::around(positions.iter().copied());
+        let centre = (bounds.lower + bounds.upper) / 2.0;
+        let size = bounds.size().max_element();
         for p in &mut positions {
             *p = (*p - centre) / size;
         }

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::TriMesh;
 use super::stance::{Direction, Stance};
+use crate::bounds::Bounds;
 
 /// A box whose edges lie along the front, the right and the up of a stance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,9 +29,8 @@ impl OrientedBox {
     /// The box around a part as it stands.
     #[must_use]
     pub fn around(mesh: &TriMesh, stance: Stance) -> Self {
-        let places = mesh.positions().iter();
-        let places: Vec<DVec3> = places.map(|&p| stance.coordinates(p)).collect();
-        let (lower, upper) = around(&places);
+        let places = mesh.positions().iter().map(|&p| stance.coordinates(p));
+        let Bounds { lower, upper } = Bounds::around(places);
         Self {
             stance,
             lower,
@@ -51,8 +51,11 @@ impl OrientedBox {
     /// Whether a point lies inside, or within `slack` (m) of it along its edges.
     #[must_use]
     pub fn contains(&self, p: DVec3, slack: f64) -> bool {
-        let at = self.stance.coordinates(p);
-        at.cmpge(self.lower - slack).all() && at.cmple(self.upper + slack).all()
+        let bounds = Bounds {
+            lower: self.lower,
+            upper: self.upper,
+        };
+        bounds.grown(slack).contains(self.stance.coordinates(p))
     }
 
     /// Its corners (m) in the file's coordinates, where it lies along the axes of the file.
@@ -88,8 +91,36 @@ impl OrientedBox {
     }
 }
 
-/// The corners of the box around some points, in the coordinates that these have.
-pub(super) fn around(points: &[DVec3]) -> (DVec3, DVec3) {
-    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    { points.iter() }.fold(empty, |(l, u), &p| (l.min(p), u.max(p)))
+impl Stance {
+    /// The box around that share of the part's height which is lowest.
+    #[must_use]
+    pub fn lower_end(&self, mesh: &TriMesh, share: f64) -> OrientedBox {
+        let height = |p: DVec3| p.dot(self.up());
+        let whole = OrientedBox::around(mesh, *self);
+        let level = whole.lower.z + share * (whole.upper.z - whole.lower.z);
+        let ends = mesh.edges().iter().flat_map(|edge| {
+            let [a, b] = [edge.a, edge.b].map(|v| mesh.positions()[v as usize]);
+            let (a, b) = if height(a) < height(b) {
+                (a, b)
+            } else {
+                (b, a)
+            };
+            let rise = height(b) - height(a);
+            let within = if rise > 0.0 {
+                ((level - height(a)) / rise).min(1.0)
+            } else {
+                1.0
+            };
+            (height(a) <= level)
+                .then(|| [a, a.lerp(b, within)])
+                .into_iter()
+                .flatten()
+        });
+        let Bounds { lower, upper } = Bounds::around(ends.map(|p| self.coordinates(p)));
+        OrientedBox {
+            stance: *self,
+            lower,
+            upper,
+        }
+    }
 }

@@ -6,6 +6,7 @@ use glam::{DVec3, I64Vec3};
 
 use super::numbers::NumberMap;
 use super::report::RepairReport;
+use crate::bounds::Bounds;
 
 /// Repairs that are asked for; without them only what must be is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,13 +32,10 @@ impl Default for Repair {
 /// For each point the first of the points kept that it is joined with, and those kept. Points within
 /// `tolerance` of a kept one join it.
 pub(super) fn join_near(positions: &[DVec3], tolerance: f64) -> (Vec<u32>, Vec<DVec3>) {
-    let (lower, upper) = positions
-        .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| {
-            (l.min(p), h.max(p))
-        });
+    let bounds = Bounds::around(positions.iter().copied());
+    let lower = bounds.lower;
     // Never so fine that cells far apart become one number.
-    let size = tolerance.max(1e-15 * (upper - lower).max_element());
+    let size = tolerance.max(1e-15 * bounds.size().max_element());
     let cell = |p: DVec3| ((p - lower) / size).floor().as_i64vec3();
     let mut grid: NumberMap<I64Vec3, Vec<u32>> = NumberMap::default();
     let mut kept: Vec<DVec3> = Vec::new();
@@ -165,13 +163,9 @@ fn fan(positions: &mut Vec<DVec3>, rim: &[u32]) -> Vec<[u32; 3]> {
 fn holes(positions: &[DVec3], triangles: &[[u32; 3]], across: f64) -> Vec<Vec<u32>> {
     let mut rims = rims(triangles);
     let size = |rim: &Vec<u32>| {
-        let (low, high) = rim
-            .iter()
-            .map(|&v| positions[v as usize])
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
-                (l.min(p), h.max(p))
-            });
-        (high - low).length()
+        Bounds::around(rim.iter().map(|&v| positions[v as usize]))
+            .size()
+            .length()
     };
     rims.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.cmp(b)));
     // A lone rim may be the one hole of a nearly closed body; it is then shorter than the body is wide.

@@ -4,7 +4,6 @@ use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::TriMesh;
-use super::oriented_box::{OrientedBox, around};
 
 /// The directions of a part, of unit length and at right angles to each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,39 +72,6 @@ impl Stance {
     #[must_use]
     pub fn place(&self, coordinates: DVec3) -> DVec3 {
         self.front * coordinates.x + self.right() * coordinates.y + self.up * coordinates.z
-    }
-
-    /// The box around that share of the part's height which is lowest.
-    #[must_use]
-    pub fn lower_end(&self, mesh: &TriMesh, share: f64) -> OrientedBox {
-        let height = |p: DVec3| p.dot(self.up);
-        let whole = OrientedBox::around(mesh, *self);
-        let level = whole.lower.z + share * (whole.upper.z - whole.lower.z);
-        let ends = mesh.edges().iter().flat_map(|edge| {
-            let [a, b] = [edge.a, edge.b].map(|v| mesh.positions()[v as usize]);
-            let (a, b) = if height(a) < height(b) {
-                (a, b)
-            } else {
-                (b, a)
-            };
-            let rise = height(b) - height(a);
-            let within = if rise > 0.0 {
-                ((level - height(a)) / rise).min(1.0)
-            } else {
-                1.0
-            };
-            (height(a) <= level)
-                .then(|| [a, a.lerp(b, within)])
-                .into_iter()
-                .flatten()
-        });
-        let ends: Vec<DVec3> = ends.map(|p| self.coordinates(p)).collect();
-        let (lower, upper) = around(&ends);
-        OrientedBox {
-            stance: *self,
-            lower,
-            upper,
-        }
     }
 }
 

@@ -8,6 +8,7 @@
 use glam::DVec3;
 
 use super::TriMesh;
+use crate::bounds::Bounds;
 
 /// A tree over the triangles of a surface.
 pub struct Winding {
@@ -127,13 +128,7 @@ fn grow(nodes: &mut Vec<Node>, triangles: &mut [[DVec3; 3]], from: usize, to: us
     if own.len() <= LEAF {
         return;
     }
-    let (lower, upper) = own
-        .iter()
-        .map(middle)
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), p| {
-            (l.min(p), u.max(p))
-        });
-    let axis = (upper - lower).max_position();
+    let axis = Bounds::around(own.iter().map(middle)).size().max_position();
     let half = own.len() / 2;
     own.select_nth_unstable_by(half, |a, b| middle(a)[axis].total_cmp(&middle(b)[axis]));
     grow(nodes, triangles, from, from + half);

@@ -2,8 +2,7 @@
 //! 3): a partial Cholesky factor of the covariance, pivoted by what is still uncertain.
 
 use super::exchange::{self, Criterion};
-use super::information::{Conditional, Geometry, finish};
-use super::lead::Best;
+use super::information::{Conditional, Geometry, Measured, finish, grow, with_each};
 use super::wishes::Field;
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Cancelled, report};
@@ -53,21 +52,50 @@ impl Sought<'_> {
         report(self.request.watch, "Selecting by entropy", chosen, wanted)
     }
 
-    /// What measurements at some places leave uncertain, and their entropy.
-    fn given(&self, places: &[usize]) -> (Conditional<'_>, f64) {
-        let mut given = Conditional::nothing(&self.geometry.covariance);
-        let mut entropy = 0.0;
+    fn measured(&self, places: &[usize]) -> Entropies<'_> {
+        let covariance = &self.geometry.covariance;
+        let mut measured = Entropies {
+            given: Conditional::nothing(covariance),
+            noise: covariance.noise,
+            entropy: 0.0,
+        };
         for &place in places {
-            entropy += self.entropy(&given, place);
-            given.observe(place);
+            measured.take(place);
         }
-        (given, entropy)
+        measured
+    }
+}
+
+/// A set of measurements: what it leaves uncertain, and its entropy (nats).
+struct Entropies<'a> {
+    given: Conditional<'a>,
+    noise: f64,
+    entropy: f64,
+}
+
+impl Measured for Entropies<'_> {
+    fn nats(&self) -> f64 {
+        self.entropy
     }
 
-    /// Of one measurement more: H = ½ ln(2πe σ²), in nats.
-    fn entropy(&self, given: &Conditional, place: usize) -> f64 {
-        let variance = given.variance(place) + self.geometry.covariance.noise;
+    /// Of one measurement more: H = ½ ln(2πe σ²).
+    fn adds(&self, place: usize) -> f64 {
+        let variance = self.given.variance(place) + self.noise;
         0.5 * (2.0 * std::f64::consts::PI * std::f64::consts::E * variance).ln()
+    }
+
+    /// The gain of a measurement over its own noise, ½ ln(1 + σ²/β⁻¹), never negative.
+    fn gain(&self, place: usize) -> f64 {
+        (1.0 + self.given.variance(place) / self.noise.max(1e-12)).ln() / 2.0
+    }
+
+    fn is_uncertain(&self, place: usize) -> bool {
+        self.given.uncertain(place)
+    }
+
+    fn take(&mut self, place: usize) {
+        self.entropy += self.adds(place);
+        self.given.observe(place);
     }
 }
 
@@ -80,61 +108,24 @@ impl Criterion for Sought<'_> {
 
     fn of(&mut self, set: &[usize]) -> Result<f64, PlacementError> {
         self.report(set.len())?;
-        Ok(-self.given(set).1)
+        Ok(-self.measured(set).entropy)
     }
 
     fn screened(&mut self, others: &Field, _: usize) -> Result<Vec<(usize, f64)>, PlacementError> {
         self.report(others.chosen.len())?;
-        let (given, entropy) = self.given(&others.chosen);
-        let mut open = others.open();
-        open.retain(|&place| given.uncertain(place));
-        let with = |place: usize| (place, -(entropy + self.entropy(&given, place)));
-        Ok(open.into_iter().map(with).collect())
+        Ok(with_each(&self.measured(&others.chosen), others))
     }
 
     fn grow<'f>(
         &mut self,
-        mut field: Field<'f>,
+        field: Field<'f>,
         found: &dyn Fn(&SensorSet),
     ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
-        let (mut given, mut entropy) = self.given(&[]);
-        let noise = self.geometry.covariance.noise;
-        let mut sets = Vec::new();
-        while !field.full() {
-            self.report(field.chosen.len())?;
-            // The gain of a measurement over its own noise, ½ ln(1 + σ²/β⁻¹), never negative.
-            let gain = |place: usize| (1.0 + given.variance(place) / noise.max(1e-12)).ln() / 2.0;
-            let best = best(&field, &given, gain);
-            let Some(place) = best.place() else {
-                break;
-            };
-            entropy += self.entropy(&given, place);
-            given.observe(place);
-            field.add(place);
-            let set = SensorSet {
-                sites: field.sites(),
-                criterion: Some(entropy),
-                criterion_mm: None,
-                gap: None,
-                lead: best.lead(),
-                certificate: None,
-            };
-            found(&set);
-            sets.push(set);
-        }
-        Ok((field, sets))
+        grow(
+            self.measured(&[]),
+            field,
+            |chosen| self.report(chosen),
+            found,
+        )
     }
-}
-
-/// The open place that is worth the most, the first of equal ones; none where nothing uncertain is left.
-fn best(field: &Field, given: &Conditional, gain: impl Fn(usize) -> f64) -> Best {
-    let open = field.open();
-    let only = matches!(open[..], [only] if field.is_required(only));
-    let mut best = Best::default();
-    for place in open {
-        if only || given.uncertain(place) {
-            best.offer(place, field.worth(place, gain(place)));
-        }
-    }
-    best
 }

@@ -52,7 +52,7 @@ impl Selector for ExpectedError<'_> {
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
         let empty = Field::new(pool, request.wishes)?;
-        let mut expectation = Expectation::new(self, pool, request)?;
+        let mut expectation = Expectation::new(&self.known, self.detail, pool, request)?;
         let mut chosen = exchange::search(&mut expectation, pool, request, &empty, self.rounds)?;
         certify_last(&expectation, request, &empty, &mut chosen)?;
         let losses = expectation.losses_note(&chosen.places)?;

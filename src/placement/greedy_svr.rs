@@ -160,7 +160,7 @@ impl GreedySvr {
         let features = Standardizer::of(pool.x)
             .apply(pool.x)
             .select_columns(&folds.order);
-        let judge = Judge::new(self, pool.targets, &folds);
+        let judge = Judge::new(self.hyper, self.effort, pool.targets, &folds);
         let n = pool.targets.len();
         // Most sets are the one before with one more site.
         let (mut known, mut whole) = (Vec::new(), vec![1.0; n * n]);
@@ -255,7 +255,7 @@ impl<'a> Search<'a> {
             request,
             features,
             constant: standardizer.constant_rows(),
-            judge: Judge::new(settings, pool.targets, folds),
+            judge: Judge::new(settings.hyper, settings.effort, pool.targets, folds),
             base: Base::empty(&sieves),
             without: Vec::new(),
             sieves,

@@ -4,9 +4,10 @@
 use serde::Serialize;
 
 use super::exchange::Chosen;
+use super::lead::Best;
 use super::wishes::{Field, shortage};
-use super::{PlacementError, Pool, Request, Selection, SelectorKind, lead};
-use crate::budget::{Achieved, StopReason, Work};
+use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet, lead};
+use crate::budget::{Achieved, Cancelled, StopReason, Work};
 use crate::gaussian_process::{Covariance, GpKernel, GpTrial};
 use crate::plain;
 
@@ -75,6 +76,69 @@ impl Geometry {
         }
         Field::new(pool, request.wishes)
     }
+}
+
+/// Measurements at some places, as a criterion in nats sees them.
+pub(super) trait Measured {
+    /// Of all of them.
+    fn nats(&self) -> f64;
+
+    /// What one more adds.
+    fn adds(&self, place: usize) -> f64;
+
+    /// What one more is worth before it is weighed with its cost.
+    fn gain(&self, place: usize) -> f64 {
+        self.adds(place)
+    }
+
+    /// Whether anything is left to be measured there.
+    fn is_uncertain(&self, place: usize) -> bool;
+
+    fn take(&mut self, place: usize);
+}
+
+/// The criterion (nats, negative) with each open place of a field beside what was measured.
+pub(super) fn with_each(measured: &impl Measured, others: &Field) -> Vec<(usize, f64)> {
+    let open = others.open().into_iter();
+    open.filter(|&place| measured.is_uncertain(place))
+        .map(|place| (place, -(measured.nats() + measured.adds(place))))
+        .collect()
+}
+
+/// Adds to a field, one after the other, the open place that is worth the most, the first of equal ones, as long as there
+/// is an uncertain one or one that must be there.
+pub(super) fn grow<'f>(
+    mut measured: impl Measured,
+    mut field: Field<'f>,
+    report: impl Fn(usize) -> Result<(), Cancelled>,
+    found: &dyn Fn(&SensorSet),
+) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
+    let mut sets = Vec::new();
+    while !field.full() {
+        report(field.chosen.len())?;
+        let mut best = Best::default();
+        for place in field.open() {
+            if measured.is_uncertain(place) || field.is_required(place) {
+                best.offer(place, field.worth(place, measured.gain(place)));
+            }
+        }
+        let Some(place) = best.place() else {
+            break;
+        };
+        measured.take(place);
+        field.add(place);
+        let set = SensorSet {
+            sites: field.sites(),
+            criterion: Some(measured.nats()),
+            criterion_mm: None,
+            gap: None,
+            lead: best.lead(),
+            certificate: None,
+        };
+        found(&set);
+        sets.push(set);
+    }
+    Ok((field, sets))
 }
 
 /// Variances of all locations given what was measured: a partial Cholesky factor, a column a measurement.

@@ -9,8 +9,7 @@ use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::{Mat, Par, Side};
 
 use super::exchange::{self, Criterion};
-use super::information::{Conditional, Geometry, finish};
-use super::lead::Best;
+use super::information::{Conditional, Geometry, Measured, finish, grow, with_each};
 use super::wishes::Field;
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Cancelled, Watch, report};
@@ -59,20 +58,28 @@ struct Sought<'a> {
 }
 
 /// A set of measurements: what it leaves uncertain, all locations beside it, and what it says of them (nats).
-struct Measured<'a> {
+struct Informed<'a> {
     given: Conditional<'a>,
     noise: f64,
     rest: Rest<'a>,
     information: f64,
 }
 
-impl Measured<'_> {
-    fn gain(&self, place: usize) -> f64 {
+impl Measured for Informed<'_> {
+    fn nats(&self) -> f64 {
+        self.information
+    }
+
+    fn adds(&self, place: usize) -> f64 {
         0.5 * ((self.given.variance(place) + self.noise) * self.rest.diagonal[place]).ln()
     }
 
-    fn add(&mut self, place: usize) {
-        self.information += self.gain(place);
+    fn is_uncertain(&self, place: usize) -> bool {
+        self.given.uncertain(place)
+    }
+
+    fn take(&mut self, place: usize) {
+        self.information += self.adds(place);
         self.given.observe(place);
         self.rest.remove(place);
     }
@@ -84,9 +91,9 @@ impl Sought<'_> {
         report(self.request.watch, STAGE, chosen, wanted)
     }
 
-    fn measured(&self, places: &[usize]) -> Result<Measured<'_>, Cancelled> {
+    fn measured(&self, places: &[usize]) -> Result<Informed<'_>, Cancelled> {
         let covariance = &self.geometry.covariance;
-        let mut measured = Measured {
+        let mut measured = Informed {
             given: Conditional::nothing(covariance),
             noise: covariance.noise,
             rest: Rest::of(&self.inverse),
@@ -94,7 +101,7 @@ impl Sought<'_> {
         };
         for &place in places {
             self.report(places.len())?;
-            measured.add(place);
+            measured.take(place);
         }
         Ok(measured)
     }
@@ -112,46 +119,16 @@ impl Criterion for Sought<'_> {
     }
 
     fn screened(&mut self, others: &Field, _: usize) -> Result<Vec<(usize, f64)>, PlacementError> {
-        let measured = self.measured(&others.chosen)?;
-        let mut open = others.open();
-        open.retain(|&place| measured.given.uncertain(place));
-        let with = |place: usize| (place, -(measured.information + measured.gain(place)));
-        Ok(open.into_iter().map(with).collect())
+        Ok(with_each(&self.measured(&others.chosen)?, others))
     }
 
     fn grow<'f>(
         &mut self,
-        mut field: Field<'f>,
+        field: Field<'f>,
         found: &dyn Fn(&SensorSet),
     ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
-        let mut measured = self.measured(&[])?;
-        let mut sets = Vec::new();
-        while !field.full() {
-            self.report(field.chosen.len())?;
-            let mut best = Best::default();
-            for place in field.open() {
-                let value = field.worth(place, measured.gain(place));
-                if measured.given.uncertain(place) || field.is_required(place) {
-                    best.offer(place, value);
-                }
-            }
-            let Some(place) = best.place() else {
-                break;
-            };
-            measured.add(place);
-            field.add(place);
-            let set = SensorSet {
-                sites: field.sites(),
-                criterion: Some(measured.information),
-                criterion_mm: None,
-                gap: None,
-                lead: best.lead(),
-                certificate: None,
-            };
-            found(&set);
-            sets.push(set);
-        }
-        Ok((field, sets))
+        let nothing = self.measured(&[])?;
+        grow(nothing, field, |chosen| self.report(chosen), found)
     }
 }
 

@@ -1,11 +1,14 @@
 //! Which numbers a project may hold. Beyond these nobody can have meant them, and what is computed from them
 //! would overflow, or never end, without a word.
 
+mod live;
+
 use std::ops::RangeInclusive;
 
 use glam::DVec3;
 
-use super::{BadValue, ChosenSite, PartAxis, Project};
+use super::value::{BadValue, all_bounded, bounded, check, counted, number};
+use super::{ChosenSite, PartAxis, Project};
 use crate::dataset::Signal;
 use crate::elasticity::support::MOST;
 use crate::evaluation::failures::MOST_FAILED;
@@ -376,52 +379,6 @@ fn check_place(key: &str, place: &[f64; 3]) -> Result<(), BadValue> {
     Ok(())
 }
 
-fn all_bounded<const N: usize>(all: [(&str, f64, RangeInclusive<f64>); N]) -> Result<(), BadValue> {
-    all.into_iter()
-        .try_for_each(|(key, value, range)| bounded(key, value, &range))
-}
-
-fn bounded(key: &str, value: f64, range: &RangeInclusive<f64>) -> Result<(), BadValue> {
-    // No number at all is in no range.
-    if range.contains(&value) {
-        return Ok(());
-    }
-    Err(BadValue {
-        key: key.to_owned(),
-        rule: format!(
-            "between {} and {}",
-            number(*range.start()),
-            number(*range.end())
-        )
-        .into(),
-        value: number(value),
-    })
-}
-
-fn counted(key: &str, count: usize, range: &RangeInclusive<usize>) -> Result<(), BadValue> {
-    if range.contains(&count) {
-        return Ok(());
-    }
-    Err(BadValue {
-        key: key.to_owned(),
-        rule: format!("between {} and {}", range.start(), range.end()).into(),
-        value: count.to_string(),
-    })
-}
-
-/// A finite number that obeys a rule of its own.
-pub(super) fn check(key: &str, rule: &'static str, value: f64, ok: bool) -> Result<(), BadValue> {
-    if ok && value.is_finite() {
-        return Ok(());
-    }
-    Err(BadValue {
-        key: key.to_owned(),
-        rule: rule.into(),
-        value: number(value),
-    })
-}
-
-/// A number as people write it: nobody reads three hundred digits.
 fn check_direction(key: &str, direction: [f64; 3]) -> Result<(), BadValue> {
     /// Below this a direction is nobody's.
     const LEAST: f64 = 1e-6;
@@ -434,15 +391,6 @@ fn check_direction(key: &str, direction: [f64; 3]) -> Result<(), BadValue> {
         rule: "a direction, whose numbers are not all 0".into(),
         value: format!("[{}]", direction.map(number).join(", ")),
     })
-}
-
-fn number(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 || !size.is_finite() || (1e-4..1e7).contains(&size) {
-        value.to_string()
-    } else {
-        format!("{value:e}")
-    }
 }
 
 #[cfg(test)]

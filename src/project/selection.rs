@@ -3,7 +3,8 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::MM;
+use super::value::MM;
+use crate::bounds::Bounds;
 use crate::gaussian_process::GpKernel;
 use crate::limb::BoxMm;
 use crate::placement::SelectorKind;
@@ -143,8 +144,7 @@ pub struct CostKeys {
 impl CostKeys {
     #[must_use]
     pub fn contains(&self, at_mm: DVec3) -> bool {
-        let [a, b] = self.box_mm.map(DVec3::from_array);
-        at_mm.cmpge(a.min(b)).all() && at_mm.cmple(a.max(b)).all()
+        Bounds::between(self.box_mm.map(DVec3::from_array)).contains(at_mm)
     }
 }
 

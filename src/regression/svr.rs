@@ -12,22 +12,13 @@
 
 mod factor;
 mod newton;
+mod problem;
 mod smo;
-
-use std::ops::Range;
 
 use crate::tally::{self, Done};
 use smo::Block;
 
-/// Settings of one fit. `c` bounds the coefficients, `epsilon` and `tolerance` are in the target's unit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SvrParams {
-    pub c: f64,
-    pub epsilon: f64,
-    /// Largest violation of the optimality conditions at which the fit counts as converged.
-    pub tolerance: f64,
-    pub max_steps: usize,
-}
+pub use problem::{Problem, Start, SvrParams};
 
 /// A fitted model in one coordinate.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,22 +34,6 @@ pub struct Fit {
     pub gap: f64,
     pub steps: usize,
     pub converged: bool,
-}
-
-/// Points with a precomputed kernel (n × n by rows, symmetric) and targets; those in `held_out` take no
-/// part in the fit, only their residuals are computed.
-#[derive(Clone, Debug)]
-pub struct Problem<'a> {
-    pub kernel: &'a [f64],
-    pub y: &'a [f64],
-    pub held_out: Range<usize>,
-}
-
-/// Where a fit starts: coefficients of a similar one, and their f = Kβ - y where it is known.
-#[derive(Clone, Copy, Debug)]
-pub struct Start<'a> {
-    pub beta: &'a [f64],
-    pub f: Option<&'a [f64]>,
 }
 
 /// Fits all points, from `warm` (coefficients of a similar fit) or from zero.

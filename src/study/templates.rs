@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::{Data, Estimator, HeldOut, Judged, Parts, Question, knowledge};
+use super::question::{Estimator, HeldOut, Judged, Parts, Question};
+use super::{Data, knowledge};
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::evaluation::failures::{Draw, FailureRow};

@@ -2,6 +2,7 @@
 
 use super::{Measured, Point};
 use crate::project::Project;
+use crate::statistics::median;
 
 /// A wish for speed or for accuracy.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,12 +40,8 @@ pub fn front<'a>(project: &Project, points: &'a [Point]) -> Vec<&'a Point> {
 #[must_use]
 pub fn clock(points: &[Point]) -> f64 {
     let measured = points.iter().filter_map(Point::measured);
-    let mut ratios: Vec<f64> = measured
-        .map(|m| m.seconds / m.cpu_seconds)
-        .filter(|r| r.is_finite() && *r > 0.0)
-        .collect();
-    ratios.sort_by(f64::total_cmp);
-    ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
+    let ratios = measured.map(|m| m.seconds / m.cpu_seconds);
+    median(ratios.filter(|r| r.is_finite() && *r > 0.0)).unwrap_or(1.0)
 }
 
 /// The point of a front that keeps a promise: the most accurate within the time, or the quickest within the

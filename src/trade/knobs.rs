@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Knob, Measured, Point};
+use crate::statistics::midpoint_median;
 
 /// What turning a knob up brought.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -62,9 +63,9 @@ fn report(knob: Knob, points: &[Point], spread: f64) -> Option<KnobReport> {
     let errors = changes(|m| m.error_mm);
     let scatter = scatter(&errors, spread);
     let [cpu, error, middle] = [
-        median(changes(|m| m.cpu_seconds)),
-        median(errors),
-        median(changes(|m| m.median_mm)),
+        midpoint_median(changes(|m| m.cpu_seconds)),
+        midpoint_median(errors),
+        midpoint_median(changes(|m| m.median_mm)),
     ];
     let bought = if error < -2.0 * scatter {
         Bought::Accuracy
@@ -149,12 +150,6 @@ fn spread(points: &[Point]) -> f64 {
     let squares: f64 = errors.iter().map(|e| (e - mean).powi(2)).sum();
     let degrees = errors.len().saturating_sub(1).max(1) as f64;
     100.0 * (squares / degrees).sqrt() / mean
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    f64::midpoint(values[(n - 1) / 2], values[n / 2])
 }
 
 #[cfg(test)]

@@ -13,15 +13,14 @@ pub use decoder::{Decoder, Event};
 pub use message::{Hello, Message};
 pub use refusal::Refusal;
 
+use payload::MOST_BITS;
+
 /// Bytes before the payload and after it.
 const HEAD: usize = 7;
 const TAIL: usize = 2;
 /// The longest frame before COBS: short enough that COBS adds one byte and no more.
 const LONGEST: usize = 253;
-/// The most bits of a count. As many channels as there may be then fit into a frame.
-const MOST_BITS: usize = 24;
 const _: () = assert!(MOST_CHANNELS * MOST_BITS <= 8 * (LONGEST - HEAD - TAIL));
-const MAGIC: [u8; 4] = *b"HAPD";
 const SUM: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 
 /// Appends a message as a frame with the zero that ends it. Counts are packed with `bits` each; they, texts

@@ -7,7 +7,7 @@ use glam::DVec3;
 use hapdef::budget::{Elements, unwatched};
 use hapdef::elasticity::estimate::under_load;
 use hapdef::elasticity::grade::{Graded, Ground};
-use hapdef::elasticity::observe::{Face, Observer};
+use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::support::Region;
 use hapdef::elasticity::{Freedoms, Model as _, Section, ShellModel, Support, Touch};
 use hapdef::mesh::{SurfacePoint, TriMesh};
@@ -22,7 +22,7 @@ pub fn strain_error(
     exact: impl Fn(DVec3) -> [f64; 3],
 ) -> f64 {
     let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
-    let observer = Observer::new(model, &points, Face::Inside);
+    let observer = model.observer(&points, Face::Inside);
     let (mut sum, mut largest) = (0.0, 0.0f64);
     for ((&p, strain), frame) in places
         .iter()

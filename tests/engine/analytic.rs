@@ -14,8 +14,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use hapdef::budget::unwatched;
 use hapdef::elasticity::element::Facet;
-use hapdef::elasticity::observe::{Face, Observer};
-use hapdef::elasticity::{Freedoms, Material, Section, ShellModel};
+use hapdef::elasticity::observe::Face;
+use hapdef::elasticity::{Freedoms, Material, Model, Section, ShellModel};
 use hapdef::mesh::{SurfacePoint, TriMesh};
 
 fn near(name: &str, computed: f64, known: f64) {
@@ -210,7 +210,7 @@ fn strain_on_the_faces_of_a_clamped_beam() {
     let at: [SurfacePoint; 1] = [middle];
     let expected = 6.0 * (length - mesh.point(middle).x) / (e * width * t * t);
     for (face, sign) in [(Face::Outside, 1.0), (Face::Inside, -1.0)] {
-        let observer = Observer::new(&model, &at, face);
+        let observer = model.observer(&at, face);
         let frame = observer.frames()[0];
         let [xx, yy, xy] = observer.strain_of(&model, &u)[0];
         let along = DVec3::X;

@@ -24,7 +24,6 @@ mod fuzz;
 mod given_tetrahedra;
 mod inference;
 mod judge;
-mod layers;
 mod libsvm;
 mod mesh_files;
 mod pictures;

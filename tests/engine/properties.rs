@@ -10,7 +10,7 @@ use hapdef::budget::{Quality, unwatched};
 use hapdef::dataset::{self, Signal, SignalMatrix, Site};
 use hapdef::design::{self, Inputs};
 use hapdef::elasticity::element::Facet;
-use hapdef::elasticity::observe::{Face, Observer};
+use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::respond::{Reading, Responses, Side, respond, respond_from};
 use hapdef::elasticity::support::held_freedoms;
 use hapdef::elasticity::{Freedoms, Model as _, ShellModel, Touch};
@@ -193,7 +193,7 @@ fn blocks_give_the_bytes_of_single_touches() {
     let inputs = bundled();
     let m = model(&inputs);
     let touches = many_touches(&inputs);
-    let observer = Observer::new(&m, &some_sites(&inputs), Face::Inside);
+    let observer = m.observer(&some_sites(&inputs), Face::Inside);
     let read = |touches: &[Touch]| {
         let reading = Reading::StrainAndDisplacement;
         let r = respond_from(Side::Loads, &m, touches, &observer, reading, &unwatched).unwrap();
@@ -218,7 +218,7 @@ fn loads_and_outputs_are_reciprocal() {
     let inputs = bundled();
     let m = model(&inputs);
     let touches = many_touches(&inputs);
-    let observer = Observer::new(&m, &some_sites(&inputs), Face::Inside);
+    let observer = m.observer(&some_sites(&inputs), Face::Inside);
     let angles: Vec<f64> = (0..12).map(|k| 0.3 * f64::from(k)).collect();
     for reading in [
         Reading::Strain,
@@ -269,7 +269,7 @@ fn the_inside_face_is_the_outside_face_of_the_shell_turned_over() {
     let place = DVec3::new(0.028, 0.012, 0.06);
     let size = |m: &ShellModel, face| {
         let at = m.index.nearest(place).0;
-        let [xx, yy, xy] = Observer::new(m, &[at], face).strain_of(m, &u)[0];
+        let [xx, yy, xy] = m.observer(&[at], face).strain_of(m, &u)[0];
         (f64::midpoint(xx, yy), ((xx - yy) / 2.0).hypot(xy / 2.0))
     };
     let (inside, outside) = (size(&m, Face::Inside), size(&n, Face::Outside));

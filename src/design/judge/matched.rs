@@ -12,11 +12,11 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::{Truth, noisy};
 use crate::budget::{Budget, Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
+use crate::design::drawn::{MOVES, POINT, drawn_on, gauge_at, map_size};
 use crate::design::known;
-use crate::design::sense::{MOVES, POINT, drawn_on, gauge_at, map_size};
+use crate::design::truth::{Truth, noisy};
 use crate::design::{DesignError, Inputs, Simulated};
 use crate::draw::normal;
 use crate::elasticity::sensitivity::Gauge;

@@ -7,8 +7,9 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::{Elements, Shape};
-use crate::elasticity::model::ElasticError;
+use super::elements::{Elements, Shape};
+use crate::bounds::Bounds;
+use crate::elasticity::error::ElasticError;
 use crate::elasticity::solver::SymmetricMatrix;
 use crate::elasticity::system::HELD;
 use crate::elasticity::{Freedoms, Material};
@@ -173,11 +174,7 @@ impl Grip {
 /// [`ElasticError`] saying what is loose.
 pub fn check(elements: &dyn Elements, grip: &Grip) -> Result<usize, ElasticError> {
     let nodes = elements.nodes();
-    let (lower, upper) = nodes
-        .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), &p| {
-            (l.min(p), u.max(p))
-        });
+    let Bounds { lower, upper } = Bounds::around(nodes.iter().copied());
     if grip.is_empty() {
         return Err(ElasticError::NothingHeld {
             lower: lower * 1000.0,

@@ -1,10 +1,13 @@
 //! A closed part ready to be computed as a solid: its faces told apart, and cells sized for its walls.
 
+mod graded;
 mod own;
 mod piece;
+mod solved;
 
 pub use self::own::Foreseen;
 pub(super) use self::piece::Piece;
+pub use self::solved::SolidGraded;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,15 +17,12 @@ use rayon::prelude::*;
 
 use super::SolidModel;
 use super::immersed::{Fineness, Immersed};
-use super::series::Series;
 use super::simplex::HIGHEST;
-use super::sizing::{self, FINER, LEAST_GRIDS, Shape};
-use super::tip;
-use crate::budget::{Cancelled, Elements, Watch, report};
-use crate::elasticity::estimate::{self, Discretization, Sample};
-use crate::elasticity::grade::{CHECKED, PLACES, even_size, sample, spread};
+use super::sizing::{FINER, Shape};
+use crate::budget::{Cancelled, Watch, report};
+use crate::elasticity::error::ElasticError;
+use crate::elasticity::grade::even_size;
 use crate::elasticity::load::Touch;
-use crate::elasticity::model::{ElasticError, LoadCheck, Model as _};
 use crate::elasticity::{Freedoms, Material, Support};
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::reach::{FINGERTIP, Reach};
@@ -53,28 +53,10 @@ pub struct SolidGround {
     held: Vec<DVec3>,
 }
 
-/// The cells, with the model built on them.
-pub struct SolidGraded {
-    pub fineness: Fineness,
-    pub model: SolidModel,
-    pub estimate: Discretization,
-    /// The worst balance over the sample of the loads.
-    pub balance: LoadCheck,
-    pub models: u64,
-    pub solves: u64,
-}
-
 /// Vertices of the even triangles, about.
 const VERTICES: usize = 9000;
-/// Orders at which errors of displacements and of strains on the surface fall: of displacements between 2, where all
-/// is smooth, and 1.5 at edges that turn inward (`benches/solid.md`).
-const ORDER: f64 = 1.75;
-const STRAIN_ORDER: f64 = 1.5;
 /// Of the distances between touches and what is held, this share may be left unresolved.
 const NEAREST: f64 = 0.1;
-/// The error is an estimate: stop at this share of the tolerance.
-const SAFETY: f64 = 0.8;
-
 impl SolidGround {
     /// Tells the faces of a part apart that fingertips touch; `told` says what the user has said of a place.
     ///
@@ -267,101 +249,10 @@ impl SolidGround {
         OF_ONE_WALL * (size / wall).powi(2)
     }
 
-    /// Sizes of the cells (m), one after the other, that [`Self::grade`] would come to for a part and a tip (m), were
-    /// the error as on other parts.
-    #[must_use]
-    pub fn foreseen(shape: &Shape, tip: f64, aim: &Elements, touches: usize) -> Vec<f64> {
-        let least = shape.least(aim, touches);
-        let mut sizes = vec![shape.first(tip, f64::INFINITY, least)];
-        while let Some(&size) = sizes.last()
-            && (sizes.len() < LEAST_GRIDS as usize
-                || Self::error_percent(size, shape.wall.min(tip))
-                    > SAFETY * aim.displacement_percent)
-            && let Some(next) = sizing::next(size, least)
-        {
-            sizes.push(next);
-        }
-        sizes
-    }
-
     /// Size of cells (m) for about so many unknowns.
     #[must_use]
     pub fn size_for(&self, unknowns: f64) -> f64 {
         self.shape().size_for(unknowns)
-    }
-
-    /// Makes cells smaller until the error under these touches is small enough or the most unknowns are
-    /// spent. `places` (m) are where strains matter.
-    ///
-    /// # Errors
-    /// [`ElasticError`] for what cannot be computed.
-    pub fn grade(
-        &self,
-        touches: &[Touch],
-        places: &[DVec3],
-        aim: &Elements,
-        watch: Watch,
-    ) -> Result<SolidGraded, ElasticError> {
-        if self.immersed.own().is_some() {
-            return self.raise(touches, places, aim, watch);
-        }
-        let shape = self.shape();
-        let least = shape.least(aim, touches.len());
-        let touches = sample(touches);
-        let places: Vec<DVec3> = spread(places, PLACES);
-        let (tip, away) = self.nearest(&touches);
-        let mut grids = Grids::default();
-        let mut size = shape.first(tip, away, least);
-        let solve = |size: f64| Solved::new(self, size, &touches, &places, watch);
-        let estimate = loop {
-            if !grids.go_on(size, solve)? {
-                break self.left(&grids, &touches, &places);
-            }
-            let next = sizing::next(size, least);
-            if let Some(finer) = next
-                && grids.sizes.len() < LEAST_GRIDS as usize
-            {
-                size = finer;
-                continue;
-            }
-            let left = self.left(&grids, &touches, &places);
-            match next {
-                Some(finer) if left.excess(aim) > SAFETY => size = finer,
-                _ => break left,
-            }
-        };
-        let models = grids.sizes.len() as u64;
-        let Some(last) = grids.last else {
-            unreachable!("there is a first grid");
-        };
-        Ok(last.graded(&touches, estimate, models))
-    }
-
-    /// What the last of several grids is off by; unknown where there is one only.
-    fn left(&self, grids: &Grids, touches: &[Touch], places: &[DVec3]) -> Discretization {
-        let Some(fine) = grids.samples.last().filter(|_| grids.sizes.len() > 1) else {
-            return estimate::unknown(touches.len(), places.len());
-        };
-        let size = grids.sizes[grids.sizes.len() - 1];
-        let wall = self.wall();
-        let (of_displacements, of_strains) = (
-            Series::new(&grids.sizes, ORDER),
-            Series::new(&grids.sizes, STRAIN_ORDER),
-        );
-        let under: Vec<f64> = (0..touches.len())
-            .map(|load| {
-                let off = of_displacements.error(|grid| grids.samples[grid].under[load]);
-                let tip = touches[load].tip_radius;
-                let unseen = tip::unseen(&self.immersed.material, tip, size, wall);
-                off.max(unseen * touches[load].force)
-            })
-            .collect();
-        estimate::of(fine, touches, places, &under, |load, place| {
-            // All grids are read on the same surface, in the same frames.
-            std::array::from_fn(|k| {
-                of_strains.error(|grid| grids.samples[grid].strains[load][place][k])
-            })
-        })
     }
 
     /// What is worth a word about the cells of a model.
@@ -400,91 +291,6 @@ impl SolidGround {
             ));
         }
         notes
-    }
-}
-
-/// A model with the sample loads solved on it.
-struct Solved {
-    fineness: Fineness,
-    model: SolidModel,
-    solutions: Vec<Vec<f64>>,
-    sample: Sample,
-}
-
-impl Solved {
-    fn new(
-        ground: &SolidGround,
-        size: f64,
-        touches: &[Touch],
-        places: &[DVec3],
-        watch: Watch,
-    ) -> Result<Self, ElasticError> {
-        let fineness = ground.fineness(size);
-        let model = ground.model(&fineness, watch)?;
-        Ok(Self::of(fineness, model, touches, places))
-    }
-
-    fn of(fineness: Fineness, model: SolidModel, touches: &[Touch], places: &[DVec3]) -> Self {
-        let loads: Vec<_> = touches.par_iter().map(|t| model.load(t)).collect();
-        let solutions = model.system().solve_loads(&loads);
-        Self {
-            sample: Sample::of(&model, touches, &solutions, places),
-            fineness,
-            model,
-            solutions,
-        }
-    }
-
-    /// As the one that is taken, after so many models.
-    fn graded(self, touches: &[Touch], estimate: Discretization, models: u64) -> SolidGraded {
-        SolidGraded {
-            balance: (self.model)
-                .check_all(&spread(touches, CHECKED), &spread(&self.solutions, CHECKED)),
-            fineness: self.fineness,
-            model: self.model,
-            estimate,
-            models,
-            solves: models * touches.len() as u64,
-        }
-    }
-}
-
-/// Models on finer and finer grids: of all but the last only what was read.
-#[derive(Default)]
-struct Grids {
-    sizes: Vec<f64>,
-    samples: Vec<Sample>,
-    last: Option<Solved>,
-}
-
-impl Grids {
-    /// Solves on a grid of the next size (m). Where memory does not hold it, but grids enough to say how far they are
-    /// off are there, the one before stays the last: false.
-    fn go_on(
-        &mut self,
-        size: f64,
-        solve: impl Fn(f64) -> Result<Solved, ElasticError>,
-    ) -> Result<bool, ElasticError> {
-        // The factor before goes first: memory is asked for one of them.
-        self.last = None;
-        match (solve(size), self.sizes.last()) {
-            (Err(error), Some(&fits))
-                if error.is_memory() && self.sizes.len() >= LEAST_GRIDS as usize =>
-            {
-                self.last = Some(solve(fits)?);
-                Ok(false)
-            }
-            (solved, _) => {
-                self.push(solved?);
-                Ok(true)
-            }
-        }
-    }
-
-    fn push(&mut self, mut solved: Solved) {
-        self.sizes.push(solved.fineness.size);
-        self.samples.push(std::mem::take(&mut solved.sample));
-        self.last = Some(solved);
     }
 }
 
@@ -558,68 +364,6 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     use super::*;
-    use crate::budget::unwatched;
-    use crate::elasticity::support::Region;
-    use crate::mesh::oriented_box::OrientedBox;
-
-    /// A cube of 20 mm that is held at its foot.
-    fn cube() -> SolidGround {
-        let corner = |i: u32| [i & 1, i >> 1 & 1, i >> 2].map(|x| 0.02 * f64::from(x));
-        let positions = (0..8).map(|i| DVec3::from_array(corner(i))).collect();
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
-        let part = TriMesh::from_checked(positions, quads.into_iter().flat_map(halves).collect());
-        let foot = Support {
-            region: Region::Box(OrientedBox::of_file(
-                DVec3::NEG_ONE,
-                DVec3::new(1.0, 1.0, 1e-6),
-            )),
-            held: Freedoms::ALL,
-        };
-        let material = Material {
-            youngs_modulus: 2e9,
-            poissons_ratio: 0.3,
-        };
-        SolidGround::new(&Arc::new(part), material, &[foot], &|_| None, &unwatched).unwrap()
-    }
-
-    #[test]
-    fn what_memory_does_not_hold_leaves_the_grid_before() {
-        const WANTING: f64 = 4e-3;
-        let ground = cube();
-        let touch = Touch {
-            position: DVec3::new(0.01, 0.01, 0.02),
-            normal: DVec3::Z,
-            force: 1.0,
-            tip_radius: 3e-3,
-        };
-        let solve = |size: f64| {
-            if size < WANTING {
-                return Err(ElasticError::OutOfMemory);
-            }
-            Solved::new(&ground, size, &[touch], &[DVec3::ZERO], &unwatched)
-        };
-        let mut grids = Grids::default();
-        for size in [9e-3, 7e-3, 5e-3] {
-            assert!(grids.go_on(size, solve).unwrap());
-        }
-        assert!(!grids.go_on(3e-3, solve).unwrap());
-        assert_eq!(grids.sizes, [9e-3, 7e-3, 5e-3]);
-        assert_eq!(grids.last.as_ref().unwrap().fineness.size, 5e-3);
-        let left = ground.left(&grids, &[touch], &[DVec3::ZERO]);
-        assert!(left.displacement_percent.is_finite());
-        // Of fewer grids nothing is known: that is refused.
-        let mut few = Grids::default();
-        few.go_on(9e-3, solve).unwrap();
-        assert!(few.go_on(3e-3, solve).is_err());
-    }
 
     #[test]
     fn behind_many_facets_is_looked_as_often_as_behind_fewer() {

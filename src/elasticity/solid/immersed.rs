@@ -11,8 +11,9 @@ use super::grip::Grip;
 use super::ground::Piece;
 use super::tetrahedra::Tetrahedra;
 use super::{Elements, SolidModel};
+use crate::bounds::Bounds;
 use crate::budget::Watch;
-use crate::elasticity::model::ElasticError;
+use crate::elasticity::error::ElasticError;
 use crate::elasticity::support::{HeldPart, Region};
 use crate::elasticity::{Freedoms, Material, Support};
 use crate::mesh::TriMesh;
@@ -211,7 +212,7 @@ impl Immersed {
             let is_volume = held == Freedoms::DISPLACEMENTS && {
                 let planes = along_planes(support);
                 let inside = |p: DVec3| match planes {
-                    Some((lower, upper)) if p.cmpge(lower).all() && p.cmple(upper).all() => held,
+                    Some((lower, upper)) if (Bounds { lower, upper }).contains(p) => held,
                     _ => Freedoms::default(),
                 };
                 let any = (0..cells.count()).any(|c| inside(cells.centre(c)).0 != 0);

@@ -1,6 +1,6 @@
 //! What of a pressure on the surface the nodes of elements take.
 
-use super::Elements;
+use super::elements::Elements;
 use crate::elasticity::load::merge;
 use crate::mesh::{SurfacePoint, TriMesh};
 

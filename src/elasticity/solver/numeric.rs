@@ -16,7 +16,7 @@ use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::{Accum, MatMut, MatRef, Par, Spec};
 use rayon::prelude::*;
 
-use super::{FactorError, SymmetricMatrix};
+use super::matrix::{FactorError, SymmetricMatrix};
 use crate::budget::{Watch, report};
 
 /// Columns and rows that are worked on together.

@@ -4,7 +4,7 @@
 //! every template half of what a touch there explains of the weighted squares, and the highest of each block. They
 //! differ in whose the weights are: the reading's, or each template's own.
 
-use super::TURNS;
+use super::modes::TURNS;
 use crate::inference::map::LANES;
 use crate::lanes::{logarithm, wide};
 

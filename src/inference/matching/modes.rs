@@ -4,14 +4,11 @@ use glam::{DMat2, DVec3};
 use nalgebra::Matrix3;
 
 use super::weighed::{Heard, Measured, Weighed};
-use super::{Contact, Matching, TURNS};
+use super::{Contact, Matching};
 use crate::inference::map::Slope;
 use crate::inference::region::{DEVIATIONS, Region};
 use crate::mesh::SurfacePoint;
 
-/// Places from which Gauss–Newton begins, and how far they are apart in templates.
-const STARTS: usize = 4;
-const APART: f64 = 3.0;
 const STEPS: usize = 8;
 /// One place with this share of the probability is the answer; below it, the mean is.
 const CLEAR: f64 = 0.9;
@@ -32,34 +29,6 @@ pub(super) struct Mode {
 }
 
 impl Matching {
-    /// The best templates, apart from each other, each followed to the best place near it. There is one at least: the
-    /// first template where none says anything.
-    pub(super) fn modes(&self, measured: &Heard) -> Vec<Mode> {
-        let reach = APART * self.map.spacing();
-        let mut starts: Vec<usize> = Vec::with_capacity(STARTS);
-        for _ in 0..STARTS {
-            let best = self.best_template(&|place| {
-                let near = |&s: &usize| self.map.places[s].distance_squared(place) < reach * reach;
-                !starts.iter().any(near)
-            });
-            starts.extend(best);
-        }
-        if starts.is_empty() {
-            starts.push(0);
-        }
-        let mut modes: Vec<Mode> = Vec::with_capacity(STARTS);
-        for start in starts {
-            let at = self.map.index.nearest(self.map.places[start]).0;
-            let mode = self.follow(measured, at, None);
-            // Two starts may end at the same place.
-            let same = |m: &Mode| m.position.distance(mode.position) < 0.5 * self.map.spacing();
-            if !modes.iter().any(same) {
-                modes.push(mode);
-            }
-        }
-        modes
-    }
-
     /// The weights for a touch at a place: of the force that is given, or else of the one that fits best.
     fn weighed_at(&self, heard: &Heard, at: SurfacePoint, force: Option<f64>) -> Weighed {
         let spread = self.errors.spread.as_ref().map(|s| s.at(at));
@@ -215,3 +184,6 @@ pub(super) fn widest(covariance: DMat2) -> f64 {
     );
     f64::midpoint(a, c) + ((a - c) / 2.0).hypot(b)
 }
+
+/// Turns in which a force and the weights that depend on it settle.
+pub(super) const TURNS: usize = 2;

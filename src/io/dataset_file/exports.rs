@@ -5,9 +5,9 @@ use std::path::{Component, Path, PathBuf};
 
 use glam::DVec3;
 
+use super::found::{Found, Touches};
 use super::plausible::{Origin, spread};
-use super::{FileError, Found, Touches};
-use crate::io::source;
+use crate::io::{FileError, source};
 use crate::memory;
 use crate::plain::{self, mm, quote};
 

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::FileError;
+use crate::bounds::Bounds;
 use crate::plain::mm;
+use crate::statistics::median;
 
 /// Wider than any part that is pressed by hand (mm): a place in another unit, or a slip.
 const WIDEST: f64 = 20_000.0;
@@ -106,7 +108,7 @@ impl<'a> Places<'a> {
 
     /// The median of each coordinate (mm): one place far away does not move it.
     fn middle(&self) -> DVec3 {
-        let of = |axis: usize| median(self.points.iter().map(|p| p[axis]));
+        let of = |axis: usize| median(self.points.iter().map(|p| p[axis])).unwrap_or(0.0);
         DVec3::new(of(0), of(1), of(2))
     }
 
@@ -123,7 +125,7 @@ impl<'a> Places<'a> {
             .iter()
             .map(|&p| (p - middle).abs().max_element())
             .collect();
-        let near = median(distances.iter().copied());
+        let near = median(distances.iter().copied()).unwrap_or(0.0);
         let farthest = (distances.into_iter().zip(0..)).max_by(|a, b| a.0.total_cmp(&b.0));
         Err(match farthest {
             Some((distance, number)) if 2.0 * near < WIDE => origin.wrong(format!(
@@ -198,21 +200,8 @@ fn in_doubt(size: f64, touches: &Places, sites: &Places) -> String {
 /// The longest side of the box around some points, in their unit; zero of none. No square is taken: it may leave
 /// the range of numbers.
 pub fn spread(points: &[DVec3]) -> f64 {
-    let Some(&first) = points.first() else {
-        return 0.0;
-    };
-    let (lower, upper) = points
-        .iter()
-        .fold((first, first), |(l, u), &p| (l.min(p), u.max(p)));
-    (upper - lower).max_element()
-}
-
-/// The middle one of some numbers; zero of none.
-fn median(numbers: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = numbers.collect();
-    if sorted.is_empty() {
+    if points.is_empty() {
         return 0.0;
     }
-    let half = sorted.len() / 2;
-    *sorted.select_nth_unstable_by(half, f64::total_cmp).1
+    Bounds::around(points.iter().copied()).size().max_element()
 }

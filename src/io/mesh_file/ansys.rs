@@ -8,25 +8,22 @@ mod elements;
 mod finish;
 mod format;
 mod material;
+mod reader;
 mod selection;
 
-use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-use super::Soup;
 use super::found::System;
-use super::held::Held;
-use super::place::{Origin, Place};
-use super::sets::{Numbered, Sets};
-use super::tetrahedra::bounded;
-use super::unread::Unread;
+use super::place::Origin;
+use super::sets::Numbered;
+use super::soup::Soup;
 use super::words::at;
 use crate::elasticity::Freedoms;
 use crate::plain::quote;
-use command::{Command, Lines, Parameters, Statement, statements};
+use command::{Command, Lines, Statement, statements};
 use elements::{Element, Routine};
 use glam::DVec3;
-use material::Materials;
+use reader::Reader;
 use selection::{Nodes, Selection};
 
 /// Commands that change nothing about the part: the program's own, how it solves, and what it writes.
@@ -69,65 +66,6 @@ pub fn read(bytes: &[u8]) -> Result<Soup, String> {
         }
     }
     reader.finish()
-}
-
-#[derive(Default)]
-struct Reader {
-    soup: Soup,
-    known: Parameters,
-    /// Places in our lists by the deck's numbers.
-    nodes: HashMap<u64, u32>,
-    element_places: HashMap<u64, u32>,
-    /// The deck's numbers of the nodes in our list, and its largest of nodes and of elements.
-    node_numbers: Vec<u64>,
-    last_node: u64,
-    last_element: u64,
-    /// The nodes in the order of their numbers, as long as there are so many.
-    numbered: Option<(usize, Rc<Numbered>)>,
-    /// Nodes with directions of their own.
-    turned: HashSet<u32>,
-    elements: Vec<Element>,
-    routines: HashMap<u64, Routine>,
-    /// What elements without attributes of their own get: type, material, section.
-    active: Active,
-    materials: Materials,
-    /// Thickness by number of section: the sum of its layers.
-    thickness: HashMap<u64, f64>,
-    section: u64,
-    node_sets: Sets,
-    element_sets: Sets,
-    selection: Selection,
-    held: Held,
-    unread: Unread,
-    /// Line of the command that made a system of coordinates active that is not the global one.
-    elsewhere: Option<usize>,
-    /// Loops and conditions that are open.
-    depth: usize,
-    /// What comes after a first solution belongs to another one.
-    solved: bool,
-    ended: bool,
-    /// Whether the numbers that follow belong to a block that is not read.
-    in_unread: bool,
-    /// Numbers that belong to no block.
-    strays: Unread,
-}
-
-/// Numbers that elements get.
-#[derive(Clone, Copy)]
-struct Active {
-    kind: u64,
-    material: u64,
-    section: u64,
-}
-
-impl Default for Active {
-    fn default() -> Self {
-        Self {
-            kind: 1,
-            material: 1,
-            section: 1,
-        }
-    }
 }
 
 impl Reader {
@@ -255,28 +193,6 @@ impl Reader {
         self.take_node(number, DVec3::new(x, y, z), &angles, line)
     }
 
-    fn take_node(
-        &mut self,
-        number: u64,
-        position: DVec3,
-        angles: &[f64],
-        line: usize,
-    ) -> Result<(), String> {
-        let place = self.soup.positions.len() as u32;
-        bounded(u64::from(place) + 1, Place::Line(line))?;
-        if number == 0 || self.nodes.insert(number, place).is_some() {
-            let what = format!("node {number} is there a second time, or has no number");
-            return Err(at(line, &what));
-        }
-        self.soup.positions.push(position);
-        self.node_numbers.push(number);
-        self.last_node = self.last_node.max(number);
-        if angles.iter().any(|&angle| angle != 0.0) {
-            self.turned.insert(place);
-        }
-        Ok(())
-    }
-
     /// NROTAT: nodes get directions of their own.
     fn turn_node(&mut self, command: &Command) -> Result<(), String> {
         if let Some(first) = self.known.whole(command, 0).ok().flatten() {
@@ -363,19 +279,6 @@ impl Reader {
             nodes.pop();
         }
         Ok(nodes)
-    }
-
-    fn take_element(&mut self, element: Element) -> Result<(), String> {
-        let place = self.elements.len() as u32;
-        let Origin { number, .. } = element.origin;
-        if let Some(first) = self.element_places.insert(number, place) {
-            let first = self.elements[first as usize].line;
-            let what = format!("element {number} is there a second time (first in line {first})");
-            return Err(at(element.line, &what));
-        }
-        self.last_element = self.last_element.max(number);
-        self.elements.push(element);
-        Ok(())
     }
 
     /// SECTYPE,SECID,Type: what follows is of that section.

@@ -8,8 +8,8 @@ use glam::{DMat4, Mat4, Vec3};
 use gltf::mesh::Mode;
 
 use self::data::Buffers;
-use super::Soup;
 use super::boundary::quietly;
+use super::soup::Soup;
 use super::words::no_surface;
 use crate::{memory, plain};
 

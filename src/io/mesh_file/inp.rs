@@ -8,15 +8,15 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::Soup;
 use super::place::{Origin, Place};
 use super::sets::{Numbered, Range, Sets, check_count};
+use super::soup::Soup;
 use super::tetrahedra::{Tetrahedra, bounded};
 use super::unread::Unread;
 use super::words::{fortran, whole};
 use crate::mesh::volume::Tetrahedron;
 use crate::plain::quote;
-use keyword::{Keyword, statements};
+use keyword::{Keyword, statements, values};
 use said::{Boundaries, Elastic};
 
 /// What the lines after a keyword are.
@@ -397,12 +397,6 @@ fn nodes_of_tetrahedron(kind: &str) -> Option<usize> {
         plain.then_some(nodes)
     };
     of("C3D10", 10).or_else(|| of("C3D4", 4))
-}
-
-/// The values of a line; a comma may follow the last.
-fn values(words: &str) -> impl Iterator<Item = &str> {
-    let words = words.strip_suffix(',').unwrap_or(words);
-    words.split(',').map(str::trim)
 }
 
 /// Adds a line to a set: a range, or numbers and names of other sets.

@@ -11,9 +11,9 @@ use std::collections::hash_map::Entry;
 
 use glam::DVec3;
 
-use super::Soup;
 use super::place::{Origin, Place};
 use super::sets::check_count;
+use super::soup::Soup;
 use super::tetrahedra::{Tetrahedra, bounded};
 use super::words::{listed, number, whole};
 use crate::mesh::volume::Tetrahedron;

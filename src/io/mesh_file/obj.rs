@@ -7,7 +7,7 @@ use std::borrow::Cow;
 
 use glam::DVec3;
 
-use super::Soup;
+use super::soup::Soup;
 use super::words::{at, no_surface, number};
 use crate::plain::{self, quote};
 

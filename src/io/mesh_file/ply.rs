@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use self::header::{Element, Header};
 use self::values::Values;
-use super::Soup;
+use super::soup::Soup;
 use super::words::no_surface;
 use crate::plain::quote;
 

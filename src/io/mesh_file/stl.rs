@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::Soup;
+use super::soup::Soup;
 use super::words::{at, number};
 use crate::plain::quote;
 

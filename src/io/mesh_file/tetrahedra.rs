@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-use super::Soup;
 use super::place::{Origin, Place};
+use super::soup::Soup;
 use crate::memory;
 use crate::mesh::volume::{Tetrahedron, VolumeError, VolumeMesh};
 use crate::plain;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use zip::ZipArchive;
 
-use super::{arrays_path, plain};
+use super::names::{arrays_path, plain};
 use crate::io::npz::read_mask;
 use crate::io::{FileError, source};
 use crate::plain::quote;

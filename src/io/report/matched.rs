@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::{escape, judged_on, title_of};
+use super::words::{judged_on, title_of};
 use crate::design::{BLIND, Design};
 use crate::evaluation::MatchedRow;
+use crate::io::svg::escape;
 
 /// A figure that may not have been asked for (mm).
 fn cell(mm: Option<f64>) -> String {

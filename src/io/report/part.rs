@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 
-use super::{PartModel, Provenance, escape};
 use crate::design::{Design, Inputs};
+use crate::io::run::Provenance;
+use crate::io::svg::escape;
 use crate::plain::{self, quote};
-use crate::project::{PartAxis, SupportKeys, SupportKind};
+use crate::project::{PartAxis, PartModel, SupportKeys, SupportKind};
 
 /// Lines that say of which part, and under which assumptions, all other figures are.
 pub(super) fn section(

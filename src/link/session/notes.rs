@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::{Heard, Listener};
+use super::listener::{Heard, Listener};
 use crate::live::Sample;
 use crate::wire::MOST_CHANNELS;
 

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver as Inbox;
 use std::time::{Duration, Instant};
 
-use super::{Command, Heard, Listener};
+use super::listener::{Command, Heard, Listener};
 use crate::link::{Address, Got, Port, ports};
 use crate::live::{Input, Receiver};
 use crate::wire::Message;

@@ -1,6 +1,6 @@
 //! What is heard, written down while it is heard.
 
-use super::{Heard, Listener};
+use super::listener::{Heard, Listener};
 use crate::link::Recorder;
 
 impl Listener {

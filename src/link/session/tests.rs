@@ -10,8 +10,11 @@ use super::*;
 use crate::inference::ResponseMap;
 use crate::limb::LimbSpec;
 use crate::link::Pace;
+use crate::link::{Address, Recorder};
 use crate::live::Settings;
+use crate::live::{Pipeline, Sample};
 use crate::wire::MOST_CHANNELS;
+use crate::wire::encode;
 
 const GAUGES: usize = 4;
 

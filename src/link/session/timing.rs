@@ -1,5 +1,7 @@
 //! How long it takes from bytes to a touch.
 
+use crate::statistics::quantile;
+
 /// Between bytes that arrive and the touch that was computed from them.
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
@@ -25,7 +27,6 @@ impl Timing {
     pub fn quantile(&self, share: f64) -> Option<f32> {
         let mut sorted = self.ring.clone();
         sorted.sort_by(f32::total_cmp);
-        let last = sorted.len().checked_sub(1)?;
-        Some(sorted[(share * last as f64).round() as usize])
+        quantile(&sorted, share)
     }
 }

@@ -4,8 +4,7 @@
 use rayon::prelude::*;
 
 use super::bank::{Bank, Rows};
-use super::scene::Scene;
-use super::{Detail, ExpectedError};
+use super::scene::{Detail, Knowledge, Scene};
 use crate::budget::{Cancelled, Watch, report};
 use crate::draw::subsets;
 use crate::placement::exchange::Criterion;
@@ -108,16 +107,16 @@ impl<'a> Expectation<'a> {
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
     pub fn new(
-        selector: &ExpectedError,
+        known: &Knowledge,
+        detail: Detail,
         pool: &'a Pool<'a>,
         request: &'a Request<'a>,
     ) -> Result<Self, Cancelled> {
-        let known = &selector.known;
         let scene = |detail: Detail| Scene::new(pool.x, pool.targets, known, detail, request.watch);
         Ok(Self {
             scenes: Scenes {
-                coarse: scene(selector.detail.coarse())?,
-                fine: scene(selector.detail)?,
+                coarse: scene(detail.coarse())?,
+                fine: scene(detail)?,
             },
             pool,
             request,

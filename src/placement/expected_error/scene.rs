@@ -14,6 +14,7 @@ pub use self::scatter::Scatter;
 
 use self::around::{Around, Neighbour, longest};
 use self::merged::Merged;
+use crate::bounds::Bounds;
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::draw::normal;
@@ -366,10 +367,7 @@ fn in_neighbourhoods(places: &mut [usize], positions: &[DVec3]) {
     if places.len() <= 2 {
         return;
     }
-    let bounds = (places.iter()).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), &k| {
-        (l.min(positions[k]), u.max(positions[k]))
-    });
-    let axis = longest(bounds.1 - bounds.0);
+    let axis = longest(Bounds::around(places.iter().map(|&k| positions[k])).size());
     places.sort_by(|&a, &b| {
         positions[a][axis]
             .total_cmp(&positions[b][axis])

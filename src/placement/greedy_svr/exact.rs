@@ -6,7 +6,6 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 
-use super::GreedySvr;
 use crate::budget::{Cancelled, Progress, Watch};
 use crate::regression::Hyper;
 use crate::regression::folds::Folds;
@@ -47,13 +46,13 @@ impl Judged {
 impl<'a> Judge<'a> {
     /// Of targets (mm) in the order of the touches.
     #[must_use]
-    pub fn new(settings: &GreedySvr, targets: &[[f64; 3]], folds: &'a Folds) -> Self {
+    pub fn new(hyper: Hyper, effort: Effort, targets: &[[f64; 3]], folds: &'a Folds) -> Self {
         let axis = |a: usize| folds.order.iter().map(|&t| targets[t][a]).collect();
         Self {
             targets: [0, 1, 2].map(axis),
             folds,
-            hyper: settings.hyper,
-            effort: settings.effort,
+            hyper,
+            effort,
         }
     }
 

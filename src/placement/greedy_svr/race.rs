@@ -1,6 +1,7 @@
 //! Which candidates go from a cheap score to a dearer one.
 
 use crate::budget::Cancelled;
+use crate::statistics::median;
 
 /// A candidate with its score (mm, smaller is better).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,22 +21,15 @@ pub struct Relation {
 
 impl Relation {
     fn of(pairs: &[(f64, f64)]) -> Self {
-        let mut ratios: Vec<f64> = pairs
-            .iter()
-            .map(|(cheap, dear)| dear / cheap)
-            .filter(|r| r.is_finite())
-            .collect();
-        ratios.sort_by(f64::total_cmp);
-        let Some(&ratio) = ratios.get(ratios.len() / 2) else {
+        let ratios = pairs.iter().map(|(cheap, dear)| dear / cheap);
+        let ratios = ratios.filter(|r| r.is_finite());
+        let Some(ratio) = median(ratios.clone()) else {
             return Self {
                 ratio: 1.0,
                 deviation: 1.0,
             };
         };
-        let deviation = ratios
-            .iter()
-            .map(|r| (r / ratio - 1.0).abs())
-            .fold(0.0, f64::max);
+        let deviation = ratios.map(|r| (r / ratio - 1.0).abs()).fold(0.0, f64::max);
         Self { ratio, deviation }
     }
 

@@ -7,7 +7,7 @@
 
 use std::borrow::Cow;
 
-use super::{Problem, Start, SvrParams};
+use super::problem::{Problem, Start, SvrParams};
 use crate::lanes::wide;
 
 /// Curvature below this is a duplicate point: LIBSVM's τ.

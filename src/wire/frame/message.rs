@@ -1,7 +1,5 @@
 //! What board and studio tell each other.
 
-use super::payload::{ASK_HELLO, kind};
-
 /// What a board is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
@@ -49,12 +47,4 @@ pub enum Message {
     /// Frames of data a second.
     Rate(u16),
     Ping(u32),
-}
-
-impl Message {
-    /// Whether a studio says it, and never a board.
-    #[must_use]
-    pub fn is_of_studio(&self) -> bool {
-        kind(self) >= ASK_HELLO
-    }
 }

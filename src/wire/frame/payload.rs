@@ -2,7 +2,6 @@
 
 use super::message::{Hello, Message};
 use super::refusal::Refusal;
-use super::{MAGIC, MOST_BITS};
 use crate::wire::{MOST_CHANNELS, VERSION};
 
 pub(super) const HELLO: u8 = 0x01;
@@ -192,5 +191,18 @@ fn usable(hello: &Hello) -> Result<(), Refusal> {
     match values.into_iter().find(|(.., fits)| !fits) {
         Some((name, rule, found, _)) => Err(Refusal::Value { name, rule, found }),
         None => Ok(()),
+    }
+}
+
+/// The most bits of a count. As many channels as there may be then fit into a frame.
+pub(super) const MOST_BITS: usize = 24;
+
+pub(super) const MAGIC: [u8; 4] = *b"HAPD";
+
+impl Message {
+    /// Whether a studio says it, and never a board.
+    #[must_use]
+    pub fn is_of_studio(&self) -> bool {
+        kind(self) >= ASK_HELLO
     }
 }

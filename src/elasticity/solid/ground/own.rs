@@ -2,13 +2,14 @@
 
 use glam::DVec3;
 
+use super::SolidGround;
 use super::piece::Piece;
-use super::{SAFETY, SolidGraded, SolidGround, Solved};
+use super::solved::{SAFETY, SolidGraded, Solved};
 use crate::budget::{Elements, Watch};
+use crate::elasticity::error::ElasticError;
 use crate::elasticity::estimate::{self, Discretization};
 use crate::elasticity::grade::{PLACES, sample, spread};
 use crate::elasticity::load::Touch;
-use crate::elasticity::model::ElasticError;
 use crate::elasticity::solid::immersed::Fineness;
 use crate::elasticity::solid::orders::{self, FIRST};
 use crate::elasticity::solid::simplex::{HIGHEST, Simplex};

@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-use super::Reader;
 use super::command::{Command, Lines};
 use super::elements::{Element, Routine};
 use super::format::Format;
+use super::reader::Reader;
 use crate::io::mesh_file::place::{Origin, Place};
 use crate::io::mesh_file::sets::Range;
 use crate::io::mesh_file::tetrahedra::bounded;

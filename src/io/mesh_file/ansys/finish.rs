@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::Reader;
 use super::elements::{Element, Use};
-use crate::io::mesh_file::Soup;
+use super::reader::Reader;
 use crate::io::mesh_file::sets::{Numbered, check_count};
+use crate::io::mesh_file::soup::Soup;
 use crate::io::mesh_file::tetrahedra::Tetrahedra;
 use crate::io::mesh_file::unread::Unread;
 use crate::io::mesh_file::words::at;

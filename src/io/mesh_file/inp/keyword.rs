@@ -72,3 +72,9 @@ pub fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
         Some((row, whole))
     })
 }
+
+/// The values of a line; a comma may follow the last.
+pub(super) fn values(words: &str) -> impl Iterator<Item = &str> {
+    let words = words.strip_suffix(',').unwrap_or(words);
+    words.split(',').map(str::trim)
+}

@@ -2,8 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::keyword::Keyword;
-use super::values;
+use super::keyword::{Keyword, values};
 use crate::elasticity::Freedoms;
 use crate::io::mesh_file::held::{Held, NodeSet};
 use crate::io::mesh_file::words::{fortran, listed, whole};

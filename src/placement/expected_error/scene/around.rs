@@ -1,6 +1,7 @@
 //! How readings change around each place: what its neighbours weigh in the two slopes along the surface, and in what
 //! would be guessed there without it.
 
+use crate::bounds::Bounds;
 use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen};
 
@@ -35,12 +36,7 @@ pub(super) struct Surroundings {
 
 impl<'a> Around<'a> {
     pub fn new(positions: &'a [DVec3], groups: &'a [usize]) -> Self {
-        let (low, high) = positions
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
-                (low.min(*p), high.max(*p))
-            });
-        let axis = longest(high - low);
+        let axis = longest(Bounds::around(positions.iter().copied()).size());
         let mut order: Vec<usize> = (0..positions.len()).collect();
         order.sort_by(|&a, &b| positions[a][axis].total_cmp(&positions[b][axis]));
         let mut ranks = vec![0; order.len()];

@@ -1,0 +1,98 @@
+//! Gauges as a workshop glues them: a little off their places, directions and gains.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{Simulated, WORKSHOP_SEED};
+use crate::dataset::Site;
+use crate::uncertainty::Gluing;
+
+/// Sites of a dataset as a workshop glues their gauges.
+pub(super) fn sites_as_built(
+    simulated: &Simulated,
+    sites: &[usize],
+    gluing: &Gluing,
+    seed: u64,
+) -> Vec<Site> {
+    let all = &simulated.dataset.sites;
+    let built = |&s: &usize| as_built(&all[s], gluing, seed, s);
+    sites.iter().map(built).collect()
+}
+
+/// The gains that these gauges end up with.
+pub(super) fn gains(sites: &[usize], gluing: &Gluing, seed: u64) -> impl Iterator<Item = f64> {
+    sites
+        .iter()
+        .map(move |&s| workshop_draw(gluing, seed, s).gain)
+}
+
+/// What a workshop does to one gauge: where it is moved to and how far it is turned (radians), and its
+/// gain.
+pub(super) struct WorkshopDraw {
+    toward: f64,
+    turned: f64,
+    pub gain: f64,
+}
+
+/// Off by as much as is usual for the workshop, in any direction and either way: the same for a site in whatever
+/// set it is.
+pub(super) fn workshop_draw(gluing: &Gluing, seed: u64, site: usize) -> WorkshopDraw {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(WORKSHOP_SEED));
+    rng.set_stream(site as u64);
+    let mut sign = || if rng.random::<bool>() { 1.0 } else { -1.0 };
+    let (turned, gain) = (gluing.angle * sign(), 1.0 + gluing.gain * sign());
+    WorkshopDraw {
+        toward: std::f64::consts::TAU * rng.random::<f64>(),
+        turned,
+        gain,
+    }
+}
+
+pub(super) fn as_built(site: &Site, gluing: &Gluing, seed: u64, number: usize) -> Site {
+    let draw = workshop_draw(gluing, seed, number);
+    let across = site.normal.cross(site.direction);
+    let along = |angle: f64| site.direction * angle.cos() + across * angle.sin();
+    Site {
+        position: site.position + along(draw.toward) * gluing.place,
+        direction: along(draw.turned),
+        ..*site
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    fn site() -> Site {
+        Site {
+            position: DVec3::new(0.01, 0.02, 0.03),
+            normal: DVec3::Z,
+            direction: DVec3::X,
+            rms_strain: 0.0,
+            peak_strain: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_gauge_is_off_by_what_the_project_says() {
+        let gluing = Gluing {
+            place: 2e-3,
+            angle: 0.1,
+            gain: 0.05,
+        };
+        for number in 0..20 {
+            let built = as_built(&site(), &gluing, 7, number);
+            assert!((built.position.distance(site().position) - 2e-3).abs() < 1e-12);
+            assert!((built.direction.angle_between(DVec3::X) - 0.1).abs() < 1e-9);
+            let gain = workshop_draw(&gluing, 7, number).gain;
+            assert!(((gain - 1.0).abs() - 0.05).abs() < 1e-12);
+            // Another workshop is off the same way, by another amount.
+            let usual = as_built(&site(), &Gluing::default(), 7, number);
+            let [a, b] = [built, usual].map(|s| (s.position - site().position).normalize());
+            assert!(a.distance(b) < 1e-9);
+            assert_eq!(as_built(&site(), &Gluing::EXACT, 7, number), site());
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! The judge's model, and what gauges read on it.
+
+use glam::DVec3;
+
+use super::judge::Pressed;
+use super::{Inputs, NOISE_SEED};
+use crate::bounds::Bounds;
+use crate::budget::Work;
+use crate::dataset::{SignalMatrix, Site};
+use crate::elasticity::load::Touch;
+use crate::evaluation::{self, EstimatorKind, Region};
+use crate::project::Project;
+use crate::uncertainty::Uncertainty;
+
+/// The judge: a model of finer elements, with touches of its own.
+#[derive(Clone)]
+pub struct Truth {
+    pub touches: Vec<Touch>,
+    pub regions: Vec<Region>,
+    /// Element size of the truth (mm).
+    pub element_mm: f64,
+    pub work: Work,
+    /// Dataset sites that were measured, rising, and their signals.
+    pub sites: Vec<usize>,
+    /// Where they are: gauges off the lattice may have moved under the same number.
+    pub drawn: Vec<Site>,
+    pub x: SignalMatrix,
+    /// The same sites as a workshop would build them.
+    pub workshop: SignalMatrix,
+    /// How far off they are built, and all else that was known to be off when they were measured.
+    pub off: Uncertainty,
+    /// Length and width of the grids (m) that gauges read over; absent where they read at a point, as regressions
+    /// learn from.
+    pub grid: Option<[f64; 2]>,
+    /// Known presses on the gauges as built, where an estimator learns from them.
+    pub pressed: Option<Pressed>,
+}
+
+/// Length and width of the grids (m) that a project's gauges are judged with: those that live touch reads them over, and
+/// none where a regression has learned from points.
+pub(super) fn grid(project: &Project) -> Option<[f64; 2]> {
+    let keys = &project.gauge;
+    let matching = project.judging().estimator() == EstimatorKind::Matching;
+    matching.then_some([keys.grid_length_mm * 1e-3, keys.grid_width_mm * 1e-3])
+}
+
+pub(super) fn regions(project: &Project, touches: &[Touch]) -> Vec<Region> {
+    project
+        .evaluation
+        .regions
+        .iter()
+        .map(|region| {
+            let bounds = Bounds::between(region.box_mm.map(DVec3::from_array));
+            let inside = |t: &Touch| bounds.contains(t.position * 1000.0);
+            Region {
+                name: region.name.clone(),
+                contains: touches.iter().map(inside).collect(),
+            }
+        })
+        .collect()
+}
+
+/// Signals with the noise that the evaluation draws: `draw` tells training (1), test (2) and workshop (3) apart.
+pub(super) fn noisy<'a>(
+    inputs: &Inputs,
+    x: &'a SignalMatrix,
+    draw: u64,
+    streams: &[u64],
+) -> std::borrow::Cow<'a, SignalMatrix> {
+    let noise = inputs.project.gauge.noise_microstrain * 1e-6;
+    let seed = inputs.project.budget.seed.wrapping_add(NOISE_SEED);
+    evaluation::add_noise_by(x, noise, seed.wrapping_add(draw), &|row| streams[row])
+}
+
+impl Truth {
+    /// Whether it measures exactly these of all sites, in any order, built and pressed as far off as that, and what this
+    /// estimator asks for beside.
+    #[must_use]
+    pub fn measures(
+        &self,
+        sites: &[usize],
+        all: &[Site],
+        off: &Uncertainty,
+        project: &Project,
+    ) -> bool {
+        let mut rows = sites.to_vec();
+        rows.sort_unstable();
+        rows.dedup();
+        let here = rows.iter().filter_map(|&s| all.get(s));
+        let by = project.judging().estimator();
+        let presses = by == EstimatorKind::Svr || self.pressed.is_some();
+        let same = off.builds_as(&self.off) && grid(project) == self.grid;
+        rows == self.sites && here.eq(&self.drawn) && same && presses
+    }
+
+    /// The same, judged in the regions that a project asks for.
+    #[must_use]
+    pub fn in_regions_of(&self, project: &Project) -> Self {
+        Self {
+            regions: regions(project, &self.touches),
+            ..self.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::uncertainty::Gluing;
+
+    fn site() -> Site {
+        Site {
+            position: DVec3::new(0.01, 0.02, 0.03),
+            normal: DVec3::Z,
+            direction: DVec3::X,
+            rms_strain: 0.0,
+            peak_strain: 0.0,
+        }
+    }
+
+    #[test]
+    fn what_another_workshop_built_was_not_measured() {
+        let truth = Truth {
+            touches: Vec::new(),
+            regions: Vec::new(),
+            element_mm: 1.0,
+            work: Work::default(),
+            sites: vec![2, 5],
+            drawn: vec![site(); 2],
+            x: SignalMatrix::default(),
+            workshop: SignalMatrix::default(),
+            off: Uncertainty::default(),
+            grid: None,
+            pressed: None,
+        };
+        let usual = Uncertainty::default();
+        let other = Uncertainty {
+            gluing: Gluing::EXACT,
+            ..usual
+        };
+        let mut project = Project::around("limb.stl", None);
+        project.evaluation.estimator = EstimatorKind::Svr;
+        let mut all = vec![site(); 6];
+        assert!(truth.measures(&[5, 2, 5], &all, &usual, &project));
+        assert!(!truth.measures(&[5, 3], &all, &usual, &project));
+        assert!(!truth.measures(&[5, 2], &all, &other, &project));
+        project.evaluation.estimator = EstimatorKind::Matching;
+        let matched = Truth {
+            grid: grid(&project),
+            pressed: Some(Pressed {
+                presses: Vec::new(),
+                x: SignalMatrix::default(),
+            }),
+            ..truth.clone()
+        };
+        assert!(!truth.measures(&[5, 2], &all, &usual, &project));
+        assert!(matched.measures(&[5, 2], &all, &usual, &project));
+        // A gauge off the lattice may lie elsewhere now.
+        all[5].position.x += 1e-4;
+        assert!(!matched.measures(&[5, 2], &all, &usual, &project));
+        all[5] = site();
+        project.gauge.grid_length_mm += 1.0;
+        assert!(!matched.measures(&[5, 2], &all, &usual, &project));
+    }
+}

@@ -1,0 +1,99 @@
+//! Why a part cannot be computed.
+
+use crate::budget::Cancelled;
+use crate::plain;
+use glam::DVec3;
+
+/// Why a model cannot be built or solved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ElasticError {
+    #[error(
+        "no triangle of the part is held by a support: move a support box onto the part, or where there is none write a project that has one, as in [[support]] kind = \"clamped\", box_mm = [[x, y, z], [x, y, z]] (the part lies between {lower:.1} and {upper:.1} mm)"
+    )]
+    NothingHeld { lower: DVec3, upper: DVec3 },
+    #[error(
+        "the part can still move as a rigid body: the supports hold it, but not in every direction. Clamp it, or add supports"
+    )]
+    Loose,
+    #[error(
+        "the shell is not held anywhere near vertex {vertex} at {place:.1} mm: join it to the rest or support it"
+    )]
+    NotHeld { vertex: usize, place: DVec3 },
+    #[error("{what} must be {rule}, but is {value}")]
+    Value {
+        what: &'static str,
+        rule: &'static str,
+        value: f64,
+    },
+    #[error(
+        "every point of the part is held, so nothing can deform: make the support boxes smaller"
+    )]
+    AllHeld,
+    #[error(
+        "a triangle of the mesh near {place:.1} mm has no area, so nothing can be computed on it: repair the mesh there (part.weld_mm joins what lies too close)"
+    )]
+    NoArea { place: DVec3 },
+    #[error(
+        "the mesh encloses nothing (it has {}), so it is no solid: {} in the program that wrote it, fill its holes (part.fill_holes_mm), or take it as a shell (part.model = \"shell\")",
+        plain::count(*rims, "free edge"),
+        closing(*closes_within)
+    )]
+    Open {
+        rims: usize,
+        /// Distance (m) within which its vertices would have to be joined to close it, where that does.
+        closes_within: Option<f64>,
+    },
+    #[error(
+        "no material was found in cells of {size_mm:.3} mm: the walls are thinner than a thousandth of that. Check the unit of the mesh, or take its middle as a shell (part.model = \"shell\")"
+    )]
+    NoMaterial { size_mm: f64 },
+    #[error(
+        "no {face} face was found on the part: paint it, so that it is known where gauges go and where touches land"
+    )]
+    NoFace { face: &'static str },
+    #[error(
+        "the factored model would take {}, more than the {} that may be taken: choose a lower quality, lower budget.limits.vertices, mesh the part coarser where the file's own elements are taken, or allow more with --memory-gb",
+        plain::needed_gb(*needed_gb),
+        plain::allowed_gb(*limit_gb)
+    )]
+    TooLarge { needed_gb: f64, limit_gb: f64 },
+    #[error(
+        "the model does not fit into memory: choose a lower quality, lower budget.limits.vertices, or end other programs"
+    )]
+    OutOfMemory,
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl ElasticError {
+    /// Whether it is memory that was wanting.
+    #[must_use]
+    pub fn is_memory(&self) -> bool {
+        matches!(self, Self::TooLarge { .. } | Self::OutOfMemory)
+    }
+}
+
+/// How an open mesh is closed.
+fn closing(within: Option<f64>) -> String {
+    let join = |metres: f64| {
+        let mm = plain::digits(metres * 1e3);
+        format!(
+            "it closes when vertices within {mm} mm are joined (part.weld_mm = {mm}). Or close it"
+        )
+    };
+    within.map_or_else(|| "close it".to_owned(), join)
+}
+
+/// A value that must obey a rule.
+pub(super) fn range(
+    what: &'static str,
+    rule: &'static str,
+    value: f64,
+    ok: bool,
+) -> Result<(), ElasticError> {
+    if ok && value.is_finite() {
+        Ok(())
+    } else {
+        Err(ElasticError::Value { what, rule, value })
+    }
+}

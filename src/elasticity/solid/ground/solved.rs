@@ -1,0 +1,69 @@
+//! Models with the sample loads solved on them, and the one that is taken.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::elasticity::estimate::{Discretization, Sample};
+use crate::elasticity::grade::{CHECKED, spread};
+use crate::elasticity::load::Touch;
+use crate::elasticity::model::{LoadCheck, Model as _};
+use crate::elasticity::solid::SolidModel;
+use crate::elasticity::solid::immersed::Fineness;
+
+/// The cells, with the model built on them.
+pub struct SolidGraded {
+    pub fineness: Fineness,
+    pub model: SolidModel,
+    pub estimate: Discretization,
+    /// The worst balance over the sample of the loads.
+    pub balance: LoadCheck,
+    pub models: u64,
+    pub solves: u64,
+}
+
+/// The error is an estimate: stop at this share of the tolerance.
+pub(super) const SAFETY: f64 = 0.8;
+
+/// A model with the sample loads solved on it.
+pub(super) struct Solved {
+    pub(super) fineness: Fineness,
+    pub(super) model: SolidModel,
+    pub(super) solutions: Vec<Vec<f64>>,
+    pub(super) sample: Sample,
+}
+
+impl Solved {
+    pub(super) fn of(
+        fineness: Fineness,
+        model: SolidModel,
+        touches: &[Touch],
+        places: &[DVec3],
+    ) -> Self {
+        let loads: Vec<_> = touches.par_iter().map(|t| model.load(t)).collect();
+        let solutions = model.system().solve_loads(&loads);
+        Self {
+            sample: Sample::of(&model, touches, &solutions, places),
+            fineness,
+            model,
+            solutions,
+        }
+    }
+
+    /// As the one that is taken, after so many models.
+    pub(super) fn graded(
+        self,
+        touches: &[Touch],
+        estimate: Discretization,
+        models: u64,
+    ) -> SolidGraded {
+        SolidGraded {
+            balance: (self.model)
+                .check_all(&spread(touches, CHECKED), &spread(&self.solutions, CHECKED)),
+            fineness: self.fineness,
+            model: self.model,
+            estimate,
+            models,
+            solves: models * touches.len() as u64,
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Who listens, what it is told, and what it tells.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::timing::Timing;
+use crate::link::{Address, Port, Recorder};
+use crate::live::{Doubt, Pipeline, Receiver, Rest, Sample, Traffic, Update};
+use crate::wire::{Hello, Message, encode};
+
+/// How the connection stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum State {
+    /// The port is open; nothing was understood yet.
+    Waiting,
+    Live,
+    /// The port is open and has fallen silent.
+    Silent,
+    /// Unplugged; looked for again and again.
+    Gone,
+    /// The recording is over.
+    Ended,
+}
+
+/// What is told while listening.
+pub enum Heard<'a> {
+    State(&'a State),
+    Hello(&'a Hello),
+    Sample {
+        sample: &'a Sample,
+        update: &'a Update,
+        pipeline: &'a Pipeline,
+    },
+    /// From a recording of a simulated board: where it is really touched (m, N).
+    Truth(Option<(DVec3, f64)>),
+    /// What the board says, or how a recording was; safe to show.
+    Message(&'a str),
+    /// Why nothing that comes can be used; each reason once.
+    Trouble(&'a str),
+    /// Why a recording could not begin, or ended by itself.
+    Unrecorded(&'a str),
+    /// After every look at the port.
+    Turn {
+        traffic: Traffic,
+        timing: &'a Timing,
+        pipeline: &'a Pipeline,
+        recorder: Option<&'a Recorder>,
+    },
+}
+
+/// What can be asked of a connection.
+pub enum Command {
+    Tare,
+    /// Samples a second.
+    Rate(u16),
+    Record(PathBuf),
+    StopRecording,
+    /// Where a simulated board is really touched, for the recording.
+    Truth(Option<(DVec3, f64)>),
+    Do(Box<dyn FnOnce(&mut Pipeline) + Send>),
+}
+
+/// One who listens, on whatever thread it is run on.
+pub struct Listener {
+    pub(super) address: Address,
+    pub(super) pipeline: Pipeline,
+    pub(super) receiver: Receiver,
+    pub(super) recorder: Option<Recorder>,
+    pub(super) timing: Timing,
+    pub(super) hello: Option<Hello>,
+    pub(super) rate: Option<u16>,
+    pub(super) state: State,
+    /// When the last sample came, or the port was opened.
+    pub(super) heard: Instant,
+    /// Why nothing can be used, as far as it was told.
+    pub(super) explained: Vec<Doubt>,
+    /// How many channels were compared with those of the gauges.
+    pub(super) compared: Option<usize>,
+    /// What a recording brings in pieces: a rest, and the counts of a line.
+    pub(super) rest: Rest,
+    pub(super) line: Vec<f64>,
+    /// Whether a recording has notes. Texts of the board are never taken for them then.
+    pub(super) noted: bool,
+    pub(super) measured: u64,
+    pub(super) begun: Instant,
+    pub(super) said: u16,
+}
+
+impl Listener {
+    #[must_use]
+    pub fn new(address: Address, pipeline: Pipeline) -> Self {
+        Self {
+            address,
+            pipeline,
+            receiver: Receiver::default(),
+            recorder: None,
+            timing: Timing::default(),
+            hello: None,
+            rate: None,
+            state: State::Waiting,
+            heard: Instant::now(),
+            explained: Vec::new(),
+            compared: None,
+            rest: Rest::default(),
+            line: Vec::new(),
+            noted: false,
+            measured: 0,
+            begun: Instant::now(),
+            said: 0,
+        }
+    }
+
+    /// Samples a second that the board is asked for.
+    #[must_use]
+    pub fn at_rate(mut self, hertz: Option<u16>) -> Self {
+        self.rate = hertz;
+        self
+    }
+
+    /// Records from the beginning.
+    #[must_use]
+    pub fn recording(mut self, recorder: Option<Recorder>) -> Self {
+        self.recorder = recorder;
+        self
+    }
+
+    pub(super) fn enter(&mut self, state: State, tell: &mut impl FnMut(Heard)) {
+        self.state = state;
+        tell(Heard::State(&self.state));
+    }
+
+    pub(super) fn say(&mut self, port: &mut dyn Port, message: &Message) {
+        let mut bytes = Vec::new();
+        encode(
+            message,
+            self.said,
+            self.begun.elapsed().as_micros() as u32,
+            12,
+            &mut bytes,
+        );
+        self.said = self.said.wrapping_add(1);
+        port.write(&bytes);
+    }
+}

@@ -1,0 +1,54 @@
+//! Samples go through the pipeline, and what comes out is told.
+
+use std::time::Instant;
+
+use super::listener::{Heard, Listener, State};
+use crate::live::Sample;
+
+impl Listener {
+    /// Says where a gauge is on a channel that does not come, whether a board has told how many there are or its
+    /// lines show it; each number of channels once.
+    pub(super) fn compare_channels(&mut self, channels: usize, tell: &mut impl FnMut(Heard)) {
+        if self.compared.replace(channels) == Some(channels) {
+            return;
+        }
+        let mut gauges = self.pipeline.settings.channels.iter().enumerate();
+        if let Some((gauge, channel)) = gauges.find(|(_, c)| **c >= channels) {
+            let many = if channels == 1 { "" } else { "s" };
+            tell(Heard::Message(&format!(
+                "gauge {} is on channel {channel}, but this board has only {channels} channel{many} (from 0): nothing can be told of a touch. Correct “Channels of the gauges”, or channels in the project's table [live]",
+                gauge + 1
+            )));
+        }
+    }
+
+    pub(super) fn measure(
+        &mut self,
+        sample: &Sample,
+        arrived: Instant,
+        tell: &mut impl FnMut(Heard),
+    ) {
+        self.measured += 1;
+        if self.state != State::Live {
+            self.enter(State::Live, tell);
+        }
+        if self.pipeline.rest.is_none() && !self.pipeline.is_taring() {
+            self.pipeline.tare();
+            self.record(|r| r.own("tare"));
+        }
+        self.compare_channels(sample.counts.len(), tell);
+        let update = self.pipeline.push(sample);
+        // What nobody touches is soon computed, and would hide the rest.
+        if update.contact.is_some() {
+            self.timing.push(arrived.elapsed().as_secs_f32() * 1e6);
+        }
+        self.record(|r| r.sample(sample));
+        tell(Heard::Sample {
+            sample,
+            update: &update,
+            pipeline: &self.pipeline,
+        });
+        // Not when it arrived: one that is slow to compute is not silent.
+        self.heard = Instant::now();
+    }
+}
