@@ -407,12 +407,18 @@ fn a_site_that_never_changes_is_chosen_only_where_it_must_be_and_ends_nothing() 
         let chosen = indices(&free);
         assert_eq!(chosen.len(), 6, "{selector}");
         assert!(!chosen.contains(&3) && !chosen.contains(&9), "{selector}");
-        assert!(notes(&free).contains("2 sites with the same report"), "{free}");
+        assert!(
+            notes(&free).contains("2 sites with the same report"),
+            "{free}"
+        );
         let bound = json(&[&base[..], &["--sensors", "4", "--require", "3"]].concat());
         let chosen = indices(&bound);
         assert_eq!((chosen.len(), chosen[0]), (4, 3), "{selector}");
         assert!(notes(&bound).contains("Site 3 must be there"), "{bound}");
-        assert!(notes(&bound).contains("1 site with the same report"), "{bound}");
+        assert!(
+            notes(&bound).contains("1 site with the same report"),
+            "{bound}"
+        );
         let mm = numbers(&bound["criterion_mm"]);
         assert!(mm[3] < 0.8 * mm[0], "{selector}: {mm:?}");
     }
