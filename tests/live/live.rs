@@ -127,31 +127,31 @@ fn compare(w: &mut Window) {
 
 /// Noticed, and found again once it is plugged in.
 fn unplug(w: &mut Window) {
-    {
-        let hosted = w.session().live.simulated_board().unwrap();
-        let now = hosted.seconds();
-        hosted
-            .board
-            .lock()
-            .unwrap()
-            .faults_mut()
-            .unplugged
-            .push((now, now + 1.5));
-    }
-    w.wait("the unplug", 10, |s| {
+    // Until it was seen: a window that waits for the processor may miss a second.
+    pull(w, f64::INFINITY);
+    w.wait("the unplug", 30, |s| {
         s.session.live.state() == Some(State::Gone)
     });
     assert!(
         w.session().live.update().is_none(),
         "no touch is shown of a board that is gone"
     );
-    w.wait("the plug", 10, |s| {
+    pull(w, 0.0);
+    w.wait("the plug", 30, |s| {
         s.session.live.state() == Some(State::Live)
     });
     // The rest is still known.
-    w.wait("strains", 5, |s| {
+    w.wait("strains", 30, |s| {
         s.session.live.update().is_some_and(|u| u.strain.is_some())
     });
+}
+
+/// Takes the board's plug out from now on for so long (s), or puts it back.
+fn pull(w: &Window, seconds: f64) {
+    let hosted = w.session().live.simulated_board().unwrap();
+    let now = hosted.seconds();
+    let mut board = hosted.board.lock().unwrap();
+    board.faults_mut().unplugged = vec![(now, now + seconds)];
 }
 
 /// What the window saw while it was recording.
