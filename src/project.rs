@@ -1,6 +1,7 @@
 //! A project: everything a design depends on, as plain data in the units of its file.
 
 mod axis;
+pub mod boxes;
 mod kept;
 mod live;
 mod masks;
@@ -240,6 +241,9 @@ fn are_usual_judged_forces(forces_n: &[f64]) -> bool {
 pub struct RegionKeys {
     pub name: String,
     pub box_mm: BoxMm,
+    /// As of a support.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_axis: Option<[f64; 3]>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

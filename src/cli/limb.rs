@@ -266,6 +266,7 @@ fn away(low: [f64; 3], high: [f64; 3]) -> RegionKeys {
     RegionKeys {
         name: "away from the boundaries".into(),
         box_mm: [low, high],
+        box_axis: None,
     }
 }
 

@@ -23,7 +23,7 @@ use crate::placement::{
     PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes, lead,
     pca_qr,
 };
-use crate::project::{CostKeys, Elements};
+use crate::project::Elements;
 use crate::regression::Grouping;
 use crate::regression::folds::evenly;
 use crate::regression::tune::Effort;
@@ -124,7 +124,7 @@ impl<'a> Offer<'a> {
             sensors: keys.sensors,
             required: required?,
             spacing: keys.spacing_mm / 1000.0,
-            costs: (!keys.costs.is_empty()).then(|| costs(&keys.costs, &positions)),
+            costs: (!keys.costs.is_empty()).then(|| keys.costs_at(&positions)),
             budget: keys.cost_budget,
             target_mm: keys.target_mm,
             failure: keys.failure,
@@ -170,15 +170,6 @@ fn nearest(positions: &[DVec3], at_mm: [f64; 3]) -> Option<usize> {
     (0..positions.len()).min_by(|&a, &b| {
         (positions[a].distance_squared(at)).total_cmp(&positions[b].distance_squared(at))
     })
-}
-
-/// What a gauge costs at each position (m).
-pub(super) fn costs(boxes: &[CostKeys], positions: &[DVec3]) -> Vec<f64> {
-    let cost = |p: &DVec3| {
-        let inside = boxes.iter().rev().find(|b| b.contains(*p * 1000.0));
-        inside.map_or(1.0, |b| b.cost)
-    };
-    positions.iter().map(cost).collect()
 }
 
 /// Told of every set as soon as it is found, with the sites it counts in.

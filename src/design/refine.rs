@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::choose::{costs, painted_sites};
+use super::choose::painted_sites;
 use super::known::{FINE, Known, detail};
 use super::{DesignError, Inputs, Reduced, Simulated};
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
@@ -504,8 +504,7 @@ impl<'a> Room<'a> {
 
     /// Whether a gauge costs no more at one place than at another.
     fn is_no_dearer(&self, chosen: DVec3, to: DVec3) -> bool {
-        let boxes = &self.inputs.project.selection.costs;
-        let cost = costs(boxes, &[chosen, to]);
+        let cost = self.inputs.project.selection.costs_at(&[chosen, to]);
         cost[1] <= cost[0]
     }
 }

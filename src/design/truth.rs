@@ -1,15 +1,12 @@
 //! The judge's model, and what gauges read on it.
 
-use glam::DVec3;
-
 use super::judge::Pressed;
 use super::{Inputs, NOISE_SEED};
-use crate::bounds::Bounds;
 use crate::budget::Work;
 use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::load::Touch;
 use crate::evaluation::{self, EstimatorKind, Region};
-use crate::project::Project;
+use crate::project::{Project, boxes};
 use crate::uncertainty::Uncertainty;
 
 /// The judge: a model of finer elements, with touches of its own.
@@ -50,8 +47,8 @@ pub(super) fn regions(project: &Project, touches: &[Touch]) -> Vec<Region> {
         .regions
         .iter()
         .map(|region| {
-            let bounds = Bounds::between(region.box_mm.map(DVec3::from_array));
-            let inside = |t: &Touch| bounds.contains(t.position * 1000.0);
+            let place = boxes::oriented(&region.box_mm, region.box_axis);
+            let inside = |t: &Touch| boxes::contains(&place, t.position);
             Region {
                 name: region.name.clone(),
                 contains: touches.iter().map(inside).collect(),
@@ -105,6 +102,8 @@ impl Truth {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::uncertainty::Gluing;
 

@@ -352,6 +352,7 @@ mod tests {
         p.selection.cost_budget = Some(12.5);
         p.selection.costs.push(CostKeys {
             box_mm: [[0.0; 3], [1.0; 3]],
+            box_axis: Some([1.0, 0.0, 0.5]),
             cost: 2.5,
         });
         p.kept.push(Kept {
@@ -387,6 +388,7 @@ mod tests {
         p.evaluation.regions.push(RegionKeys {
             name: "middle".into(),
             box_mm: [[-1.0; 3], [1.0; 3]],
+            box_axis: Some([0.0, 1.0, -0.25]),
         });
         p
     }

@@ -1,14 +1,13 @@
 //! The part: its mesh and what is made of it, what it is made of, and how it is held.
 
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::PartAxis;
+use super::boxes;
 use super::value::MM;
 use crate::limb::BoxMm;
 use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::repair::Repair;
-use crate::mesh::stance::Stance;
 use crate::mesh::unroll::Axis;
 
 /// Unit of a mesh file.
@@ -189,25 +188,14 @@ impl SupportKeys {
     /// Its box, where it has one.
     #[must_use]
     pub fn oriented_box(&self) -> Option<OrientedBox> {
-        let [a, b] = self.box_mm?.map(|p| DVec3::from_array(p) * MM);
-        let stance = (self.box_axis).map_or_else(Stance::default, |axis| {
-            Stance::about(DVec3::from_array(axis))
-        });
-        Some(OrientedBox {
-            stance,
-            lower: a.min(b),
-            upper: a.max(b),
-        })
+        (self.box_mm.as_ref()).map(|corners| boxes::oriented(corners, self.box_axis))
     }
 
     /// Gives it a box: by the file's axes where the box lies along them.
     pub fn set_box(&mut self, region: &OrientedBox) {
-        let (lower, upper, axis) = match region.along_axes() {
-            Some((lower, upper)) => (lower, upper, None),
-            None => (region.lower, region.upper, Some(region.stance.up())),
-        };
-        self.box_mm = Some([lower, upper].map(|p| (p * 1e3).to_array()));
-        self.box_axis = axis.map(|axis| axis.to_array());
+        let (corners, axis) = boxes::keys(region);
+        self.box_mm = Some(corners);
+        self.box_axis = axis;
     }
 }
 

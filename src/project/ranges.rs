@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use glam::DVec3;
 
 use super::value::{BadValue, all_bounded, bounded, check, counted, number};
-use super::{ChosenSite, PartAxis, Project};
+use super::{ChosenSite, PartAxis, Project, SupportKeys};
 use crate::dataset::Signal;
 use crate::elasticity::support::MOST;
 use crate::evaluation::failures::MOST_FAILED;
@@ -302,18 +302,24 @@ impl Project {
         if let PartAxis::Along(direction) = self.part.axis {
             check_direction("part.axis", direction)?;
         }
-        for support in &self.supports {
-            let Some(direction) = support.box_axis else {
-                continue;
-            };
-            check_direction("support.box_axis", direction)?;
-            if support.box_mm.is_none() {
-                return Err(BadValue {
-                    key: "support.box_axis".to_owned(),
-                    rule: "given beside box_mm, which it turns".into(),
-                    value: "given without it".into(),
-                });
+        let supports = self.supports.iter().map(|s| s.box_axis);
+        let regions = self.evaluation.regions.iter().map(|r| r.box_axis);
+        let costs = self.selection.costs.iter().map(|c| c.box_axis);
+        let axes = (supports.map(|axis| ("support.box_axis", axis)))
+            .chain(regions.map(|axis| ("evaluation.region.box_axis", axis)))
+            .chain(costs.map(|axis| ("selection.cost.box_axis", axis)));
+        for (key, direction) in axes {
+            if let Some(direction) = direction {
+                check_direction(key, direction)?;
             }
+        }
+        let is_alone = |s: &SupportKeys| s.box_axis.is_some() && s.box_mm.is_none();
+        if self.supports.iter().any(is_alone) {
+            return Err(BadValue {
+                key: "support.box_axis".to_owned(),
+                rule: "given beside box_mm, which it turns".into(),
+                value: "given without it".into(),
+            });
         }
         Ok(())
     }
@@ -407,11 +413,13 @@ mod tests {
         });
         project.selection.costs.push(CostKeys {
             box_mm: [[0.0; 3]; 2],
+            box_axis: None,
             cost: 1.0,
         });
         project.evaluation.regions.push(RegionKeys {
             name: "all".into(),
             box_mm: [[0.0; 3]; 2],
+            box_axis: None,
         });
         project
     }

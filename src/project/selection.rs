@@ -3,8 +3,8 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::boxes;
 use super::value::MM;
-use crate::bounds::Bounds;
 use crate::gaussian_process::GpKernel;
 use crate::limb::BoxMm;
 use crate::placement::SelectorKind;
@@ -88,6 +88,19 @@ impl Default for SelectionKeys {
 }
 
 impl SelectionKeys {
+    /// What a gauge costs at each position (m).
+    #[must_use]
+    pub fn costs_at(&self, positions: &[DVec3]) -> Vec<f64> {
+        let places: Vec<_> = (self.costs.iter().rev())
+            .map(|keys| (boxes::oriented(&keys.box_mm, keys.box_axis), keys.cost))
+            .collect();
+        let cost = |p: &DVec3| {
+            let inside = places.iter().find(|(place, _)| boxes::contains(place, *p));
+            inside.map_or(1.0, |(_, cost)| *cost)
+        };
+        positions.iter().map(cost).collect()
+    }
+
     /// Which gauges may be lost.
     #[must_use]
     pub fn loss(&self) -> Loss {
@@ -138,14 +151,10 @@ impl GaussianProcessKeys {
 #[serde(deny_unknown_fields)]
 pub struct CostKeys {
     pub box_mm: BoxMm,
+    /// As of a support.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_axis: Option<[f64; 3]>,
     pub cost: f64,
-}
-
-impl CostKeys {
-    #[must_use]
-    pub fn contains(&self, at_mm: DVec3) -> bool {
-        Bounds::between(self.box_mm.map(DVec3::from_array)).contains(at_mm)
-    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

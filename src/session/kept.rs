@@ -67,10 +67,11 @@ impl Session {
     }
 
     fn cost_of(&self, at_mm: DVec3) -> f64 {
-        let costs = self.document.state.project.selection.costs.iter().rev();
-        { costs }
-            .find(|c| c.contains(at_mm))
-            .map_or(1.0, |c| c.cost)
+        self.document
+            .state
+            .project
+            .selection
+            .costs_at(&[at_mm * 1e-3])[0]
     }
 
     fn free_name(&self, wanted: &str) -> String {

@@ -21,7 +21,7 @@ use crate::plain;
 use crate::project::{
     ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCES, GAIN_OFF, GAUGES, LOST, Lattice,
     PLACE_OFF, PartAxis, PartModel, Project, RegionKeys, STARTS, SupportKeys, SupportKind, TIP_OFF,
-    TOUCHES, ToleranceKeys,
+    TOUCHES, ToleranceKeys, boxes,
 };
 
 impl Studio {
@@ -122,8 +122,9 @@ impl Studio {
     }
 
     fn evaluation_form(&mut self, ui: &mut Ui) {
-        let (low, high) = self.session.document.part.bounds();
-        let bounds = [low, high].map(|p| (p * 1000.0).to_array());
+        let part = Arc::clone(&self.session.document.part);
+        let stance = self.view.camera.stance;
+        let start = || boxes::keys(&OrientedBox::around(&part, stance));
         let evaluation = &mut self.session.document.state.project.evaluation;
         rows(ui, "Judge", |ui| {
             choice(
@@ -136,7 +137,7 @@ impl Studio {
             );
         });
         let regions = &mut evaluation.regions;
-        rows(ui, "Regions", |ui| regions_form(ui, regions, bounds));
+        rows(ui, "Regions", |ui| regions_form(ui, regions, start));
     }
 }
 
@@ -386,7 +387,12 @@ fn supports(ui: &mut Ui, project: &mut Project, start: impl FnOnce() -> Oriented
     ui.end_row();
 }
 
-fn regions_form(ui: &mut Ui, regions: &mut Vec<RegionKeys>, bounds: BoxMm) {
+/// The regions that errors are quoted for, with a new one beginning as the box that `start` gives.
+fn regions_form(
+    ui: &mut Ui,
+    regions: &mut Vec<RegionKeys>,
+    start: impl FnOnce() -> (BoxMm, Option<[f64; 3]>),
+) {
     let mut removed = None;
     for (k, region) in regions.iter_mut().enumerate() {
         let number = k + 1;
@@ -394,7 +400,7 @@ fn regions_form(ui: &mut Ui, regions: &mut Vec<RegionKeys>, bounds: BoxMm) {
         ui.text_edit_singleline(&mut region.name)
             .labelled_by(name.id);
         ui.end_row();
-        let names = names_along(ui, None);
+        let names = names_along(ui, region.box_axis);
         corners(ui, &format!("Region {number}"), names, &mut region.box_mm);
         ui.label("");
         let button = ui.button("Remove");
@@ -413,9 +419,11 @@ fn regions_form(ui: &mut Ui, regions: &mut Vec<RegionKeys>, bounds: BoxMm) {
         .button("Add region")
         .on_hover_text("Errors are quoted for it beside all touches");
     if button.clicked() {
+        let (box_mm, box_axis) = start();
         regions.push(RegionKeys {
             name: format!("region {}", regions.len() + 1),
-            box_mm: bounds,
+            box_mm,
+            box_axis,
         });
     }
     ui.end_row();

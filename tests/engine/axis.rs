@@ -11,7 +11,7 @@ use hapdef::mesh::oriented_box::OrientedBox;
 use hapdef::mesh::stance::{Direction, Stance};
 use hapdef::mesh::stretch::KEPT;
 use hapdef::mesh::unroll::{Axis, Unrolling};
-use hapdef::project::{Masks, PartAxis, Project, SupportKeys, Unit};
+use hapdef::project::{CostKeys, Masks, PartAxis, Project, RegionKeys, SupportKeys, Unit, boxes};
 
 const AROUND: usize = 48;
 
@@ -328,6 +328,52 @@ fn a_turned_box_is_kept_by_the_project_and_one_by_the_axes_writes_what_it_did() 
     project.supports[0].vertices = Some("rim".into());
     let said = project.check().map_err(|e| e.to_string());
     assert!(said.is_err_and(|said| said.contains("support.box_axis")));
+}
+
+#[test]
+fn boxes_of_regions_and_costs_stand_as_the_part_does() {
+    let part = tube(0.03, 0.2, onto(DVec3::new(0.5, 0.8, 0.6)));
+    let whole = OrientedBox::around(&part, Stance::of(&part));
+    let half = OrientedBox {
+        lower: DVec3 {
+            z: 0.5 * (whole.lower.z + whole.upper.z),
+            ..whole.lower
+        },
+        ..whole
+    };
+    let (box_mm, box_axis) = boxes::keys(&half);
+    let mut project = Project::around("a.stl", Some(Unit::Millimetre));
+    project.evaluation.regions = vec![RegionKeys {
+        name: "upper half".into(),
+        box_mm,
+        box_axis,
+    }];
+    project.selection.costs = vec![CostKeys {
+        box_mm,
+        box_axis,
+        cost: 2.0,
+    }];
+    let text = project_file::to_text(&project);
+    assert_eq!(text.matches("box_axis = ").count(), 2);
+    let read = project_file::parse(&text).unwrap();
+    assert_eq!(read, project);
+    let region = &read.evaluation.regions[0];
+    let region = boxes::oriented(&region.box_mm, region.box_axis);
+    let inside = (part.positions().iter())
+        .filter(|&&p| boxes::contains(&region, p))
+        .count();
+    let share = inside as f64 / part.positions().len() as f64;
+    assert!((share - 0.5).abs() < 0.05, "{share}");
+    for key in ["evaluation.region.box_axis", "selection.cost.box_axis"] {
+        let mut wrong = project.clone();
+        if key.starts_with("evaluation") {
+            wrong.evaluation.regions[0].box_axis = Some([0.0; 3]);
+        } else {
+            wrong.selection.costs[0].box_axis = Some([0.0; 3]);
+        }
+        let said = wrong.check().unwrap_err().to_string();
+        assert!(said.contains(key), "{said}");
+    }
 }
 
 #[test]

@@ -180,6 +180,7 @@ fn another_region_is_quoted_from_what_was_found() {
     asked.project.evaluation.regions = vec![RegionKeys {
         name: "upper half".into(),
         box_mm: [[-100.0, -100.0, 60.0], [100.0, 100.0, 200.0]],
+        box_axis: None,
     }];
     let again = |asked: &Inputs| {
         let hooks = design::Hooks {

@@ -461,6 +461,7 @@ fn what_the_project_asks_of_a_choice_is_kept() {
     // The lower half is dear.
     selection.costs.push(hapdef::project::CostKeys {
         box_mm: [[-1e3, -1e3, -1e3], [1e3, 1e3, 60.0]],
+        box_axis: None,
         cost: 3.5,
     });
     let simulated = Arc::new(design::simulate(&inputs, &budget, &unwatched).unwrap());

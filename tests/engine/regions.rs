@@ -161,6 +161,7 @@ fn other_regions_are_quoted_from_the_same_errors() {
     inputs.project.evaluation.regions = vec![RegionKeys {
         name: "upper half".into(),
         box_mm: [[-100.0, -100.0, 60.0], [100.0, 100.0, 200.0]],
+        box_axis: None,
     }];
     let known = Known {
         reduced: Some((Arc::clone(&first.feasibility), Arc::clone(&first.reduced))),

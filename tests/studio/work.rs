@@ -144,6 +144,7 @@ fn a_change_costs_only_what_depends_on_it() {
         let half = hapdef::project::RegionKeys {
             name: "upper half".into(),
             box_mm: [[-100.0, -100.0, 60.0], [100.0, 100.0, 200.0]],
+            box_axis: None,
         };
         p.evaluation.regions.push(half);
     });

@@ -104,6 +104,17 @@ fn part(t: &mut Text, project: &Project) {
     supports(t, project);
 }
 
+/// Written where a box does not lie along the file's axes.
+fn box_axis(t: &mut Text, axis: Option<&[f64; 3]>) {
+    if let Some(axis) = axis {
+        t.key(
+            "box_axis",
+            numbers(axis),
+            "the box stands along this direction: its corners are along the front, the right and the up of a part of that axis",
+        );
+    }
+}
+
 fn supports(t: &mut Text, project: &Project) {
     for support in &project.supports {
         t.list("support");
@@ -113,13 +124,7 @@ fn supports(t: &mut Text, project: &Project) {
             support.box_mm.as_ref().map(corners),
             "every point of the part inside it is held",
         );
-        if let Some(axis) = &support.box_axis {
-            t.key(
-                "box_axis",
-                numbers(axis),
-                "the box stands along this direction: its corners are along the front, the right and the up of a part of that axis",
-            );
-        }
+        box_axis(t, support.box_axis.as_ref());
         t.maybe(
             "vertices",
             support.vertices.as_deref().map(quoted),
@@ -248,6 +253,7 @@ fn evaluation(t: &mut Text, project: &Project) {
             "errors are quoted for it, beside all touches",
         );
         t.key("box_mm", corners(&region.box_mm), "");
+        box_axis(t, region.box_axis.as_ref());
     }
     t.table("budget");
     t.key(
@@ -465,6 +471,7 @@ fn selection(t: &mut Text, project: &Project) {
     for cost in &selection.costs {
         t.list("selection.cost");
         t.key("box_mm", corners(&cost.box_mm), "a gauge in here costs");
+        box_axis(t, cost.box_axis.as_ref());
         t.key("cost", float(cost.cost), "");
     }
     for site in &selection.sites {
