@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use eframe::egui_wgpu::RenderState;
 use egui::{Context, FullOutput, Pos2, RawInput, Rect, vec2};
 
-use super::Studio;
+use super::{Studio, layout};
 use crate::io::atomic;
 use crate::io::project_file::LoadedProject;
 use crate::job::{Reporter, Stop};
@@ -40,7 +40,7 @@ pub fn png(loaded: LoadedProject, picture: &Picture) -> Result<Vec<u8>, String> 
     }
     let [width, height] = picture.size.map(|s| s as f32);
     fit(&mut studio, width / height);
-    let output = studio.drawn(&ctx, picture);
+    let output = drawn(&mut studio, &ctx, picture);
     finish(&state, &ctx, output, picture.size)
 }
 
@@ -56,57 +56,55 @@ fn finish(
     encode(pixels, size)
 }
 
-impl Studio {
-    /// The 3D view as it would be in a window of a picture's size, on a context of its own.
-    fn drawn(&mut self, ctx: &Context, picture: &Picture) -> FullOutput {
-        let [width, height] = picture.size.map(|s| s as f32);
-        let points = vec2(width, height) * (POINTS / height.max(1.0));
-        let mut input = RawInput {
-            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, points)),
-            ..RawInput::default()
-        };
-        for viewport in input.viewports.values_mut() {
-            viewport.native_pixels_per_point = Some(height / POINTS);
-        }
-        ctx.run_ui(input, |ui| {
-            let rect = ui.ctx().content_rect();
-            self.scene(ui, rect, picture.transparent);
-        })
+/// The 3D view as it would be in a window of a picture's size, on a context of its own.
+fn drawn(studio: &mut Studio, ctx: &Context, picture: &Picture) -> FullOutput {
+    let [width, height] = picture.size.map(|s| s as f32);
+    let points = vec2(width, height) * (POINTS / height.max(1.0));
+    let mut input = RawInput {
+        screen_rect: Some(Rect::from_min_size(Pos2::ZERO, points)),
+        ..RawInput::default()
+    };
+    for viewport in input.viewports.values_mut() {
+        viewport.native_pixels_per_point = Some(height / POINTS);
     }
+    ctx.run_ui(input, |ui| {
+        let rect = ui.ctx().content_rect();
+        studio.view.rect = rect;
+        studio.scene.build(&studio.session, &studio.view);
+        layout::picture(studio.look(), ui, rect, picture.transparent);
+    })
+}
 
-    /// Writes what the 3D view shows into a PNG file.
-    pub(super) fn save_picture(
-        &mut self,
-        ctx: &Context,
-        path: PathBuf,
-        size: [u32; 2],
-        transparent: bool,
-    ) {
-        let picture = Picture {
-            size,
-            view: None,
-            transparent,
-        };
-        // On a context and an adapter of its own: the window goes on meanwhile.
-        let own = Context::default();
-        own.set_theme(ctx.theme());
-        let rect = self.view.rect;
-        let mut output = self.drawn(&own, &picture);
-        self.view.rect = rect;
-        let work = move |_: &Reporter| {
-            let state = offscreen::adapter().inspect_err(|_| output.textures_delta.clear());
-            let state = state.map_err(Stop::Failed)?;
-            crate::render::gpu::install(&state);
-            let png = finish(&state, &own, output, size).map_err(Stop::Failed)?;
-            atomic::write(&path, &png).map_err(|e| Stop::Failed(e.to_string()))?;
-            Ok(path)
-        };
-        self.session
-            .jobs
-            .start(Task::Picture, (), work, |s, (), path| {
-                s.tell(format!("The picture is in {}", path.display()));
-            });
-    }
+/// Writes what the 3D view shows into a PNG file, in the background.
+pub(super) fn save(
+    studio: &mut Studio,
+    ctx: &Context,
+    path: PathBuf,
+    size: [u32; 2],
+    transparent: bool,
+) {
+    let picture = Picture {
+        size,
+        view: None,
+        transparent,
+    };
+    // On a context and an adapter of its own: the window goes on meanwhile.
+    let own = Context::default();
+    own.set_theme(ctx.theme());
+    let rect = studio.view.rect;
+    let mut output = drawn(studio, &own, &picture);
+    studio.view.rect = rect;
+    let work = move |_: &Reporter| {
+        let state = offscreen::adapter().inspect_err(|_| output.textures_delta.clear());
+        let state = state.map_err(Stop::Failed)?;
+        crate::render::gpu::install(&state);
+        let png = finish(&state, &own, output, size).map_err(Stop::Failed)?;
+        atomic::write(&path, &png).map_err(|e| Stop::Failed(e.to_string()))?;
+        Ok(path)
+    };
+    (studio.session.jobs).start(Task::Picture, (), work, |s, (), path| {
+        s.tell(format!("The picture is in {}", path.display()));
+    });
 }
 
 /// Comes as near as shows all of the limb.
