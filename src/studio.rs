@@ -15,6 +15,7 @@ mod form;
 mod inspector;
 mod jobs;
 mod kept;
+mod keys;
 mod labels;
 mod layout;
 mod live;
@@ -279,11 +280,10 @@ impl Studio {
                 (self.scene).frame_points(&mut self.view, &points, &self.session.document);
             }
             WindowAction::OpenOrAsk(path) => self.open_or_ask(&path),
-            WindowAction::Picture {
-                path,
-                size,
-                transparent,
-            } => picture::save(self, ctx, path, size, transparent),
+            WindowAction::Picture(path, picture) => {
+                let (session, view, scene) = (&mut self.session, &self.view, &mut self.scene);
+                picture::save(session, view, scene, ctx, path, &picture);
+            }
             WindowAction::Recover => {
                 let left = self
                     .kept
@@ -397,7 +397,7 @@ impl Studio {
         if self.panels.is_covered() || offers {
             return;
         }
-        self.asking(ctx, |ask, _, _, _| commands::shortcuts(ctx, ask));
+        self.asking(ctx, |ask, _, _, _| keys::shortcuts(ctx, ask));
     }
 
     /// A gesture has ended when nothing is held down any more: what it changed is one step of undo.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::commands::Command;
 use super::nudge::next_site;
-use super::view::{View, Way};
+use super::view::{Picture, View, Way};
 use crate::document::{Brush, Layer};
 use crate::io::examples::Example;
 use crate::mesh::SurfacePoint;
@@ -37,12 +37,7 @@ pub enum WindowAction {
     Look(Vec<glam::DVec3>),
     /// Opens a file, or asks where something would be lost or is not known.
     OpenOrAsk(PathBuf),
-    Picture {
-        path: PathBuf,
-        /// Width and height in pixels.
-        size: [u32; 2],
-        transparent: bool,
-    },
+    Picture(PathBuf, Picture),
     /// Opens what was left behind, or throws it away.
     Recover,
     DropLeft,

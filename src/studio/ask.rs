@@ -63,9 +63,14 @@ impl<'a> Ask<'a> {
 
     /// Shows a form on what belongs to the desk; what it changes is asked for.
     pub fn edit_desk<T>(&mut self, form: impl FnOnce(&mut Desk) -> T) -> T {
-        let mut desk = self.session.desk.clone();
+        let pending = self.actions.iter().rev().find_map(|a| match a {
+            Action::Desk(desk) => Some(&**desk),
+            _ => None,
+        });
+        let before = pending.unwrap_or(&self.session.desk);
+        let mut desk = before.clone();
         let answer = form(&mut desk);
-        if desk != self.session.desk {
+        if desk != *before {
             self.act(Action::Desk(Box::new(desk)));
         }
         answer

@@ -8,6 +8,7 @@ use egui::Context;
 use super::action::{Action, FileAction, WindowAction};
 use super::ask::Ask;
 use super::commands::Command;
+use super::view::Picture;
 use crate::document::Document;
 use crate::io::examples::Example;
 use crate::io::mesh_file::{ENDINGS, may_say_unit, needs_unit};
@@ -363,12 +364,18 @@ impl Dialog {
             Purpose::Open => FileAction::Open(path, self.chosen_unit()).into(),
             Purpose::SaveAs => FileAction::SaveTo(path).into(),
             Purpose::Export => FileAction::Export(path).into(),
-            Purpose::Picture => WindowAction::Picture {
-                path: path.with_extension("png"),
-                size: self.size,
-                transparent: self.transparent,
+            Purpose::Picture => {
+                WindowAction::Picture(path.with_extension("png"), self.as_seen()).into()
             }
-            .into(),
+        }
+    }
+
+    /// From where the view shows it.
+    fn as_seen(&self) -> Picture {
+        Picture {
+            size: self.size,
+            view: None,
+            transparent: self.transparent,
         }
     }
 }

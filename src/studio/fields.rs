@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use super::paint::expected;
-use super::scene::Scene;
 use super::view::{Field, View};
 use crate::colormap::ColorMap;
 use crate::document::{Layer, PaintInputs, WallInputs};
 use crate::elasticity::support::held_freedoms;
 use crate::feasible::Feasibility;
 use crate::io::report::{robust_top, round_up};
+use crate::mesh::flatten::Flat;
 use crate::mesh::walls::Side;
 use crate::project::Project;
 use crate::render::gpu::Shown;
@@ -81,18 +80,21 @@ pub struct FlatShown {
     pub shown: Arc<Vec<Shown>>,
 }
 
-impl Scene {
-    /// Builds what is shown a vertex, where anything it depends on has changed.
-    pub fn build(&mut self, session: &Session, view: &View) {
-        let source = Source { session, view };
-        let field = source.field_inputs();
-        let region = source.region_inputs();
-        let last = self.built.take();
-        let same_field = last.as_ref().is_some_and(|b| b.field == field);
-        let same_region = last.as_ref().is_some_and(|b| b.region == region);
-        let mut built = match last {
-            Some(built) if same_field && same_region => built,
-            Some(mut built) if same_field => {
+impl Built {
+    /// What is shown a vertex, made anew where anything it depends on has changed since the last; of the unrolled part
+    /// too where that is shown.
+    #[must_use]
+    pub fn of(last: Option<Self>, flat: &Flat, session: &Session, view: &View) -> Self {
+        let mut built = Self::coloured(last, Source { session, view });
+        built.flat = view.unrolled_shown.then(|| built.laid_flat(flat));
+        built
+    }
+
+    fn coloured(last: Option<Self>, source: Source<'_>) -> Self {
+        let (field, region) = (source.field_inputs(), source.region_inputs());
+        match last {
+            Some(built) if built.field == field && built.region == region => built,
+            Some(mut built) if built.field == field => {
                 let shown: &mut Vec<Shown> = Arc::make_mut(&mut built.shown);
                 source.colour_regions(shown);
                 built.region = region;
@@ -101,7 +103,7 @@ impl Scene {
             _ => {
                 let (mut shown, legend) = source.field_shown();
                 source.colour_regions(&mut shown);
-                Built {
+                Self {
                     field,
                     region,
                     shown: Arc::new(shown),
@@ -109,24 +111,22 @@ impl Scene {
                     legend,
                 }
             }
-        };
-        built.flat = view.unrolled_shown.then(|| self.laid_flat(&mut built));
-        self.built = Some(built);
+        }
     }
 
     /// The same for the unrolled part, made anew where what is shown has changed.
-    fn laid_flat(&self, built: &mut Built) -> FlatShown {
-        let known = built.flat.take();
+    fn laid_flat(&mut self, flat: &Flat) -> FlatShown {
+        let known = self.flat.take();
         known
-            .filter(|k| Arc::ptr_eq(&k.of, &built.shown))
+            .filter(|k| Arc::ptr_eq(&k.of, &self.shown))
             .unwrap_or_else(|| {
-                let flat = self.unrolled.flat.vertices.iter().map(|&v| Shown {
+                let shown = flat.vertices.iter().map(|&v| Shown {
                     displacement: [0.0; 3],
-                    ..built.shown[v as usize]
+                    ..self.shown[v as usize]
                 });
                 FlatShown {
-                    shown: Arc::new(flat.collect()),
-                    of: Arc::clone(&built.shown),
+                    shown: Arc::new(shown.collect()),
+                    of: Arc::clone(&self.shown),
                 }
             })
     }
@@ -151,7 +151,7 @@ impl<'a> Source<'a> {
             Field::SignalToNoise => OfField::Noise(self.project().gauge.noise_microstrain),
             Field::Expected => {
                 let version = self.session.caches.expected.version;
-                OfField::Expected(version, expected(self.session, self.view).is_some())
+                OfField::Expected(version, self.view.expected(self.session).is_some())
             }
             Field::Error | Field::Uncertainty => {
                 let shown = self.session.caches.field.as_ref();
@@ -272,7 +272,7 @@ impl<'a> Source<'a> {
             }
             Field::Expected => {
                 let vertices = self.session.document.part.positions().len();
-                let answer = expected(self.session, self.view)?;
+                let answer = self.view.expected(self.session)?;
                 let values = answer.expected.map_mm.clone();
                 let [lightest, hardest] = self.session.in_hand()?.forces_n;
                 let title = format!("expected error (mm), {lightest}–{hardest} N");
@@ -290,7 +290,7 @@ impl<'a> Source<'a> {
 
     /// What the gauges are blind to, a vertex of the part, where that is marked.
     fn blind_shown(&self) -> Option<&[f64]> {
-        let answer = expected(self.session, self.view);
+        let answer = self.view.expected(self.session);
         let answer = answer.filter(|_| self.view.field == Field::Expected)?;
         Some(&answer.expected.blind_map)
     }

@@ -6,7 +6,7 @@ use egui::{Align2, Color32, FontId, Galley, Painter, Pos2, Rect, Ui, vec2};
 use glam::DVec3;
 
 use super::scene::Scene;
-use super::view::{Gesture, Pane, Tool, View};
+use super::view::{Pane, Tool, View};
 use crate::project::Project;
 use crate::session::{ExpectedOf, Session};
 
@@ -40,7 +40,7 @@ impl<'a> Look<'a> {
     /// What is expected of the gauges: as they are, or while one moves, as they just were.
     #[must_use]
     pub fn expected(&self) -> Option<&'a ExpectedOf> {
-        expected(self.session, self.view)
+        self.view.expected(self.session)
     }
 }
 
@@ -49,12 +49,6 @@ impl<'a> Look<'a> {
 pub fn exaggeration(session: &Session, view: &View) -> Option<f64> {
     let touched = session.caches.touching.result()?;
     touched.exaggeration.filter(|_| view.tool == Tool::Touch)
-}
-
-/// As [`Look::expected`].
-#[must_use]
-pub fn expected<'s>(session: &'s Session, view: &View) -> Option<&'s ExpectedOf> {
-    session.expected(matches!(view.gesture, Gesture::Gauge(..)))
 }
 
 /// Text on a dark plate, readable over anything.

@@ -185,6 +185,12 @@ impl Scene {
         view.flat = (self.unrolled.centre(), fit / 0.9);
     }
 
+    /// Colours the part anew where what is shown has changed.
+    pub fn build(&mut self, session: &Session, view: &View) {
+        let built = Built::of(self.built.take(), &self.unrolled.flat, session, view);
+        self.built = Some(built);
+    }
+
     /// Whether colours with a legend are shown.
     #[must_use]
     pub fn shows_field(&self) -> bool {

@@ -66,7 +66,7 @@ pub fn use_tool(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, response: &Response, 
     }
     let at = response.interact_pointer_pos().or(response.hover_pos());
     if response.clicked() && at.as_ref().is_none_or(free) {
-        click(scene, ask, pane, at);
+        click(scene, ask, response, pane);
     }
     let from = pressed_at(ui).filter(free);
     if let Some(from) = from.filter(|_| response.contains_pointer()) {
@@ -81,10 +81,11 @@ pub fn use_tool(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, response: &Response, 
     }
 }
 
-fn click(scene: &Scene, ask: &mut Ask<'_>, pane: Pane, at: Option<Pos2>) {
+fn click(scene: &Scene, ask: &mut Ask<'_>, response: &Response, pane: Pane) {
     match ask.view.tool {
-        Tool::Touch => press(scene, ask, pane, at),
+        Tool::Touch => press(scene, ask, pane, response.interact_pointer_pos()),
         Tool::Measure => {
+            let at = response.interact_pointer_pos().or(response.hover_pos());
             let place = at.and_then(|at| scene.pick(ask.view, pane, at));
             ask.view.measure.take(place);
             if let Some(ends) = ask.view.measure.ends() {

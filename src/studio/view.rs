@@ -12,9 +12,10 @@ use crate::mesh::SurfacePoint;
 use crate::mesh::stance::Direction;
 use crate::project::{Kept, PartAxis, Project};
 use crate::render::camera::Camera;
+use crate::session::{ExpectedOf, Session};
 
 pub use crate::session::Stage;
-pub use choices::{Field, Gesture, Measure, Pane, Ranges, Section, Tab, Tool, Way};
+pub use choices::{Field, Gesture, Measure, Pane, Picture, Ranges, Section, Tab, Tool, Way};
 
 /// What is shown, picked and chosen.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,6 +134,12 @@ impl View {
             Gesture::Gauge(_, number, _) => Some(number),
             _ => None,
         }
+    }
+
+    /// What is expected of the gauges: as they are, or while one moves, as they just were.
+    #[must_use]
+    pub fn expected<'s>(&self, session: &'s Session) -> Option<&'s ExpectedOf> {
+        session.expected(self.moved_gauge().is_some())
     }
 
     #[must_use]

@@ -3,7 +3,6 @@
 use egui::Ui;
 
 use super::super::ask::Ask;
-use super::super::paint::expected;
 
 /// Why nothing is known of the gauges yet.
 fn nothing_expected(ask: &Ask<'_>) -> &'static str {
@@ -28,7 +27,7 @@ fn nothing_expected(ask: &Ask<'_>) -> &'static str {
 
 /// What is expected of the gauges, over the view.
 pub fn expected_lines(ask: &Ask<'_>, ui: &mut Ui) {
-    let (Some(answer), Some(in_hand)) = (expected(ask.session, ask.view), ask.session.in_hand())
+    let (Some(answer), Some(in_hand)) = (ask.view.expected(ask.session), ask.session.in_hand())
     else {
         ui.weak(nothing_expected(ask));
         return;

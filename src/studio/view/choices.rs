@@ -8,6 +8,7 @@ use glam::DVec3;
 use crate::mesh::SurfacePoint;
 use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::stance::Direction;
+use crate::render::camera::Preset;
 use crate::session::Ends;
 
 /// One of the views.
@@ -290,6 +291,17 @@ impl Measure {
             (self.from, self.to) = (place, None);
         }
     }
+}
+
+/// What is asked of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Picture {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// The side to look from; three-quarters from above where there is none.
+    pub view: Option<Preset>,
+    /// Leave out what is behind the limb.
+    pub transparent: bool,
 }
 
 #[cfg(test)]
