@@ -24,6 +24,7 @@ mod results;
 mod saving;
 mod shape;
 mod slot;
+mod standing;
 mod touching;
 mod trade;
 mod wake;
@@ -34,12 +35,12 @@ use std::path::PathBuf;
 use crate::document::Document;
 use crate::job::Outcome;
 
-pub use attention::Attention;
+pub use attention::{Attention, Colours};
 pub use confusions::{Confusions, Taken};
 pub use desk::Desk;
 pub use drive::Drive;
 pub use expected::{ExpectedOf, Expecting};
-pub use fields::{FieldInputs, FieldKind, FieldSlot};
+pub use fields::{FieldInputs, FieldKind, FieldValues};
 pub use gauges::{ByHand, SAME_MM};
 pub use jobs::{Ended, Jobs, Running, Task, duration};
 pub use kept::chooser_title;
@@ -50,6 +51,7 @@ pub use opening::Opened;
 pub use results::{DesignMark, DesignResult, Results, SimulationResult};
 pub use shape::Shape;
 pub use slot::{Slot, current};
+pub use standing::{NOBODY_REDUCES, Stage, Standing};
 pub use touching::{Touched, Touching};
 pub use trade::{Promise, Trade};
 pub use wake::Wake;
@@ -63,7 +65,7 @@ pub struct Caches {
     pub expected: Expecting,
     pub confusions: Confusions,
     pub walls: Walls,
-    pub field: FieldSlot,
+    pub field: Option<FieldValues>,
     pub distance: Option<Slot<Ends, f64>>,
     pub trade: Trade,
 }
@@ -139,6 +141,8 @@ impl Session {
         self.refresh_by_hand(attention);
         self.refresh_expected(attention);
         self.refresh_confusions(attention);
+        self.refresh_field(attention);
+        self.refresh_walls(attention);
         self.refresh_live();
         if !attention.hand {
             self.refresh_trade();
@@ -172,6 +176,12 @@ impl Session {
     /// As [`Self::tell`], of something that went wrong.
     pub fn complain(&mut self, text: impl Into<String>) {
         self.news.complain(text);
+    }
+
+    /// Changes what belongs to the desk.
+    pub fn set_desk(&mut self, desk: Desk) {
+        self.desk = desk;
+        self.show_estimator(self.desk.estimator);
     }
 
     /// Takes the last change back.

@@ -1,7 +1,15 @@
 //! What whoever works with a session does at the moment: nothing is computed for which nobody asks, and nothing that a
 //! hand is still changing.
 
+use super::fields::FieldKind;
 use crate::mesh::SurfacePoint;
+
+/// What colours the part and takes a while to compute.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Colours {
+    Field(FieldKind),
+    Walls,
+}
 
 /// A look at the hands and eyes in front of a session. Without any, only what was commanded is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -16,11 +24,21 @@ pub struct Attention {
     pub expected: bool,
     /// Somebody looks at the worst confusions.
     pub confusions: bool,
+    /// What colours the part, where that takes a while.
+    pub colours: Option<Colours>,
     /// The place whose mistakes are looked at.
     pub pointed: Option<SurfacePoint>,
 }
 
 impl Attention {
+    /// The field that is looked at and takes a while.
+    pub(super) fn field(&self) -> Option<FieldKind> {
+        match self.colours {
+            Some(Colours::Field(kind)) => Some(kind),
+            _ => None,
+        }
+    }
+
     /// Whether nothing is being changed by hand.
     pub(super) fn rests(&self) -> bool {
         !self.hand && self.moved.is_none()

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::Session;
+use super::attention::Attention;
 use super::jobs::Task;
 use super::results::DesignMark;
-use super::slot::Slot;
+use super::slot::{Slot, current};
 use crate::design::Simulated;
 use crate::job::Reporter;
 
@@ -29,32 +30,42 @@ pub struct FieldInputs {
     gauges: Vec<DVec3>,
 }
 
-/// The last field, a vertex of the part.
-pub type FieldSlot = Option<Slot<FieldInputs, Arc<Vec<f64>>>>;
+/// A field, a vertex of the part.
+pub type FieldValues = Slot<FieldInputs, Arc<Vec<f64>>>;
 
 impl Session {
-    /// A field, a vertex of the part: until it is computed, the last of its kind. Nothing without a design.
-    pub fn field(&mut self, kind: FieldKind) -> Option<Arc<Vec<f64>>> {
-        let vertices = self.document.part.positions().len();
-        let inputs = FieldInputs {
+    fn field_inputs(&self, kind: FieldKind) -> Option<FieldInputs> {
+        Some(FieldInputs {
             kind,
             design: self.results.design_mark()?,
             gauges: match kind {
                 FieldKind::Error => Vec::new(),
                 FieldKind::Uncertainty => self.gauge_places(),
             },
-        };
-        let last = self.caches.field.as_ref();
-        let last = last.filter(|f| f.inputs.kind == kind && f.value.len() == vertices);
-        let value = last.map(|f| Arc::clone(&f.value));
-        if last.is_some_and(|f| f.holds_for(&inputs)) || !self.jobs.is_new(Task::Field, &inputs) {
-            return value;
-        }
-        self.start_field(inputs, vertices);
-        value
+        })
     }
 
-    fn start_field(&mut self, inputs: FieldInputs, vertices: usize) {
+    /// A field, a vertex of the part: until it is computed, the last of its kind.
+    #[must_use]
+    pub fn field(&self, kind: FieldKind) -> Option<&FieldValues> {
+        let vertices = self.document.part.positions().len();
+        let last = self.caches.field.as_ref();
+        last.filter(|f| f.inputs.kind == kind && f.value.len() == vertices)
+    }
+
+    /// Computes the field that is looked at.
+    pub(super) fn refresh_field(&mut self, attention: &Attention) {
+        let Some(inputs) = attention.field().and_then(|kind| self.field_inputs(kind)) else {
+            return;
+        };
+        let known = current(self.caches.field.as_ref(), &inputs).is_some();
+        if !known && self.jobs.is_new(Task::Field, &inputs) {
+            self.start_field(inputs);
+        }
+    }
+
+    fn start_field(&mut self, inputs: FieldInputs) {
+        let vertices = self.document.part.positions().len();
         let Some(design) = (self.results.design.as_ref()).map(|d| Arc::clone(&d.value.design))
         else {
             return;

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::Session;
 use super::gauges::BY_HAND;
+use super::news::Event;
 use crate::evaluation::Evaluation;
 use crate::placement::SelectorKind;
 use crate::project::{Kept, KeptError, KeptFailure};
@@ -16,13 +17,13 @@ pub fn chooser_title(selector: &str) -> &str {
 }
 
 impl Session {
-    /// Keeps the gauges as they are, with what is known of them; the name that they go by.
-    pub fn keep(&mut self) -> Option<String> {
+    /// Keeps the gauges as they are, with what is known of them; its name is said as [`Event::Kept`].
+    pub fn keep(&mut self) {
         let project = &self.document.state.project;
         let sites = project.selection.sites.clone();
         if sites.is_empty() {
             self.complain("There are no gauges to keep yet. Press “Select gauges” first");
-            return None;
+            return;
         }
         let cost = sites
             .iter()
@@ -63,7 +64,16 @@ impl Session {
         let name = kept.name.clone();
         self.document.state.project.kept.push(kept);
         self.document.settle();
-        Some(name)
+        self.news.happened(Event::Kept(name));
+    }
+
+    /// Keeps one of them no longer, as one step of undo.
+    pub fn delete_kept(&mut self, number: usize) {
+        let kept = &mut self.document.state.project.kept;
+        if number < kept.len() {
+            kept.remove(number);
+        }
+        self.document.settle();
     }
 
     fn cost_of(&self, at_mm: DVec3) -> f64 {

@@ -24,6 +24,8 @@ pub enum Event {
     GaugesReplaced,
     /// This gauge was found or added, by its number from zero.
     GaugeFound(usize),
+    /// A selection is kept by this name.
+    Kept(String),
     /// A board is being listened to.
     Connected,
 }
@@ -48,6 +50,13 @@ impl News {
             text: text.into(),
             error: true,
         });
+    }
+
+    /// A message was read.
+    pub fn dismiss(&mut self, number: usize) {
+        if number < self.messages.len() {
+            self.messages.remove(number);
+        }
     }
 
     pub(super) fn happened(&mut self, event: Event) {

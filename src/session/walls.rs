@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::Session;
+use super::attention::{Attention, Colours};
 use super::drive::stop;
 use super::jobs::Task;
 use super::slot::{Slot, current};
@@ -18,6 +19,15 @@ impl Session {
     #[must_use]
     pub fn advice(&self) -> Option<&Arc<Advice>> {
         current(self.caches.walls.as_ref(), &self.document.wall_inputs())
+    }
+
+    /// Measures the walls anew while somebody looks at them, when no hand is painting.
+    pub(super) fn refresh_walls(&mut self, attention: &Attention) {
+        let looked_at = attention.colours == Some(Colours::Walls) && !attention.hand;
+        let inputs = self.document.wall_inputs();
+        if looked_at && self.advice().is_none() && self.jobs.is_new(Task::Advise, &inputs) {
+            self.measure_walls();
+        }
     }
 
     /// Measures the walls in the background, unless that is under way.

@@ -1,24 +1,12 @@
-//! One list of commands feeds menus and keys, and is carried out in one place.
+//! One list of commands feeds menus, keys and palette: their names, keys, and when they can be given.
 
-use egui::{Context, Key, KeyboardShortcut, Modifiers};
+use egui::{Key, KeyboardShortcut, Modifiers};
 
-use super::dialogs::Dialog;
-use super::gauges::Way;
-use super::palette::Palette;
-use super::tools::Tool;
-use super::{Stage, Studio};
+use super::view::{Stage, Tool, View, Way};
 use crate::document::Layer;
 use crate::io::examples::Example;
 use crate::render::camera::Preset;
-
-/// By how much a key makes the brush wider.
-const BRUSH_STEP: f64 = 1.25;
-/// By how much a key makes the window's text larger.
-const ZOOM_STEP: f32 = 0.1;
-
-fn zoom(ctx: &Context, by: f32) {
-    ctx.set_zoom_factor((ctx.zoom_factor() + by).clamp(0.5, 3.0));
-}
+use crate::session::{Session, Task};
 
 /// Everything that can be commanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -350,336 +338,60 @@ impl Command {
     }
 }
 
-impl Studio {
-    /// Whether a command can be given now.
-    #[must_use]
-    pub fn enabled(&self, command: Command) -> bool {
-        match command {
-            Command::Undo => self.session.document.can_undo(),
-            Command::Redo => self.session.document.can_redo(),
-            Command::GrowPaint | Command::ShrinkPaint => {
-                self.session.document.layer(self.view.layer).is_some()
-            }
-            Command::Cancel => self.session.busy(),
-            Command::Tare | Command::Record | Command::Disconnect => {
-                self.session.live.is_connected()
-            }
-            Command::Export => self.session.results.design.is_some(),
-            Command::MeasureTrade => !self.session.jobs.runs(crate::session::Task::Trade),
-            Command::Keep => !self
-                .session
-                .document
-                .state
-                .project
-                .selection
-                .sites
-                .is_empty(),
-            Command::Paint(layer) if layer.is_face() => self.session.document.is_solid(),
-            Command::Pin | Command::RemoveGauges | Command::FramePicked | Command::Nudge(_) => {
-                !self.picked.is_empty()
-            }
-            Command::AddHelpful | Command::FindSpare => self.no_help(command).is_none(),
-            _ => true,
+/// Whether a command can be given now.
+#[must_use]
+pub fn enabled(session: &Session, view: &View, command: Command) -> bool {
+    match command {
+        Command::Undo => session.document.can_undo(),
+        Command::Redo => session.document.can_redo(),
+        Command::GrowPaint | Command::ShrinkPaint => session.document.layer(view.layer).is_some(),
+        Command::Cancel => session.busy(),
+        Command::Tare | Command::Record | Command::Disconnect => session.live.is_connected(),
+        Command::Export => session.results.design.is_some(),
+        Command::MeasureTrade => !session.jobs.runs(Task::Trade),
+        Command::Keep => !session.document.state.project.selection.sites.is_empty(),
+        Command::Paint(layer) if layer.is_face() => session.document.is_solid(),
+        Command::Pin | Command::RemoveGauges | Command::FramePicked | Command::Nudge(_) => {
+            !view.picked.is_empty()
         }
+        Command::AddHelpful | Command::FindSpare => no_help(session, command).is_none(),
+        _ => true,
     }
+}
 
-    /// Why one of the commands that look for a gauge cannot be given now.
-    pub(super) fn no_help(&self, command: Command) -> Option<&'static str> {
-        match command {
-            Command::AddHelpful => self.session.no_helpful(),
-            Command::FindSpare => self.session.no_spare(),
-            _ => None,
-        }
+/// Why one of the commands that look for a gauge cannot be given now.
+fn no_help(session: &Session, command: Command) -> Option<&'static str> {
+    match command {
+        Command::AddHelpful => session.no_helpful(),
+        Command::FindSpare => session.no_spare(),
+        _ => None,
     }
+}
 
-    /// Whether a command that turns something on or off has it on.
-    pub(super) fn is_on(&self, command: Command) -> bool {
-        match command {
-            Command::Follow => self.session.desk.follow,
-            Command::SeeThrough => self.view.see_through,
-            Command::Section => self.view.section.is_some(),
-            Command::Unrolled => self.view.unrolled_shown,
-            Command::Tool(tool) => self.view.tool == tool,
-            _ => false,
-        }
-    }
+/// What is said of a command that cannot be given.
+#[must_use]
+pub fn why_not(session: &Session, command: Command) -> &'static str {
+    no_help(session, command).unwrap_or(command.tooltip())
+}
 
-    /// Carries a command out.
-    pub fn execute(&mut self, ctx: &Context, command: Command) {
-        if !self.enabled(command) {
-            return;
-        }
-        let needs_part = matches!(
-            command,
-            Command::Simulate | Command::Select | Command::Export | Command::Save | Command::SaveAs
-        );
-        if needs_part && self.session.document.asks_for_another_part() {
-            self.session.complain(
-                "The body or the repairs were changed, but the mesh was not read again: press “Read the mesh again” (right side, Part and material), or undo",
-            );
-            return;
-        }
-        match command {
-            Command::Open => self.dialog = Some(Dialog::open(&self.session.document)),
-            Command::Example(example) => self.open_example_or_ask(example),
-            Command::Save => match self.session.document.path.clone() {
-                Some(path) => self.session.save_to(&path),
-                None => self.dialog = Some(Dialog::save_as(&self.session.document)),
-            },
-            Command::SaveAs => self.dialog = Some(Dialog::save_as(&self.session.document)),
-            Command::Export => self.dialog = Some(Dialog::export(&self.session.document)),
-            Command::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
-            Command::Undo => self.session.undo(),
-            Command::Redo => self.session.redo(),
-            Command::SavePicture => self.dialog = Some(Dialog::picture(&self.session.document)),
-            Command::ClearPaint => self.session.document.clear(self.view.layer),
-            Command::FillPaint => self.session.document.fill(self.view.layer),
-            Command::InvertPaint => self.session.document.invert(self.view.layer),
-            Command::GrowPaint => self
-                .session
-                .document
-                .grow(self.view.layer, self.view.brush / 4.0),
-            Command::ShrinkPaint => self
-                .session
-                .document
-                .shrink(self.view.layer, self.view.brush / 4.0),
-            Command::WiderBrush => self.view.brush *= BRUSH_STEP,
-            Command::NarrowerBrush => self.view.brush /= BRUSH_STEP,
-            Command::Palette => self.palette = Some(Palette::default()),
-            Command::Simulate => self.session.simulate(),
-            Command::Select => self.session.select(),
-            Command::Keep => {
-                if let Some(name) = self.session.keep() {
-                    self.shown_kept.insert(name);
-                    self.results = super::results::Tab::Compare;
-                }
-            }
-            Command::Advise => {
-                self.stage = Stage::Part;
-                self.session.measure_walls();
-            }
-            Command::MeasureTrade => {
-                self.results = super::results::Tab::Trade;
-                self.session.measure_trade(self.trade.count);
-            }
-            Command::Cancel => self.session.cancel(),
-            Command::SimulatedBoard => {
-                self.stage = Stage::Live;
-                self.session.start_simulated_board();
-            }
-            Command::Tare => self.session.tare(),
-            Command::Record => self.session.toggle_recording(&self.live_form.record_to),
-            Command::Disconnect => self.session.disconnect(),
-            Command::Follow => self.session.desk.follow = !self.session.desk.follow,
-            Command::Pin => self.session.pin_gauges(&self.picked),
-            Command::RemoveGauges => {
-                let picked = std::mem::take(&mut self.picked);
-                self.session.remove_gauges(&picked);
-            }
-            Command::AddHelpful => self.session.add_helpful(),
-            Command::FindSpare => self.session.find_spare(),
-            Command::Nudge(way) => self.nudge(way),
-            command => self.change_view(ctx, command),
-        }
+/// Whether a command that turns something on or off has it on.
+#[must_use]
+pub fn is_on(session: &Session, view: &View, command: Command) -> bool {
+    match command {
+        Command::Follow => session.desk.follow,
+        Command::SeeThrough => view.see_through,
+        Command::Section => view.section.is_some(),
+        Command::Unrolled => view.unrolled_shown,
+        Command::Tool(tool) => view.tool == tool,
+        _ => false,
     }
+}
 
-    /// Commands that change only how things are shown.
-    fn change_view(&mut self, ctx: &Context, command: Command) {
-        match command {
-            Command::Frame => self.view.frame(&self.session.document),
-            Command::FramePicked => {
-                let all = self.session.gauge_places();
-                let picked: Vec<_> = self
-                    .picked
-                    .iter()
-                    .filter_map(|&n| all.get(n).copied())
-                    .collect();
-                self.view.frame_points(&picked, &self.session.document);
-            }
-            Command::SeeThrough => self.view.see_through = !self.view.see_through,
-            Command::Section => self.view.toggle_section(),
-            Command::Unrolled => {
-                self.view.unrolled_shown = !self.view.unrolled_shown;
-                // What was begun in a view that goes ends with it.
-                self.view.drop_gesture();
-                self.session.document.settle();
-            }
-            Command::DarkLight => ctx.set_theme(match ctx.theme() {
-                egui::Theme::Dark => egui::Theme::Light,
-                egui::Theme::Light => egui::Theme::Dark,
-            }),
-            Command::LargerText => zoom(ctx, ZOOM_STEP),
-            Command::SmallerText => zoom(ctx, -ZOOM_STEP),
-            Command::Look(preset) => self.view.camera.look_from(preset),
-            Command::Tool(tool) => self.view.take(tool),
-            Command::Paint(layer) => {
-                self.view.layer = layer;
-                self.view.take(Tool::Paint);
-            }
-            Command::Stage(stage) => self.stage = stage,
-            _ => {}
-        }
-    }
-
-    pub(super) fn shortcuts(&mut self, ctx: &Context) {
-        if self.dialog.is_some()
-            || self.ask_quit
-            || self.ask_example.is_some()
-            || self.palette.is_some()
-            || self.offers_recovery()
-        {
-            return;
-        }
-        let typing = ctx.egui_wants_keyboard_input();
-        // Escape closes what has opened, or ends what is under way, before it ends jobs.
-        let closing = egui::Popup::is_any_open(ctx) || !self.view.is_idle();
-        for command in Command::all() {
-            let Some(shortcut) = command.shortcut() else {
-                continue;
-            };
-            // Single keys belong to a text field while it has the focus.
-            let single = shortcut.modifiers == Modifiers::NONE;
-            if !self.enabled(command) || command == Command::Cancel && closing {
-                continue;
-            }
-            if !(typing && single) && ctx.input_mut(|i| i.consume_shortcut(&shortcut)) {
-                self.execute(ctx, command);
-            }
-        }
-    }
-
-    /// A button or menu entry for a command.
-    pub(super) fn button(&mut self, ui: &mut egui::Ui, command: Command) {
-        let mut button = egui::Button::new(command.name()).selected(self.is_on(command));
-        if let Some(shortcut) = command.shortcut() {
-            button = button.shortcut_text(ui.ctx().format_shortcut(&shortcut));
-        }
-        let response = ui
-            .add_enabled(self.enabled(command), button)
-            .accessible_name(command.name())
-            .on_hover_text(command.tooltip())
-            .on_disabled_hover_text(self.no_help(command).unwrap_or(command.tooltip()));
-        if response.clicked() {
-            let ctx = ui.ctx().clone();
-            self.execute(&ctx, command);
-        }
-    }
-
-    fn run_menu(&mut self, ui: &mut egui::Ui) {
-        for command in [
-            Command::Simulate,
-            Command::Select,
-            Command::Keep,
-            Command::Cancel,
-        ] {
-            self.button(ui, command);
-        }
-        ui.separator();
-        for command in [
-            Command::SimulatedBoard,
-            Command::Tare,
-            Command::Record,
-            Command::Disconnect,
-        ] {
-            self.button(ui, command);
-        }
-        ui.separator();
-        self.button(ui, Command::Follow);
-    }
-
-    fn gauges_menu(&mut self, ui: &mut egui::Ui) {
-        for command in [
-            Command::Pin,
-            Command::RemoveGauges,
-            Command::AddHelpful,
-            Command::FindSpare,
-        ] {
-            self.button(ui, command);
-        }
-        ui.separator();
-        for way in Way::ALL {
-            self.button(ui, Command::Nudge(way));
-        }
-    }
-
-    pub(super) fn menu(&mut self, ui: &mut egui::Ui) {
-        egui::MenuBar::new().ui(ui, |ui| {
-            ui.menu_button("File", |ui| {
-                self.button(ui, Command::Open);
-                self.recent_menu(ui);
-                ui.menu_button("Examples", |ui| {
-                    for example in Example::ALL {
-                        self.button(ui, Command::Example(example));
-                    }
-                });
-                ui.separator();
-                for command in [Command::Save, Command::SaveAs] {
-                    self.button(ui, command);
-                }
-                ui.separator();
-                self.button(ui, Command::Export);
-                self.button(ui, Command::SavePicture);
-                ui.separator();
-                self.button(ui, Command::Quit);
-            });
-            ui.menu_button("Edit", |ui| {
-                for command in [Command::Undo, Command::Redo] {
-                    self.button(ui, command);
-                }
-                ui.separator();
-                for tool in Tool::ALL {
-                    self.button(ui, Command::Tool(tool));
-                }
-                ui.separator();
-                ui.menu_button("Painted layer", |ui| {
-                    for layer in Layer::ALL {
-                        self.button(ui, Command::Paint(layer));
-                    }
-                    ui.separator();
-                    for command in [
-                        Command::FillPaint,
-                        Command::InvertPaint,
-                        Command::GrowPaint,
-                        Command::ShrinkPaint,
-                        Command::ClearPaint,
-                    ] {
-                        self.button(ui, command);
-                    }
-                });
-                ui.menu_button("Gauges", |ui| self.gauges_menu(ui));
-                ui.separator();
-                self.button(ui, Command::Palette);
-            });
-            ui.menu_button("View", |ui| {
-                for command in [Command::Frame, Command::FramePicked] {
-                    self.button(ui, command);
-                }
-                ui.separator();
-                for command in [Command::SeeThrough, Command::Section, Command::Unrolled] {
-                    self.button(ui, command);
-                }
-                ui.separator();
-                for preset in Preset::ALL {
-                    self.button(ui, Command::Look(preset));
-                }
-                ui.separator();
-                for command in [
-                    Command::DarkLight,
-                    Command::LargerText,
-                    Command::SmallerText,
-                ] {
-                    self.button(ui, command);
-                }
-            });
-            ui.menu_button("Run", |ui| self.run_menu(ui));
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let state = if self.session.document.is_dirty() {
-                    "not saved"
-                } else {
-                    "saved"
-                };
-                ui.weak(format!("{} · {state}", self.session.document.name()));
-            });
-        });
-    }
+/// Whether a command works on what the file holds, which must be the part that the project asks for.
+#[must_use]
+pub fn needs_part(command: Command) -> bool {
+    matches!(
+        command,
+        Command::Simulate | Command::Select | Command::Export | Command::Save | Command::SaveAs
+    )
 }

@@ -5,7 +5,10 @@ use std::sync::mpsc::{Receiver, channel};
 
 use egui::Context;
 
-use super::Studio;
+use super::action::{Action, FileAction, WindowAction};
+use super::ask::Ask;
+use super::commands::Command;
+use super::view::Picture;
 use crate::document::Document;
 use crate::io::examples::Example;
 use crate::io::mesh_file::{ENDINGS, may_say_unit, needs_unit};
@@ -21,7 +24,7 @@ enum Purpose {
 }
 
 /// A dialog that asks for a path.
-pub(super) struct Dialog {
+pub struct Dialog {
     purpose: Purpose,
     path: String,
     unit: Unit,
@@ -192,165 +195,187 @@ impl Dialog {
     }
 }
 
-impl Studio {
-    pub(super) fn dialogs(&mut self, ctx: &Context) {
-        self.path_dialog(ctx);
-        self.example_dialog(ctx);
-        self.quit_dialog(ctx);
+/// The dialogs that are open.
+#[derive(Default)]
+pub struct Dialogs {
+    pub path: Option<Dialog>,
+    /// The example to open once its user has said that changes may go.
+    pub example: Option<Example>,
+    /// Whether to save before the program ends.
+    pub quit: bool,
+}
+
+impl Dialogs {
+    /// Whether any is open.
+    #[must_use]
+    pub fn any(&self) -> bool {
+        self.path.is_some() || self.example.is_some() || self.quit
     }
 
-    /// Opens an example, or asks where changes would be lost.
-    pub(super) fn open_example_or_ask(&mut self, example: Example) {
-        if self.session.document.is_dirty() {
-            self.ask_example = Some(example);
-        } else {
-            self.session.open_example(example);
+    /// Shows those that are open.
+    pub fn show(&mut self, ctx: &Context, ask: &mut Ask<'_>) {
+        if let Some(mut dialog) = self.path.take()
+            && dialog.show(ctx, ask)
+        {
+            self.path = Some(dialog);
+        }
+        if let Some(example) = self.example {
+            self.ask_example(ctx, ask, example);
+        }
+        if self.quit {
+            self.ask_quit(ctx, ask);
         }
     }
 
-    fn example_dialog(&mut self, ctx: &Context) {
-        let Some(example) = self.ask_example else {
-            return;
-        };
+    fn ask_example(&mut self, ctx: &Context, ask: &mut Ask<'_>, example: Example) {
         let modal = egui::Modal::new(egui::Id::unique("example dialog")).show(ctx, |ui| {
             ui.heading(example.name());
             let text = format!(
                 "{} has changes that are not saved; opening an example discards them",
-                self.session.document.name()
+                ask.session.document.name()
             );
             ui.colored_label(super::theme::ERROR, text);
             ui.horizontal(|ui| {
                 if ui.button("Discard and open").clicked() {
-                    self.ask_example = None;
-                    self.session.open_example(example);
+                    self.example = None;
+                    ask.act(FileAction::Example(example));
                 }
                 if ui.button("Go back").clicked() {
-                    self.ask_example = None;
+                    self.example = None;
                 }
             });
         });
         if modal.should_close() {
-            self.ask_example = None;
+            self.example = None;
         }
     }
 
-    fn path_dialog(&mut self, ctx: &Context) {
-        let Some(mut dialog) = self.dialog.take() else {
-            return;
-        };
-        if let Some(chosen) = dialog.browsing.as_ref().and_then(|r| r.try_recv().ok()) {
-            dialog.browsing = None;
+    fn ask_quit(&mut self, ctx: &Context, ask: &mut Ask<'_>) {
+        let modal = egui::Modal::new(egui::Id::unique("quit dialog")).show(ctx, |ui| {
+            ui.heading("Save before closing?");
+            ui.label(format!(
+                "{} has changes that are not saved.",
+                ask.session.document.name()
+            ));
+            ui.horizontal(|ui| {
+                if ui.button("Save and keep open").clicked() {
+                    self.quit = false;
+                    ask.command(Command::Save);
+                }
+                if ui.button("Close without saving").clicked() {
+                    ask.act(WindowAction::Close);
+                }
+                if ui.button("Go back").clicked() {
+                    self.quit = false;
+                }
+            });
+        });
+        if modal.should_close() {
+            self.quit = false;
+        }
+    }
+}
+
+impl Dialog {
+    /// Shows it; whether it stays open.
+    fn show(&mut self, ctx: &Context, ask: &mut Ask<'_>) -> bool {
+        if let Some(chosen) = self.browsing.as_ref().and_then(|r| r.try_recv().ok()) {
+            self.browsing = None;
             if let Some(path) = chosen {
-                dialog.path = path.display().to_string();
+                self.path = path.display().to_string();
             }
         }
-        let mut confirmed = false;
-        let mut closed = false;
+        let (mut confirmed, mut closed) = (false, false);
         let modal = egui::Modal::new(egui::Id::unique("path dialog")).show(ctx, |ui| {
             ui.set_width(480.0);
-            ui.heading(dialog.title());
+            ui.heading(self.title());
             ui.add_space(4.0);
-            let hint = dialog.hint();
-            let field = egui::TextEdit::singleline(&mut dialog.path)
-                .hint_text(hint)
-                .desired_width(f32::INFINITY);
-            let field = ui.add(field).accessible_name("Path");
-            if !dialog.focused {
-                field.request_focus();
-                dialog.focused = true;
+            confirmed |= self.path_row(ui);
+            ui.weak(self.hint());
+            self.unit_row(ui);
+            if self.purpose == Purpose::Picture {
+                self.picture_row(ui);
             }
-            confirmed |= field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
-            ui.weak(hint);
-            dialog.unit_row(ui);
-            if dialog.purpose == Purpose::Picture {
-                ui.horizontal(|ui| {
-                    let names = ["Width in pixels", "Height in pixels"];
-                    for (name, side) in names.into_iter().zip(&mut dialog.size) {
-                        ui.add(egui::DragValue::new(side).range(16..=16384).suffix(" px"))
-                            .accessible_name(name);
-                    }
-                    ui.checkbox(&mut dialog.transparent, "Transparent background");
-                });
-            }
-            let discards = dialog.purpose == Purpose::Open && self.session.document.is_dirty();
+            let discards = self.purpose == Purpose::Open && ask.session.document.is_dirty();
             if discards {
                 let text = format!(
                     "{} has changes that are not saved; opening another file discards them",
-                    self.session.document.name()
+                    ask.session.document.name()
                 );
                 ui.colored_label(super::theme::ERROR, text);
             }
             ui.add_space(6.0);
             ui.horizontal(|ui| {
-                let ready = !dialog.path.trim().is_empty();
-                confirmed |= ui
-                    .add_enabled(
-                        ready,
-                        egui::Button::new(if discards {
-                            "Discard and open"
-                        } else {
-                            dialog.verb()
-                        }),
-                    )
-                    .clicked();
-                if ui
-                    .add_enabled(dialog.browsing.is_none(), egui::Button::new("Browse…"))
-                    .clicked()
-                {
-                    dialog.browse(ctx);
+                confirmed |= self.confirm_button(ui, discards);
+                let browse = ui.add_enabled(self.browsing.is_none(), egui::Button::new("Browse…"));
+                if browse.clicked() {
+                    self.browse(ctx);
                 }
                 closed |= ui.button("Cancel").clicked();
             });
         });
         closed |= modal.should_close();
-        if confirmed && !dialog.path.trim().is_empty() {
-            self.confirm(ctx, &dialog);
-        } else if !closed {
-            self.dialog = Some(dialog);
+        if confirmed && !self.path.trim().is_empty() {
+            ask.act(self.action());
+            return false;
         }
+        !closed
     }
 
-    fn confirm(&mut self, ctx: &Context, dialog: &Dialog) {
-        let path = PathBuf::from(dialog.path.trim());
-        match dialog.purpose {
-            Purpose::Open => {
-                self.session.open_path(&path, dialog.chosen_unit());
-            }
-            Purpose::SaveAs => self.session.save_to(&path),
-            Purpose::Export => self.session.export(path),
-            Purpose::Picture => {
-                let path = path.with_extension("png");
-                self.save_picture(ctx, path, dialog.size, dialog.transparent);
-            }
+    /// The path as it is typed; whether Enter was pressed.
+    fn path_row(&mut self, ui: &mut egui::Ui) -> bool {
+        let hint = self.hint();
+        let field = egui::TextEdit::singleline(&mut self.path)
+            .hint_text(hint)
+            .desired_width(f32::INFINITY);
+        let field = ui.add(field).accessible_name("Path");
+        if !self.focused {
+            field.request_focus();
+            self.focused = true;
         }
+        field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter))
     }
 
-    fn quit_dialog(&mut self, ctx: &Context) {
-        if !self.ask_quit {
-            return;
-        }
-        let modal = egui::Modal::new(egui::Id::unique("quit dialog")).show(ctx, |ui| {
-            ui.heading("Save before closing?");
-            ui.label(format!(
-                "{} has changes that are not saved.",
-                self.session.document.name()
-            ));
-            ui.horizontal(|ui| {
-                if ui.button("Save and keep open").clicked() {
-                    self.ask_quit = false;
-                    self.execute(ctx, super::Command::Save);
-                }
-                if ui.button("Close without saving").clicked() {
-                    self.quit = true;
-                    ctx.send_viewport_cmd(egui::ViewportCommand::Close);
-                }
-                if ui.button("Go back").clicked() {
-                    self.ask_quit = false;
-                }
-            });
+    fn picture_row(&mut self, ui: &mut egui::Ui) {
+        ui.horizontal(|ui| {
+            let names = ["Width in pixels", "Height in pixels"];
+            for (name, side) in names.into_iter().zip(&mut self.size) {
+                ui.add(egui::DragValue::new(side).range(16..=16384).suffix(" px"))
+                    .accessible_name(name);
+            }
+            ui.checkbox(&mut self.transparent, "Transparent background");
         });
-        if modal.should_close() {
-            self.ask_quit = false;
+    }
+
+    fn confirm_button(&self, ui: &mut egui::Ui, discards: bool) -> bool {
+        let ready = !self.path.trim().is_empty();
+        let verb = if discards {
+            "Discard and open"
+        } else {
+            self.verb()
+        };
+        ui.add_enabled(ready, egui::Button::new(verb)).clicked()
+    }
+
+    /// What was asked for.
+    fn action(&self) -> Action {
+        let path = PathBuf::from(self.path.trim());
+        match self.purpose {
+            Purpose::Open => FileAction::Open(path, self.chosen_unit()).into(),
+            Purpose::SaveAs => FileAction::SaveTo(path).into(),
+            Purpose::Export => FileAction::Export(path).into(),
+            Purpose::Picture => {
+                WindowAction::Picture(path.with_extension("png"), self.as_seen()).into()
+            }
+        }
+    }
+
+    /// From where the view shows it.
+    fn as_seen(&self) -> Picture {
+        Picture {
+            size: self.size,
+            view: None,
+            transparent: self.transparent,
         }
     }
 }

@@ -1,87 +1,21 @@
 //! What colours the limb: the fields a vertex, their legends, and the shape that is shown.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::Studio;
-use super::tools::Tool;
+use super::view::{Field, View};
 use crate::colormap::ColorMap;
 use crate::document::{Layer, PaintInputs, WallInputs};
 use crate::elasticity::support::held_freedoms;
 use crate::feasible::Feasibility;
 use crate::io::report::{robust_top, round_up};
+use crate::mesh::flatten::Flat;
+use crate::mesh::walls::Side;
+use crate::project::Project;
 use crate::render::gpu::Shown;
-use crate::session::{self, FieldKind};
-
-/// What colours the limb.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Field {
-    #[default]
-    Region,
-    Strain,
-    Displacement,
-    SignalToNoise,
-    Error,
-    /// By matching, of the gauges as they are; what they are blind to is marked.
-    Expected,
-    Uncertainty,
-    Faces,
-    Thickness,
-}
-
-impl Field {
-    pub const ALL: [Self; 9] = [
-        Self::Region,
-        Self::Strain,
-        Self::Displacement,
-        Self::SignalToNoise,
-        Self::Error,
-        Self::Expected,
-        Self::Uncertainty,
-        Self::Faces,
-        Self::Thickness,
-    ];
-
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Region => "Regions",
-            Self::Strain => "Strain, inside",
-            Self::Displacement => "Displacement",
-            Self::SignalToNoise => "Signal to noise",
-            Self::Error => "Localization error",
-            Self::Expected => "Expected error",
-            Self::Uncertainty => "GP variance",
-            Self::Faces => "Faces",
-            Self::Thickness => "Wall thickness",
-        }
-    }
-}
-
-/// Ranges of the colours that stay whatever the values are, in the legend's units.
-#[derive(Default)]
-pub(super) struct Ranges(BTreeMap<Field, (f64, f64)>);
-
-impl Ranges {
-    pub fn of(&self, field: Field) -> Option<(f64, f64)> {
-        self.0.get(&field).copied()
-    }
-
-    /// Fixes a range, or lets it go. Bounds that are no numbers, endless or equal can be typed, but nothing can be
-    /// coloured by them: they leave the range before.
-    pub fn set(&mut self, field: Field, range: Option<(f64, f64)>) {
-        match range {
-            Some((low, high)) if (high - low).is_finite() && low != high => {
-                self.0.insert(field, (low, high));
-            }
-            Some(_) => {}
-            None => drop(self.0.remove(&field)),
-        }
-    }
-}
+use crate::session::{self, FieldKind, Session};
 
 /// Faces are ±1 on colours that reach this far, so that both are bright.
-pub(super) const FACE_RANGE: f64 = 1.7;
+pub const FACE_RANGE: f64 = 1.7;
 
 /// What the regions were built from.
 #[derive(Clone, PartialEq)]
@@ -123,7 +57,7 @@ struct OfWalls {
 }
 
 /// A field ready to be shown, and the legend that goes with it.
-pub(super) struct Built {
+pub struct Built {
     /// What the field and the regions were built from.
     field: FieldInputs,
     region: RegionInputs,
@@ -134,39 +68,42 @@ pub(super) struct Built {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Legend {
+pub struct Legend {
     pub title: String,
     pub low: f64,
     pub high: f64,
     pub map: ColorMap,
 }
 
-pub(super) struct FlatShown {
+pub struct FlatShown {
     of: Arc<Vec<Shown>>,
     pub shown: Arc<Vec<Shown>>,
 }
 
-impl Studio {
-    /// Builds what is shown a vertex, where anything it depends on has changed.
-    pub(super) fn build_field(&mut self) {
-        let slow = self.slow_field();
-        let field = self.field_inputs();
-        let region = self.region_inputs();
-        let last = self.view.built.take();
-        let same_field = last.as_ref().is_some_and(|b| b.field == field);
-        let same_region = last.as_ref().is_some_and(|b| b.region == region);
-        let mut built = match last {
-            Some(built) if same_field && same_region => built,
-            Some(mut built) if same_field => {
+impl Built {
+    /// What is shown a vertex, made anew where anything it depends on has changed since the last; of the unrolled part
+    /// too where that is shown.
+    #[must_use]
+    pub fn of(last: Option<Self>, flat: &Flat, session: &Session, view: &View) -> Self {
+        let mut built = Self::coloured(last, Source { session, view });
+        built.flat = view.unrolled_shown.then(|| built.laid_flat(flat));
+        built
+    }
+
+    fn coloured(last: Option<Self>, source: Source<'_>) -> Self {
+        let (field, region) = (source.field_inputs(), source.region_inputs());
+        match last {
+            Some(built) if built.field == field && built.region == region => built,
+            Some(mut built) if built.field == field => {
                 let shown: &mut Vec<Shown> = Arc::make_mut(&mut built.shown);
-                self.colour_regions(shown);
+                source.colour_regions(shown);
                 built.region = region;
                 built
             }
             _ => {
-                let (mut shown, legend) = self.field_shown(slow.as_deref());
-                self.colour_regions(&mut shown);
-                Built {
+                let (mut shown, legend) = source.field_shown();
+                source.colour_regions(&mut shown);
+                Self {
                     field,
                     region,
                     shown: Arc::new(shown),
@@ -174,41 +111,47 @@ impl Studio {
                     legend,
                 }
             }
-        };
-        if self.view.unrolled_shown {
-            let known = built.flat.as_ref();
-            if known.is_none_or(|k| !Arc::ptr_eq(&k.of, &built.shown)) {
-                let flat = self.view.unrolled.flat.vertices.iter().map(|&v| Shown {
-                    displacement: [0.0; 3],
-                    ..built.shown[v as usize]
-                });
-                built.flat = Some(FlatShown {
-                    shown: Arc::new(flat.collect()),
-                    of: Arc::clone(&built.shown),
-                });
-            }
-        } else {
-            built.flat = None;
         }
-        self.view.built = Some(built);
     }
 
-    /// Whether colours with a legend are shown.
-    #[must_use]
-    pub fn shows_field(&self) -> bool {
-        self.view.built.as_ref().is_some_and(|b| b.legend.is_some())
+    /// The same for the unrolled part, made anew where what is shown has changed.
+    fn laid_flat(&mut self, flat: &Flat) -> FlatShown {
+        let known = self.flat.take();
+        known
+            .filter(|k| Arc::ptr_eq(&k.of, &self.shown))
+            .unwrap_or_else(|| {
+                let shown = flat.vertices.iter().map(|&v| Shown {
+                    displacement: [0.0; 3],
+                    ..self.shown[v as usize]
+                });
+                FlatShown {
+                    shown: Arc::new(shown.collect()),
+                    of: Arc::clone(&self.shown),
+                }
+            })
+    }
+}
+
+/// What fields are made of.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    session: &'a Session,
+    view: &'a View,
+}
+
+impl<'a> Source<'a> {
+    fn project(&self) -> &'a Project {
+        &self.session.document.state.project
     }
 
     fn field_inputs(&self) -> FieldInputs {
         let field = self.view.field;
         let of_field = match field {
             Field::Region | Field::Strain | Field::Displacement => OfField::Nothing,
-            Field::SignalToNoise => {
-                OfField::Noise(self.session.document.state.project.gauge.noise_microstrain)
-            }
+            Field::SignalToNoise => OfField::Noise(self.project().gauge.noise_microstrain),
             Field::Expected => {
                 let version = self.session.caches.expected.version;
-                OfField::Expected(version, self.expected_shown().is_some())
+                OfField::Expected(version, self.view.expected(self.session).is_some())
             }
             Field::Error | Field::Uncertainty => {
                 let shown = self.session.caches.field.as_ref();
@@ -244,20 +187,10 @@ impl Studio {
         verdicts.filter(|_| !self.view.is_stroking())
     }
 
-    /// A field that is computed in the background, once it is there.
-    fn slow_field(&mut self) -> Option<Arc<Vec<f64>>> {
-        let kind = match self.view.field {
-            Field::Error => FieldKind::Error,
-            Field::Uncertainty => FieldKind::Uncertainty,
-            _ => return None,
-        };
-        self.session.field(kind)
-    }
-
     /// The field over its range, a vertex, with the shape that is shown.
-    fn field_shown(&mut self, slow: Option<&Vec<f64>>) -> (Vec<Shown>, Option<Legend>) {
+    fn field_shown(&self) -> (Vec<Shown>, Option<Legend>) {
         let field = self.view.field;
-        let found = self.field_values(slow).map(|(values, mut legend)| {
+        let found = self.field_values().map(|(values, mut legend)| {
             if let Some((low, high)) = self.view.ranges.of(field) {
                 (legend.low, legend.high) = (low, high);
             }
@@ -280,7 +213,7 @@ impl Studio {
     }
 
     /// The chosen field a vertex of the part, in the units of its legend.
-    fn field_values(&mut self, slow: Option<&Vec<f64>>) -> Option<(Vec<f64>, Legend)> {
+    fn field_values(&self) -> Option<(Vec<f64>, Legend)> {
         let legend = |title: &str, low, high, map| Legend {
             title: title.to_owned(),
             low,
@@ -304,7 +237,7 @@ impl Studio {
                 Some((mm.collect(), legend("displacement (mm)", 0.0, top, map)))
             }
             Field::SignalToNoise => {
-                let noise = self.session.document.state.project.gauge.noise_microstrain * 1e-6;
+                let noise = self.project().gauge.noise_microstrain * 1e-6;
                 let simulation = self
                     .session
                     .results
@@ -332,14 +265,14 @@ impl Studio {
                 ))
             }
             Field::Error => {
-                let errors = slow?;
+                let errors = &*self.session.field(FieldKind::Error)?.value;
                 let top = robust_top(errors);
                 let map = ColorMap::Viridis;
                 Some((errors.clone(), legend("error (mm)", 0.0, top, map)))
             }
             Field::Expected => {
                 let vertices = self.session.document.part.positions().len();
-                let answer = self.expected_shown()?;
+                let answer = self.view.expected(self.session)?;
                 let values = answer.expected.map_mm.clone();
                 let [lightest, hardest] = self.session.in_hand()?.forces_n;
                 let title = format!("expected error (mm), {lightest}–{hardest} N");
@@ -347,7 +280,7 @@ impl Studio {
                 (values.len() == vertices).then_some((values, found))
             }
             Field::Uncertainty => {
-                let variances = slow?;
+                let variances = &*self.session.field(FieldKind::Uncertainty)?.value;
                 let map = ColorMap::Viridis;
                 let title = "variance left";
                 Some((variances.clone(), legend(title, 0.0, 1.0, map)))
@@ -357,7 +290,7 @@ impl Studio {
 
     /// What the gauges are blind to, a vertex of the part, where that is marked.
     fn blind_shown(&self) -> Option<&[f64]> {
-        let answer = self.expected_shown();
+        let answer = self.view.expected(self.session);
         let answer = answer.filter(|_| self.view.field == Field::Expected)?;
         Some(&answer.expected.blind_map)
     }
@@ -381,12 +314,7 @@ impl Studio {
         let mask = |layer| self.session.document.layer(layer).map(|m| m.as_slice());
         let painted = mask(Layer::Feasible);
         let (touch, out) = (mask(Layer::Touch), mask(Layer::KeepOut));
-        let supports = self
-            .session
-            .document
-            .state
-            .project
-            .supports(&self.session.document.state.masks);
+        let supports = self.project().supports(&self.session.document.state.masks);
         let held = supports
             .map(|s| held_freedoms(&self.session.document.part, &s))
             .unwrap_or_default();
@@ -402,36 +330,31 @@ impl Studio {
         }
     }
 
-    /// How much the deformation is exaggerated; nothing without a touch, nor with other tools: they work
-    /// on the limb at rest.
-    #[must_use]
-    pub fn exaggeration(&self) -> Option<f64> {
-        let touched = self.session.caches.touching.result()?;
-        touched
-            .exaggeration
-            .filter(|_| self.view.tool == Tool::Touch)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bounds_that_nothing_can_be_coloured_by_leave_the_range_before() {
-        let field = Field::Strain;
-        let mut ranges = Ranges::default();
-        ranges.set(field, Some((f64::NAN, 1.0)));
-        assert_eq!(ranges.of(field), None);
-        ranges.set(field, Some((-2.0, 3.0)));
-        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            ranges.set(field, Some((bad, 3.0)));
-            ranges.set(field, Some((-2.0, bad)));
+    /// The sides of a solid, or how thick its walls are (mm), a vertex of the part.
+    fn wall_values(&self, sides: bool) -> Option<Vec<f64>> {
+        // Until it is measured anew what was known of this part stays.
+        let advice = &self.session.caches.walls.as_ref()?.value;
+        let faces = advice.faces.as_ref()?;
+        if faces.sides.len() != self.session.document.part.positions().len() {
+            return None;
         }
-        ranges.set(field, Some((f64::MIN, f64::MAX)));
-        ranges.set(field, Some((3.0, 3.0)));
-        assert_eq!(ranges.of(field), Some((-2.0, 3.0)));
-        ranges.set(field, None);
-        assert_eq!(ranges.of(field), None);
+        let of_side = |side: &Side| match side {
+            Side::Outside => -1.0,
+            Side::Rim | Side::Frame => 0.0,
+            Side::Inside => 1.0,
+        };
+        Some(if sides {
+            let mut values: Vec<f64> = faces.sides.iter().map(of_side).collect();
+            // What the brush says counts at once.
+            for (layer, value) in [(Layer::Inside, 1.0), (Layer::Outside, -1.0)] {
+                let painted = self.session.document.layer(layer).map_or(&[][..], |m| m);
+                for (shown, _) in values.iter_mut().zip(painted).filter(|(_, p)| **p) {
+                    *shown = value;
+                }
+            }
+            values
+        } else {
+            faces.thickness.iter().map(|t| t * 1e3).collect()
+        })
     }
 }

@@ -5,9 +5,11 @@ use std::sync::Arc;
 use egui::{DragValue, RichText, Ui};
 use glam::DVec3;
 
+use super::action::{Change, FileAction};
+use super::ask::Ask;
+use super::commands::Command;
 use super::form::{choice, count, number, percentage, rows};
-use super::results::NOBODY_REDUCES;
-use super::{Stage, Studio};
+use super::view::{Stage, Tab, Tool};
 use crate::budget::{Limits, Quality};
 use crate::dataset::Signal;
 use crate::document::Layer;
@@ -23,109 +25,110 @@ use crate::project::{
     PLACE_OFF, PartAxis, PartModel, Project, RegionKeys, STARTS, SupportKeys, SupportKind, TIP_OFF,
     TOUCHES, ToleranceKeys, boxes,
 };
+use crate::session::NOBODY_REDUCES;
 
-impl Studio {
-    /// The settings of the stage that is looked at.
-    pub(super) fn inspector(&mut self, ui: &mut Ui) {
-        egui::ScrollArea::vertical()
-            .auto_shrink(false)
-            .show(ui, |ui| {
-                ui.add_space(6.0);
-                ui.heading(self.stage.name());
-                ui.add(egui::Label::new(purpose(self.stage)).wrap());
-                ui.add_space(4.0);
-                match self.stage {
-                    Stage::Part => self.part_form(ui),
-                    Stage::Supports => self.supports_form(ui),
-                    Stage::Simulation => {
-                        let project = &mut self.session.document.state.project;
-                        quality(ui, project);
-                        self.quality_promises(ui);
-                        let project = &mut self.session.document.state.project;
-                        rows(ui, "Touch", |ui| touch(ui, project));
-                        rows(ui, "Signal and sites", |ui| sites(ui, project));
-                    }
-                    Stage::Feasible => {
-                        let project = &mut self.session.document.state.project;
-                        rows(ui, "Gauge", |ui| gauge(ui, project));
-                        rows(ui, "Room", |ui| feasible(ui, project));
-                    }
-                    Stage::Candidates => {
-                        let project = &mut self.session.document.state.project;
-                        rows(ui, "Reduction", |ui| candidates(ui, project));
-                    }
-                    Stage::Selection => {
-                        let project = &mut self.session.document.state.project;
-                        rows(ui, "Gauges", |ui| selection(ui, project));
-                        pins(ui, project);
-                        rows(ui, "Regression of greedy SVR", |ui| regression(ui, project));
-                    }
-                    Stage::Evaluation => self.evaluation_form(ui),
-                    Stage::Report => self.button(ui, super::Command::Export),
-                    Stage::Live => self.live_form(ui),
-                }
+/// What a stage is, and what for.
+pub fn heading(stage: Stage, ui: &mut Ui) {
+    ui.add_space(6.0);
+    ui.heading(stage.name());
+    ui.add(egui::Label::new(purpose(stage)).wrap());
+    ui.add_space(4.0);
+}
+
+/// The settings of the stage that is looked at.
+pub fn settings(ask: &mut Ask<'_>, ui: &mut Ui) {
+    match ask.view.stage {
+        Stage::Part => part_form(ask, ui),
+        Stage::Supports => supports_form(ask, ui),
+        Stage::Simulation => {
+            ask.edit(|project| quality(ui, project));
+            quality_promises(ask, ui);
+            ask.edit(|project| {
+                rows(ui, "Touch", |ui| touch(ui, project));
+                rows(ui, "Signal and sites", |ui| sites(ui, project));
             });
-    }
-
-    /// What each quality was measured to cost and achieve.
-    fn quality_promises(&mut self, ui: &mut Ui) {
-        for quality in Quality::ALL {
-            let chosen = quality == self.session.quality();
-            let text = RichText::new(self.session.prediction_in_words(quality)).size(11.5);
-            ui.add(egui::Label::new(if chosen { text } else { text.weak() }).wrap());
         }
-        if ui.button("Speed against accuracy…").clicked() {
-            self.results = super::results::Tab::Trade;
-        }
+        Stage::Feasible => ask.edit(|project| {
+            rows(ui, "Gauge", |ui| gauge(ui, project));
+            rows(ui, "Room", |ui| feasible(ui, project));
+        }),
+        Stage::Candidates => ask.edit(|project| {
+            rows(ui, "Reduction", |ui| candidates(ui, project));
+        }),
+        Stage::Selection => ask.edit(|project| {
+            rows(ui, "Gauges", |ui| selection(ui, project));
+            pins(ui, project);
+            rows(ui, "Regression of greedy SVR", |ui| regression(ui, project));
+        }),
+        Stage::Evaluation => evaluation_form(ask, ui),
+        Stage::Report => ask.button(ui, Command::Export),
+        // It has a panel of its own.
+        Stage::Live => {}
     }
+}
 
-    fn part_form(&mut self, ui: &mut Ui) {
-        let from_file = !self.session.document.bundled;
-        let bodies = self.session.document.repairs.bodies;
-        let again = from_file && self.session.document.asks_for_another_part();
-        let mesh = &self.session.document.mesh_path;
-        let example = Example::of_mesh(mesh).filter(|_| !from_file);
-        let file = || mesh.display().to_string();
-        ui.weak(example.map_or_else(file, |example| example.name().to_owned()));
-        let project = &mut self.session.document.state.project;
-        let mut pressed = false;
-        let up = self.view.camera.stance.up();
+/// What each quality was measured to cost and achieve.
+fn quality_promises(ask: &mut Ask<'_>, ui: &mut Ui) {
+    for quality in Quality::ALL {
+        let chosen = quality == ask.session.quality();
+        let text = RichText::new(ask.session.prediction_in_words(quality)).size(11.5);
+        ui.add(egui::Label::new(if chosen { text } else { text.weak() }).wrap());
+    }
+    if ui.button("Speed against accuracy…").clicked() {
+        ask.view.tab = Tab::Trade;
+    }
+}
+
+fn part_form(ask: &mut Ask<'_>, ui: &mut Ui) {
+    let from_file = !ask.session.document.bundled;
+    let bodies = ask.session.document.repairs.bodies;
+    let again = from_file && ask.session.document.asks_for_another_part();
+    let mesh = &ask.session.document.mesh_path;
+    let example = Example::of_mesh(mesh).filter(|_| !from_file);
+    let file = || mesh.display().to_string();
+    ui.weak(example.map_or_else(file, |example| example.name().to_owned()));
+    let up = ask.view.camera.stance.up();
+    let mut pressed = false;
+    ask.edit(|project| {
         rows(ui, "Model", |ui| part(ui, project, up));
         if from_file {
             rows(ui, "Taking the mesh in", |ui| {
                 pressed = taking_in(ui, project, bodies, again);
             });
         }
-        if pressed {
-            self.session.take_in_again();
-        }
-        self.button(ui, super::Command::Advise);
-        self.advice_lines(ui);
+    });
+    if pressed {
+        ask.act(FileAction::TakeInAgain);
     }
+    ask.button(ui, Command::Advise);
+    advice_lines(ask, ui);
+}
 
-    fn supports_form(&mut self, ui: &mut Ui) {
-        let part = Arc::clone(&self.session.document.part);
-        let stance = self.view.camera.stance;
-        let project = &mut self.session.document.state.project;
+fn supports_form(ask: &mut Ask<'_>, ui: &mut Ui) {
+    let part = Arc::clone(&ask.session.document.part);
+    let stance = ask.view.camera.stance;
+    // A slice at the lower end: a start that holds something on any part.
+    let start = || stance.lower_end(&part, 0.05);
+    ask.edit(|project| {
         rows(ui, "Material", |ui| material(ui, project));
-        // A slice at the lower end: a start that holds something on any part.
-        let start = || stance.lower_end(&part, 0.05);
         rows(ui, "Supports", |ui| supports(ui, project, start));
-        let paint = ui
-            .button("Paint a support")
-            .on_hover_text("Another support, on the vertices that you paint next");
-        if paint.clicked() {
-            self.session.document.add_painted_support();
-            self.view.layer = Layer::Support;
-            self.view.take(super::Tool::Paint);
-        }
+    });
+    let paint = ui
+        .button("Paint a support")
+        .on_hover_text("Another support, on the vertices that you paint next");
+    if paint.clicked() {
+        ask.act(Change::AddPaintedSupport);
+        ask.view.layer = Layer::Support;
+        ask.view.take(Tool::Paint);
     }
+}
 
-    fn evaluation_form(&mut self, ui: &mut Ui) {
-        let part = Arc::clone(&self.session.document.part);
-        let stance = self.view.camera.stance;
-        let start = || boxes::keys(&OrientedBox::around(&part, stance));
-        let evaluation = &mut self.session.document.state.project.evaluation;
+fn evaluation_form(ask: &mut Ask<'_>, ui: &mut Ui) {
+    let part = Arc::clone(&ask.session.document.part);
+    let stance = ask.view.camera.stance;
+    let start = || boxes::keys(&OrientedBox::around(&part, stance));
+    ask.edit(|project| {
+        let evaluation = &mut project.evaluation;
         rows(ui, "Judge", |ui| {
             choice(
                 ui,
@@ -138,6 +141,16 @@ impl Studio {
         });
         let regions = &mut evaluation.regions;
         rows(ui, "Regions", |ui| regions_form(ui, regions, start));
+    });
+}
+
+/// What was found of the walls, in words.
+fn advice_lines(ask: &Ask<'_>, ui: &mut Ui) {
+    let Some(advice) = ask.session.advice() else {
+        return;
+    };
+    for line in &advice.words {
+        ui.add(egui::Label::new(line).wrap());
     }
 }
 

@@ -5,118 +5,83 @@ use std::collections::BTreeSet;
 use egui::{Color32, Painter, Stroke, TextEdit, Ui, vec2};
 use glam::DVec3;
 
-use super::Studio;
-use super::viewport::Pane;
+use super::action::Change;
+use super::ask::Ask;
+use super::paint::{Look, empty};
+use super::theme::kept_colour;
+use super::view::Pane;
 use crate::evaluation::EVERYWHERE;
 use crate::project::Kept;
 use crate::session::chooser_title;
 
-/// Colours of kept selections, apart from each other for colour-blind eyes and from the selectors' own
-/// (M. Okabe and K. Ito, 2008; P. Tol, 2021).
-const COLOURS: [Color32; 6] = [
-    Color32::from_rgb(240, 228, 66),
-    Color32::from_rgb(170, 68, 153),
-    Color32::from_rgb(136, 204, 238),
-    Color32::from_rgb(153, 153, 51),
-    Color32::from_rgb(204, 102, 119),
-    Color32::from_rgb(187, 187, 187),
-];
-
-pub(super) fn colour(k: usize) -> Color32 {
-    COLOURS[k % COLOURS.len()]
-}
-
-impl Studio {
-    /// The tab: what is kept, side by side.
-    pub(super) fn compare_tab(&mut self, ui: &mut Ui) {
-        if self.session.document.state.project.kept.is_empty() {
-            super::results::empty(
-                ui,
-                "Nothing kept yet. Press “Keep this selection”, change what you like, and keep the next to see both side by side",
-            );
-            return;
-        }
-        let mut asked = Asked::None;
-        egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
-            egui::Grid::new("kept")
-                .num_columns(10)
-                .striped(true)
-                .spacing([12.0, 4.0])
-                .show(ui, |ui| {
-                    for title in [
-                        "Show",
-                        "Name",
-                        "Chosen by",
-                        "Quality",
-                        "Gauges",
-                        "Error (mm)",
-                        "Median (mm)",
-                        "3 failed (mm)",
-                        "Cost",
-                        "Time (s)",
-                        "",
-                    ] {
-                        ui.strong(title);
-                    }
-                    ui.end_row();
-                    let shown = &mut self.shown_kept;
-                    for (k, kept) in self
-                        .session
-                        .document
-                        .state
-                        .project
-                        .kept
-                        .iter_mut()
-                        .enumerate()
-                    {
-                        kept_row(ui, k, kept, shown, &mut asked);
+/// The tab: what is kept, side by side.
+pub fn compare_tab(ask: &mut Ask<'_>, ui: &mut Ui) {
+    if ask.project().kept.is_empty() {
+        empty(
+            ui,
+            "Nothing kept yet. Press “Keep this selection”, change what you like, and keep the next to see both side by side",
+        );
+        return;
+    }
+    let mut asked = Asked::None;
+    egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+        egui::Grid::new("kept")
+            .num_columns(10)
+            .striped(true)
+            .spacing([12.0, 4.0])
+            .show(ui, |ui| {
+                for title in [
+                    "Show",
+                    "Name",
+                    "Chosen by",
+                    "Quality",
+                    "Gauges",
+                    "Error (mm)",
+                    "Median (mm)",
+                    "3 failed (mm)",
+                    "Cost",
+                    "Time (s)",
+                    "",
+                ] {
+                    ui.strong(title);
+                }
+                ui.end_row();
+                let mut shown = ask.view.shown_kept.clone();
+                ask.edit(|project| {
+                    for (k, kept) in project.kept.iter_mut().enumerate() {
+                        kept_row(ui, k, kept, &mut shown, &mut asked);
                     }
                 });
-        });
-        match asked {
-            Asked::None => {}
-            Asked::Use(k) => {
-                let sites = self.session.document.state.project.kept[k].sites.clone();
-                self.session.use_gauges(sites);
-            }
-            Asked::Delete(k) => {
-                // Its name stays among those shown: when the deletion is taken back, so is this.
-                self.session.document.state.project.kept.remove(k);
-                self.session.document.settle();
-            }
+                ask.view.shown_kept = shown;
+            });
+    });
+    match asked {
+        Asked::None => {}
+        Asked::Use(k) => {
+            let sites = ask.project().kept[k].sites.clone();
+            ask.act(Change::UseGauges(sites));
+        }
+        Asked::Delete(k) => {
+            // Its name stays among those shown: when the deletion is taken back, so is this.
+            ask.act(Change::DeleteKept(k));
         }
     }
+}
 
-    /// Shows kept selections by their numbers, beside those that are shown already.
-    pub fn show_kept(&mut self, numbers: impl IntoIterator<Item = usize>) {
-        let kept = &self.session.document.state.project.kept;
-        let names = numbers
-            .into_iter()
-            .filter_map(|n| Some(kept.get(n)?.name.clone()));
-        self.shown_kept.extend(names);
-    }
-
-    /// Kept selections that are shown, with their numbers.
-    pub(super) fn compared(&self) -> impl Iterator<Item = (usize, &Kept)> {
-        let kept = self.session.document.state.project.kept.iter().enumerate();
-        kept.filter(|(_, kept)| self.shown_kept.contains(&kept.name))
-    }
-
-    /// The sites of the kept selections that are shown, as rhombs.
-    pub(super) fn paint_kept(&self, painter: &Painter, pane: Pane) {
-        let toward = self.view.camera.toward_eye();
-        for (k, kept) in self.compared() {
-            for site in &kept.sites {
-                let position = DVec3::from_array(site.position_mm) / 1000.0;
-                let (on, _) = self.view.index.nearest(position);
-                let away = self.session.document.part.normal(on).dot(toward) < 0.0;
-                let Some(at) = self.view.place_in(pane, position) else {
-                    continue;
-                };
-                let faint = pane == Pane::Limb && away;
-                let ink = colour(k).gamma_multiply(if faint { 0.45 } else { 1.0 });
-                painter.add(rhomb(at, 8.0, ink));
-            }
+/// The sites of the kept selections that are shown, as rhombs.
+pub fn paint_kept(look: Look<'_>, painter: &Painter, pane: Pane) {
+    let toward = look.view.camera.toward_eye();
+    for (k, kept) in look.view.compared(look.project()) {
+        for site in &kept.sites {
+            let position = DVec3::from_array(site.position_mm) / 1000.0;
+            let (on, _) = look.scene.index.nearest(position);
+            let away = look.session.document.part.normal(on).dot(toward) < 0.0;
+            let Some(at) = look.place_in(pane, position) else {
+                continue;
+            };
+            let faint = pane == Pane::Limb && away;
+            let ink = kept_colour(k).gamma_multiply(if faint { 0.45 } else { 1.0 });
+            painter.add(rhomb(at, 8.0, ink));
         }
     }
 }
@@ -152,7 +117,7 @@ fn kept_row(
             }
         }
         let (rect, _) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::hover());
-        ui.painter().add(rhomb(rect.center(), 6.0, colour(k)));
+        ui.painter().add(rhomb(rect.center(), 6.0, kept_colour(k)));
     });
     let height = ui.spacing().interact_size.y;
     ui.add_sized([160.0, height], TextEdit::singleline(&mut kept.name))

@@ -3,4 +3,5 @@
 mod form;
 mod shown;
 
-pub(super) use form::LiveForm;
+pub use form::{LiveForm, live_form};
+pub use shown::{live_tab, paint_live};

@@ -2,12 +2,12 @@
 
 use egui::{Align2, Context, Id, Key, Modal, RichText, ScrollArea, TextEdit, Ui};
 
-use super::Studio;
-use super::commands::Command;
+use super::ask::Ask;
+use super::commands::{Command, why_not};
 
 /// The open palette.
 #[derive(Default)]
-pub(super) struct Palette {
+pub struct Palette {
     query: String,
     /// Which of those found is taken by Enter.
     marked: usize,
@@ -39,83 +39,78 @@ fn found(query: &str) -> Vec<Command> {
     all
 }
 
-impl Studio {
-    pub(super) fn palette(&mut self, ctx: &Context) {
-        let Some(mut palette) = self.palette.take() else {
-            return;
-        };
-        let mut chosen = None;
-        let modal = Modal::new(Id::unique("palette")).show(ctx, |ui| {
-            ui.set_width(420.0);
-            chosen = self.palette_rows(ui, &mut palette);
-        });
-        if let Some(command) = chosen {
-            self.execute(ctx, command);
-        } else if !modal.should_close() {
-            self.palette = Some(palette);
-        }
+/// The palette while it is open; whether it stays open.
+pub fn show(palette: &mut Palette, ctx: &Context, ask: &mut Ask<'_>) -> bool {
+    let mut chosen = None;
+    let modal = Modal::new(Id::unique("palette")).show(ctx, |ui| {
+        ui.set_width(420.0);
+        chosen = rows(ask, ui, palette);
+    });
+    if let Some(command) = chosen {
+        ask.command(command);
+        return false;
     }
+    !modal.should_close()
+}
 
-    fn palette_rows(&self, ui: &mut Ui, palette: &mut Palette) -> Option<Command> {
-        let input = ui.add(
-            TextEdit::singleline(&mut palette.query)
-                .hint_text("A command")
-                .desired_width(f32::INFINITY),
-        );
-        let input = input.accessible_name("Find a command");
-        input.request_focus();
-        if input.changed() {
-            palette.marked = 0;
-        }
-        let mut all = found(&palette.query);
-        all.sort_by_key(|c| !self.enabled(*c));
-        let (down, up, enter) = ui.input(|i| {
-            (
-                i.key_pressed(Key::ArrowDown),
-                i.key_pressed(Key::ArrowUp),
-                i.key_pressed(Key::Enter),
-            )
-        });
-        if down {
-            palette.marked += 1;
-        }
-        if up {
-            palette.marked = palette.marked.saturating_sub(1);
-        }
-        palette.marked = palette.marked.min(all.len().saturating_sub(1));
-        let mut chosen = all.get(palette.marked).copied().filter(|_| enter);
-        ui.separator();
-        if all.is_empty() {
-            ui.weak("No command has these letters");
-        }
-        ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
-            for (k, &command) in all.iter().enumerate() {
-                if self.palette_row(ui, command, k == palette.marked, down || up) {
-                    chosen = Some(command);
-                }
+fn rows(ask: &Ask<'_>, ui: &mut Ui, palette: &mut Palette) -> Option<Command> {
+    let input = ui.add(
+        TextEdit::singleline(&mut palette.query)
+            .hint_text("A command")
+            .desired_width(f32::INFINITY),
+    );
+    let input = input.accessible_name("Find a command");
+    input.request_focus();
+    if input.changed() {
+        palette.marked = 0;
+    }
+    let mut all = found(&palette.query);
+    all.sort_by_key(|c| !ask.enabled(*c));
+    let (down, up, enter) = ui.input(|i| {
+        (
+            i.key_pressed(Key::ArrowDown),
+            i.key_pressed(Key::ArrowUp),
+            i.key_pressed(Key::Enter),
+        )
+    });
+    if down {
+        palette.marked += 1;
+    }
+    if up {
+        palette.marked = palette.marked.saturating_sub(1);
+    }
+    palette.marked = palette.marked.min(all.len().saturating_sub(1));
+    let mut chosen = all.get(palette.marked).copied().filter(|_| enter);
+    ui.separator();
+    if all.is_empty() {
+        ui.weak("No command has these letters");
+    }
+    ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
+        for (k, &command) in all.iter().enumerate() {
+            if row(ask, ui, command, k == palette.marked, down || up) {
+                chosen = Some(command);
             }
-        });
-        chosen
-    }
+        }
+    });
+    chosen
+}
 
-    /// One command with its key and what it does; whether it was clicked.
-    fn palette_row(&self, ui: &mut Ui, command: Command, marked: bool, moved: bool) -> bool {
-        let mut button = egui::Button::selectable(marked, command.name())
-            .min_size(egui::vec2(ui.available_width(), 0.0));
-        if let Some(shortcut) = command.shortcut() {
-            button =
-                button.shortcut_text(RichText::new(ui.ctx().format_shortcut(&shortcut)).weak());
-        }
-        let response = ui
-            .add_enabled(self.enabled(command), button)
-            .accessible_name(format!("Palette: {}", command.name()))
-            .on_hover_text(command.tooltip())
-            .on_disabled_hover_text(self.no_help(command).unwrap_or(command.tooltip()));
-        if marked && moved {
-            response.scroll_to_me(Some(Align2::CENTER_CENTER.y()));
-        }
-        response.clicked()
+/// One command with its key and what it does; whether it was clicked.
+fn row(ask: &Ask<'_>, ui: &mut Ui, command: Command, marked: bool, moved: bool) -> bool {
+    let mut button = egui::Button::selectable(marked, command.name())
+        .min_size(egui::vec2(ui.available_width(), 0.0));
+    if let Some(shortcut) = command.shortcut() {
+        button = button.shortcut_text(RichText::new(ui.ctx().format_shortcut(&shortcut)).weak());
     }
+    let response = ui
+        .add_enabled(ask.enabled(command), button)
+        .accessible_name(format!("Palette: {}", command.name()))
+        .on_hover_text(command.tooltip())
+        .on_disabled_hover_text(why_not(ask.session, command));
+    if marked && moved {
+        response.scroll_to_me(Some(Align2::CENTER_CENTER.y()));
+    }
+    response.clicked()
 }
 
 #[cfg(test)]

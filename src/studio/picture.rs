@@ -5,24 +5,20 @@ use std::path::PathBuf;
 use eframe::egui_wgpu::RenderState;
 use egui::{Context, FullOutput, Pos2, RawInput, Rect, vec2};
 
-use super::Studio;
+use super::paint::Look;
+use super::scene::Scene;
+use super::view::View;
+use super::{layout, theme};
+use crate::document::Document;
 use crate::io::atomic;
 use crate::io::project_file::LoadedProject;
 use crate::job::{Reporter, Stop};
-use crate::render::camera::Preset;
-use crate::render::offscreen;
-use crate::session::Task;
+use crate::mesh::TriMesh;
+use crate::render::camera::Camera;
+use crate::render::{gpu, offscreen};
+use crate::session::{Session, Task, Wake};
 
-/// What is asked of a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Picture {
-    /// Width and height in pixels.
-    pub size: [u32; 2],
-    /// The side to look from; three-quarters from above where there is none.
-    pub view: Option<Preset>,
-    /// Leave out what is behind the limb.
-    pub transparent: bool,
-}
+pub use super::view::Picture;
 
 /// Height of the window, in points, that a picture is drawn like: gauges and letters grow with the pixels.
 const POINTS: f32 = 720.0;
@@ -33,14 +29,18 @@ const POINTS: f32 = 720.0;
 /// A message in the user's terms.
 pub fn png(loaded: LoadedProject, picture: &Picture) -> Result<Vec<u8>, String> {
     let state = offscreen::adapter()?;
+    gpu::install(&state);
     let ctx = Context::default();
-    let mut studio = Studio::on(&state, &ctx, loaded, None);
+    theme::apply(&ctx);
+    let session = Session::new(Document::new(loaded, None), Wake::default());
+    let mut view = View::of(&session.document);
+    let mut scene = Scene::of(&session.document, &session.shape);
     if let Some(preset) = picture.view {
-        studio.view.camera.look_from(preset);
+        view.camera.look_from(preset);
     }
     let [width, height] = picture.size.map(|s| s as f32);
-    fit(&mut studio, width / height);
-    let output = studio.drawn(&ctx, picture);
+    fit(&mut view.camera, &session.document.part, width / height);
+    let output = drawn(&session, &view, &mut scene, &ctx, picture);
     finish(&state, &ctx, output, picture.size)
 }
 
@@ -56,72 +56,77 @@ fn finish(
     encode(pixels, size)
 }
 
-impl Studio {
-    /// The 3D view as it would be in a window of a picture's size, on a context of its own.
-    fn drawn(&mut self, ctx: &Context, picture: &Picture) -> FullOutput {
-        let [width, height] = picture.size.map(|s| s as f32);
-        let points = vec2(width, height) * (POINTS / height.max(1.0));
-        let mut input = RawInput {
-            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, points)),
-            ..RawInput::default()
-        };
-        for viewport in input.viewports.values_mut() {
-            viewport.native_pixels_per_point = Some(height / POINTS);
-        }
-        ctx.run_ui(input, |ui| {
-            let rect = ui.ctx().content_rect();
-            self.scene(ui, rect, picture.transparent);
-        })
+/// The 3D view as it would be in a window of a picture's size, on a context of its own.
+fn drawn(
+    session: &Session,
+    view: &View,
+    scene: &mut Scene,
+    ctx: &Context,
+    picture: &Picture,
+) -> FullOutput {
+    let [width, height] = picture.size.map(|s| s as f32);
+    let points = vec2(width, height) * (POINTS / height.max(1.0));
+    let mut input = RawInput {
+        screen_rect: Some(Rect::from_min_size(Pos2::ZERO, points)),
+        ..RawInput::default()
+    };
+    for viewport in input.viewports.values_mut() {
+        viewport.native_pixels_per_point = Some(height / POINTS);
     }
+    let mut view = view.clone();
+    ctx.run_ui(input, |ui| {
+        let rect = ui.ctx().content_rect();
+        view.rect = rect;
+        scene.build(session, &view);
+        let look = Look {
+            session,
+            view: &view,
+            scene,
+        };
+        layout::picture(look, ui, rect, picture.transparent);
+    })
+}
 
-    /// Writes what the 3D view shows into a PNG file.
-    pub(super) fn save_picture(
-        &mut self,
-        ctx: &Context,
-        path: PathBuf,
-        size: [u32; 2],
-        transparent: bool,
-    ) {
-        let picture = Picture {
-            size,
-            view: None,
-            transparent,
-        };
-        // On a context and an adapter of its own: the window goes on meanwhile.
-        let own = Context::default();
-        own.set_theme(ctx.theme());
-        let rect = self.view.rect;
-        let mut output = self.drawn(&own, &picture);
-        self.view.rect = rect;
-        let work = move |_: &Reporter| {
-            let state = offscreen::adapter().inspect_err(|_| output.textures_delta.clear());
-            let state = state.map_err(Stop::Failed)?;
-            crate::render::gpu::install(&state);
-            let png = finish(&state, &own, output, size).map_err(Stop::Failed)?;
-            atomic::write(&path, &png).map_err(|e| Stop::Failed(e.to_string()))?;
-            Ok(path)
-        };
-        self.session
-            .jobs
-            .start(Task::Picture, (), work, |s, (), path| {
-                s.tell(format!("The picture is in {}", path.display()));
-            });
-    }
+/// Writes what the 3D view shows into a PNG file, in the background.
+pub(super) fn save(
+    session: &mut Session,
+    view: &View,
+    scene: &mut Scene,
+    ctx: &Context,
+    path: PathBuf,
+    picture: &Picture,
+) {
+    // On a context and an adapter of its own: the window goes on meanwhile.
+    let own = Context::default();
+    own.set_theme(ctx.theme());
+    let mut output = drawn(session, view, scene, &own, picture);
+    let size = picture.size;
+    let work = move |_: &Reporter| {
+        let state = offscreen::adapter().inspect_err(|_| output.textures_delta.clear());
+        let state = state.map_err(Stop::Failed)?;
+        gpu::install(&state);
+        let png = finish(&state, &own, output, size).map_err(Stop::Failed)?;
+        atomic::write(&path, &png).map_err(|e| Stop::Failed(e.to_string()))?;
+        Ok(path)
+    };
+    (session.jobs).start(Task::Picture, (), work, |s, (), path| {
+        s.tell(format!("The picture is in {}", path.display()));
+    });
 }
 
 /// Comes as near as shows all of the limb.
-fn fit(studio: &mut Studio, aspect: f32) {
+fn fit(camera: &mut Camera, part: &TriMesh, aspect: f32) {
     /// Of half the picture.
     const FILLED: f64 = 0.9;
     // Perspective: what is nearer grows more, so the second time corrects the first.
     for _ in 0..4 {
-        let projection = studio.view.camera.projection(aspect);
-        let reach = (studio.session.document.part.positions().iter())
+        let projection = camera.projection(aspect);
+        let reach = (part.positions().iter())
             .filter_map(|&p| projection.place(p))
             .map(|(at, _)| 2.0 * (at - 0.5).abs().max_element())
             .fold(0.0, f64::max);
         if reach > 0.0 {
-            studio.view.camera.distance *= reach / FILLED;
+            camera.distance *= reach / FILLED;
         }
     }
 }

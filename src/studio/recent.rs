@@ -3,8 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::Studio;
-use super::dialogs::Dialog;
+use egui::Ui;
+
+use super::action::WindowAction;
+use super::ask::Ask;
 use crate::io::atomic;
 
 /// Files kept.
@@ -13,7 +15,7 @@ const FILE: &str = "recent.json";
 
 /// The list, the latest first, and where it is kept between runs.
 #[derive(Default)]
-pub(super) struct Recent {
+pub struct Recent {
     file: Option<PathBuf>,
     paths: Vec<PathBuf>,
 }
@@ -45,51 +47,27 @@ impl Recent {
         }
     }
 
-    /// Those that are still there.
-    pub fn paths(&self) -> impl Iterator<Item = &PathBuf> {
-        self.paths.iter().filter(|p| p.exists())
-    }
-}
-
-impl Studio {
-    /// Keeps the list of recent files in a folder from now on.
-    pub fn keep_recent_in(&mut self, home: &Path) {
-        self.recent = Recent::kept_in(home);
-    }
-
-    pub(super) fn recent_menu(&mut self, ui: &mut egui::Ui) {
-        let mut chosen = None;
+    /// The menu of them.
+    pub fn menu(&self, ui: &mut Ui, ask: &mut Ask<'_>) {
         ui.menu_button("Open recent", |ui| {
             let mut any = false;
-            for path in self.recent.paths() {
+            for path in self.paths() {
                 any = true;
                 let name = path.file_name().unwrap_or_default().to_string_lossy();
                 let entry = ui.button(&*name).on_hover_text(path.display().to_string());
                 if entry.clicked() {
-                    chosen = Some(path.clone());
+                    ask.act(WindowAction::OpenOrAsk(path.clone()));
                 }
             }
             if !any {
                 ui.weak("Nothing yet");
             }
         });
-        if let Some(path) = chosen {
-            self.open_or_ask(&path);
-        }
     }
 
-    /// Opens a file, or asks where something would be lost or is not known.
-    pub(super) fn open_or_ask(&mut self, path: &Path) {
-        if path.extension().is_some_and(|e| e == crate::link::ENDING) {
-            self.stage = super::Stage::Live;
-            return self.session.connect(&path.display().to_string());
-        }
-        let dialog = Dialog::open_dropped(path);
-        if dialog.needs_unit() || self.session.document.is_dirty() {
-            self.dialog = Some(dialog);
-        } else {
-            self.session.open_path(path, None);
-        }
+    /// Those that are still there.
+    pub fn paths(&self) -> impl Iterator<Item = &PathBuf> {
+        self.paths.iter().filter(|p| p.exists())
     }
 }
 

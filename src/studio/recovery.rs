@@ -12,7 +12,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use egui::{Context, Id, Modal};
 use serde::{Deserialize, Serialize};
 
-use super::Studio;
+use super::action::WindowAction;
+use super::ask::Ask;
 use crate::document::{Document, State};
 use crate::io::examples::write_bundled_mesh;
 use crate::io::{atomic, project_file};
@@ -40,7 +41,7 @@ struct Left {
 }
 
 /// What this window keeps aside.
-pub(super) struct Recovery {
+pub struct Recovery {
     folder: PathBuf,
     _lock: Option<File>,
     kept: Option<State>,
@@ -113,6 +114,84 @@ impl Recovery {
         });
         self.writing = Some(receiver);
     }
+
+    /// Keeps what has changed, when it is time; an error in the user's terms comes back.
+    pub fn keep(&mut self, document: &Document, ctx: &Context) -> Option<String> {
+        let failed = match self.writing.as_ref().map(Receiver::try_recv) {
+            Some(Err(TryRecvError::Empty)) => return None,
+            Some(Ok(Err(message))) => Some(message),
+            _ => None,
+        };
+        self.writing = None;
+        if document.asks_for_another_part() {
+            // Masks of this mesh beside settings for another would be read by nobody.
+        } else if !document.is_dirty() {
+            if self.kept.is_some() {
+                self.forget();
+            }
+        } else if self.kept.as_ref() != Some(&document.state) {
+            let since = self.written.elapsed();
+            if since >= EVERY {
+                self.write(document);
+            } else {
+                ctx.request_repaint_after(EVERY.saturating_sub(since));
+            }
+        }
+        failed.map(|message| format!("Unsaved changes could not be kept aside: {message}"))
+    }
+
+    fn offered(&self) -> Option<&Left> {
+        self.left.first().filter(|_| !self.asked)
+    }
+
+    /// Whether somebody is being asked about what was left behind.
+    #[must_use]
+    pub fn offers(&self) -> bool {
+        self.offered().is_some()
+    }
+
+    /// Offers what was left behind, one project at a time.
+    pub fn show(&self, ctx: &Context, ask: &mut Ask<'_>) {
+        let Some(left) = self.offered() else {
+            return;
+        };
+        let modal = Modal::new(Id::unique("recovery dialog"));
+        modal.show(ctx, |ui| {
+            ui.set_width(420.0);
+            ui.heading("Recover unsaved changes?");
+            ui.label(format!(
+                "The studio ended before the changes of {} were saved. They were kept aside.",
+                left.origin.name
+            ));
+            ui.add_space(6.0);
+            ui.horizontal(|ui| {
+                if ui.button("Recover changes").clicked() {
+                    ask.act(WindowAction::Recover);
+                }
+                if ui.button("Discard them").clicked() {
+                    ask.act(WindowAction::DropLeft);
+                }
+            });
+        });
+    }
+
+    /// The first that was left, to be opened: its folder, its project and the file that this came from. Whether or not it
+    /// can be read, it is offered once.
+    pub fn take_left(&mut self) -> Option<(PathBuf, PathBuf, Option<PathBuf>)> {
+        self.asked = true;
+        let left = self.left.first()?;
+        let project = left.folder.join(PROJECT);
+        Some((left.folder.clone(), project, left.origin.path.clone()))
+    }
+
+    /// The first that was left is not needed any more.
+    pub fn drop_left(&mut self) {
+        if !self.left.is_empty() {
+            let left = self.left.remove(0);
+            self.asked = false;
+            let _ = fs::remove_dir_all(&left.folder);
+        }
+    }
 }
 
 fn absolute(path: &Path) -> PathBuf {
@@ -166,104 +245,4 @@ fn left_behind(home: &Path, own: &Path) -> Vec<Left> {
         .collect();
     left.sort_by(|a, b| a.folder.cmp(&b.folder));
     left
-}
-
-impl Studio {
-    /// Keeps unsaved changes in a folder from now on, and offers what was left there.
-    pub fn keep_unsaved_in(&mut self, home: &Path) {
-        self.recovery = Some(Recovery::new(home));
-    }
-
-    /// Keeps what has changed, when it is time.
-    pub(super) fn keep_unsaved(&mut self, ctx: &Context) {
-        let Some(recovery) = &mut self.recovery else {
-            return;
-        };
-        let failed = match recovery.writing.as_ref().map(Receiver::try_recv) {
-            Some(Err(TryRecvError::Empty)) => return,
-            Some(Ok(Err(message))) => Some(message),
-            _ => None,
-        };
-        recovery.writing = None;
-        if self.session.document.asks_for_another_part() {
-            // Masks of this mesh beside settings for another would be read by nobody.
-        } else if !self.session.document.is_dirty() {
-            if recovery.kept.is_some() {
-                recovery.forget();
-            }
-        } else if recovery.kept.as_ref() != Some(&self.session.document.state) {
-            let since = recovery.written.elapsed();
-            if since >= EVERY {
-                recovery.write(&self.session.document);
-            } else {
-                ctx.request_repaint_after(EVERY.saturating_sub(since));
-            }
-        }
-        if let Some(message) = failed {
-            self.session.complain(format!(
-                "Unsaved changes could not be kept aside: {message}"
-            ));
-        }
-    }
-
-    fn left(&self) -> Option<&Left> {
-        let open = self.recovery.as_ref().filter(|r| !r.asked);
-        open.and_then(|r| r.left.first())
-    }
-
-    /// Whether somebody is being asked about what was left behind.
-    pub(super) fn offers_recovery(&self) -> bool {
-        self.left().is_some()
-    }
-
-    /// Offers what was left behind, one project at a time.
-    pub(super) fn recovery_dialog(&mut self, ctx: &Context) {
-        let Some(left) = self.left() else {
-            return;
-        };
-        let (mut recover, mut discard) = (false, false);
-        let modal = Modal::new(Id::unique("recovery dialog"));
-        modal.show(ctx, |ui| {
-            ui.set_width(420.0);
-            ui.heading("Recover unsaved changes?");
-            ui.label(format!(
-                "The studio ended before the changes of {} were saved. They were kept aside.",
-                left.origin.name
-            ));
-            ui.add_space(6.0);
-            ui.horizontal(|ui| {
-                recover = ui.button("Recover changes").clicked();
-                discard = ui.button("Discard them").clicked();
-            });
-        });
-        if recover {
-            self.recover();
-        } else if discard {
-            self.drop_left();
-        }
-    }
-
-    fn recover(&mut self) {
-        let Some(recovery) = &mut self.recovery else {
-            return;
-        };
-        // Whether or not it can be read: it is offered once.
-        recovery.asked = true;
-        if let Some(left) = recovery.left.first() {
-            let (folder, path) = (left.folder.clone(), left.origin.path.clone());
-            let project = folder.join(PROJECT);
-            self.session.open_kept(folder, project, path);
-        }
-    }
-
-    /// The first that was left is not needed any more.
-    pub(super) fn drop_left(&mut self) {
-        if let Some(recovery) = &mut self.recovery
-            && !recovery.left.is_empty()
-        {
-            let left = recovery.left.remove(0);
-            recovery.asked = false;
-            let _ = fs::remove_dir_all(&left.folder);
-        }
-    }
 }

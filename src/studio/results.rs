@@ -3,60 +3,18 @@
 use egui::{Color32, Response, RichText, Role, Ui, WidgetInfo};
 use egui_plot::{Corner, HLine, Legend, Line, LineStyle, Plot, PlotPoints, PlotUi, Points};
 
-use super::Studio;
+use super::action::Change;
+use super::ask::Ask;
+use super::commands::Command;
+use super::paint::empty;
+use super::theme::kept_colour;
+use super::view::{Tab, Tool};
 use crate::evaluation::{BASELINE, EVERYWHERE, EstimatorKind};
 use crate::io::artifacts::{range, signal_to_noise, signal_unit};
 use crate::io::report::{curve, failure_curve, failure_name, failure_ways};
 use crate::placement::SensorSet;
 use crate::placement::expected_error::ASSUMES;
-
-/// What is shown below the views.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Tab {
-    #[default]
-    Error,
-    Failures,
-    Compare,
-    Gauges,
-    Confusions,
-    Reduction,
-    Trade,
-    Live,
-    Jobs,
-}
-
-impl Tab {
-    const ALL: [Self; 9] = [
-        Self::Error,
-        Self::Failures,
-        Self::Compare,
-        Self::Gauges,
-        Self::Confusions,
-        Self::Reduction,
-        Self::Trade,
-        Self::Live,
-        Self::Jobs,
-    ];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Error => "Error",
-            Self::Failures => "Failures",
-            Self::Compare => "Compare",
-            Self::Gauges => "Gauge table",
-            Self::Confusions => "Confusions",
-            Self::Reduction => "Reduction",
-            Self::Trade => "Trade",
-            Self::Live => "Strains",
-            Self::Jobs => "Jobs",
-        }
-    }
-
-    /// Whether it shows what a design found.
-    fn is_of_design(self) -> bool {
-        matches!(self, Self::Error | Self::Failures | Self::Reduction)
-    }
-}
+use crate::session::NOBODY_REDUCES;
 
 /// One for each selector; told apart by colour-blind eyes too (Okabe and Ito).
 const COLOURS: [Color32; 5] = [
@@ -104,364 +62,348 @@ fn figure(response: &Response, label: &str) {
     response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, label));
 }
 
-impl Studio {
-    pub(super) fn results(&mut self, ui: &mut Ui) {
-        // A resizable panel that is not filled shrinks a little every frame.
-        ui.set_min_height(ui.available_height());
-        ui.add_space(4.0);
-        ui.horizontal(|ui| {
-            for tab in Tab::ALL {
-                ui.selectable_value(&mut self.results, tab, tab.name());
-            }
-            if self.session.design_holds() == Some(false) && self.results.is_of_design() {
-                ui.colored_label(super::theme::STALE, "of settings that have changed since");
-            }
-            self.by_hand_label(ui);
-            self.certificate_label(ui);
-            self.doubt_label(ui);
-        });
-        ui.separator();
-        let nothing = self.session.results.design.is_none() && self.compared().next().is_none();
-        if nothing && self.results.is_of_design() {
-            let press =
-                "Press “Select gauges” to choose the sites and judge them on unseen touches";
-            let shown = self.session.gauges_before_selection();
-            empty(
-                ui,
-                &shown.map_or_else(
-                    || format!("Nothing selected yet. {press}"),
-                    |shown| format!("{shown}, and not judged yet. {press}"),
-                ),
-            );
-            return;
+/// The names of the tabs, and what holds for all that a design found; whether there is anything to show below.
+pub fn header(ask: &mut Ask<'_>, ui: &mut Ui) -> bool {
+    // A resizable panel that is not filled shrinks a little every frame.
+    ui.set_min_height(ui.available_height());
+    ui.add_space(4.0);
+    ui.horizontal(|ui| {
+        for tab in Tab::ALL {
+            ui.selectable_value(&mut ask.view.tab, tab, tab.name());
         }
-        match self.results {
-            Tab::Error => self.error_plots(ui),
-            Tab::Failures => self.failure_plots(ui),
-            Tab::Gauges => self.gauge_table(ui),
-            Tab::Confusions => self.confusions_tab(ui),
-            Tab::Compare => self.compare_tab(ui),
-            Tab::Reduction => self.reduction_plot(ui),
-            Tab::Trade => self.trade_tab(ui),
-            Tab::Live => self.live_tab(ui),
-            Tab::Jobs => self.jobs_tab(ui),
+        if ask.session.design_holds() == Some(false) && ask.view.tab.is_of_design() {
+            ui.colored_label(super::theme::STALE, "of settings that have changed since");
         }
-    }
-
-    /// Beside every figure of a design that cannot be trusted: that it cannot, and why.
-    fn doubt_label(&self, ui: &mut Ui) {
-        let doubts = self
-            .session
-            .results
-            .design
-            .as_ref()
-            .map_or_else(Vec::new, |d| d.value.design.doubts());
-        if doubts.is_empty() || !self.results.is_of_design() {
-            return;
-        }
-        let numbers: Vec<&str> = doubts.iter().map(|d| d.number).collect();
-        let words: Vec<&str> = doubts.iter().map(|d| d.words.as_str()).collect();
-        let text = format!("not to be trusted: {}", numbers.join(", "));
-        ui.colored_label(super::theme::ERROR, text)
-            .on_hover_text(words.join("\n"));
-    }
-
-    /// How far the selected gauges are at most from the best ones, while they stand as they were selected.
-    fn certificate_label(&self, ui: &mut Ui) {
-        let set = self
-            .session
-            .results
-            .design
-            .as_ref()
-            .and_then(|d| d.value.design.chosen_set());
-        let words = set.and_then(SensorSet::certified);
-        if let Some(words) =
-            words.filter(|_| self.results.is_of_design() && self.session.as_designed())
-        {
-            ui.separator();
-            // Cut rather than make the panel wider than the window.
-            let label = egui::Label::new(words).truncate();
-            ui.add(label).on_hover_text(ASSUMES);
-        }
-    }
-
-    /// What gauges that were moved by hand do to the error.
-    fn by_hand_label(&self, ui: &mut Ui) {
-        let sites = &self.session.document.state.project.selection.sites;
-        if !self.session.knows_hand() || sites.is_empty() || self.session.as_designed() {
-            return;
-        }
-        let text = match self.session.by_hand_error() {
-            (_, Some(mm)) => format!("by hand: {mm:.2} mm on unseen touches"),
-            (Some(mm), None) => format!("by hand: about {mm:.2} mm, judging …"),
-            (None, None) => "by hand: …".into(),
-        };
-        let chosen = self.session.results.design.as_ref().and_then(|d| {
-            let (lead, count) = (d.value.design.lead.name(), d.value.design.chosen().len());
-            let mut rows = d.value.design.evaluation.rows.iter();
-            rows.find(|r| r.selector == lead && r.sensors == count && r.region == EVERYWHERE)
-        });
-        let beside = chosen.map_or(String::new(), |r| {
-            format!("; as selected {:.2} mm", r.error_mm)
-        });
-        ui.separator();
-        ui.label(RichText::new(text + &beside).color(super::theme::TOUCHED));
-    }
-
-    fn regions(&self) -> Vec<String> {
-        let designed = self
-            .session
-            .results
-            .design
-            .iter()
-            .flat_map(|d| &d.value.design.evaluation.rows);
-        let kept = self.compared().flat_map(|(_, k)| &k.errors);
-        let mut regions: Vec<String> = Vec::new();
-        for region in designed.map(|r| &r.region).chain(kept.map(|e| &e.region)) {
-            if !regions.contains(region) {
-                regions.push(region.clone());
-            }
-        }
-        regions
-    }
-
-    fn error_plots(&self, ui: &mut Ui) {
-        let regions = self.regions();
-        let height = ui.available_height() - 26.0;
-        ui.columns(regions.len().max(1), |columns| {
-            for (ui, region) in columns.iter_mut().zip(&regions) {
-                ui.label(RichText::new(region).strong());
-                let id = ("error", region);
-                let shown = plot(id, height, Corner::RightTop, "gauges", "mean error (mm)")
-                    .show(ui, |plot| self.error_curves(plot, region));
-                let label = format!("Error against number of gauges, {region}");
-                figure(&shown.response, &label);
-            }
-        });
-    }
-
-    fn error_curves(&self, plot: &mut PlotUi<'_>, region: &str) {
-        if let Some(design) = self
-            .session
-            .results
-            .design
-            .as_ref()
-            .map(|d| &d.value.design)
-        {
-            for (k, selection) in design.selections.iter().enumerate() {
-                let points = curve(design, selection.selector, region);
-                let colour = COLOURS[k % COLOURS.len()];
-                draw(plot, selection.selector.title(), &points, colour, false);
-            }
-            let mut rows = design.evaluation.rows.iter();
-            if let Some(row) = rows.find(|r| r.selector == BASELINE && r.region == *region) {
-                let name = format!("all {} candidates", row.sensors);
-                plot.hline(HLine::new(name, row.error_mm).color(Color32::GRAY));
-            }
-        }
-        for (k, kept) in self.compared() {
-            let rows = kept.errors.iter().filter(|e| e.region == *region);
-            let points: Vec<(f64, f64)> = rows.map(|e| (e.sensors as f64, e.mean_mm)).collect();
-            draw(plot, &kept.name, &points, super::kept::colour(k), true);
-        }
-    }
-
-    fn failure_plots(&self, ui: &mut Ui) {
-        let height = ui.available_height() - 26.0;
-        let design = self
-            .session
-            .results
-            .design
-            .as_ref()
-            .map(|d| &d.value.design);
-        let by = design.map_or(EstimatorKind::Svr, |d| d.evaluation.judging.estimator());
-        let ways = failure_ways(by);
-        ui.columns(ways.len(), |columns| {
-            for (ui, &(retrained, title)) in columns.iter_mut().zip(ways) {
-                ui.label(RichText::new(title).strong());
-                let id = ("failures", retrained);
-                let shown = plot(
-                    id,
-                    height,
-                    Corner::RightBottom,
-                    "failed gauges",
-                    "mean error (mm)",
-                )
-                .show(ui, |plot| self.failure_curves(plot, retrained));
-                figure(&shown.response, title);
-            }
-        });
-    }
-
-    fn failure_curves(&self, plot: &mut PlotUi<'_>, retrained: bool) {
-        let sets = self
-            .session
-            .results
-            .design
-            .iter()
-            .flat_map(|d| &d.value.design.evaluation.failures);
-        for (k, set) in sets.enumerate() {
-            let colour = COLOURS[k % COLOURS.len()];
-            draw(
-                plot,
-                failure_name(set),
-                &failure_curve(set, retrained),
-                colour,
-                false,
-            );
-        }
-        for (k, kept) in self.compared() {
-            let rows = kept
-                .failures
-                .iter()
-                .filter(|f| f.retrained == retrained || f.failed == 0);
-            let points: Vec<(f64, f64)> = rows.map(|f| (f.failed as f64, f.mean_mm)).collect();
-            draw(plot, &kept.name, &points, super::kept::colour(k), true);
-        }
-    }
-
-    fn reduction_plot(&self, ui: &mut Ui) {
-        let Some(result) = &self.session.results.design else {
-            return;
-        };
-        let Some(candidates) = &result.value.design.candidates else {
-            let feasible = result.value.design.reduced.feasible.len();
-            empty(
-                ui,
-                &format!("All {feasible} feasible sites are candidates. {NOBODY_REDUCES}"),
-            );
-            return;
-        };
-        let points: Vec<(f64, f64)> = (candidates.curve.iter())
-            .map(|p| (p.sites as f64, 100.0 * p.unexplained))
-            .collect();
-        let height = ui.available_height() - 4.0;
-        let target = 100.0 * result.value.snapshot.project.candidates.unexplained;
-        let shown = Plot::new("reduction")
-            .height(height)
-            .legend(Legend::default().position(Corner::RightTop))
-            .x_axis_label("sites kept")
-            .y_axis_label("held-out variance unexplained (%)")
-            .include_y(0.0)
-            .allow_scroll(false)
-            .show(ui, |plot| {
-                draw(plot, "PCA-QR", &points, COLOURS[0], false);
-                plot.hline(HLine::new("asked for", target).color(Color32::GRAY));
-            });
-        figure(&shown.response, "Unexplained variance against sites kept");
-    }
-
-    /// The project's gauges; with a design also what they will report.
-    fn gauge_table(&mut self, ui: &mut Ui) {
-        let sites = self.session.document.state.project.selection.sites.clone();
-        if sites.is_empty() {
-            empty(
-                ui,
-                "No gauges chosen yet. Press “Select gauges”, or put some with the tool “Gauges” and Ctrl-click",
-            );
-            return;
-        }
-        let designed = self.session.as_designed();
-        let mut asked = None;
-        egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
-            egui::Grid::new("gauges")
-                .num_columns(11)
-                .striped(true)
-                .spacing([18.0, 3.0])
-                .show(ui, |ui| {
-                    for title in ["Gauge", "Pinned", "x (mm)", "y (mm)", "z (mm)", "Direction"] {
-                        ui.strong(title);
-                    }
-                    if let Some(d) = self.session.results.design.as_ref().filter(|_| designed) {
-                        let unit = signal_unit(d.value.design.simulated.dataset.signal);
-                        ui.strong(format!("Signal, from – to ({unit})"));
-                        ui.strong("Rms strain (µε)");
-                        ui.strong("Signal to noise");
-                    }
-                    ui.end_row();
-                    for (k, site) in sites.iter().enumerate() {
-                        if let Some(what) = self.gauge_row(ui, k, site) {
-                            asked = Some((k, what));
-                        }
-                        if designed {
-                            self.report_cells(ui, k);
-                        }
-                        ui.end_row();
-                    }
-                });
-        });
-        match asked {
-            None => {}
-            Some((k, Row::Pick)) => {
-                self.picked = vec![k];
-                self.view.take(super::Tool::Gauges);
-            }
-            Some((k, Row::Add)) => self.picked.push(k),
-            Some((k, Row::Frame)) => {
-                self.picked = vec![k];
-                let ctx = ui.ctx().clone();
-                self.execute(&ctx, super::Command::FramePicked);
-            }
-            Some((k, Row::Pin)) => {
-                self.picked = vec![k];
-                self.session.pin_gauges(&self.picked);
-            }
-        }
-    }
-
-    /// Number, pin, place and direction of a gauge, and what was pressed.
-    fn gauge_row(&self, ui: &mut Ui, k: usize, site: &crate::project::ChosenSite) -> Option<Row> {
-        let picked = self.picked.contains(&k);
-        let number = RichText::new(format!("{:>3}", k + 1)).monospace();
-        let button = ui
-            .add(egui::Button::selectable(picked, number))
-            .on_hover_text("Pick it; double-click comes near to it")
-            .accessible_name(format!("Gauge {}", k + 1));
-        let shift = ui.input(|i| i.modifiers.shift);
-        let mut asked = match (button.double_clicked(), button.clicked()) {
-            (true, _) => Some(Row::Frame),
-            (_, true) if shift && !picked => Some(Row::Add),
-            (_, true) => Some(Row::Pick),
-            _ => None,
-        };
-        let mut pinned = self.session.pin_of(k).is_some();
-        let tick = ui
-            .checkbox(&mut pinned, "")
-            .on_hover_text("Selections must have a gauge here");
-        if tick
-            .accessible_name(format!("Pin gauge {}", k + 1))
-            .changed()
-        {
-            asked = Some(Row::Pin);
-        }
-        for x in site.position_mm {
-            ui.monospace(format!("{x:8.2}"));
-        }
-        let [x, y, z] = site.direction;
-        ui.monospace(format!("{x:+.3} {y:+.3} {z:+.3}"));
-        asked
-    }
-
-    /// What a gauge of the design will report.
-    fn report_cells(&self, ui: &mut Ui, k: usize) {
-        let Some(d) = &self.session.results.design else {
-            return;
-        };
-        let dataset = &d.value.design.simulated.dataset;
-        let index = d.value.design.chosen()[k];
-        let (low, high) = range(dataset, index);
-        let rms = dataset.sites[index].rms_strain;
-        let decimals = if signal_unit(dataset.signal) == "mm" {
-            3
-        } else {
-            0
-        };
-        ui.monospace(format!("{low:8.decimals$} – {high:8.decimals$}"));
-        ui.monospace(format!("{:7.0}", rms * 1e6));
-        ui.monospace(
-            signal_to_noise(&d.value.snapshot, rms).map_or("–".into(), |r| format!("{r:7.0}")),
+        by_hand_label(ask, ui);
+        certificate_label(ask, ui);
+        doubt_label(ask, ui);
+    });
+    ui.separator();
+    let any = ask.session.results.design.is_some()
+        || ask.view.compared(ask.project()).next().is_some()
+        || !ask.view.tab.is_of_design();
+    if !any {
+        let press = "Press “Select gauges” to choose the sites and judge them on unseen touches";
+        let shown = ask.session.gauges_before_selection();
+        empty(
+            ui,
+            &shown.map_or_else(
+                || format!("Nothing selected yet. {press}"),
+                |shown| format!("{shown}, and not judged yet. {press}"),
+            ),
         );
     }
+    any
+}
+
+/// Beside every figure of a design that cannot be trusted: that it cannot, and why.
+fn doubt_label(ask: &Ask<'_>, ui: &mut Ui) {
+    let doubts = ask
+        .session
+        .results
+        .design
+        .as_ref()
+        .map_or_else(Vec::new, |d| d.value.design.doubts());
+    if doubts.is_empty() || !ask.view.tab.is_of_design() {
+        return;
+    }
+    let numbers: Vec<&str> = doubts.iter().map(|d| d.number).collect();
+    let words: Vec<&str> = doubts.iter().map(|d| d.words.as_str()).collect();
+    let text = format!("not to be trusted: {}", numbers.join(", "));
+    ui.colored_label(super::theme::ERROR, text)
+        .on_hover_text(words.join("\n"));
+}
+
+/// How far the selected gauges are at most from the best ones, while they stand as they were selected.
+fn certificate_label(ask: &Ask<'_>, ui: &mut Ui) {
+    let set = ask
+        .session
+        .results
+        .design
+        .as_ref()
+        .and_then(|d| d.value.design.chosen_set());
+    let words = set.and_then(SensorSet::certified);
+    if let Some(words) = words.filter(|_| ask.view.tab.is_of_design() && ask.session.as_designed())
+    {
+        ui.separator();
+        // Cut rather than make the panel wider than the window.
+        let label = egui::Label::new(words).truncate();
+        ui.add(label).on_hover_text(ASSUMES);
+    }
+}
+
+/// What gauges that were moved by hand do to the error.
+fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
+    let sites = &ask.project().selection.sites;
+    if !ask.session.knows_hand() || sites.is_empty() || ask.session.as_designed() {
+        return;
+    }
+    let text = match ask.session.by_hand_error() {
+        (_, Some(mm)) => format!("by hand: {mm:.2} mm on unseen touches"),
+        (Some(mm), None) => format!("by hand: about {mm:.2} mm, judging …"),
+        (None, None) => "by hand: …".into(),
+    };
+    let chosen = ask.session.results.design.as_ref().and_then(|d| {
+        let (lead, count) = (d.value.design.lead.name(), d.value.design.chosen().len());
+        let mut rows = d.value.design.evaluation.rows.iter();
+        rows.find(|r| r.selector == lead && r.sensors == count && r.region == EVERYWHERE)
+    });
+    let beside = chosen.map_or(String::new(), |r| {
+        format!("; as selected {:.2} mm", r.error_mm)
+    });
+    ui.separator();
+    ui.label(RichText::new(text + &beside).color(super::theme::TOUCHED));
+}
+
+fn regions(ask: &Ask<'_>) -> Vec<String> {
+    let designed = ask
+        .session
+        .results
+        .design
+        .iter()
+        .flat_map(|d| &d.value.design.evaluation.rows);
+    let kept = ask
+        .view
+        .compared(ask.project())
+        .flat_map(|(_, k)| &k.errors);
+    let mut regions: Vec<String> = Vec::new();
+    for region in designed.map(|r| &r.region).chain(kept.map(|e| &e.region)) {
+        if !regions.contains(region) {
+            regions.push(region.clone());
+        }
+    }
+    regions
+}
+
+pub fn error_plots(ask: &Ask<'_>, ui: &mut Ui) {
+    let regions = regions(ask);
+    let height = ui.available_height() - 26.0;
+    ui.columns(regions.len().max(1), |columns| {
+        for (ui, region) in columns.iter_mut().zip(&regions) {
+            ui.label(RichText::new(region).strong());
+            let id = ("error", region);
+            let shown = plot(id, height, Corner::RightTop, "gauges", "mean error (mm)")
+                .show(ui, |plot| error_curves(ask, plot, region));
+            let label = format!("Error against number of gauges, {region}");
+            figure(&shown.response, &label);
+        }
+    });
+}
+
+fn error_curves(ask: &Ask<'_>, plot: &mut PlotUi<'_>, region: &str) {
+    if let Some(design) = ask.session.results.design.as_ref().map(|d| &d.value.design) {
+        for (k, selection) in design.selections.iter().enumerate() {
+            let points = curve(design, selection.selector, region);
+            let colour = COLOURS[k % COLOURS.len()];
+            draw(plot, selection.selector.title(), &points, colour, false);
+        }
+        let mut rows = design.evaluation.rows.iter();
+        if let Some(row) = rows.find(|r| r.selector == BASELINE && r.region == *region) {
+            let name = format!("all {} candidates", row.sensors);
+            plot.hline(HLine::new(name, row.error_mm).color(Color32::GRAY));
+        }
+    }
+    for (k, kept) in ask.view.compared(ask.project()) {
+        let rows = kept.errors.iter().filter(|e| e.region == *region);
+        let points: Vec<(f64, f64)> = rows.map(|e| (e.sensors as f64, e.mean_mm)).collect();
+        draw(plot, &kept.name, &points, kept_colour(k), true);
+    }
+}
+
+pub fn failure_plots(ask: &Ask<'_>, ui: &mut Ui) {
+    let height = ui.available_height() - 26.0;
+    let design = ask.session.results.design.as_ref().map(|d| &d.value.design);
+    let by = design.map_or(EstimatorKind::Svr, |d| d.evaluation.judging.estimator());
+    let ways = failure_ways(by);
+    ui.columns(ways.len(), |columns| {
+        for (ui, &(retrained, title)) in columns.iter_mut().zip(ways) {
+            ui.label(RichText::new(title).strong());
+            let id = ("failures", retrained);
+            let shown = plot(
+                id,
+                height,
+                Corner::RightBottom,
+                "failed gauges",
+                "mean error (mm)",
+            )
+            .show(ui, |plot| failure_curves(ask, plot, retrained));
+            figure(&shown.response, title);
+        }
+    });
+}
+
+fn failure_curves(ask: &Ask<'_>, plot: &mut PlotUi<'_>, retrained: bool) {
+    let sets = ask
+        .session
+        .results
+        .design
+        .iter()
+        .flat_map(|d| &d.value.design.evaluation.failures);
+    for (k, set) in sets.enumerate() {
+        let colour = COLOURS[k % COLOURS.len()];
+        draw(
+            plot,
+            failure_name(set),
+            &failure_curve(set, retrained),
+            colour,
+            false,
+        );
+    }
+    for (k, kept) in ask.view.compared(ask.project()) {
+        let rows = kept
+            .failures
+            .iter()
+            .filter(|f| f.retrained == retrained || f.failed == 0);
+        let points: Vec<(f64, f64)> = rows.map(|f| (f.failed as f64, f.mean_mm)).collect();
+        draw(plot, &kept.name, &points, kept_colour(k), true);
+    }
+}
+
+pub fn reduction_plot(ask: &Ask<'_>, ui: &mut Ui) {
+    let Some(result) = &ask.session.results.design else {
+        return;
+    };
+    let Some(candidates) = &result.value.design.candidates else {
+        let feasible = result.value.design.reduced.feasible.len();
+        empty(
+            ui,
+            &format!("All {feasible} feasible sites are candidates. {NOBODY_REDUCES}"),
+        );
+        return;
+    };
+    let points: Vec<(f64, f64)> = (candidates.curve.iter())
+        .map(|p| (p.sites as f64, 100.0 * p.unexplained))
+        .collect();
+    let height = ui.available_height() - 4.0;
+    let target = 100.0 * result.value.snapshot.project.candidates.unexplained;
+    let shown = Plot::new("reduction")
+        .height(height)
+        .legend(Legend::default().position(Corner::RightTop))
+        .x_axis_label("sites kept")
+        .y_axis_label("held-out variance unexplained (%)")
+        .include_y(0.0)
+        .allow_scroll(false)
+        .show(ui, |plot| {
+            draw(plot, "PCA-QR", &points, COLOURS[0], false);
+            plot.hline(HLine::new("asked for", target).color(Color32::GRAY));
+        });
+    figure(&shown.response, "Unexplained variance against sites kept");
+}
+
+/// The project's gauges; with a design also what they will report.
+pub fn gauge_table(ask: &mut Ask<'_>, ui: &mut Ui) {
+    let sites = ask.project().selection.sites.clone();
+    if sites.is_empty() {
+        empty(
+            ui,
+            "No gauges chosen yet. Press “Select gauges”, or put some with the tool “Gauges” and Ctrl-click",
+        );
+        return;
+    }
+    let designed = ask.session.as_designed();
+    let mut asked = None;
+    egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+        egui::Grid::new("gauges")
+            .num_columns(11)
+            .striped(true)
+            .spacing([18.0, 3.0])
+            .show(ui, |ui| {
+                for title in ["Gauge", "Pinned", "x (mm)", "y (mm)", "z (mm)", "Direction"] {
+                    ui.strong(title);
+                }
+                if let Some(d) = ask.session.results.design.as_ref().filter(|_| designed) {
+                    let unit = signal_unit(d.value.design.simulated.dataset.signal);
+                    ui.strong(format!("Signal, from – to ({unit})"));
+                    ui.strong("Rms strain (µε)");
+                    ui.strong("Signal to noise");
+                }
+                ui.end_row();
+                for (k, site) in sites.iter().enumerate() {
+                    if let Some(what) = gauge_row(ask, ui, k, site) {
+                        asked = Some((k, what));
+                    }
+                    if designed {
+                        report_cells(ask, ui, k);
+                    }
+                    ui.end_row();
+                }
+            });
+    });
+    match asked {
+        None => {}
+        Some((k, Row::Pick)) => {
+            ask.view.picked = vec![k];
+            ask.view.take(Tool::Gauges);
+        }
+        Some((k, Row::Add)) => ask.view.picked.push(k),
+        Some((k, Row::Frame)) => {
+            ask.view.picked = vec![k];
+            ask.command(Command::FramePicked);
+        }
+        Some((k, Row::Pin)) => {
+            ask.view.picked = vec![k];
+            ask.act(Change::PinGauges(vec![k]));
+        }
+    }
+}
+
+/// Number, pin, place and direction of a gauge, and what was pressed.
+fn gauge_row(
+    ask: &Ask<'_>,
+    ui: &mut Ui,
+    k: usize,
+    site: &crate::project::ChosenSite,
+) -> Option<Row> {
+    let picked = ask.view.picked.contains(&k);
+    let number = RichText::new(format!("{:>3}", k + 1)).monospace();
+    let button = ui
+        .add(egui::Button::selectable(picked, number))
+        .on_hover_text("Pick it; double-click comes near to it")
+        .accessible_name(format!("Gauge {}", k + 1));
+    let shift = ui.input(|i| i.modifiers.shift);
+    let mut asked = match (button.double_clicked(), button.clicked()) {
+        (true, _) => Some(Row::Frame),
+        (_, true) if shift && !picked => Some(Row::Add),
+        (_, true) => Some(Row::Pick),
+        _ => None,
+    };
+    let mut pinned = ask.session.pin_of(k).is_some();
+    let tick = ui
+        .checkbox(&mut pinned, "")
+        .on_hover_text("Selections must have a gauge here");
+    if tick
+        .accessible_name(format!("Pin gauge {}", k + 1))
+        .changed()
+    {
+        asked = Some(Row::Pin);
+    }
+    for x in site.position_mm {
+        ui.monospace(format!("{x:8.2}"));
+    }
+    let [x, y, z] = site.direction;
+    ui.monospace(format!("{x:+.3} {y:+.3} {z:+.3}"));
+    asked
+}
+
+/// What a gauge of the design will report.
+fn report_cells(ask: &Ask<'_>, ui: &mut Ui, k: usize) {
+    let Some(d) = &ask.session.results.design else {
+        return;
+    };
+    let dataset = &d.value.design.simulated.dataset;
+    let index = d.value.design.chosen()[k];
+    let (low, high) = range(dataset, index);
+    let rms = dataset.sites[index].rms_strain;
+    let decimals = if signal_unit(dataset.signal) == "mm" {
+        3
+    } else {
+        0
+    };
+    ui.monospace(format!("{low:8.decimals$} – {high:8.decimals$}"));
+    ui.monospace(format!("{:7.0}", rms * 1e6));
+    ui.monospace(
+        signal_to_noise(&d.value.snapshot, rms).map_or("–".into(), |r| format!("{r:7.0}")),
+    );
 }
 
 /// What was pressed in a row of the table.
@@ -470,12 +412,4 @@ enum Row {
     Add,
     Frame,
     Pin,
-}
-
-/// Where no sites are left out as candidates, and what would leave some out.
-pub(super) const NOBODY_REDUCES: &str = "Nobody asks for fewer: greedy SVR chooses among candidates, a judge by regression compares sets with all of them together, and a fixed number may be asked for";
-
-pub(super) fn empty(ui: &mut Ui, text: &str) {
-    ui.add_space(12.0);
-    ui.vertical_centered(|ui| ui.weak(text));
 }

@@ -34,3 +34,20 @@ pub fn apply(ctx: &Context) {
         style.spacing.button_padding = egui::vec2(8.0, 4.0);
     });
 }
+
+/// Colours of kept selections, apart from each other for colour-blind eyes and from the selectors' own
+/// (M. Okabe and K. Ito, 2008; P. Tol, 2021).
+const KEPT: [Color32; 6] = [
+    Color32::from_rgb(240, 228, 66),
+    Color32::from_rgb(170, 68, 153),
+    Color32::from_rgb(136, 204, 238),
+    Color32::from_rgb(153, 153, 51),
+    Color32::from_rgb(204, 102, 119),
+    Color32::from_rgb(187, 187, 187),
+];
+
+/// The colour of a kept selection, by its number.
+#[must_use]
+pub fn kept_colour(k: usize) -> Color32 {
+    KEPT[k % KEPT.len()]
+}

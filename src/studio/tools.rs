@@ -4,325 +4,314 @@ use egui::{PointerButton, Pos2, Response, Ui};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::Studio;
-use super::fields::Field;
-use super::viewport::{Pane, Viewport};
+use super::action::{Compute, HandAction, History};
+use super::ask::Ask;
+use super::paint::exaggeration;
+use super::scene::{Scene, pick_on};
+use super::view::{Field, Gesture, Pane, Tool, View};
 use crate::document::Brush;
 use crate::mesh::{SurfacePoint, TriMesh};
-
-/// What the pointer does on the limb.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tool {
-    #[default]
-    Touch,
-    Gauges,
-    Paint,
-    Erase,
-    Box,
-    Lasso,
-    Measure,
-}
-
-impl Tool {
-    pub const ALL: [Self; 7] = [
-        Self::Touch,
-        Self::Gauges,
-        Self::Paint,
-        Self::Erase,
-        Self::Box,
-        Self::Lasso,
-        Self::Measure,
-    ];
-
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Touch => "Touch",
-            Self::Gauges => "Gauges",
-            Self::Paint => "Paint",
-            Self::Erase => "Erase",
-            Self::Box => "Box",
-            Self::Lasso => "Lasso",
-            Self::Measure => "Measure",
-        }
-    }
-
-    /// Whether it changes what is painted.
-    #[must_use]
-    pub fn paints(self) -> bool {
-        matches!(self, Self::Paint | Self::Erase | Self::Box | Self::Lasso)
-    }
-
-    /// Whether it has a radius.
-    #[must_use]
-    pub fn is_brush(self) -> bool {
-        matches!(self, Self::Paint | Self::Erase)
-    }
-
-    /// Whether a drag with the left button is its own and not a look around.
-    fn drags(self) -> bool {
-        self.paints() || self == Self::Gauges
-    }
-}
+use crate::project::ChosenSite;
 
 /// A click that moves less than this (points) is no drag.
 const TREMBLE: f32 = 4.0;
+/// How near (points) the pointer must be to a gauge to take it.
+const REACH: f32 = 14.0;
 
-/// What is under way between pressing and letting go.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) enum Gesture {
-    #[default]
-    None,
-    /// A stroke, and where its last dab was.
-    Stroke(Pane, Pos2),
-    /// The outline drawn so far.
-    Outline(Pane, Vec<Pos2>),
-    /// A gauge that is moved, by its number from zero, and where it was taken.
-    Gauge(Pane, usize, Pos2),
+/// Orbit with the right button (or the left one where the tool has no use for it), pan with the middle one or with Shift,
+/// zoom with the wheel; with Shift the wheel sets the brush.
+pub fn navigate(view: &mut View, ui: &Ui, response: &Response, pane: Pane) {
+    let drag = response.drag_delta();
+    let shift = ui.input(|i| i.modifiers.shift);
+    let left = response.dragged_by(PointerButton::Primary);
+    let free = !view.tool.drags() || view.is_idle();
+    let turning = response.dragged_by(PointerButton::Secondary) || left && free;
+    let panning = response.dragged_by(PointerButton::Middle) || turning && shift;
+    let moved = DVec2::new(f64::from(drag.x), f64::from(drag.y));
+    match pane {
+        Pane::Unrolled if panning || turning => view.pan_flat(drag),
+        Pane::Limb if panning => {
+            let height = f64::from(view.rect.height());
+            view.camera.pan(moved, height);
+        }
+        Pane::Limb if turning => view.camera.orbit(moved),
+        _ => {}
+    }
+    if !response.hovered() {
+        return;
+    }
+    let wheel = ui.input(|i| {
+        // With Shift a wheel scrolls sideways.
+        let scroll = i.smooth_scroll_delta();
+        scroll.x + scroll.y + 400.0 * (i.zoom_delta() - 1.0)
+    });
+    if wheel == 0.0 {
+        return;
+    }
+    let factor = (-0.0022 * f64::from(wheel)).exp();
+    match (pane, response.hover_pos()) {
+        _ if shift && view.tool.is_brush() => view.brush /= factor,
+        (Pane::Limb, _) => view.camera.zoom(factor),
+        (Pane::Unrolled, Some(at)) => view.zoom_flat(at, factor),
+        _ => {}
+    }
 }
 
-impl Studio {
-    /// Orbit with the right button (or the left one where the tool has no use for it), pan with the middle
-    /// one or with Shift, zoom with the wheel; with Shift the wheel sets the brush.
-    pub(super) fn navigate(&mut self, ui: &Ui, response: &Response, pane: Pane) {
-        let drag = response.drag_delta();
-        let shift = ui.input(|i| i.modifiers.shift);
-        let left = response.dragged_by(PointerButton::Primary);
-        let free = !self.view.tool.drags() || self.view.gesture == Gesture::None;
-        let turning = response.dragged_by(PointerButton::Secondary) || left && free;
-        let panning = response.dragged_by(PointerButton::Middle) || turning && shift;
-        let moved = DVec2::new(f64::from(drag.x), f64::from(drag.y));
-        match pane {
-            Pane::Unrolled if panning || turning => self.view.pan_flat(drag),
-            Pane::Limb if panning => {
-                let height = f64::from(self.view.rect.height());
-                self.view.camera.pan(moved, height);
-            }
-            Pane::Limb if turning => self.view.camera.orbit(moved),
-            _ => {}
-        }
-        if !response.hovered() {
-            return;
-        }
-        let wheel = ui.input(|i| {
-            // With Shift a wheel scrolls sideways.
-            let scroll = i.smooth_scroll_delta();
-            scroll.x + scroll.y + 400.0 * (i.zoom_delta() - 1.0)
-        });
-        if wheel == 0.0 {
-            return;
-        }
-        let factor = (-0.0022 * f64::from(wheel)).exp();
-        match (pane, response.hover_pos()) {
-            _ if shift && self.view.tool.is_brush() => self.view.brush /= factor,
-            (Pane::Limb, _) => self.view.camera.zoom(factor),
-            (Pane::Unrolled, Some(at)) => self.view.zoom_flat(at, factor),
-            _ => {}
-        }
+/// What the tool in hand does where the pointer is.
+pub fn use_tool(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, response: &Response, pane: Pane) {
+    let covered = ask.view.covered;
+    let free = |at: &Pos2| !covered.contains(*at);
+    if let Some(at) = response.hover_pos().filter(free) {
+        ask.view.hover = scene.pick(ask.view, pane, at);
     }
-
-    pub(super) fn use_tool(&mut self, ui: &Ui, response: &Response, pane: Pane) {
-        let covered = self.view.covered;
-        let free = |at: &Pos2| !covered.contains(*at);
-        if let Some(at) = response.hover_pos().filter(free) {
-            self.view.hover = self.view.pick(pane, at);
-        }
-        let at = response.interact_pointer_pos().or(response.hover_pos());
-        let clicked = response.clicked() && at.as_ref().is_none_or(free);
-        match self.view.tool {
-            Tool::Touch if clicked => {
-                self.press(pane, response.interact_pointer_pos());
-            }
-            Tool::Measure if clicked => {
-                let place = at.and_then(|at| self.view.pick(pane, at));
-                self.view.measure.take(place);
-                if let Some(ends) = self.view.measure.ends() {
-                    self.session.measure(ends);
-                }
-            }
-            _ => {}
-        }
-        let from = pressed_at(ui).filter(free);
-        if let Some(from) = from.filter(|_| response.contains_pointer()) {
-            self.begin(ui, pane, from);
-        }
-        // In the same frame too: where frames are slow, a hand has pressed and moved on in one.
-        if let Some(at) = at {
-            self.go_on(ui, pane, at);
-        }
-        if !ui.input(|i| i.pointer.primary_down()) {
-            self.let_go(ui, pane);
-        }
+    let at = response.interact_pointer_pos().or(response.hover_pos());
+    if response.clicked() && at.as_ref().is_none_or(free) {
+        click(scene, ask, response, pane);
     }
-
-    /// The left button goes down.
-    fn begin(&mut self, ui: &Ui, pane: Pane, from: Pos2) {
-        match self.view.tool {
-            Tool::Gauges => self.grab(ui, pane, from),
-            Tool::Paint | Tool::Erase if self.view.pick(pane, from).is_some() => {
-                self.view.gesture = Gesture::Stroke(pane, from);
-                self.stroke(ui, pane, from);
-            }
-            Tool::Box | Tool::Lasso => {
-                self.view.gesture = Gesture::Outline(pane, vec![from]);
-            }
-            _ => {}
-        }
+    let from = pressed_at(ui).filter(free);
+    if let Some(from) = from.filter(|_| response.contains_pointer()) {
+        begin(scene, ask, ui, pane, from);
     }
-
-    /// The pointer moves while something is under way in this view.
-    fn go_on(&mut self, ui: &Ui, pane: Pane, at: Pos2) {
-        match &mut self.view.gesture {
-            Gesture::Stroke(own, _) if *own == pane => self.stroke(ui, pane, at),
-            Gesture::Outline(own, outline) if *own == pane => match self.view.tool {
-                Tool::Box => outline.splice(1.., [at]).for_each(drop),
-                _ if outline.last().is_some_and(|last| last.distance(at) > 3.0) => outline.push(at),
-                _ => {}
-            },
-            Gesture::Gauge(own, number, from) if *own == pane && from.distance(at) > TREMBLE => {
-                // From here on it follows however little the pointer moves.
-                *from = Pos2::new(f32::MAX, 0.0);
-                let number = *number;
-                self.drag_gauge(pane, number, at);
-            }
-            _ => {}
-        }
+    // In the same frame too: where frames are slow, a hand has pressed and moved on in one.
+    if let Some(at) = at {
+        go_on(scene, ask, ui, pane, at);
     }
+    if !ui.input(|i| i.pointer.primary_down()) {
+        let_go(scene, ask, ui, pane);
+    }
+}
 
-    fn let_go(&mut self, ui: &Ui, pane: Pane) {
-        let own = match &self.view.gesture {
-            Gesture::None => return,
-            Gesture::Stroke(own, _) | Gesture::Outline(own, _) | Gesture::Gauge(own, ..) => *own,
+fn click(scene: &Scene, ask: &mut Ask<'_>, response: &Response, pane: Pane) {
+    match ask.view.tool {
+        Tool::Touch => press(scene, ask, pane, response.interact_pointer_pos()),
+        Tool::Measure => {
+            let at = response.interact_pointer_pos().or(response.hover_pos());
+            let place = at.and_then(|at| scene.pick(ask.view, pane, at));
+            ask.view.measure.take(place);
+            if let Some(ends) = ask.view.measure.ends() {
+                ask.act(Compute::Distance(ends));
+            }
+        }
+        _ => {}
+    }
+}
+
+/// The left button goes down.
+fn begin(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, from: Pos2) {
+    match ask.view.tool {
+        Tool::Gauges => grab(scene, ask, ui, pane, from),
+        Tool::Paint | Tool::Erase if scene.pick(ask.view, pane, from).is_some() => {
+            ask.view.gesture = Gesture::Stroke(pane, from);
+            stroke(scene, ask, ui, pane, from);
+        }
+        Tool::Box | Tool::Lasso => {
+            ask.view.gesture = Gesture::Outline(pane, vec![from]);
+        }
+        _ => {}
+    }
+}
+
+/// The pointer moves while something is under way in this view.
+fn go_on(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, at: Pos2) {
+    let tool = ask.view.tool;
+    match &mut ask.view.gesture {
+        Gesture::Stroke(own, _) if *own == pane => stroke(scene, ask, ui, pane, at),
+        Gesture::Outline(own, outline) if *own == pane => match tool {
+            Tool::Box => outline.splice(1.., [at]).for_each(drop),
+            _ if outline.last().is_some_and(|last| last.distance(at) > 3.0) => outline.push(at),
+            _ => {}
+        },
+        Gesture::Gauge(own, number, from) if *own == pane && from.distance(at) > TREMBLE => {
+            // From here on it follows however little the pointer moves.
+            *from = Pos2::new(f32::MAX, 0.0);
+            let number = *number;
+            let there = number < ask.project().selection.sites.len();
+            if let Some(site) = site_at(scene, ask, pane, at, number).filter(|_| there) {
+                ask.act(HandAction::PutGauge(number, site));
+            }
+        }
+        _ => {}
+    }
+}
+
+fn let_go(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane) {
+    let own = match &ask.view.gesture {
+        Gesture::None => return,
+        Gesture::Stroke(own, _) | Gesture::Outline(own, _) | Gesture::Gauge(own, ..) => *own,
+    };
+    if own != pane {
+        return;
+    }
+    match std::mem::take(&mut ask.view.gesture) {
+        Gesture::Outline(_, outline) => mark_inside(scene, ask, ui, pane, outline),
+        // What the move does to the error is found out when the window is next drawn.
+        Gesture::Gauge(..) => ui.ctx().request_repaint(),
+        _ => {}
+    }
+    ask.act(History::Settle);
+}
+
+fn press(scene: &Scene, ask: &mut Ask<'_>, pane: Pane, at: Option<Pos2>) {
+    let Some(place) = at.and_then(|at| pick_shown(scene, ask, pane, at)) else {
+        return ask.act(Compute::LetGo);
+    };
+    ask.act(Compute::Press(place));
+    if !matches!(ask.view.field, Field::Strain | Field::Displacement) {
+        ask.view.field = Field::Strain;
+    }
+}
+
+/// The point of the limb under a place of the window, on the shape that is shown there.
+fn pick_shown(scene: &Scene, ask: &Ask<'_>, pane: Pane, at: Pos2) -> Option<SurfacePoint> {
+    match ask.session.caches.touching.result() {
+        Some(touched) if pane == Pane::Limb && exaggeration(ask.session, ask.view).is_some() => {
+            pick_on(ask.view, &touched.index, at)
+        }
+        _ => scene.pick(ask.view, pane, at),
+    }
+}
+
+/// The pointer goes down with the gauges in hand: on one it is picked and may be moved, beside them none is. Shift picks
+/// several, Control puts a new one there.
+fn grab(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, at: Pos2) {
+    let modifiers = ui.input(|i| i.modifiers);
+    let away = |n: &usize| {
+        let place = ask.session.gauge_place(*n);
+        let place = place.and_then(|p| scene.place_in(ask.view, pane, p));
+        place.map_or(f32::INFINITY, |p| p.distance(at))
+    };
+    let count = ask.project().selection.sites.len();
+    let nearest = (0..count).min_by(|a, b| away(a).total_cmp(&away(b)));
+    match nearest.filter(|n| away(n) < REACH) {
+        Some(number) if modifiers.shift => {
+            let picked = &mut ask.view.picked;
+            match picked.iter().position(|&n| n == number) {
+                Some(k) => drop(picked.remove(k)),
+                None => picked.push(number),
+            }
+        }
+        Some(number) => {
+            ask.view.picked = vec![number];
+            ask.view.gesture = Gesture::Gauge(pane, number, at);
+        }
+        None if modifiers.command => {
+            if let Some(site) = site_at(scene, ask, pane, at, usize::MAX) {
+                ask.view.picked = vec![count];
+                ask.act(HandAction::AddGauge(site));
+            }
+        }
+        None if !modifiers.shift => ask.view.picked.clear(),
+        None => {}
+    }
+}
+
+/// The site for a gauge nearest to a place of a view.
+fn site_at(
+    scene: &Scene,
+    ask: &Ask<'_>,
+    pane: Pane,
+    at: Pos2,
+    number: usize,
+) -> Option<ChosenSite> {
+    let place = scene.pick(ask.view, pane, at)?;
+    ask.session.site_near(place, number)
+}
+
+/// What a brush or outline does now: Control turns it around, as elsewhere.
+fn brush(view: &View, ui: &Ui) -> Brush {
+    let erases = view.tool == Tool::Erase;
+    if erases == ui.input(|i| i.modifiers.ctrl) {
+        Brush::Paint
+    } else {
+        Brush::Erase
+    }
+}
+
+/// Dabs along the way from the last pointer sample, so that a fast stroke has no gaps: half a radius apart, nearer where
+/// that is less than a few points of the window.
+fn stroke(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, to: Pos2) {
+    const MOST: f32 = 256.0;
+    let Gesture::Stroke(_, from) = ask.view.gesture else {
+        return;
+    };
+    let part = &ask.session.document.part;
+    let step = dab_step(scene, ask.view, part, pane, to).max(4.0);
+    let steps = ((to - from).length() / step).ceil().clamp(1.0, MOST) as usize;
+    let radius = ask.view.brush;
+    let mut dabs = Vec::new();
+    for k in 1..=steps {
+        let at = from.lerp(to, k as f32 / steps as f32);
+        let Some(place) = scene.pick(ask.view, pane, at) else {
+            continue;
         };
-        if own != pane {
-            return;
-        }
-        match std::mem::take(&mut self.view.gesture) {
-            Gesture::Outline(_, outline) => self.paint_inside(ui, pane, outline),
-            // What the move does to the error is found out when the window is next drawn.
-            Gesture::Gauge(..) => ui.ctx().request_repaint(),
-            _ => {}
-        }
-        self.session.document.settle();
-    }
-
-    fn press(&mut self, pane: Pane, at: Option<Pos2>) {
-        match at.and_then(|at| self.pick_shown(pane, at)) {
-            Some(place) => {
-                self.session.press(place);
-                if !matches!(self.view.field, Field::Strain | Field::Displacement) {
-                    self.view.field = Field::Strain;
-                }
+        dabs.push(place);
+        if let Some(image) = scene.image(ask.view, part.point(place)) {
+            let (image, off) = scene.index.nearest(image);
+            // A part that is not its own mirror image has nothing there.
+            if off < radius {
+                dabs.push(image);
             }
-            None => self.session.let_go(),
         }
     }
+    let brush = brush(ask.view, ui);
+    ask.act(HandAction::Dab(ask.view.layer, brush, dabs, radius));
+    ask.view.gesture = Gesture::Stroke(pane, to);
+}
 
-    /// The point of the limb under a place of the window, on the shape that is shown there.
-    fn pick_shown(&self, pane: Pane, at: Pos2) -> Option<SurfacePoint> {
-        match self.session.caches.touching.result() {
-            Some(touched) if pane == Pane::Limb && self.exaggeration().is_some() => {
-                self.view.pick_on(&touched.index, at)
-            }
-            _ => self.view.pick(pane, at),
-        }
-    }
-
-    /// What a brush or outline does now: Control turns it around, as elsewhere.
-    fn brush(&self, ui: &Ui) -> Brush {
-        let erases = self.view.tool == Tool::Erase;
-        if erases == ui.input(|i| i.modifiers.ctrl) {
-            Brush::Paint
-        } else {
-            Brush::Erase
-        }
-    }
-
-    /// Dabs along the way from the last pointer sample, so that a fast stroke has no gaps: half a radius
-    /// apart, nearer where that is less than a few points of the window.
-    fn stroke(&mut self, ui: &Ui, pane: Pane, to: Pos2) {
-        const MOST: f32 = 256.0;
-        let brush = self.brush(ui);
-        let Gesture::Stroke(_, from) = self.view.gesture else {
-            return;
-        };
-        let step = self.dab_step(pane, to).max(4.0);
-        let steps = ((to - from).length() / step).ceil().clamp(1.0, MOST) as usize;
-        let radius = self.view.brush;
-        for k in 1..=steps {
-            let at = from.lerp(to, k as f32 / steps as f32);
-            let Some(place) = self.view.pick(pane, at) else {
-                continue;
+/// Half the brush's radius in points of the window.
+fn dab_step(scene: &Scene, view: &View, part: &TriMesh, pane: Pane, at: Pos2) -> f32 {
+    match pane {
+        Pane::Unrolled => (0.5 * view.brush / view.flat.1) as f32,
+        Pane::Limb => {
+            let Some(place) = scene.pick(view, pane, at) else {
+                return 0.0;
             };
-            self.session
-                .document
-                .dab(self.view.layer, brush, place, radius);
-            if let Some(image) = self.view.image(self.session.document.part.point(place)) {
-                let (image, off) = self.view.index.nearest(image);
-                // A part that is not its own mirror image has nothing there.
-                if off < radius {
-                    self.session
-                        .document
-                        .dab(self.view.layer, brush, image, radius);
-                }
-            }
-        }
-        self.view.gesture = Gesture::Stroke(pane, to);
-    }
-
-    /// Half the brush's radius in points of the window.
-    fn dab_step(&self, pane: Pane, at: Pos2) -> f32 {
-        match pane {
-            Pane::Unrolled => (0.5 * self.view.brush / self.view.flat_view().1) as f32,
-            Pane::Limb => {
-                let Some(place) = self.view.pick(pane, at) else {
-                    return 0.0;
-                };
-                let p = self.session.document.part.point(place);
-                let side = self.view.camera.side() * self.view.brush * 0.5;
-                let ends = [self.view.place(p), self.view.place(p + side)];
-                match ends {
-                    [Some(a), Some(b)] => a.distance(b),
-                    _ => 0.0,
-                }
+            let p = part.point(place);
+            let side = view.camera.side() * view.brush * 0.5;
+            let ends = [view.place(p), view.place(p + side)];
+            match ends {
+                [Some(a), Some(b)] => a.distance(b),
+                _ => 0.0,
             }
         }
     }
+}
 
-    /// Paints the vertices inside an outline: those that can be seen, or all where walls are see-through.
-    fn paint_inside(&mut self, ui: &Ui, pane: Pane, mut outline: Vec<Pos2>) {
-        if let (Tool::Box, [a, b]) = (self.view.tool, &outline[..]) {
-            outline = vec![*a, Pos2::new(b.x, a.y), *b, Pos2::new(a.x, b.y)];
-        }
-        if outline.len() < 3 {
-            return;
-        }
-        let brush = self.brush(ui);
-        let part = std::sync::Arc::clone(&self.session.document.part);
-        let bounds = egui::Rect::from_points(&outline);
-        let place = self.view.placing(pane);
-        let inside: Vec<u32> = (0..part.positions().len() as u32)
-            .filter(|&v| {
-                let at = place(part.positions()[v as usize]);
-                at.is_some_and(|at| bounds.contains(at) && encloses(&outline, at))
-            })
-            .collect();
-        let through = pane == Pane::Unrolled || self.view.see_through;
-        let inside: Vec<u32> = (inside.into_par_iter())
-            .filter(|&v| through || is_seen(&self.view, &part, v))
-            .collect();
-        self.session.document.mark(self.view.layer, brush, inside);
+/// Marks the vertices inside an outline: those that can be seen, or all where walls are see-through.
+fn mark_inside(scene: &Scene, ask: &mut Ask<'_>, ui: &Ui, pane: Pane, mut outline: Vec<Pos2>) {
+    if let (Tool::Box, [a, b]) = (ask.view.tool, &outline[..]) {
+        outline = vec![*a, Pos2::new(b.x, a.y), *b, Pos2::new(a.x, b.y)];
     }
+    if outline.len() < 3 {
+        return;
+    }
+    let (session, view) = (ask.session, &*ask.view);
+    let part = &session.document.part;
+    let bounds = egui::Rect::from_points(&outline);
+    let place = scene.placing(view, pane);
+    let drawn: Vec<u32> = (0..part.positions().len() as u32)
+        .filter(|&v| {
+            let at = place(part.positions()[v as usize]);
+            at.is_some_and(|at| bounds.contains(at) && encloses(&outline, at))
+        })
+        .collect();
+    let through = pane == Pane::Unrolled || view.see_through;
+    let inside: Vec<u32> = (drawn.into_par_iter())
+        .filter(|&v| through || is_seen(scene, view, part, v))
+        .collect();
+    let (layer, brush) = (view.layer, brush(view, ui));
+    drop(place);
+    ask.act(HandAction::Mark(layer, brush, inside));
 }
 
 /// Whether nothing of the part lies between the eye and one of its vertices.
-fn is_seen(view: &Viewport, part: &TriMesh, vertex: u32) -> bool {
+fn is_seen(scene: &Scene, view: &View, part: &TriMesh, vertex: u32) -> bool {
     let p = part.positions()[vertex as usize];
     let Some(at) = view.place(p) else {
         return false;
     };
     let near = 1e-3 * view.camera.distance + part.mean_edge();
-    let hit = view.pick(Pane::Limb, at);
+    let hit = scene.pick(view, Pane::Limb, at);
     hit.is_none_or(|hit| part.point(hit).distance(p) < near)
 }
 

@@ -34,20 +34,23 @@ const ORDER: [&[&str]; 14] = [
     &["project"],
     &["design", "study"],
     &["given", "trade"],
-    &["io", "job", "link", "document", "render", "cli", "studio"],
+    &[
+        "io", "job", "link", "document", "render", "session", "cli", "studio",
+    ],
 ];
 
 /// Among the outer modules, who may use whom.
-pub const OUTER: [(&str, &[&str]); 7] = [
+pub const OUTER: [(&str, &[&str]); 8] = [
     ("io", &[]),
     ("job", &[]),
     ("link", &[]),
     ("render", &[]),
     ("document", &["io"]),
-    ("cli", &["io", "link"]),
+    ("session", &["io", "job", "link", "document"]),
+    ("cli", &["io", "link", "session"]),
     (
         "studio",
-        &["io", "job", "link", "document", "render", "cli"],
+        &["io", "job", "link", "document", "render", "session"],
     ),
 ];
 
@@ -58,42 +61,44 @@ const KNOWN: [(&str, &[&str]); 2] = [
         "a document and what is painted on it",
         &["document.rs", "document/paint.rs"],
     ),
-    ("the window", WINDOW),
+    ("a session and what is done with it", SESSION),
 ];
 
-const WINDOW: &[&str] = &[
-    "studio.rs",
-    "studio/advice.rs",
-    "studio/commands.rs",
-    "studio/confusions.rs",
-    "studio/dialogs.rs",
-    "studio/drive.rs",
-    "studio/expected.rs",
-    "studio/fields.rs",
-    "studio/gauges.rs",
-    "studio/helping.rs",
-    "studio/inspector.rs",
-    "studio/jobs.rs",
-    "studio/kept.rs",
-    "studio/live.rs",
-    "studio/live/form.rs",
-    "studio/live/known.rs",
-    "studio/live/shown.rs",
-    "studio/measure.rs",
-    "studio/opening.rs",
-    "studio/overlay.rs",
-    "studio/palette.rs",
-    "studio/picture.rs",
-    "studio/recent.rs",
-    "studio/recovery.rs",
-    "studio/results.rs",
-    "studio/saving.rs",
-    "studio/stages.rs",
-    "studio/toolbar.rs",
-    "studio/tools.rs",
-    "studio/trade.rs",
-    "studio/trade/tab.rs",
-    "studio/viewport.rs",
+const SESSION: &[&str] = &[
+    "session.rs",
+    "session/attention.rs",
+    "session/confusions.rs",
+    "session/drive.rs",
+    "session/expected.rs",
+    "session/fields.rs",
+    "session/gauges.rs",
+    "session/jobs.rs",
+    "session/live.rs",
+    "session/live/known.rs",
+    "session/measure.rs",
+    "session/results.rs",
+    "session/saving.rs",
+    "session/touching.rs",
+    "session/trade.rs",
+    "session/walls.rs",
+];
+
+/// What shows and asks in the window. `studio/layout.rs` alone knows them all.
+const PANELS: [&str; 14] = [
+    "confusions",
+    "dialogs",
+    "inspector",
+    "jobs",
+    "kept",
+    "live",
+    "measure",
+    "menu",
+    "overlay",
+    "palette",
+    "results",
+    "stages",
+    "toolbar",
+    "trade",
 ];
 
 fn level(module: &str) -> usize {
@@ -172,4 +177,45 @@ fn no_files_know_each_other_in_a_circle() {
             "{free:?} stand in no circle any more: take them out of KNOWN, {circle}"
         );
     }
+}
+
+#[test]
+fn no_panel_of_the_window_knows_another() {
+    let source = Source::read();
+    let panel = |file: usize| {
+        let name = source.files[file].name.strip_prefix("studio/")?;
+        let first = name.split(['/', '.']).next()?;
+        PANELS.into_iter().find(|panel| *panel == first)
+    };
+    let all: BTreeSet<&str> = (0..source.files.len()).filter_map(panel).collect();
+    assert_eq!(
+        all,
+        BTreeSet::from(PANELS),
+        "a panel is gone or has another name"
+    );
+    let wrong: Vec<String> = arrows(&source)
+        .keys()
+        .filter_map(|&(from, to)| {
+            let (from, to) = (panel(from)?, panel(to)?);
+            (from != to).then(|| format!("{from} knows {to}"))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn what_the_window_does_stands_in_one_file() {
+    let source = Source::read();
+    let of_window = source.impls.iter().filter(|block| {
+        let target = source.resolve(block.module, &block.of);
+        target.is_some_and(|t| t.item.as_deref() == Some("Studio"))
+    });
+    let files: BTreeSet<&str> = of_window
+        .map(|block| {
+            source.files[source.modules[block.module].file]
+                .name
+                .as_str()
+        })
+        .collect();
+    assert_eq!(files, BTreeSet::from(["studio.rs"]));
 }

@@ -67,7 +67,7 @@ fn sections_mirrors_and_new_boxes_follow_the_axis_of_the_part() {
             assert_eq!(section.normal, stance.direction(side), "{axis:?}");
             assert!(section.cuts(stance.direction(side) * 10.0));
         }
-        let image = w.harness.state().view.image(DVec3::ZERO).unwrap();
+        let image = w.harness.state().image(DVec3::ZERO).unwrap();
         assert!(image.cross(stance.right()).length() < 1e-12, "{axis:?}");
         let document = &mut w.session_mut().document;
         document.state.project.supports.clear();

@@ -217,7 +217,7 @@ fn by_hand(w: &mut Window) {
     w.drag(&path);
     let moved = w.session().document.state.project.selection.sites[gauge].clone();
     assert_ne!(moved, sites[gauge], "the gauge follows the pointer");
-    assert_eq!(w.harness.state().picked, [gauge]);
+    assert_eq!(w.harness.state().view.picked, [gauge]);
     assert_eq!(gauges(w), sites.len());
     // An estimate at once, the exact figure after it.
     let start = Instant::now();
@@ -235,7 +235,7 @@ fn by_hand(w: &mut Window) {
     // Pinned, it stays where it is in the next selection.
     w.press("Pin");
     assert_eq!(
-        w.harness.state().picked,
+        w.harness.state().view.picked,
         [gauge],
         "the button is over the view, not in it"
     );
@@ -351,7 +351,7 @@ fn every_control_has_a_name() {
     let mut w = Window::open();
     w.press("Section");
     for stage in Stage::ALL {
-        w.harness.state_mut().stage = stage;
+        w.harness.state_mut().view.stage = stage;
         w.harness.run_ok();
         w.assert_named(&format!("{stage:?}"));
     }

@@ -591,7 +591,7 @@ fn one_key_adds_the_gauge_that_helps_most() {
     w.key(Modifiers::NONE, egui::Key::A);
     w.wait("the gauge", 120, |s| !s.busy());
     assert_eq!(gauges(&w).len(), sites.len() + 1);
-    assert_eq!(w.harness.state().picked, [sites.len()]);
+    assert_eq!(w.harness.state().view.picked, [sites.len()]);
     let after = expected(&mut w);
     assert!(after < before, "{after} {before}");
     w.key(Modifiers::COMMAND, egui::Key::Z);
@@ -607,7 +607,7 @@ fn one_key_finds_the_gauge_that_helps_least() {
     let sites = gauges(&w);
     w.key(Modifiers::NONE, egui::Key::W);
     w.wait("the gauge", 120, |s| !s.busy());
-    let picked = w.harness.state().picked.clone();
+    let picked = w.harness.state().view.picked.clone();
     assert_eq!(picked.len(), 1);
     assert_eq!(gauges(&w), sites, "it is marked, not taken");
     w.key(Modifiers::NONE, egui::Key::Delete);

@@ -197,7 +197,7 @@ impl Window {
     /// Where a point of the limb (mm) is in the unrolled view.
     pub fn flat_place(&self, x: f64, y: f64, z: f64) -> Pos2 {
         let p = DVec3::new(x, y, z) / 1000.0;
-        self.harness.state().view.flat_place(p).unwrap()
+        self.harness.state().flat_place(p).unwrap()
     }
 
     /// Writes what the window shows into the folder that `HAPDEF_PICTURES` names, if it does.

@@ -5,9 +5,11 @@ use std::fmt::Write as _;
 use egui::{Align2, Color32, Painter, Rect, RichText, Role, Stroke, Ui, WidgetInfo, pos2, vec2};
 use glam::DVec3;
 
-use super::super::overlay::label;
-use super::super::viewport::Pane;
-use super::super::{Stage, Studio, theme};
+use super::super::ask::Ask;
+use super::super::paint::{Look, label};
+use super::super::theme;
+use super::super::view::{Pane, Stage};
+use super::super::words::live_in_words;
 use crate::inference::Contact;
 use crate::live::{Estimator, Health};
 use crate::session::{Feed, STRIPS_S, Strip};
@@ -26,171 +28,171 @@ fn colour(estimator: Estimator) -> Color32 {
         .unwrap_or(0)]
 }
 
-impl Studio {
-    pub(in super::super) fn paint_live(&self, painter: &Painter, pane: Pane) {
-        self.paint_proposed(painter, pane);
-        self.session
-            .live
-            .look(|feed| self.paint_heard(painter, pane, feed));
-    }
+/// What is heard of a touch, over the limb.
+pub fn paint_live(look: Look<'_>, painter: &Painter, pane: Pane) {
+    paint_proposed(look, painter, pane);
+    look.session
+        .live
+        .look(|feed| paint_heard(look, painter, pane, feed));
+}
 
-    fn paint_heard(&self, painter: &Painter, pane: Pane, feed: &Feed) {
-        let Some(update) = &feed.update else {
-            return;
-        };
-        self.paint_trail(painter, pane, feed);
-        if let Some((place, _)) = feed.truth
-            && let Some(at) = self.view.place_in(pane, place)
-        {
-            painter.circle_stroke(at, 9.0, Stroke::new(1.5, Color32::WHITE));
-        }
-        for estimator in Estimator::ALL {
-            let shown = estimator == self.session.desk.estimator;
-            let Some(guess) = update
-                .by(estimator)
-                .filter(|_| shown || self.session.desk.compare)
-            else {
-                continue;
-            };
-            let Some(at) = self.view.place_in(pane, guess.position) else {
-                continue;
-            };
-            let colour = colour(estimator);
-            if !shown {
-                painter.circle(at, 4.0, colour, Stroke::new(1.0, Color32::BLACK));
-                continue;
-            }
-            if let Some(contact) = update.contact.filter(|_| estimator == Estimator::Matching) {
-                self.paint_region(painter, pane, &contact, colour);
-            }
-            painter.circle(at, 6.0, colour, Stroke::new(1.5, Color32::BLACK));
-            if pane == Pane::Limb {
-                self.paint_press(
-                    painter,
-                    guess.position,
-                    guess.force,
-                    update.contact.as_ref(),
-                    colour,
-                );
-            }
-        }
+fn paint_heard(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
+    let Some(update) = &feed.update else {
+        return;
+    };
+    paint_trail(look, painter, pane, feed);
+    if let Some((place, _)) = feed.truth
+        && let Some(at) = look.place_in(pane, place)
+    {
+        painter.circle_stroke(at, 9.0, Stroke::new(1.5, Color32::WHITE));
     }
-
-    /// The press as an arrow against the surface, with how hard and how sure.
-    fn paint_press(
-        &self,
-        painter: &Painter,
-        place: DVec3,
-        force: f64,
-        contact: Option<&Contact>,
-        colour: Color32,
-    ) {
-        /// Force (N) at which the arrow is as long as it gets, and that length over the view.
-        const FULL: f64 = 30.0;
-        const LENGTH: f64 = 0.22;
-        let (on, _) = self.view.index.nearest(place);
-        let normal = self.session.document.part.normal(on);
-        let share = 0.25 + 0.75 * (force / FULL).clamp(0.0, 1.0);
-        let length = LENGTH * share * self.view.camera.distance;
-        let ends = [place, place + normal * length].map(|p| self.view.place(p));
-        let [Some(tip), Some(tail)] = ends else {
-            return;
+    for estimator in Estimator::ALL {
+        let shown = estimator == look.session.desk.estimator;
+        let Some(guess) = update
+            .by(estimator)
+            .filter(|_| shown || look.session.desk.compare)
+        else {
+            continue;
         };
-        painter.arrow(tail, tip - tail, Stroke::new(4.0, Color32::BLACK));
-        painter.arrow(tail, tip - tail, Stroke::new(2.5, colour));
-        let mut text = format!("{force:.1} N");
-        if let Some(c) = contact.filter(|_| self.session.desk.estimator == Estimator::Matching) {
-            let _ = write!(
-                text,
-                " ± {:.1} · ± {:.1} mm",
-                c.force_deviation,
-                c.region.radius * 1e3
+        let Some(at) = look.place_in(pane, guess.position) else {
+            continue;
+        };
+        let colour = colour(estimator);
+        if !shown {
+            painter.circle(at, 4.0, colour, Stroke::new(1.0, Color32::BLACK));
+            continue;
+        }
+        if let Some(contact) = update.contact.filter(|_| estimator == Estimator::Matching) {
+            paint_region(look, painter, pane, &contact, colour);
+        }
+        painter.circle(at, 6.0, colour, Stroke::new(1.5, Color32::BLACK));
+        if pane == Pane::Limb {
+            paint_press(
+                look,
+                painter,
+                guess.position,
+                guess.force,
+                update.contact.as_ref(),
+                colour,
             );
         }
-        // Above the hint and within the view.
-        let room = self.view.rect.shrink2(vec2(90.0, 44.0));
-        label(
-            painter,
-            room.clamp(tail),
-            Align2::CENTER_BOTTOM,
-            &text,
-            colour,
+    }
+}
+
+/// The press as an arrow against the surface, with how hard and how sure.
+fn paint_press(
+    look: Look<'_>,
+    painter: &Painter,
+    place: DVec3,
+    force: f64,
+    contact: Option<&Contact>,
+    colour: Color32,
+) {
+    /// Force (N) at which the arrow is as long as it gets, and that length over the view.
+    const FULL: f64 = 30.0;
+    const LENGTH: f64 = 0.22;
+    let (on, _) = look.scene.index.nearest(place);
+    let normal = look.session.document.part.normal(on);
+    let share = 0.25 + 0.75 * (force / FULL).clamp(0.0, 1.0);
+    let length = LENGTH * share * look.view.camera.distance;
+    let ends = [place, place + normal * length].map(|p| look.view.place(p));
+    let [Some(tip), Some(tail)] = ends else {
+        return;
+    };
+    painter.arrow(tail, tip - tail, Stroke::new(4.0, Color32::BLACK));
+    painter.arrow(tail, tip - tail, Stroke::new(2.5, colour));
+    let mut text = format!("{force:.1} N");
+    if let Some(c) = contact.filter(|_| look.session.desk.estimator == Estimator::Matching) {
+        let _ = write!(
+            text,
+            " ± {:.1} · ± {:.1} mm",
+            c.force_deviation,
+            c.region.radius * 1e3
         );
     }
+    // Above the hint and within the view.
+    let room = look.view.rect.shrink2(vec2(90.0, 44.0));
+    label(
+        painter,
+        room.clamp(tail),
+        Align2::CENTER_BOTTOM,
+        &text,
+        colour,
+    );
+}
 
-    /// The 90 % region, laid onto the surface.
-    fn paint_region(&self, painter: &Painter, pane: Pane, contact: &Contact, colour: Color32) {
-        const POINTS: usize = 48;
-        let [a, b] = contact.region.axes;
-        // How far the surface may fall away from the tangent plane before it is another part of it.
-        let near = 2e-3 + 0.4 * contact.region.radius.min(0.02);
-        let on_surface = |k: usize| {
-            let (sin, cos) = (std::f64::consts::TAU * k as f64 / POINTS as f64).sin_cos();
-            let place = contact.position + a * cos + b * sin;
-            let (at, away) = self.view.index.nearest(place);
-            let shown = (away < near).then(|| self.session.document.part.point(at))?;
-            self.view.place_in(pane, shown)
-        };
-        let points: Vec<Option<egui::Pos2>> = (0..=POINTS).map(on_surface).collect();
-        // Where the surface has an edge or a slot, the outline has a gap.
-        let longest = 0.35 * self.view.rect_of(pane).height();
-        for (width, colour) in [(3.5, Color32::from_black_alpha(140)), (1.5, colour)] {
-            for pair in points.windows(2) {
-                if let [Some(from), Some(to)] = *pair
-                    && from.distance(to) < longest
-                {
-                    painter.line_segment([from, to], Stroke::new(width, colour));
-                }
+/// The 90 % region, laid onto the surface.
+fn paint_region(look: Look<'_>, painter: &Painter, pane: Pane, contact: &Contact, colour: Color32) {
+    const POINTS: usize = 48;
+    let [a, b] = contact.region.axes;
+    // How far the surface may fall away from the tangent plane before it is another part of it.
+    let near = 2e-3 + 0.4 * contact.region.radius.min(0.02);
+    let on_surface = |k: usize| {
+        let (sin, cos) = (std::f64::consts::TAU * k as f64 / POINTS as f64).sin_cos();
+        let place = contact.position + a * cos + b * sin;
+        let (at, away) = look.scene.index.nearest(place);
+        let shown = (away < near).then(|| look.session.document.part.point(at))?;
+        look.place_in(pane, shown)
+    };
+    let points: Vec<Option<egui::Pos2>> = (0..=POINTS).map(on_surface).collect();
+    // Where the surface has an edge or a slot, the outline has a gap.
+    let longest = 0.35 * look.view.rect_of(pane).height();
+    for (width, colour) in [(3.5, Color32::from_black_alpha(140)), (1.5, colour)] {
+        for pair in points.windows(2) {
+            if let [Some(from), Some(to)] = *pair
+                && from.distance(to) < longest
+            {
+                painter.line_segment([from, to], Stroke::new(width, colour));
             }
         }
     }
+}
 
-    fn paint_trail(&self, painter: &Painter, pane: Pane, feed: &Feed) {
-        let Some(&(now, _, _)) = feed.trail.back() else {
-            return;
-        };
-        let placed: Vec<_> = feed
-            .trail
-            .iter()
-            .filter_map(|&(t, e, p)| Some((t, e, self.view.place_in(pane, p)?)))
-            .collect();
-        for pair in placed.windows(2) {
-            let ((t, e, from), (_, _, to)) = (pair[0], pair[1]);
-            // Over the seam of the unrolled view no line is drawn.
-            if from.distance(to) < 60.0 {
-                let fade = (1.0 - (now - t)).clamp(0.0, 1.0) as f32;
-                painter.line_segment(
-                    [from, to],
-                    Stroke::new(3.0, colour(e).gamma_multiply(0.6 * fade)),
-                );
-            }
+fn paint_trail(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
+    let Some(&(now, _, _)) = feed.trail.back() else {
+        return;
+    };
+    let placed: Vec<_> = feed
+        .trail
+        .iter()
+        .filter_map(|&(t, e, p)| Some((t, e, look.place_in(pane, p)?)))
+        .collect();
+    for pair in placed.windows(2) {
+        let ((t, e, from), (_, _, to)) = (pair[0], pair[1]);
+        // Over the seam of the unrolled view no line is drawn.
+        if from.distance(to) < 60.0 {
+            let fade = (1.0 - (now - t)).clamp(0.0, 1.0) as f32;
+            painter.line_segment(
+                [from, to],
+                Stroke::new(3.0, colour(e).gamma_multiply(0.6 * fade)),
+            );
         }
     }
+}
 
-    /// Where the next known touch is to be pressed.
-    fn paint_proposed(&self, painter: &Painter, pane: Pane) {
-        let shown = self.stage == Stage::Live
-            && self.session.live.is_connected()
-            && self.session.live.simulated_board().is_none();
-        let Some(place) = shown.then(|| self.session.proposed_touch()).flatten() else {
-            return;
-        };
-        if let Some(at) = self.view.place_in(pane, place) {
-            for d in [vec2(7.0, 7.0), vec2(7.0, -7.0)] {
-                painter.line_segment([at - d, at + d], Stroke::new(4.0, Color32::BLACK));
-                painter.line_segment([at - d, at + d], Stroke::new(2.0, theme::TOUCHED));
-            }
+/// Where the next known touch is to be pressed.
+fn paint_proposed(look: Look<'_>, painter: &Painter, pane: Pane) {
+    let shown = look.view.stage == Stage::Live
+        && look.session.live.is_connected()
+        && look.session.live.simulated_board().is_none();
+    let Some(place) = shown.then(|| look.session.proposed_touch()).flatten() else {
+        return;
+    };
+    if let Some(at) = look.place_in(pane, place) {
+        for d in [vec2(7.0, 7.0), vec2(7.0, -7.0)] {
+            painter.line_segment([at - d, at + d], Stroke::new(4.0, Color32::BLACK));
+            painter.line_segment([at - d, at + d], Stroke::new(2.0, theme::TOUCHED));
         }
     }
+}
 
-    /// Strips of all gauges with their health, and how the line does.
-    pub(in super::super) fn live_tab(&mut self, ui: &mut Ui) {
-        let (words, warning) = self.live_in_words();
-        let compare = self.session.desk.compare;
-        self.session.live.look(|feed| {
-            heard(ui, feed, RichText::new(words).strong(), warning, compare);
-        });
-    }
+/// Strips of all gauges with their health, and how the line does.
+pub fn live_tab(ask: &mut Ask<'_>, ui: &mut Ui) {
+    let (words, warning) = live_in_words(ask.session);
+    let compare = ask.session.desk.compare;
+    ask.session.live.look(|feed| {
+        heard(ui, feed, RichText::new(words).strong(), warning, compare);
+    });
 }
 
 /// How the line does and what every estimator says, over the strips.

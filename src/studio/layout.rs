@@ -1,0 +1,119 @@
+//! Which panel lies where, and what is drawn over what: the one place that knows all panels.
+
+use egui::{Context, Rect, Ui};
+
+use super::ask::Ask;
+use super::dialogs::Dialogs;
+use super::live::LiveForm;
+use super::paint::Look;
+use super::palette::{self, Palette};
+use super::recovery::Recovery;
+use super::trade::Dial;
+use super::view::{Pane, Stage, Tab};
+use super::{confusions, inspector, jobs, kept, live, measure, overlay, results, trade};
+
+/// What is typed in panels, and what is open over them.
+#[derive(Default)]
+pub struct Panels {
+    pub dialogs: Dialogs,
+    pub palette: Option<Palette>,
+    pub dial: Dial,
+    pub live: LiveForm,
+}
+
+impl Panels {
+    /// The settings of the stage that is looked at.
+    pub fn inspector(&mut self, ask: &mut Ask<'_>, ui: &mut Ui) {
+        egui::ScrollArea::vertical()
+            .auto_shrink(false)
+            .show(ui, |ui| {
+                inspector::heading(ask.view.stage, ui);
+                match ask.view.stage {
+                    Stage::Live => live::live_form(ask, &mut self.live, ui),
+                    _ => inspector::settings(ask, ui),
+                }
+            });
+    }
+
+    /// The tabs, and the one that is chosen.
+    pub fn results(&mut self, ask: &mut Ask<'_>, ui: &mut Ui) {
+        if !results::header(ask, ui) {
+            return;
+        }
+        match ask.view.tab {
+            Tab::Error => results::error_plots(ask, ui),
+            Tab::Failures => results::failure_plots(ask, ui),
+            Tab::Gauges => results::gauge_table(ask, ui),
+            Tab::Confusions => confusions::confusions_tab(ask, ui),
+            Tab::Compare => kept::compare_tab(ask, ui),
+            Tab::Reduction => results::reduction_plot(ask, ui),
+            Tab::Trade => trade::trade_tab(ask, &mut self.dial, ui),
+            Tab::Live => live::live_tab(ask, ui),
+            Tab::Jobs => jobs::jobs_tab(ask, ui),
+        }
+    }
+
+    /// What is open over the panels.
+    pub fn over(&mut self, ctx: &Context, ask: &mut Ask<'_>, recovery: Option<&Recovery>) {
+        self.dialogs.show(ctx, ask);
+        if let Some(mut palette) = self.palette.take()
+            && palette::show(&mut palette, ctx, ask)
+        {
+            self.palette = Some(palette);
+        }
+        if let Some(recovery) = recovery {
+            recovery.show(ctx, ask);
+        }
+    }
+
+    /// Whether anything is open over the panels.
+    #[must_use]
+    pub fn is_covered(&self) -> bool {
+        self.dialogs.any() || self.palette.is_some()
+    }
+}
+
+/// Draws the views, after all that happened in either: what is hovered in one shows in the other.
+pub fn draw(look: Look<'_>, ui: &Ui, panes: &[(Pane, Rect)]) {
+    for &(pane, rect) in panes {
+        match pane {
+            Pane::Limb => overlay::paint_limb(look, ui, rect, false),
+            Pane::Unrolled => overlay::paint_unrolled(look, ui, rect),
+        }
+        draw_over(look, ui, pane, rect);
+    }
+    if let Some((_, flat)) = panes.get(1) {
+        let line = ui.visuals().widgets.noninteractive.bg_stroke;
+        ui.painter().vline(flat.left(), flat.y_range(), line);
+    }
+}
+
+fn draw_over(look: Look<'_>, ui: &Ui, pane: Pane, rect: Rect) {
+    let painter = &ui.painter_at(rect);
+    kept::paint_kept(look, painter, pane);
+    confusions::paint_confusions(look, painter, pane);
+    overlay::paint_gauges(look, painter, pane);
+    overlay::paint_touch(look, painter, pane);
+    live::paint_live(look, painter, pane);
+    measure::paint_measure(look, painter, pane);
+    overlay::paint_brush(look, painter, pane);
+    overlay::paint_outline(look, painter, pane);
+    if pane == Pane::Unrolled {
+        overlay::paint_stretch(look, painter, rect);
+    } else {
+        overlay::paint_legend(look, painter, rect);
+        overlay::paint_region_key(look, painter, rect);
+        overlay::paint_hint(look, painter, rect);
+    }
+}
+
+/// The limb with all that belongs to it, for a picture.
+pub fn picture(look: Look<'_>, ui: &Ui, rect: Rect, transparent: bool) {
+    overlay::paint_limb(look, ui, rect, transparent);
+    let painter = &ui.painter_at(rect);
+    kept::paint_kept(look, painter, Pane::Limb);
+    overlay::paint_gauges(look, painter, Pane::Limb);
+    overlay::paint_touch(look, painter, Pane::Limb);
+    live::paint_live(look, painter, Pane::Limb);
+    overlay::paint_legend(look, painter, rect);
+}
