@@ -62,12 +62,13 @@ const KNOWN: [(&str, &[&str]); 1] = [(
 )];
 
 /// What shows and asks in the window. `studio/layout.rs` alone knows them all.
-const PANELS: [&str; 14] = [
+const PANELS: [&str; 15] = [
     "confusions",
     "dialogs",
     "inspector",
     "jobs",
     "kept",
+    "legend",
     "live",
     "measure",
     "menu",
