@@ -10,6 +10,7 @@ use crate::document::Layer;
 /// What stands for the stripes of blind places in a key.
 const BLIND_KEY: Color32 = Color32::from_gray(150);
 
+/// The scale of the colours.
 pub fn paint_legend(look: Look<'_>, painter: &Painter, rect: Rect) {
     let mut bottom = rect.bottom() - 16.0;
     if let Some(scale) = look.exaggeration() {
@@ -68,6 +69,7 @@ pub fn paint_legend(look: Look<'_>, painter: &Painter, rect: Rect) {
     painter.galley(corner, title, Color32::WHITE);
 }
 
+/// What to do next with the tool in hand.
 pub fn paint_hint(look: Look<'_>, painter: &Painter, rect: Rect) {
     let text = match look.view.tool {
         _ if look.session.caches.touching.is_waiting() => "Computing the touch …",

@@ -19,6 +19,7 @@ const GHOST: f32 = 0.22;
 /// Of a gauge's number (points).
 const MARK: f32 = 9.0;
 
+/// The limb itself, as the adapter draws it.
 pub fn paint_limb(look: Look<'_>, ui: &Ui, rect: Rect, transparent: bool) {
     let Some(built) = &look.scene.built else {
         return;
@@ -76,6 +77,7 @@ fn cover(look: Look<'_>, share: f32) -> [f32; 4] {
     [share, f32::from(u8::from(marked)), 0.0, 0.0]
 }
 
+/// The same laid flat.
 pub fn paint_unrolled(look: Look<'_>, ui: &Ui, rect: Rect) {
     let Some((built, flat)) =
         (look.scene.built.as_ref()).and_then(|built| Some((built, built.flat.as_ref()?)))
@@ -117,6 +119,7 @@ pub fn paint_unrolled(look: Look<'_>, ui: &Ui, rect: Rect) {
         .add(egui_wgpu::Callback::new_paint_callback(rect, frame));
 }
 
+/// The touch, as an arrow.
 pub fn paint_touch(look: Look<'_>, painter: &Painter, pane: Pane) {
     let shown = look.view.tool == Tool::Touch;
     let Some(touched) = look.session.caches.touching.result().filter(|_| shown) else {
@@ -157,6 +160,7 @@ fn shift_at(look: Look<'_>, position: DVec3) -> DVec3 {
     shift * deformation
 }
 
+/// The gauges with their numbers.
 pub fn paint_gauges(look: Look<'_>, painter: &Painter, pane: Pane) {
     let sites = look.session.gauges();
     let rect = look.view.rect_of(pane);
@@ -209,6 +213,7 @@ fn mark(look: Look<'_>, pane: Pane, number: usize, site: &ChosenSite) -> Option<
     })
 }
 
+/// What the brush would reach.
 pub fn paint_brush(look: Look<'_>, painter: &Painter, pane: Pane) {
     let Some(at) = look.view.hover else {
         return;

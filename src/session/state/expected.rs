@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::design::{Expected, InHand};
 use crate::document::ExpectedInputs;
-use crate::io::report::robust_top;
+use crate::plain::robust_top;
 use crate::project::ChosenSite;
 use crate::session::latest::{Desk, Latest};
 use crate::session::slot::Slot;
