@@ -6,6 +6,7 @@ mod advise;
 mod as_built;
 mod by_hand;
 mod choose;
+pub mod curves;
 mod doubt;
 mod drawn;
 mod finest;

@@ -100,6 +100,28 @@ pub(crate) fn next_round(number: f64, figures: &[f64]) -> f64 {
     round.find(|&r| r >= number).unwrap_or(number)
 }
 
+/// A round number not below most of the sizes (99.5 % of them): single peaks do not wash a map out.
+#[must_use]
+pub fn robust_top(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values
+        .iter()
+        .map(|v| v.abs())
+        .filter(|v| v.is_finite())
+        .collect();
+    sizes.sort_by(f64::total_cmp);
+    let last = sizes.len().saturating_sub(1);
+    round_up(sizes.get(last * 995 / 1000).copied().unwrap_or(1.0))
+}
+
+/// The next round number.
+#[must_use]
+pub fn round_up(top: f64) -> f64 {
+    if !(top > 0.0 && top.is_finite()) {
+        return 1.0;
+    }
+    next_round(top, &[1.0, 2.0, 4.0, 5.0, 8.0, 10.0])
+}
+
 /// The first three digits of a number, the third one rounded.
 fn three_digits(number: f64, rounded: impl Fn(f64) -> f64) -> String {
     /// Powers of ten between which a number is written out.

@@ -18,6 +18,7 @@ mod kept;
 mod keys;
 mod labels;
 mod layout;
+mod legend;
 mod live;
 mod measure;
 mod menu;
@@ -29,6 +30,7 @@ pub mod picture;
 mod recent;
 mod recovery;
 mod results;
+mod run;
 mod scene;
 mod stages;
 mod theme;
@@ -39,15 +41,13 @@ mod view;
 mod viewport;
 mod words;
 
-use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
-use eframe::egui_wgpu::RenderState;
 use egui::{CentralPanel, Context, Panel, ViewportCommand};
 
 use crate::document::Document;
-use crate::io::opening;
-use crate::io::project_file::{self, LoadedProject};
+use crate::io::project_file::LoadedProject;
+use crate::render::gpu;
 use crate::session::{Attention, Colours, Event, FieldKind, Session, Wake};
 use action::WindowAction;
 use ask::Ask;
@@ -59,6 +59,7 @@ use scene::Scene;
 pub use crate::session::Standing;
 pub use commands::Command;
 pub use display::last_words;
+pub use run::run;
 pub use view::{Field, Pane, Section, Stage, Tab, Tool, View, Way};
 
 /// What is kept between runs.
@@ -101,21 +102,14 @@ impl Studio {
         let Some(state) = &cc.wgpu_render_state else {
             return Err("no graphics adapter was found. Install a Vulkan driver (Debian: mesa-vulkan-drivers), or run `hapdef design --out DIR`, which needs none".into());
         };
-        Ok(Self::on(state, &cc.egui_ctx, loaded, path))
-    }
-
-    /// The same on an adapter and a context of any kind.
-    pub(crate) fn on(
-        state: &RenderState,
-        ctx: &Context,
-        loaded: LoadedProject,
-        path: Option<PathBuf>,
-    ) -> Self {
-        crate::render::gpu::install(state);
-        theme::apply(ctx);
-        let waker = ctx.clone();
+        gpu::install(state);
+        theme::apply(&cc.egui_ctx);
+        let waker = cc.egui_ctx.clone();
         let wake = Wake::new(move |wait| waker.request_repaint_after(wait));
-        Self::around(Session::new(Document::new(loaded, path), wake))
+        Ok(Self::around(Session::new(
+            Document::new(loaded, path),
+            wake,
+        )))
     }
 
     /// The window around a session that nobody has looked at yet.
@@ -138,6 +132,11 @@ impl Studio {
     /// Keeps the list of recent files in a folder from now on.
     pub fn keep_recent_in(&mut self, home: &Path) {
         self.kept.recent = recent::Recent::kept_in(home);
+    }
+
+    /// Puts a file among the recent ones.
+    fn remember(&mut self, file: &Path) {
+        self.kept.recent.push(file);
     }
 
     /// Whether a job is running that somebody waits for.
@@ -217,7 +216,7 @@ impl Studio {
         for event in self.session.news.take_events() {
             match event {
                 Event::Opened { file, recovered } => self.show_opened(file.as_deref(), recovered),
-                Event::Saved(file) => self.kept.recent.push(&file),
+                Event::Saved(file) => self.remember(&file),
                 Event::Kept(name) => {
                     self.view.shown_kept.insert(name);
                     self.view.tab = Tab::Compare;
@@ -475,55 +474,4 @@ impl eframe::App for Studio {
     fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
         visuals.panel_fill.to_normalized_gamma_f32()
     }
-}
-
-/// Opens the window and returns when it is closed.
-///
-/// # Errors
-/// A message in the user's terms when no window can be opened.
-pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::Result<()> {
-    let (loaded, path) = match file {
-        Some(path) => {
-            let loaded = opening::open(path, unit)?;
-            let is_project = project_file::is_project(path);
-            (loaded, is_project.then(|| path.to_owned()))
-        }
-        None => (opening::bundled()?, None),
-    };
-    let display = display::Display::named();
-    let opened = Cell::new(false);
-    let options = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_title("HapDef Studio")
-            .with_app_id("hapdef-studio")
-            .with_inner_size([1440.0, 900.0])
-            .with_min_inner_size([960.0, 600.0])
-            .with_drag_and_drop(true),
-        renderer: eframe::Renderer::Wgpu,
-        ..Default::default()
-    };
-    let open = |cc: &eframe::CreationContext<'_>| -> Result<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>> {
-        let mut studio = Studio::new(cc, loaded, path)?;
-        opened.set(true);
-        display.opened();
-        display.clone().end_with_it();
-        if let Some(home) = eframe::storage_dir("hapdef-studio") {
-            studio.keep_unsaved_in(&home.join("unsaved"));
-            studio.keep_recent_in(&home);
-            studio.session.keep_trades_in(&home.join("trades"));
-            if let Some(path) = file {
-                studio.kept.recent.push(path);
-            }
-        }
-        Ok(Box::new(studio))
-    };
-    let ended = eframe::run_native("hapdef-studio", options, Box::new(open));
-    display::Display::closed();
-    ended.map_err(|error| {
-        anyhow::Error::msg(if opened.get() {
-            display.ending(&error)
-        } else {
-            display.refusal(&error)
-        })
-    })
 }

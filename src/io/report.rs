@@ -7,17 +7,17 @@ mod words;
 
 use std::fmt::Write as _;
 
-use self::words::{judged_on, title_of};
+use self::words::judged_on;
 use super::run::{Provenance, range, run_key, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Paint, Series, escape};
 use crate::colormap::ColorMap;
+use crate::design::curves::{curve, failure_curve, failure_name, failure_ways, title_of};
 use crate::design::{Design, Inputs, Simulated};
-use crate::evaluation::{BASELINE, EstimatorKind, Failures};
+use crate::evaluation::{BASELINE, EstimatorKind};
 use crate::gaussian_process::GpTrial;
 use crate::mesh::flatten::Flat;
-use crate::placement::SelectorKind;
 use crate::placement::candidates::Candidates;
-use crate::plain;
+use crate::plain::robust_top;
 use crate::project::PartModel;
 use crate::regression::Hyper;
 
@@ -343,28 +343,6 @@ fn error_map(page: &mut String, inputs: &Inputs, design: &Design) {
     );
 }
 
-/// A round number not below most of the sizes (99.5 % of them): single peaks do not wash a map out.
-#[must_use]
-pub fn robust_top(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = values
-        .iter()
-        .map(|v| v.abs())
-        .filter(|v| v.is_finite())
-        .collect();
-    sizes.sort_by(f64::total_cmp);
-    let last = sizes.len().saturating_sub(1);
-    round_up(sizes.get(last * 995 / 1000).copied().unwrap_or(1.0))
-}
-
-/// The next round number.
-#[must_use]
-pub fn round_up(top: f64) -> f64 {
-    if !(top > 0.0 && top.is_finite()) {
-        return 1.0;
-    }
-    plain::next_round(top, &[1.0, 2.0, 4.0, 5.0, 8.0, 10.0])
-}
-
 /// The cross-validated search that the Gaussian process took its kernel from.
 fn kernel_search(page: &mut String, design: &Design) {
     let Some(geometry) = design.reduced.geometry().filter(|g| !g.map.is_empty()) else {
@@ -417,46 +395,6 @@ fn kernel_search(page: &mut String, design: &Design) {
         page.push_str("</tr>");
     }
     page.push_str("</table>");
-}
-
-/// Error against number of gauges for one selector and region.
-#[must_use]
-pub fn curve(design: &Design, selector: SelectorKind, region: &str) -> Vec<(f64, f64)> {
-    design
-        .evaluation
-        .rows
-        .iter()
-        .filter(|r| r.selector == selector.name() && r.region == region)
-        .map(|r| (r.sensors as f64, r.error_mm))
-        .collect()
-}
-
-/// The ways in which an estimator meets a failure: whether it is trained anew, and what that is called.
-#[must_use]
-pub fn failure_ways(by: EstimatorKind) -> &'static [(bool, &'static str)] {
-    match by {
-        EstimatorKind::Svr => &[
-            (false, "Failed gauges, as trained with all"),
-            (true, "Failed gauges, trained anew without them"),
-        ],
-        EstimatorKind::Matching => &[(false, "Failed gauges, left out")],
-    }
-}
-
-/// The selector of a set with failed gauges, as read by people.
-#[must_use]
-pub fn failure_name(set: &Failures) -> &str {
-    title_of(&set.selector)
-}
-
-/// Error against number of failed gauges.
-#[must_use]
-pub fn failure_curve(set: &Failures, retrained: bool) -> Vec<(f64, f64)> {
-    set.rows
-        .iter()
-        .filter(|r| r.retrained == retrained || r.failed == 0)
-        .map(|r| (r.failed as f64, r.error_mm))
-        .collect()
 }
 
 fn failures(page: &mut String, design: &Design) {

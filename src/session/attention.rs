@@ -1,7 +1,7 @@
 //! What whoever works with a session does at the moment: nothing is computed for which nobody asks, and nothing that a
 //! hand is still changing.
 
-use super::fields::FieldKind;
+use super::state::fields::FieldKind;
 use crate::mesh::SurfacePoint;
 
 /// What colours the part and takes a while to compute.

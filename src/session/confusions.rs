@@ -2,66 +2,16 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
-use super::Session;
 use super::attention::Attention;
 use super::jobs::Task;
-use super::latest::{Desk, Latest};
+use super::latest::Latest;
 use super::slot::{Slot, current};
+use super::state::Session;
+use super::state::confusions::{BROKEN, ConfusionInputs, Question, Taken, serve};
 use crate::design::InHand;
-use crate::document::ExpectedInputs;
 use crate::job::{Reporter, Stop};
 use crate::mesh::SurfacePoint;
-use crate::placement::expected_error::{Mistaken, Pair};
-use crate::project::ChosenSite;
-
-const BROKEN: &str = "An internal error stopped what a touch is taken for. Please report it";
-
-/// What confusions depend on: the gauges, and what is expected of them.
-#[derive(Clone, Debug, PartialEq)]
-struct ConfusionInputs {
-    sites: Vec<ChosenSite>,
-    expected: ExpectedInputs,
-}
-
-/// What the press nearest to the pointer is taken for by a set.
-struct Question {
-    in_hand: Arc<InHand>,
-    set: Vec<usize>,
-    press: usize,
-    /// Of the press (m).
-    place: DVec3,
-}
-
-/// What a press is taken for.
-pub struct Taken {
-    press: usize,
-    /// Where it really is (m).
-    pub place: DVec3,
-    pub taken: Vec<Mistaken>,
-}
-
-/// Confusions, and the worker that finds what a press is taken for.
-#[derive(Default)]
-pub struct Confusions {
-    worker: Option<Latest<Question, Taken>>,
-    /// What is pointed at, and by which gauges: where neither has changed nothing is asked.
-    asked: Option<(usize, ConfusionInputs)>,
-    answer: Option<Taken>,
-    /// The worst.
-    pairs: Option<Slot<ConfusionInputs, Arc<Vec<Pair>>>>,
-}
-
-fn serve(first: Question, desk: &Desk<Question, Taken>) -> Option<Question> {
-    let question = desk.latest(first);
-    desk.answer(Ok(Taken {
-        press: question.press,
-        place: question.place,
-        taken: question.in_hand.taken_for(&question.set, question.press),
-    }));
-    desk.wait()
-}
+use crate::placement::expected_error::Pair;
 
 impl Session {
     fn confusion_inputs(&self) -> Option<ConfusionInputs> {

@@ -4,14 +4,14 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use super::Session;
 use super::attention::Attention;
-use super::jobs::Task;
-use super::results::{DesignResult, SimulationResult};
-use crate::budget::{Budget, Progress, Quality};
+use super::jobs::{Task, stop};
+use super::state::Session;
+use super::state::drive::{Goal, Making};
+use super::state::results::{DesignResult, SimulationResult};
+use crate::budget::{Progress, Quality};
 use crate::dataset::Site;
-use crate::design::{self, Design, DesignError, Hooks, Inputs, Known, Simulated, StageTime, Step};
-use crate::document::DesignInputs;
+use crate::design::{self, Design, Hooks, Inputs, Known, Simulated, StageTime};
 use crate::io::artifacts::as_chosen;
 use crate::job::{Reporter, Stop};
 use crate::placement::{SelectorKind, SensorSet};
@@ -19,49 +19,6 @@ use crate::project::ChosenSite;
 
 /// How long settings rest before what depends on them is computed again.
 const STILL: Duration = Duration::from_millis(400);
-
-/// How far the pipeline is to be kept computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Goal {
-    Simulation,
-    Design,
-}
-
-/// The running design's state, as its job shares it.
-#[derive(Debug, Default)]
-pub struct Making {
-    /// What the selector in the lead has chosen so far.
-    pub sites: Vec<ChosenSite>,
-    pub step: Option<Step>,
-}
-
-/// What is to be kept computed, and what becomes of it.
-#[derive(Default)]
-pub struct Drive {
-    goal: Option<Goal>,
-    /// Whether what a selection finds becomes the project's gauges: until one is moved by hand.
-    pub take: bool,
-    /// Whether a selection was asked for by hand and has not come yet.
-    pressed: bool,
-    /// What the settings gave when they were looked at last.
-    seen: Option<DesignInputs>,
-    still_since: Option<Instant>,
-    making: Arc<Mutex<Making>>,
-}
-
-impl Drive {
-    /// The step that the running design is at.
-    #[must_use]
-    pub fn step(&self) -> Option<Step> {
-        self.making.lock().ok().and_then(|making| making.step)
-    }
-
-    /// The gauges that the running design has chosen so far.
-    fn chosen(&self) -> Option<Vec<ChosenSite>> {
-        let making = self.making.lock().ok()?;
-        Some(making.sites.clone()).filter(|sites| !sites.is_empty())
-    }
-}
 
 impl Session {
     /// Simulates the project as it is now.
@@ -88,18 +45,6 @@ impl Session {
         self.drive.seen = Some(self.document.design_inputs(self.quality()));
         self.drive.still_since = None;
         self.go_on(&Attention::default());
-    }
-
-    /// The quality that is asked for.
-    #[must_use]
-    pub fn quality(&self) -> Quality {
-        self.document.state.project.budget.quality
-    }
-
-    /// What may be spent.
-    #[must_use]
-    pub fn budget(&self) -> Budget {
-        self.document.state.project.budget.budget()
     }
 
     /// Whether there is a design of this quality or a better one that holds.
@@ -277,26 +222,6 @@ impl Session {
         }
     }
 
-    /// The project's gauges are those that the design chose.
-    pub(super) fn take_sites(&mut self) {
-        let Some(result) = &self.results.design else {
-            return;
-        };
-        let sites = result.value.chosen_sites();
-        if self.document.state.project.selection.sites != sites {
-            if std::mem::take(&mut self.drive.pressed) {
-                // Somebody asked for them: what was there before can be had back.
-                self.document.settle();
-                self.document.state.project.selection.sites = sites;
-                self.document.settle();
-            } else {
-                self.document.adopt_sites(sites);
-            }
-            self.news.happened(super::Event::GaugesReplaced);
-        }
-        self.drive.take = true;
-    }
-
     /// The gauges to draw: those of the running selection as far as it has come where there is no draft of it, else the
     /// project's.
     #[must_use]
@@ -364,13 +289,4 @@ fn make(
     let budget = inputs.project.budget.budget_at(quality);
     design::run_step_by_step(inputs, simulated, &kinds, &budget, known, &hooks)
         .map_err(|e| stop(&e))
-}
-
-/// A stage's error as a job's end.
-pub(super) fn stop(error: &DesignError) -> Stop {
-    if error.is_cancelled() {
-        Stop::Cancelled
-    } else {
-        Stop::Failed(error.to_string())
-    }
 }

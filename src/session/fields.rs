@@ -2,36 +2,13 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
-use super::Session;
 use super::attention::Attention;
 use super::jobs::Task;
-use super::results::DesignMark;
 use super::slot::{Slot, current};
+use super::state::Session;
+use super::state::fields::{FieldInputs, FieldKind, FieldValues};
 use crate::design::Simulated;
 use crate::job::Reporter;
-
-/// Which field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FieldKind {
-    /// The error (mm) that the design was found to make.
-    Error,
-    /// The share of the variance that the gauges leave.
-    Uncertainty,
-}
-
-/// What a field was computed from.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FieldInputs {
-    kind: FieldKind,
-    design: DesignMark,
-    /// Gauges (m), where it depends on where they are now.
-    gauges: Vec<DVec3>,
-}
-
-/// A field, a vertex of the part.
-pub type FieldValues = Slot<FieldInputs, Arc<Vec<f64>>>;
 
 impl Session {
     fn field_inputs(&self, kind: FieldKind) -> Option<FieldInputs> {

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::jobs::Task;
-use super::{Event, Session};
+use super::news::Event;
+use super::state::Session;
 use crate::design::InHand;
 use crate::document::ExpectedInputs;
 use crate::io::artifacts::as_chosen;

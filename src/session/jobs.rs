@@ -5,9 +5,9 @@ use std::any::Any;
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
-use super::Session;
 use super::wake::Wake;
 use crate::budget::Quality;
+use crate::design::DesignError;
 use crate::job::{self, Job, Reporter, Stop};
 
 /// Between two pictures: a report is seen in the next one.
@@ -111,21 +111,21 @@ impl Task {
 }
 
 /// What is done with what a job brought.
-type Finish = Box<dyn FnOnce(&mut Session) + Send>;
+type Finish<S> = Box<dyn FnOnce(&mut S) + Send>;
 
 /// A job that runs.
-pub struct Running {
+pub struct Running<S> {
     pub task: Task,
     /// What it was started on.
     inputs: Box<dyn Any + Send>,
     /// The session it was started in, by its number.
     session: u64,
-    job: Job<Finish>,
+    job: Job<Finish<S>>,
     /// When its current step began, and which one that is.
     step: (&'static str, Instant),
 }
 
-impl Running {
+impl<S: 'static> Running<S> {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.job.name
@@ -162,6 +162,15 @@ impl Running {
     }
 }
 
+/// A stage's error as a job's end.
+pub(super) fn stop(error: &DesignError) -> Stop {
+    if error.is_cancelled() {
+        Stop::Cancelled
+    } else {
+        Stop::Failed(error.to_string())
+    }
+}
+
 /// Seconds as people say them.
 #[must_use]
 pub fn duration(seconds: f32) -> String {
@@ -189,17 +198,16 @@ struct Failure {
 }
 
 /// A job that has ended: what is to be done, or why it cannot be.
-pub(super) struct Outcome {
+pub(super) struct Outcome<S> {
     pub task: Task,
     pub session: u64,
     pub inputs: Box<dyn Any + Send>,
-    pub result: job::Outcome<Finish>,
+    pub result: job::Outcome<Finish<S>>,
 }
 
-/// Everything that runs, the last of what has run, and what could not be computed.
-#[derive(Default)]
-pub struct Jobs {
-    running: Vec<Running>,
+/// Everything that runs, the last of what has run, and what could not be computed, for an owner of this type.
+pub struct Jobs<S> {
+    running: Vec<Running<S>>,
     ended: Vec<Ended>,
     failed: Vec<Failure>,
     wake: Wake,
@@ -207,14 +215,17 @@ pub struct Jobs {
     session: u64,
 }
 
-impl Jobs {
+impl<S: 'static> Jobs<S> {
     /// How many that have ended are remembered.
     const MEMORY: usize = 50;
 
     pub(super) fn new(wake: Wake) -> Self {
         Self {
+            running: Vec::new(),
+            ended: Vec::new(),
+            failed: Vec::new(),
             wake,
-            ..Self::default()
+            session: 0,
         }
     }
 
@@ -240,7 +251,7 @@ impl Jobs {
         task: Task,
         inputs: I,
         work: impl FnOnce(&Reporter) -> Result<T, Stop> + Send + 'static,
-        then: impl FnOnce(&mut Session, I, T) + Send + 'static,
+        then: impl FnOnce(&mut S, I, T) + Send + 'static,
     ) where
         I: Clone + PartialEq + Send + 'static,
         T: Send + 'static,
@@ -248,9 +259,9 @@ impl Jobs {
         self.cancel(|t| std::mem::discriminant(&t) == std::mem::discriminant(&task));
         let wake = self.wake.clone();
         let own = inputs.clone();
-        let work = move |reporter: &Reporter| -> Result<Finish, Stop> {
+        let work = move |reporter: &Reporter| -> Result<Finish<S>, Stop> {
             let value = work(reporter)?;
-            Ok(Box::new(move |session: &mut Session| {
+            Ok(Box::new(move |session: &mut S| {
                 then(session, own, value);
             }))
         };
@@ -265,7 +276,7 @@ impl Jobs {
 
     /// What runs, in the order that it was started in.
     #[must_use]
-    pub fn running(&self) -> &[Running] {
+    pub fn running(&self) -> &[Running<S>] {
         &self.running
     }
 
@@ -314,13 +325,16 @@ impl Jobs {
     }
 
     /// Ends jobs at once: what they still bring is dropped, and they stop at their next report.
-    pub(super) fn cancel(&mut self, which: impl Fn(Task) -> bool) -> Vec<Running> {
+    pub(super) fn cancel(&mut self, which: impl Fn(Task) -> bool) -> Vec<Running<S>> {
         self.cancel_running(|r| which(r.task))
     }
 
     /// As [`Self::cancel`], by all that is known of what runs.
-    pub(super) fn cancel_running(&mut self, which: impl Fn(&Running) -> bool) -> Vec<Running> {
-        let (gone, kept): (Vec<Running>, Vec<Running>) = self
+    pub(super) fn cancel_running(
+        &mut self,
+        which: impl Fn(&Running<S>) -> bool,
+    ) -> Vec<Running<S>> {
+        let (gone, kept): (Vec<Running<S>>, Vec<Running<S>>) = self
             .running
             .drain(..)
             .partition(|r| which(r) && !r.task.writes());
@@ -345,7 +359,7 @@ impl Jobs {
         tasks
     }
 
-    fn remember(&mut self, r: &Running, how: String, failed: bool) {
+    fn remember(&mut self, r: &Running<S>, how: String, failed: bool) {
         self.ended.push(Ended {
             name: r.job.name.clone(),
             how,
@@ -358,7 +372,7 @@ impl Jobs {
     }
 
     /// Those that have ended since the last call.
-    pub(super) fn collect(&mut self) -> Vec<Outcome> {
+    pub(super) fn collect(&mut self) -> Vec<Outcome<S>> {
         let mut out = Vec::new();
         let mut k = 0;
         while k < self.running.len() {
@@ -408,11 +422,11 @@ mod tests {
         }
     }
 
-    fn nothing<I>(_: &mut Session, _: I, (): ()) {}
+    fn nothing<I>((): &mut (), _: I, (): ()) {}
 
     #[test]
     fn several_run_at_once_and_one_of_a_kind() {
-        let mut jobs = Jobs::default();
+        let mut jobs = Jobs::new(Wake::default());
         jobs.start(Task::Simulate(Quality::Draft), "a", endless, nothing);
         jobs.start(Task::Judge, 7, endless, nothing);
         assert_eq!(jobs.running().len(), 2);
@@ -434,7 +448,7 @@ mod tests {
 
     #[test]
     fn a_panic_ends_as_a_message() {
-        let mut jobs = Jobs::default();
+        let mut jobs = Jobs::new(Wake::default());
         let task = Task::Design(Quality::Draft);
         let fall = |_: &Reporter| -> Result<(), Stop> { panic!("over a stone") };
         jobs.start(task, "k", fall, nothing);

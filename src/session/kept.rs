@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::Session;
-use super::gauges::BY_HAND;
+use super::by_hand::BY_HAND;
 use super::news::Event;
+use super::state::Session;
 use crate::evaluation::Evaluation;
 use crate::placement::SelectorKind;
 use crate::project::{Kept, KeptError, KeptFailure};

@@ -1,141 +1,43 @@
 //! Live touch: a board, or one that is simulated, and what its readings say of a touch.
 
-mod feed;
+pub(super) mod feed;
 mod known;
-mod training;
+pub(super) mod training;
+mod upkeep;
+
+pub use feed::{Feed, Recording, STRIPS_S, Strip};
+pub use known::{LEAST as LEAST_KNOWN, WANTED as WANTED_KNOWN};
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::DVec3;
-
-use super::jobs::Task;
+use super::desk::Desk;
+use super::jobs::{Task, stop};
+use super::news::Event;
 use super::slot::{Slot, current};
-use super::{Event, Session};
+use super::state::Session;
+use super::state::live::{Gathering, Target};
 use crate::board::{Faults, Script, SimulatedBoard, Truth, script_seed};
-use crate::budget::Quality;
 use crate::design::simulated_board::{options, places, simulated};
 use crate::design::{self, Inputs, Sensing, Workshop};
 use crate::document::SensingInputs;
-use crate::inference::Known;
 use crate::job::{Reporter, Stop};
 use crate::link::{
-    Address, BAUD, Command, Connection, Doorway, ENDING, Hosted, Listener, Pace, State, host,
-    write_table,
+    Address, BAUD, Command, Connection, Doorway, ENDING, Listener, Pace, host, write_table,
 };
-use crate::live::{Estimator, Pipeline, Update};
-use crate::project::LiveKeys;
-use crate::session::drive::stop;
-use training::{Pair, train};
-
-pub use feed::{Feed, Recording, STRIPS_S, Shared, Strip};
-pub use known::{LEAST as LEAST_KNOWN, WANTED as WANTED_KNOWN};
+use crate::live::{Estimator, Pipeline};
+use feed::Shared;
 
 /// Smallest and largest force of the touches of a simulated board (N).
 const FORCES_N: [f64; 2] = [2.0, 15.0];
 
-/// What is to be listened to once the model is there.
-#[derive(Clone, Debug, PartialEq)]
-enum Target {
-    Board(Address),
-    Simulated,
-}
-
-/// Trained estimators, and the gauges that they were trained for.
-type TrainedFor = (Vec<bool>, Pair);
-
-/// A connection, and what is known of the gauges that it reads.
-#[derive(Default)]
-pub struct Live {
-    /// The model of the gauges.
-    sensing: Option<Slot<SensingInputs, Arc<Sensing>>>,
-    connection: Option<Connection>,
-    /// A simulated board of our own.
-    hosted: Option<Hosted>,
-    feed: Shared,
-    target: Option<Target>,
-    known: Vec<Known>,
-    gathering: known::Gathering,
-    trained: Option<Slot<SensingInputs, TrainedFor>>,
-    /// For which gauges training was begun.
-    training_for: Option<Vec<bool>>,
-    /// The last recording that was begun.
-    pub recorded: Option<PathBuf>,
-    /// The settings that the pipeline has.
-    applied: Option<LiveKeys>,
-}
-
-impl Live {
-    /// What is heard at the moment.
-    pub fn look<T>(&self, at: impl FnOnce(&Feed) -> T) -> Option<T> {
-        self.feed.lock().ok().map(|feed| at(&feed))
-    }
-
-    #[must_use]
-    pub fn is_connected(&self) -> bool {
-        self.connection.is_some()
-    }
-
-    /// Whether a board is to be listened to once the model of the gauges is there.
-    #[must_use]
-    pub fn is_preparing(&self) -> bool {
-        self.target.is_some()
-    }
-
-    /// The simulated board of our own, to make things go wrong.
-    #[must_use]
-    pub fn simulated_board(&self) -> Option<&Hosted> {
-        self.hosted.as_ref()
-    }
-
-    /// How the connection stands; nothing where there is none.
-    #[must_use]
-    pub fn state(&self) -> Option<State> {
-        self.connection.as_ref()?;
-        self.look(|feed| feed.state.clone()).flatten()
-    }
-
-    /// What the last sample said.
-    #[must_use]
-    pub fn update(&self) -> Option<Update> {
-        self.look(|feed| feed.update.clone()).flatten()
-    }
-
-    /// Where a simulated board is really touched (m, N).
-    #[must_use]
-    pub fn truth(&self) -> Option<(DVec3, f64)> {
-        self.look(|feed| feed.truth).flatten()
-    }
-
-    /// How many known touches there are.
-    #[must_use]
-    pub fn known_touches(&self) -> usize {
-        self.known.len()
-    }
-
-    /// Whether a known touch is being read, and whether off a simulated board.
-    #[must_use]
-    pub fn is_gathering(&self) -> (bool, bool) {
-        (
-            self.gathering.at.is_some() || self.gathering.from_board,
-            self.gathering.from_board,
-        )
-    }
-
-    fn send(&self, command: Command) {
-        if let Some(connection) = &self.connection {
-            connection.send(command);
-        }
-    }
-}
-
 impl Session {
-    fn sensing(&self) -> Option<&Arc<Sensing>> {
+    pub(super) fn sensing(&self) -> Option<&Arc<Sensing>> {
         current(self.live.sensing.as_ref(), &self.document.sensing_inputs())
     }
 
     /// Starts a job whose result is of the model of the gauges as they are now.
-    fn start_sensing<T: Send + 'static>(
+    pub(super) fn start_sensing<T: Send + 'static>(
         &mut self,
         task: Task,
         work: impl FnOnce(&Reporter) -> Result<T, Stop> + Send + 'static,
@@ -171,7 +73,7 @@ impl Session {
         self.live.connection = None;
         self.live.hosted = None;
         self.live.target = None;
-        self.live.gathering = known::Gathering::default();
+        self.live.gathering = Gathering::default();
         self.live.feed = Shared::default();
         self.show_estimator(self.desk.estimator);
     }
@@ -276,96 +178,10 @@ impl Session {
         }
     }
 
-    /// Looks after the connection.
-    pub(super) fn refresh_live(&mut self) {
-        let (messages, ended) = match self.live.feed.lock() {
-            Ok(mut feed) => (std::mem::take(&mut feed.messages), feed.ended.take()),
-            Err(_) => return,
-        };
-        for message in messages {
-            self.tell(format!("Board: {message}"));
-        }
-        match ended {
-            // A recording that is over stays as it was at its end.
-            Some(Ok(())) => self.live.connection = None,
-            Some(Err(message)) => {
-                self.disconnect();
-                self.complain(message);
-            }
-            None => {}
-        }
-        if !self.live.is_connected() {
-            return;
-        }
-        self.apply_settings();
-        self.keep_trained();
-        self.gather_known();
-        if let (Some(_), Some(truth)) = (&self.live.hosted, self.live.look(|f| f.truth))
-            && self.live.look(|f| f.recording.is_some()) == Some(true)
-        {
-            self.live.send(Command::Truth(truth));
-        }
-    }
-
-    /// Settings that were changed, or brought back by undo, reach the pipeline.
-    fn apply_settings(&mut self) {
-        let live = &self.document.state.project.live;
-        if self.live.applied.as_ref() == Some(live) {
-            return;
-        }
-        let Some(sensing) = self.sensing().map(Arc::clone) else {
-            return;
-        };
-        let live = live.clone();
-        self.live.applied = Some(live.clone());
-        self.live.send(Command::Do(Box::new(move |pipeline| {
-            let settings = live.settings(sensing.gauges.len());
-            pipeline.set_model(sensing.map_for(&live), settings);
-        })));
-    }
-
-    /// The trained estimators are trained when they are wanted, and again when gauges fail or recover.
-    fn keep_trained(&mut self) {
-        if !self.desk.compare && self.desk.estimator == Estimator::Matching {
-            return;
-        }
-        let used = self.live.look(|f| f.used.clone()).unwrap_or_default();
-        let inputs = self.document.sensing_inputs();
-        let trained = current(self.live.trained.as_ref(), &inputs);
-        let done = trained.is_some_and(|(u, _)| *u == used);
-        let begun = self.live.training_for.as_ref() == Some(&used) && self.jobs.runs(Task::Train);
-        if used.iter().filter(|u| **u).count() < 3 || done || begun {
-            return;
-        }
-        let Some(sensing) = self.sensing().map(Arc::clone) else {
-            return;
-        };
-        self.live.training_for = Some(used.clone());
-        self.start_training(sensing, used);
-    }
-
-    fn start_training(&mut self, sensing: Arc<Sensing>, used: Vec<bool>) {
-        let inputs = self.document.inputs();
-        let noise = self.live.look(|f| f.noise.first().copied()).flatten();
-        let noise = noise.unwrap_or(1e-6);
-        let count = if self.quality() == Quality::Draft {
-            800
-        } else {
-            3200
-        };
-        let work = move |r: &Reporter| {
-            let watch = |p| r.report(p);
-            let trained = train(&sensing, &inputs, &used, noise, count, &watch);
-            Ok((used, trained.map_err(|e| stop(&e))?))
-        };
-        self.start_sensing(Task::Train, work, |s, inputs, (used, trained)| {
-            s.live.trained = Some(Slot {
-                inputs,
-                value: (used.clone(), trained.clone()),
-            });
-            s.live
-                .send(Command::Do(Box::new(move |p| p.set_trained(trained, used))));
-        });
+    /// Changes what belongs to the desk.
+    pub fn set_desk(&mut self, desk: Desk) {
+        self.desk = desk;
+        self.show_estimator(self.desk.estimator);
     }
 
     /// Shows another estimator.

@@ -2,26 +2,12 @@
 
 use std::sync::Arc;
 
-use super::Session;
 use super::jobs::Task;
 use super::slot::{Slot, current};
+use super::state::Session;
+use super::state::measure::{Distance, Ends};
 use crate::job::Reporter;
-use crate::mesh::{SurfacePoint, TriMesh, geodesic};
-
-/// Two points of the part.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ends {
-    pub from: SurfacePoint,
-    pub to: SurfacePoint,
-}
-
-/// How far two points are apart (m).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Distance {
-    pub straight: f64,
-    /// Infinite where no way leads from one to the other; nothing while it is computed.
-    pub over_surface: Option<f64>,
-}
+use crate::mesh::{TriMesh, geodesic};
 
 impl Session {
     /// Measures over the surface in the background.

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::jobs::Task;
+use super::news::Event;
 use super::shape::Shape;
-use super::{Event, Session};
+use super::state::Session;
 use crate::design::Inputs;
 use crate::document::{Document, State};
 use crate::io::examples::Example;
@@ -132,6 +133,17 @@ impl Session {
             opened.said.push(said.into());
             Ok(opened)
         });
+    }
+
+    /// Puts another project in this one's place. Only what is named here, which belongs to the desk, goes over to it:
+    /// whatever else is known or under way was of the one before.
+    fn replace(&mut self, document: Document, shape: Shape) {
+        let next = Self::shaped(document, shape, self.wake.clone());
+        let old = std::mem::replace(self, next);
+        self.jobs = old.jobs.for_another_session();
+        self.desk = old.desk;
+        self.news = old.news;
+        self.show_estimator(self.desk.estimator);
     }
 
     /// Puts a project in the place of the one that is open, and says so; it stays open where changes would be lost.

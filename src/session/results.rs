@@ -1,156 +1,18 @@
-//! What was computed of the project: the results that are shown, and the last ones of each quality.
+//! What jobs brought becomes what is shown, and the gauges that were chosen the project's.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::jobs::Task;
+use super::news::Event;
 use super::slot::{Slot, current};
-use super::{Event, Session};
+use super::state::Session;
+use super::state::results::{DesignResult, SimulationResult};
 use crate::budget::Quality;
-use crate::design::{self, Design, Inputs, Simulated};
-use crate::document::{DesignInputs, FilterInputs, SimulationInputs};
-use crate::feasible::Feasibility;
-use crate::io::artifacts::as_chosen;
+use crate::design::{self, Design};
+use crate::document::{DesignInputs, SimulationInputs};
 use crate::job::Reporter;
-use crate::placement::SelectorKind;
-use crate::project::ChosenSite;
-
-/// A finished simulation.
-#[derive(Clone)]
-pub struct SimulationResult {
-    pub simulated: Arc<Simulated>,
-    /// Read again from elements that were there.
-    pub(super) again: bool,
-    pub quality: Quality,
-    pub seconds: f64,
-}
-
-/// A finished design.
-#[derive(Clone)]
-pub struct DesignResult {
-    pub design: Arc<Design>,
-    /// What it was computed from, for whoever computes more of it.
-    pub snapshot: Inputs,
-    pub quality: Quality,
-    pub seconds: f64,
-}
-
-impl DesignResult {
-    /// The gauges that it chose, as a project keeps them.
-    #[must_use]
-    pub fn chosen_sites(&self) -> Vec<ChosenSite> {
-        let sites = &self.design.simulated.dataset.sites;
-        as_chosen(sites, self.design.chosen())
-    }
-}
-
-/// Which design it is: what it was computed from, and whose gauges lead.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DesignMark {
-    inputs: DesignInputs,
-    lead: SelectorKind,
-}
-
-/// The last results of a quality.
-#[derive(Default)]
-struct Last {
-    simulation: Option<Slot<SimulationInputs, SimulationResult>>,
-    design: Option<Slot<DesignInputs, DesignResult>>,
-}
-
-/// What was computed of the project.
-#[derive(Default)]
-pub struct Results {
-    pub simulation: Option<Slot<SimulationInputs, SimulationResult>>,
-    /// Verdicts of the filters.
-    pub feasibility: Option<Slot<FilterInputs, Arc<Feasibility>>>,
-    pub design: Option<Slot<DesignInputs, DesignResult>>,
-    /// What is asked for again after a change is often there.
-    last: BTreeMap<Quality, Last>,
-    /// Counts changes of simulation and design, so that whoever draws them knows when to do so anew.
-    pub version: u64,
-}
-
-impl Results {
-    pub(super) fn last_simulation(
-        &self,
-        quality: Quality,
-    ) -> Option<&Slot<SimulationInputs, SimulationResult>> {
-        self.last.get(&quality)?.simulation.as_ref()
-    }
-
-    pub(super) fn last_design(
-        &self,
-        quality: Quality,
-    ) -> Option<&Slot<DesignInputs, DesignResult>> {
-        self.last.get(&quality)?.design.as_ref()
-    }
-
-    fn show_simulation(&mut self, slot: Slot<SimulationInputs, SimulationResult>) {
-        self.simulation = Some(slot);
-        self.version += 1;
-    }
-
-    fn show_design(&mut self, slot: Slot<DesignInputs, DesignResult>) {
-        self.design = Some(slot);
-        self.version += 1;
-        self.show_refined();
-    }
-
-    /// The simulation that is shown has the gauges that the design that is shown moved off its lattice.
-    fn show_refined(&mut self) {
-        let (Some(simulation), Some(design)) = (&mut self.simulation, &self.design) else {
-            return;
-        };
-        let refined = &design.value.design.simulated;
-        if simulation.value.simulated.is_one_with(refined) {
-            simulation.value.simulated = Arc::clone(refined);
-            self.version += 1;
-        }
-    }
-
-    /// Which design is shown.
-    pub(super) fn design_mark(&self) -> Option<DesignMark> {
-        let shown = self.design.as_ref()?;
-        Some(DesignMark {
-            inputs: shown.inputs.clone(),
-            lead: shown.value.design.lead,
-        })
-    }
-}
 
 impl Session {
-    /// The simulation of a quality, where it holds for the project as it is.
-    pub(super) fn simulation_at(&self, quality: Quality) -> Option<Arc<Simulated>> {
-        let now = self.document.simulation_inputs(quality);
-        let last = current(self.results.last_simulation(quality), &now)?;
-        Some(Arc::clone(&last.simulated))
-    }
-
-    /// Whether the shown simulation holds for the project as it is, in whatever quality it has; nothing without one.
-    #[must_use]
-    pub fn simulation_holds(&self) -> Option<bool> {
-        let shown = self.results.simulation.as_ref()?;
-        Some(shown.holds_for(&self.document.simulation_inputs(shown.value.quality)))
-    }
-
-    /// As [`Self::simulation_holds`], of the design.
-    #[must_use]
-    pub fn design_holds(&self) -> Option<bool> {
-        let shown = self.results.design.as_ref()?;
-        Some(shown.holds_for(&self.document.design_inputs(shown.value.quality)))
-    }
-
-    fn better_simulation_holds(&self, than: Quality) -> bool {
-        let shown = self.results.simulation.as_ref();
-        shown.is_some_and(|s| s.value.quality > than) && self.simulation_holds() == Some(true)
-    }
-
-    fn better_design_holds(&self, than: Quality) -> bool {
-        let shown = self.results.design.as_ref();
-        shown.is_some_and(|d| d.value.quality > than) && self.design_holds() == Some(true)
-    }
-
     pub(super) fn take_simulation(&mut self, inputs: SimulationInputs, value: SimulationResult) {
         let quality = value.quality;
         let slot = Slot { inputs, value };
@@ -240,22 +102,6 @@ impl Session {
         }
     }
 
-    /// What the filters' verdicts on the simulation that is shown depend on, where it holds.
-    #[must_use]
-    pub fn shown_filter_inputs(&self) -> Option<FilterInputs> {
-        let quality = self.results.simulation.as_ref()?.value.quality;
-        (self.simulation_holds() == Some(true)).then(|| self.document.filter_inputs(quality))
-    }
-
-    /// The filters' verdicts, while they hold for the project as it is.
-    #[must_use]
-    pub fn current_verdicts(&self) -> Option<&Arc<Feasibility>> {
-        current(
-            self.results.feasibility.as_ref(),
-            &self.shown_filter_inputs()?,
-        )
-    }
-
     /// Filters anew when anything that the verdicts depend on has changed.
     pub(super) fn refresh_feasibility(&mut self) {
         let (Some(inputs), Some(simulation)) =
@@ -278,9 +124,23 @@ impl Session {
             });
     }
 
-    pub(super) fn dropped(&mut self, what: &str) {
-        self.tell(format!(
-            "The {what} was for settings that have changed since, and was dropped"
-        ));
+    /// The project's gauges are those that the design chose.
+    pub(super) fn take_sites(&mut self) {
+        let Some(result) = &self.results.design else {
+            return;
+        };
+        let sites = result.value.chosen_sites();
+        if self.document.state.project.selection.sites != sites {
+            if std::mem::take(&mut self.drive.pressed) {
+                // Somebody asked for them: what was there before can be had back.
+                self.document.settle();
+                self.document.state.project.selection.sites = sites;
+                self.document.settle();
+            } else {
+                self.document.adopt_sites(sites);
+            }
+            self.news.happened(Event::GaugesReplaced);
+        }
+        self.drive.take = true;
     }
 }

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::jobs::Task;
-use super::{Event, Session};
+use super::news::Event;
+use super::state::Session;
 use crate::design::Design;
 use crate::document::State;
 use crate::io::artifacts::{self, Provenance};

@@ -1,7 +1,7 @@
 //! The stages of the pipeline, and how each stands.
 
-use super::Session;
 use super::jobs::Task;
+use super::state::Session;
 use crate::budget::Quality;
 use crate::design::Step;
 use crate::link::State;

@@ -2,17 +2,12 @@
 
 use std::sync::Arc;
 
-use super::Session;
 use super::attention::{Attention, Colours};
-use super::drive::stop;
-use super::jobs::Task;
+use super::jobs::{Task, stop};
 use super::slot::{Slot, current};
+use super::state::Session;
 use crate::design::{self, Advice};
-use crate::document::WallInputs;
 use crate::job::Reporter;
-
-/// What was measured of the walls.
-pub type Walls = Option<Slot<WallInputs, Arc<Advice>>>;
 
 impl Session {
     /// What is known of the part as it is, if it was measured.

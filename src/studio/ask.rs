@@ -16,6 +16,7 @@ pub struct Ask<'a> {
 }
 
 impl<'a> Ask<'a> {
+    /// A side on which nothing is asked for yet.
     pub fn new(session: &'a Session, view: &'a mut View) -> Self {
         Self {
             session,

@@ -57,6 +57,7 @@ impl Dialog {
         Self::new(Purpose::Open, path.display().to_string())
     }
 
+    /// For a project or a mesh, beside the one that is open.
     pub fn open(document: &Document) -> Self {
         let folder = document.path.as_ref().and_then(|p| p.parent());
         Self::new(
@@ -67,6 +68,7 @@ impl Dialog {
         )
     }
 
+    /// For the project's file.
     pub fn save_as(document: &Document) -> Self {
         let path = document.path.clone().unwrap_or_else(|| {
             let stem = document
@@ -82,6 +84,7 @@ impl Dialog {
         Self::new(Purpose::SaveAs, path.display().to_string())
     }
 
+    /// For the folder of a report.
     pub fn export(document: &Document) -> Self {
         let folder = document
             .path
@@ -91,6 +94,7 @@ impl Dialog {
         Self::new(Purpose::Export, folder.join("report").display().to_string())
     }
 
+    /// For a picture of what the view shows.
     pub fn picture(document: &Document) -> Self {
         let mesh = document.path.as_ref().unwrap_or(&document.mesh_path);
         let name = mesh.file_name().unwrap_or_default().to_string_lossy();

@@ -10,7 +10,7 @@ use super::palette::{self, Palette};
 use super::recovery::Recovery;
 use super::trade::Dial;
 use super::view::{Pane, Stage, Tab};
-use super::{confusions, inspector, jobs, kept, live, measure, overlay, results, trade};
+use super::{confusions, inspector, jobs, kept, legend, live, measure, overlay, results, trade};
 
 /// What is typed in panels, and what is open over them.
 #[derive(Default)]
@@ -99,11 +99,11 @@ fn draw_over(look: Look<'_>, ui: &Ui, pane: Pane, rect: Rect) {
     overlay::paint_brush(look, painter, pane);
     overlay::paint_outline(look, painter, pane);
     if pane == Pane::Unrolled {
-        overlay::paint_stretch(look, painter, rect);
+        legend::paint_stretch(look, painter, rect);
     } else {
-        overlay::paint_legend(look, painter, rect);
-        overlay::paint_region_key(look, painter, rect);
-        overlay::paint_hint(look, painter, rect);
+        legend::paint_legend(look, painter, rect);
+        legend::paint_region_key(look, painter, rect);
+        legend::paint_hint(look, painter, rect);
     }
 }
 
@@ -115,5 +115,5 @@ pub fn picture(look: Look<'_>, ui: &Ui, rect: Rect, transparent: bool) {
     overlay::paint_gauges(look, painter, Pane::Limb);
     overlay::paint_touch(look, painter, Pane::Limb);
     live::paint_live(look, painter, Pane::Limb);
-    overlay::paint_legend(look, painter, rect);
+    legend::paint_legend(look, painter, rect);
 }

@@ -9,9 +9,9 @@ use super::commands::Command;
 use super::paint::empty;
 use super::theme::kept_colour;
 use super::view::{Tab, Tool};
+use crate::design::curves::{curve, failure_curve, failure_name, failure_ways};
 use crate::evaluation::{BASELINE, EVERYWHERE, EstimatorKind};
 use crate::io::artifacts::{range, signal_to_noise, signal_unit};
-use crate::io::report::{curve, failure_curve, failure_name, failure_ways};
 use crate::placement::SensorSet;
 use crate::placement::expected_error::ASSUMES;
 use crate::session::NOBODY_REDUCES;
@@ -175,6 +175,7 @@ fn regions(ask: &Ask<'_>) -> Vec<String> {
     regions
 }
 
+/// The tab: error against number of gauges, a plot for each region.
 pub fn error_plots(ask: &Ask<'_>, ui: &mut Ui) {
     let regions = regions(ask);
     let height = ui.available_height() - 26.0;
@@ -210,6 +211,7 @@ fn error_curves(ask: &Ask<'_>, plot: &mut PlotUi<'_>, region: &str) {
     }
 }
 
+/// The tab: error against number of failed gauges.
 pub fn failure_plots(ask: &Ask<'_>, ui: &mut Ui) {
     let height = ui.available_height() - 26.0;
     let design = ask.session.results.design.as_ref().map(|d| &d.value.design);
@@ -259,6 +261,7 @@ fn failure_curves(ask: &Ask<'_>, plot: &mut PlotUi<'_>, retrained: bool) {
     }
 }
 
+/// The tab: what is left unexplained by so many sites.
 pub fn reduction_plot(ask: &Ask<'_>, ui: &mut Ui) {
     let Some(result) = &ask.session.results.design else {
         return;

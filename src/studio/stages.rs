@@ -34,6 +34,7 @@ fn word(standing: &Standing) -> &'static str {
     }
 }
 
+/// All stages, and whether changes are followed.
 pub fn stages(ask: &mut Ask<'_>, ui: &mut Ui) {
     egui::ScrollArea::vertical()
         .auto_shrink(false)

@@ -8,6 +8,7 @@ pub const CHOSEN: Color32 = Color32::from_rgb(230, 110, 30);
 pub const TOUCHED: Color32 = Color32::from_rgb(70, 170, 255);
 /// Results of settings that have changed since.
 pub const STALE: Color32 = Color32::from_rgb(225, 180, 80);
+/// What went wrong, or is not to be trusted.
 pub const ERROR: Color32 = Color32::from_rgb(235, 110, 95);
 
 /// Behind the limb, by theme.
@@ -19,6 +20,7 @@ pub fn backdrop(theme: Theme) -> Color32 {
     }
 }
 
+/// Gives a context these colours and spacings.
 pub fn apply(ctx: &Context) {
     ctx.set_theme(ThemePreference::System);
     let mut dark = Visuals::dark();

@@ -56,40 +56,19 @@ pub const OUTER: [(&str, &[&str]); 8] = [
 
 /// Circles that are known and wait for their mending: the name of each and its files. They may only lose files; a
 /// circle that is gone must leave this list.
-const KNOWN: [(&str, &[&str]); 2] = [
-    (
-        "a document and what is painted on it",
-        &["document.rs", "document/paint.rs"],
-    ),
-    ("a session and what is done with it", SESSION),
-];
-
-const SESSION: &[&str] = &[
-    "session.rs",
-    "session/attention.rs",
-    "session/confusions.rs",
-    "session/drive.rs",
-    "session/expected.rs",
-    "session/fields.rs",
-    "session/gauges.rs",
-    "session/jobs.rs",
-    "session/live.rs",
-    "session/live/known.rs",
-    "session/measure.rs",
-    "session/results.rs",
-    "session/saving.rs",
-    "session/touching.rs",
-    "session/trade.rs",
-    "session/walls.rs",
-];
+const KNOWN: [(&str, &[&str]); 1] = [(
+    "a document and what is painted on it",
+    &["document.rs", "document/paint.rs"],
+)];
 
 /// What shows and asks in the window. `studio/layout.rs` alone knows them all.
-const PANELS: [&str; 14] = [
+const PANELS: [&str; 15] = [
     "confusions",
     "dialogs",
     "inspector",
     "jobs",
     "kept",
+    "legend",
     "live",
     "measure",
     "menu",

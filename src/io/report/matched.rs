@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::words::{judged_on, title_of};
+use super::words::judged_on;
+use crate::design::curves::title_of;
 use crate::design::{BLIND, Design};
 use crate::evaluation::MatchedRow;
 use crate::io::svg::escape;

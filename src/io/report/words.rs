@@ -1,19 +1,6 @@
 //! What sets and judges are called in a report.
 
 use crate::design::Design;
-use crate::evaluation::BASELINE;
-use crate::placement::SelectorKind;
-
-/// What a set was chosen by, as read by people.
-pub(super) fn title_of(selector: &str) -> &str {
-    if selector == BASELINE {
-        return "All candidates";
-    }
-    SelectorKind::ALL
-        .into_iter()
-        .find(|k| k.name() == selector)
-        .map_or(selector, |kind| kind.title())
-}
 
 /// What the touches that judge are computed on: where a finer model would not have fitted, on one like the design's.
 pub(super) fn judged_on(design: &Design) -> String {

@@ -7,7 +7,8 @@ use glam::DVec3;
 use crate::design::Sensing;
 use crate::inference::{Calibration, Known, calibrate};
 use crate::job::Reporter;
-use crate::session::{Session, Task};
+use crate::session::jobs::Task;
+use crate::session::state::Session;
 use crate::uncertainty::{Pressing, Uncertainty};
 
 /// How many are proposed, and how many a calibration takes at least.
@@ -15,22 +16,6 @@ pub const WANTED: usize = crate::design::PROPOSED;
 pub const LEAST: usize = 4;
 /// Pictures that a reading is averaged over.
 const FRAMES: usize = 10;
-
-/// A known touch that is being read.
-#[derive(Default)]
-pub struct Gathering {
-    /// From the touches of a simulated board, until there are enough.
-    pub from_board: bool,
-    /// Whether all of them were read off a board that tells where it is pressed, and how hard.
-    exact: bool,
-    /// At a place that was proposed.
-    pub at: Option<DVec3>,
-    rows: Vec<Vec<f64>>,
-    truth: Option<(DVec3, f64)>,
-    /// The last touch that was read: each only once.
-    read: Option<DVec3>,
-    last_us: u64,
-}
 
 impl Session {
     /// Where the next known touch is proposed (m).

@@ -1,0 +1,127 @@
+//! A connection to a board, and what is known of the gauges that it reads.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::design::Sensing;
+use crate::document::SensingInputs;
+use crate::inference::Known;
+use crate::link::{Address, Command, Connection, Hosted, State};
+use crate::live::Update;
+use crate::project::LiveKeys;
+use crate::session::live::feed::{Feed, Shared};
+use crate::session::live::training::Pair;
+use crate::session::slot::Slot;
+
+/// What is to be listened to once the model is there.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::session) enum Target {
+    Board(Address),
+    Simulated,
+}
+
+/// Trained estimators, and the gauges that they were trained for.
+pub(in crate::session) type TrainedFor = (Vec<bool>, Pair);
+
+/// A known touch that is being read.
+#[derive(Default)]
+pub struct Gathering {
+    /// From the touches of a simulated board, until there are enough.
+    pub from_board: bool,
+    /// Whether all of them were read off a board that tells where it is pressed, and how hard.
+    pub(in crate::session) exact: bool,
+    /// At a place that was proposed.
+    pub at: Option<DVec3>,
+    pub(in crate::session) rows: Vec<Vec<f64>>,
+    pub(in crate::session) truth: Option<(DVec3, f64)>,
+    /// The last touch that was read: each only once.
+    pub(in crate::session) read: Option<DVec3>,
+    pub(in crate::session) last_us: u64,
+}
+
+/// A connection, and what is known of the gauges that it reads.
+#[derive(Default)]
+pub struct Live {
+    /// The model of the gauges.
+    pub(in crate::session) sensing: Option<Slot<SensingInputs, Arc<Sensing>>>,
+    pub(in crate::session) connection: Option<Connection>,
+    /// A simulated board of our own.
+    pub(in crate::session) hosted: Option<Hosted>,
+    pub(in crate::session) feed: Shared,
+    pub(in crate::session) target: Option<Target>,
+    pub(in crate::session) known: Vec<Known>,
+    pub(in crate::session) gathering: Gathering,
+    pub(in crate::session) trained: Option<Slot<SensingInputs, TrainedFor>>,
+    /// For which gauges training was begun.
+    pub(in crate::session) training_for: Option<Vec<bool>>,
+    /// The last recording that was begun.
+    pub recorded: Option<PathBuf>,
+    /// The settings that the pipeline has.
+    pub(in crate::session) applied: Option<LiveKeys>,
+}
+
+impl Live {
+    /// What is heard at the moment.
+    pub fn look<T>(&self, at: impl FnOnce(&Feed) -> T) -> Option<T> {
+        self.feed.lock().ok().map(|feed| at(&feed))
+    }
+
+    #[must_use]
+    pub fn is_connected(&self) -> bool {
+        self.connection.is_some()
+    }
+
+    /// Whether a board is to be listened to once the model of the gauges is there.
+    #[must_use]
+    pub fn is_preparing(&self) -> bool {
+        self.target.is_some()
+    }
+
+    /// The simulated board of our own, to make things go wrong.
+    #[must_use]
+    pub fn simulated_board(&self) -> Option<&Hosted> {
+        self.hosted.as_ref()
+    }
+
+    /// How the connection stands; nothing where there is none.
+    #[must_use]
+    pub fn state(&self) -> Option<State> {
+        self.connection.as_ref()?;
+        self.look(|feed| feed.state.clone()).flatten()
+    }
+
+    /// What the last sample said.
+    #[must_use]
+    pub fn update(&self) -> Option<Update> {
+        self.look(|feed| feed.update.clone()).flatten()
+    }
+
+    /// Where a simulated board is really touched (m, N).
+    #[must_use]
+    pub fn truth(&self) -> Option<(DVec3, f64)> {
+        self.look(|feed| feed.truth).flatten()
+    }
+
+    /// How many known touches there are.
+    #[must_use]
+    pub fn known_touches(&self) -> usize {
+        self.known.len()
+    }
+
+    /// Whether a known touch is being read, and whether off a simulated board.
+    #[must_use]
+    pub fn is_gathering(&self) -> (bool, bool) {
+        (
+            self.gathering.at.is_some() || self.gathering.from_board,
+            self.gathering.from_board,
+        )
+    }
+
+    pub(in crate::session) fn send(&self, command: Command) {
+        if let Some(connection) = &self.connection {
+            connection.send(command);
+        }
+    }
+}

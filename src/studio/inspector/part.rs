@@ -1,0 +1,183 @@
+//! The part: its model, how it stands, and how its mesh is taken in.
+
+use egui::{DragValue, Ui};
+use glam::DVec3;
+
+use super::super::action::FileAction;
+use super::super::ask::Ask;
+use super::super::commands::Command;
+use super::super::form::{choice, count, number, rows};
+use crate::io::examples::Example;
+use crate::mesh::unroll::Axis;
+use crate::project::{PartAxis, PartModel, Project};
+
+/// The settings of the part.
+pub fn part_form(ask: &mut Ask<'_>, ui: &mut Ui) {
+    let from_file = !ask.session.document.bundled;
+    let bodies = ask.session.document.repairs.bodies;
+    let again = from_file && ask.session.document.asks_for_another_part();
+    let mesh = &ask.session.document.mesh_path;
+    let example = Example::of_mesh(mesh).filter(|_| !from_file);
+    let file = || mesh.display().to_string();
+    ui.weak(example.map_or_else(file, |example| example.name().to_owned()));
+    let up = ask.view.camera.stance.up();
+    let mut pressed = false;
+    ask.edit(|project| {
+        rows(ui, "Model", |ui| part(ui, project, up));
+        if from_file {
+            rows(ui, "Taking the mesh in", |ui| {
+                pressed = taking_in(ui, project, bodies, again);
+            });
+        }
+    });
+    if pressed {
+        ask.act(FileAction::TakeInAgain);
+    }
+    ask.button(ui, Command::Advise);
+    advice_lines(ask, ui);
+}
+
+/// How the mesh file is taken in; whether it is to be read again.
+fn taking_in(ui: &mut Ui, project: &mut Project, bodies: usize, again: bool) -> bool {
+    if bodies > 1 {
+        count(
+            ui,
+            "Body",
+            &mut project.part.body,
+            0..=bodies - 1,
+            "Which connected body of the file, 0 being the one with the largest surface",
+        );
+    }
+    number(
+        ui,
+        "Weld",
+        &mut project.part.weld_mm,
+        0.0..=1e3,
+        0.001,
+        " mm",
+        "Vertices nearer to each other than this are joined; 0 joins equal ones only",
+    );
+    number(
+        ui,
+        "Fill holes",
+        &mut project.part.fill_holes_mm,
+        0.0..=1e4,
+        0.1,
+        " mm",
+        "Holes up to this far across are filled",
+    );
+    number(
+        ui,
+        "Straighten",
+        &mut project.part.straighten_mm,
+        0.0..=1e3,
+        0.1,
+        " mm",
+        "A bent edge that turns a tetrahedron inside out is straightened where its node moves no farther than this",
+    );
+    if !again {
+        return false;
+    }
+    ui.label("");
+    let pressed = ui
+        .button("Read the mesh again")
+        .on_hover_text(
+            "With this body and these repairs. What was painted on other vertices is lost",
+        )
+        .clicked();
+    ui.end_row();
+    pressed
+}
+
+fn model_name(model: PartModel) -> &'static str {
+    match model {
+        PartModel::Shell => "Shell",
+        PartModel::Solid => "Solid",
+    }
+}
+
+fn part(ui: &mut Ui, project: &mut Project, up: DVec3) {
+    choice(
+        ui,
+        "Taken as",
+        &mut project.part.model,
+        &[PartModel::Shell, PartModel::Solid],
+        model_name,
+        "Shell: the mesh is the middle of a wall. Solid: the mesh encloses a part with walls",
+    );
+    if project.part.model == PartModel::Shell {
+        number(
+            ui,
+            "Thickness",
+            &mut project.part.thickness_mm,
+            1e-4..=1e4,
+            0.01,
+            " mm",
+            "Of the shell; the mesh is its mid-surface",
+        );
+    }
+    axis(ui, &mut project.part.axis, up);
+}
+
+/// Which way the part stands; `up` is how it does.
+fn axis(ui: &mut Ui, axis: &mut PartAxis, up: DVec3) {
+    let direction = if let PartAxis::Along(direction) = *axis {
+        direction
+    } else {
+        up.to_array()
+    };
+    let all = [
+        PartAxis::Auto,
+        PartAxis::Coordinate(Axis::X),
+        PartAxis::Coordinate(Axis::Y),
+        PartAxis::Coordinate(Axis::Z),
+        PartAxis::Along(direction),
+    ];
+    choice(
+        ui,
+        "Axis",
+        axis,
+        &all,
+        axis_name,
+        "What is up for the part: views, unrolling and new supports follow it",
+    );
+    match axis {
+        PartAxis::Coordinate(_) => {}
+        PartAxis::Auto => {
+            ui.label("Found");
+            let [x, y, z] = up.to_array();
+            ui.label(format!("{x:.2}, {y:.2}, {z:.2}"));
+            ui.end_row();
+        }
+        PartAxis::Along(direction) => {
+            ui.label("Direction");
+            ui.horizontal(|ui| {
+                for (value, name) in direction.iter_mut().zip(["x", "y", "z"]) {
+                    ui.add(DragValue::new(value).speed(0.01).max_decimals(4))
+                        .accessible_name(format!("Axis, {name}"));
+                }
+            });
+            ui.end_row();
+        }
+    }
+}
+
+fn axis_name(axis: PartAxis) -> &'static str {
+    match axis {
+        PartAxis::Auto => "By its shape",
+        PartAxis::Coordinate(Axis::X) => "x",
+        PartAxis::Coordinate(Axis::Y) => "y",
+        PartAxis::Coordinate(Axis::Z) => "z",
+        PartAxis::Along(_) => "Direction",
+    }
+}
+
+/// What was found of the walls, in words.
+fn advice_lines(ask: &Ask<'_>, ui: &mut Ui) {
+    let Some(advice) = ask.session.advice() else {
+        return;
+    };
+    for line in &advice.words {
+        ui.add(egui::Label::new(line).wrap());
+    }
+}

@@ -1,0 +1,117 @@
+//! Material, and what the part is held by.
+
+use std::sync::Arc;
+
+use egui::Ui;
+
+use super::super::action::Change;
+use super::super::ask::Ask;
+use super::super::form::{choice, number, rows};
+use super::super::view::Tool;
+use super::corners::{corners, names_along};
+use crate::document::Layer;
+use crate::mesh::oriented_box::OrientedBox;
+use crate::project::{Project, SupportKeys, SupportKind};
+
+/// The settings of material and supports.
+pub fn supports_form(ask: &mut Ask<'_>, ui: &mut Ui) {
+    let part = Arc::clone(&ask.session.document.part);
+    let stance = ask.view.camera.stance;
+    // A slice at the lower end: a start that holds something on any part.
+    let start = || stance.lower_end(&part, 0.05);
+    ask.edit(|project| {
+        rows(ui, "Material", |ui| material(ui, project));
+        rows(ui, "Supports", |ui| supports(ui, project, start));
+    });
+    let paint = ui
+        .button("Paint a support")
+        .on_hover_text("Another support, on the vertices that you paint next");
+    if paint.clicked() {
+        ask.act(Change::AddPaintedSupport);
+        ask.view.layer = Layer::Support;
+        ask.view.take(Tool::Paint);
+    }
+}
+
+fn material(ui: &mut Ui, project: &mut Project) {
+    number(
+        ui,
+        "Young's modulus",
+        &mut project.material.youngs_modulus_gpa,
+        1e-6..=1e4,
+        0.01,
+        " GPa",
+        "Printed nylon: 1.7 GPa",
+    );
+    number(
+        ui,
+        "Poisson's ratio",
+        &mut project.material.poissons_ratio,
+        -0.99..=0.499,
+        0.005,
+        "",
+        "Printed nylon: 0.35",
+    );
+}
+
+/// The supports, with a new one beginning as the box that `start` gives.
+fn supports(ui: &mut Ui, project: &mut Project, start: impl FnOnce() -> OrientedBox) {
+    let mut removed = None;
+    for (k, support) in project.supports.iter_mut().enumerate() {
+        let number = k + 1;
+        let kinds = [
+            SupportKind::Clamped,
+            SupportKind::Pinned,
+            SupportKind::Symmetry,
+        ];
+        let label = format!("Support {number}");
+        choice(
+            ui,
+            &label,
+            &mut support.kind,
+            &kinds,
+            kind_name,
+            "Clamped: no displacement, no rotation. Pinned: no displacement. Symmetry: a mirror plane",
+        );
+        if let Some(name) = &support.vertices {
+            ui.label("Vertices");
+            ui.label(name);
+            ui.end_row();
+        }
+        if let Some(held) = &mut support.box_mm {
+            let names = names_along(ui, support.box_axis);
+            corners(ui, &format!("Support {number}"), names, held);
+        }
+        ui.label("");
+        if ui
+            .button("Remove")
+            .accessible_name(format!("Remove support {number}"))
+            .clicked()
+        {
+            removed = Some(k);
+        }
+        ui.end_row();
+    }
+    if let Some(k) = removed {
+        project.supports.remove(k);
+    }
+    if ui
+        .button("Add support")
+        .on_hover_text("Everything inside a box is held")
+        .clicked()
+    {
+        /// What lies on the box's faces is meant (m).
+        const ROOM: f64 = 1e-5;
+        let held = start().grown(ROOM);
+        project.supports.push(SupportKeys::clamping(&held));
+    }
+    ui.end_row();
+}
+
+fn kind_name(kind: SupportKind) -> &'static str {
+    match kind {
+        SupportKind::Clamped => "Clamped",
+        SupportKind::Pinned => "Pinned",
+        SupportKind::Symmetry => "Symmetry",
+    }
+}
