@@ -237,7 +237,10 @@ fn trade(text: &mut String) {
         let (graded, build) =
             on_one_core(|| ground.grade(&touches, &places, &aim(vertices, 2), &unwatched));
         let model = graded.expect("grades").model;
-        let points: Vec<_> = places.iter().map(|&p| model.index.nearest(p).0).collect();
+        let points: Vec<_> = places
+            .iter()
+            .map(|&p| model.mesh.index().nearest(p).0)
+            .collect();
         let solve = |signal| {
             on_one_core(|| {
                 dataset::simulate(&model, many.clone(), &points, signal, 1, &[], &unwatched)

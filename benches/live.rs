@@ -222,7 +222,7 @@ impl Lab {
         let known: Vec<Known> = places
             .iter()
             .map(|t| Known {
-                at: self.sensing.drawn.map.index.nearest(t.position).0,
+                at: self.sensing.drawn.map.mesh.index().nearest(t.position).0,
                 force: 10.0,
                 reading: read(
                     truth,
@@ -319,7 +319,14 @@ impl Lab {
         for touch in &self.touches {
             let force = forces[0] + (forces[1] - forces[0]) * rng.random::<f64>();
             let touch = Touch { force, ..*touch };
-            let at = self.sensing.drawn.map.index.nearest(touch.position).0;
+            let at = self
+                .sensing
+                .drawn
+                .map
+                .mesh
+                .index()
+                .nearest(touch.position)
+                .0;
             let mut squares = 0.0;
             for draw in 0..DRAWS {
                 let x = read(scene.truth, &scene.gains, &touch, NOISE, &mut rng);

@@ -236,7 +236,7 @@ fn solve(
         .iter()
         .zip(model.solve_many(&loads))
         .map(|(touch, u)| {
-            let at = model.index.nearest(touch.position).0;
+            let at = model.mesh.index().nearest(touch.position).0;
             let tri = model.mesh.triangles()[at.triangle as usize];
             let moved: DVec3 = (0..3)
                 .map(|k| DVec3::from_slice(&u[6 * tri[k] as usize..]) * at.barycentric[k])

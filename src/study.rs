@@ -153,7 +153,45 @@ pub fn select(
     watch: Watch,
     found: &(dyn Fn(&SensorSet) + Sync),
 ) -> Result<Choice, PlacementError> {
-    /// A choice that is not learned from needs signals that differ.
+    enough_touches(data, settings)?;
+    let offer = Offer::new(data, kept_out, wishes, settings)?;
+    let pool = Pool {
+        x: &offer.x,
+        targets: &data.targets,
+        sites: &offer.open,
+        positions: &offer.positions,
+    };
+    let request = Request {
+        wishes: &offer.wishes,
+        watch,
+        found,
+    };
+    let located = |seconds: &mut ChoiceSeconds| {
+        straight(&pool, data, kept_out, settings, clock, seconds, watch)
+    };
+    match settings.kind {
+        SelectorKind::Entropy => by_geometry(located, clock, &|geometry| {
+            Entropy { geometry }.select(&pool, &request)
+        }),
+        SelectorKind::MutualInformation => by_geometry(located, clock, &|geometry| {
+            MutualInformation { geometry }.select(&pool, &request)
+        }),
+        SelectorKind::PcaQr => by_signals(clock, || PcaQr.select(&pool, &request)),
+        SelectorKind::GreedySvr => by_signals(clock, || settings.svr.select(&pool, &request)),
+        SelectorKind::ExpectedError => {
+            let mut weighed = None;
+            let choice = by_signals(clock, || {
+                let (selection, what) = by_expected_error(&pool, &request, data, settings)?;
+                weighed = Some(what);
+                Ok(selection)
+            })?;
+            Ok(Choice { weighed, ..choice })
+        }
+    }
+}
+
+/// Refuses data that nothing can be learned from: a choice needs signals that differ at the least.
+fn enough_touches(data: &Data, settings: &Settings) -> Result<(), PlacementError> {
     const LEAST: usize = 2;
     let touches = data.targets.len();
     if touches < LEAST {
@@ -162,87 +200,110 @@ pub fn select(
             least: 2 * settings.svr.folds,
         });
     }
-    // Expected error knows the noise; the others hear it.
-    let heard = if settings.kind == SelectorKind::ExpectedError {
-        0.0
-    } else {
-        settings.noise
-    };
-    let noisy = add_noise(&data.x, heard, settings.svr.seed);
-    let open: Vec<usize> = (0..noisy.rows())
-        .filter(|s| !kept_out.contains(s))
-        .collect();
-    if open.is_empty() {
-        return Err(PlacementError::Wish {
-            what: "every site is kept out: leave some to choose from",
-        });
+    Ok(())
+}
+
+/// The sites that may be chosen, with what is asked of the choice among them.
+struct Offer<'a> {
+    /// As numbered in the data.
+    open: Vec<usize>,
+    /// Their signals, as the selector is to see them.
+    x: Cow<'a, SignalMatrix>,
+    /// m; empty where nobody knows them.
+    positions: Vec<DVec3>,
+    /// As numbered among the open sites.
+    wishes: Wishes,
+}
+
+impl<'a> Offer<'a> {
+    fn new(
+        data: &'a Data,
+        kept_out: &[usize],
+        wishes: &Wishes,
+        settings: &Settings,
+    ) -> Result<Self, PlacementError> {
+        // Expected error knows the noise; to the others it is added.
+        let added = if settings.kind == SelectorKind::ExpectedError {
+            0.0
+        } else {
+            settings.noise
+        };
+        let noisy = add_noise(&data.x, added, settings.svr.seed);
+        let open: Vec<usize> = (0..noisy.rows())
+            .filter(|s| !kept_out.contains(s))
+            .collect();
+        if open.is_empty() {
+            return Err(PlacementError::Wish {
+                what: "every site is kept out: leave some to choose from",
+            });
+        }
+        let wishes = among(wishes, &open, &data.costs)?;
+        let positions: Vec<DVec3> = if data.positions.is_empty() {
+            Vec::new()
+        } else {
+            open.iter().map(|&s| data.positions[s]).collect()
+        };
+        let x = if open.len() == noisy.rows() {
+            noisy
+        } else {
+            Cow::Owned(noisy.select_rows(&open))
+        };
+        Ok(Self {
+            open,
+            x,
+            positions,
+            wishes,
+        })
     }
+}
+
+/// Wishes by the numbers of the sites that are open, with what those cost.
+fn among(wishes: &Wishes, open: &[usize], costs: &[f64]) -> Result<Wishes, PlacementError> {
     let place = |site: &usize| open.iter().position(|o| o == site);
     let required: Option<Vec<usize>> = wishes.required.iter().map(place).collect();
-    let wishes = Wishes {
+    Ok(Wishes {
         required: required.ok_or(PlacementError::Wish {
             what: "a gauge that must be there is not among the sites, or is kept out",
         })?,
-        costs: (!data.costs.is_empty()).then(|| open.iter().map(|&s| data.costs[s]).collect()),
+        costs: (!costs.is_empty()).then(|| open.iter().map(|&s| costs[s]).collect()),
         ..wishes.clone()
-    };
-    let x = if open.len() == noisy.rows() {
-        noisy
-    } else {
-        Cow::Owned(noisy.select_rows(&open))
-    };
-    let positions: Vec<DVec3> = if data.positions.is_empty() {
-        Vec::new()
-    } else {
-        open.iter().map(|&s| data.positions[s]).collect()
-    };
-    let pool = Pool {
-        x: &x,
-        targets: &data.targets,
-        sites: &open,
-        positions: &positions,
-    };
-    let request = Request {
-        wishes: &wishes,
-        watch,
-        found,
-    };
-    let mut seconds = ChoiceSeconds::default();
-    let geometry = match settings.kind {
-        SelectorKind::Entropy | SelectorKind::MutualInformation => Some(straight(
-            &pool,
-            data,
-            kept_out,
-            settings,
-            clock,
-            &mut seconds,
-            watch,
-        )?),
-        _ => None,
-    };
+    })
+}
+
+/// A choice by the signals alone.
+fn by_signals(
+    clock: &dyn Fn() -> f64,
+    choose: impl FnOnce() -> Result<Selection, PlacementError>,
+) -> Result<Choice, PlacementError> {
     let before = clock();
-    let geometry = geometry.as_ref();
-    let mut weighed = None;
-    let selection = match (settings.kind, geometry) {
-        (SelectorKind::Entropy, Some(geometry)) => Entropy { geometry }.select(&pool, &request),
-        (SelectorKind::MutualInformation, Some(geometry)) => {
-            MutualInformation { geometry }.select(&pool, &request)
-        }
-        (SelectorKind::PcaQr, _) => PcaQr.select(&pool, &request),
-        (SelectorKind::ExpectedError, _) => {
-            by_expected_error(&pool, &request, data, settings).map(|(selection, what)| {
-                weighed = Some(what);
-                selection
-            })
-        }
-        _ => settings.svr.select(&pool, &request),
-    }?;
+    let selection = choose()?;
+    Ok(Choice {
+        selection,
+        geometry: None,
+        weighed: None,
+        seconds: ChoiceSeconds {
+            selection: clock() - before,
+            ..ChoiceSeconds::default()
+        },
+    })
+}
+
+/// A choice by a Gaussian process over the sites.
+fn by_geometry(
+    located: impl FnOnce(&mut ChoiceSeconds) -> Result<Geometry, PlacementError>,
+    clock: &dyn Fn() -> f64,
+    choose: &dyn Fn(&Geometry) -> Result<Selection, PlacementError>,
+) -> Result<Choice, PlacementError> {
+    let mut seconds = ChoiceSeconds::default();
+    let geometry = located(&mut seconds)?;
+    let before = clock();
+    let selection = choose(&geometry)?;
     // The covariance is part of the choice.
     seconds.selection += clock() - before;
     Ok(Choice {
         selection,
-        geometry: geometry.map(Geometry::summary),
-        weighed,
+        geometry: Some(geometry.summary()),
+        weighed: None,
         seconds,
     })
 }

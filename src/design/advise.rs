@@ -14,7 +14,6 @@ use crate::elasticity::solid::simplex::Simplex;
 use crate::elasticity::solid::sizing::Shape;
 use crate::elasticity::{ElasticError, Touch, scope};
 use crate::mesh::TriMesh;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::sample;
 use crate::mesh::walls::Side;
 use crate::plain::{self, digits};
@@ -438,7 +437,7 @@ fn bent(radius: [f64; 2]) -> String {
 
 /// Faces and thickness at the vertices of the part that is shown.
 fn carried(part: &Arc<TriMesh>, solid: &SolidGround) -> Faces {
-    let index = SurfaceIndex::new(&solid.whole);
+    let index = solid.whole.index();
     let (mut sides, mut thickness) = (Vec::new(), Vec::new());
     let over = 0.1 * solid.wall();
     for (p, n) in part.positions().iter().zip(part.vertex_normals()) {

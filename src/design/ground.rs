@@ -15,7 +15,6 @@ use crate::elasticity::shell::check_section;
 use crate::elasticity::solid::ground::SolidGround;
 use crate::elasticity::{Model, Touch};
 use crate::feasible::Surroundings;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::walls::Side;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain;
@@ -114,9 +113,12 @@ fn told(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, Desig
     };
     let inside = mask("part.inside", keys.inside.as_ref())?;
     let outside = mask("part.outside", keys.outside.as_ref())?;
-    let index = (inside.is_some() || outside.is_some()).then(|| SurfaceIndex::new(&part));
+    let is_said = inside.is_some() || outside.is_some();
     Ok(move |place: DVec3| {
-        let at = index.as_ref()?.nearest(place).0;
+        if !is_said {
+            return None;
+        }
+        let at = part.index().nearest(place).0;
         let set = |mask: &Option<Arc<Vec<bool>>>| {
             mask.as_ref().is_some_and(|mask| part.mostly_in(mask, at))
         };
@@ -129,6 +131,15 @@ fn told(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, Desig
 }
 
 impl Ground {
+    /// What elements were laid on.
+    #[must_use]
+    pub fn of(meshed: &Meshed) -> Self {
+        match meshed {
+            Meshed::Shell(shell, _) => Self::Shell(Arc::clone(shell)),
+            Meshed::Solid(solid, _) => Self::Solid(Arc::clone(solid)),
+        }
+    }
+
     /// Refuses at once what cannot be computed at all: a part that nothing holds is the likeliest mistake.
     ///
     /// # Errors

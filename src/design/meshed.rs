@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{DesignError, Ground};
+use super::DesignError;
 use crate::budget::Watch;
 use crate::elasticity::solid::ground::SolidGround;
 use crate::elasticity::solid::immersed::Fineness;
@@ -18,15 +18,6 @@ pub enum Meshed {
 }
 
 impl Meshed {
-    /// What they were laid on.
-    #[must_use]
-    pub fn ground(&self) -> Ground {
-        match self {
-            Self::Shell(shell, _) => Ground::Shell(Arc::clone(shell)),
-            Self::Solid(solid, _) => Ground::Solid(Arc::clone(solid)),
-        }
-    }
-
     /// The surface that gauges are glued to, and what is held at its vertices.
     #[must_use]
     pub fn gauge_surface(&self) -> (Arc<TriMesh>, Vec<Freedoms>) {

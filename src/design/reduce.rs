@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
-use super::choose::shortage;
+use super::filter::shortage;
 use super::{DesignError, HEARD_SEED, Inputs, LEAST_TOUCHES, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::{Signal, SignalMatrix, Site};

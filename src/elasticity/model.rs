@@ -25,7 +25,10 @@ pub trait Model: Send + Sync {
     /// The surface (m).
     fn mesh(&self) -> &Arc<TriMesh>;
 
-    fn index(&self) -> &SurfaceIndex;
+    /// Where points of the surface are found.
+    fn index(&self) -> &SurfaceIndex {
+        self.mesh().index()
+    }
 
     /// The factored stiffness.
     fn system(&self) -> &System;

@@ -14,7 +14,6 @@ use super::observe::Face;
 use super::respond::{Reading, output_rows};
 use super::rows::Rows;
 use crate::budget::{Cancelled, Watch};
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// A strain gauge as it is glued: it reads the mean strain over its grid.
@@ -59,7 +58,6 @@ impl Gauge {
 /// The weights of nodal forces in every gauge's strain.
 pub struct Sensitivity {
     pub mesh: Arc<TriMesh>,
-    index: SurfaceIndex,
     gauges: usize,
     /// Vertices × gauges: strain a newton along x, y and z there.
     weights: Vec<DVec3>,
@@ -88,7 +86,6 @@ impl Sensitivity {
         }
         Ok(Self {
             mesh: Arc::clone(mesh),
-            index: SurfaceIndex::new(mesh),
             gauges: gauges.len(),
             weights,
         })
@@ -103,7 +100,7 @@ impl Sensitivity {
     #[must_use]
     pub fn read(&self, touch: &Touch) -> Vec<f64> {
         let mut strains = vec![0.0; self.gauges];
-        for (vertex, force) in nodal_forces(&self.mesh, &self.index, touch) {
+        for (vertex, force) in nodal_forces(&self.mesh, touch) {
             let row = &self.weights[vertex as usize * self.gauges..][..self.gauges];
             for (strain, weight) in strains.iter_mut().zip(row) {
                 *strain += weight.dot(force);

@@ -12,7 +12,6 @@ use super::observe::{Face, Observer};
 use super::solver::{BLOCK, FactorError, SymmetricMatrix};
 use super::system::{HELD, System, number_unknowns};
 use crate::budget::{Cancelled, Watch, report};
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -21,7 +20,6 @@ use rayon::prelude::*;
 pub struct ShellModel {
     pub mesh: Arc<TriMesh>,
     pub section: Section,
-    pub index: SurfaceIndex,
     system: System,
 }
 
@@ -49,7 +47,6 @@ impl ShellModel {
         Ok(Self {
             mesh: Arc::clone(mesh),
             section,
-            index: SurfaceIndex::new(mesh),
             system,
         })
     }
@@ -57,7 +54,7 @@ impl ShellModel {
     /// Nodal forces of a touch.
     #[must_use]
     pub fn forces(&self, touch: &Touch) -> NodalForces {
-        nodal_forces(&self.mesh, &self.index, touch)
+        nodal_forces(&self.mesh, touch)
     }
 
     /// Displacements and rotations under one load: 6 × vertices, m and rad.
@@ -140,10 +137,6 @@ impl ShellModel {
 impl Model for ShellModel {
     fn mesh(&self) -> &Arc<TriMesh> {
         &self.mesh
-    }
-
-    fn index(&self) -> &SurfaceIndex {
-        &self.index
     }
 
     fn system(&self) -> &System {

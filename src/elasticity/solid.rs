@@ -42,13 +42,11 @@ use super::solver::{BLOCK, FactorError, SymmetricMatrix, bytes, check_bytes};
 use super::system::{HELD, System, number_unknowns};
 use crate::budget::{Cancelled, Watch, report};
 use crate::memory;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// A solid: elements, material and supports, assembled once and factored once.
 pub struct SolidModel {
     mesh: Arc<TriMesh>,
-    index: SurfaceIndex,
     elements: Box<dyn Elements>,
     material: Material,
     grip: Grip,
@@ -87,7 +85,6 @@ impl SolidModel {
         let system = factored.map_err(|e| explain(&*elements, &unknowns, e))?;
         let mut model = Self {
             mesh: Arc::clone(mesh),
-            index: SurfaceIndex::new(mesh),
             elements,
             material,
             grip,
@@ -176,17 +173,13 @@ impl Model for SolidModel {
         &self.mesh
     }
 
-    fn index(&self) -> &SurfaceIndex {
-        &self.index
-    }
-
     fn system(&self) -> &System {
         &self.system
     }
 
     fn load(&self, touch: &Touch) -> Vec<(usize, f64)> {
         let force = -touch.normal * touch.force;
-        let pressure = pressure(&self.mesh, &self.index, touch, self.elements.grain());
+        let pressure = pressure(&self.mesh, touch, self.elements.grain());
         let shares = nodal_shares(&*self.elements, &self.mesh, &self.guesses, &pressure);
         let along = |(node, share)| (0..3).map(move |i| (3 * node as usize + i, share * force[i]));
         shares.into_iter().flat_map(along).collect()
@@ -229,7 +222,7 @@ impl Model for SolidModel {
         // A vertex whose displacement no free node takes part in.
         let moves = |v: usize| (0..3).any(|i| !self.vertices.row(3 * v + i).is_empty());
         let by_nodes = (0..self.vertices.count() / 3).map(|v| !moves(v));
-        let near = self.grip.near(&self.mesh, &self.index);
+        let near = self.grip.near(&self.mesh);
         by_nodes
             .zip(near)
             .map(|(held, spring)| held || spring)

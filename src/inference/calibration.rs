@@ -385,7 +385,7 @@ mod tests {
         let at = somewhere(rng);
         let beside = pressing.place / 2.0_f64.sqrt();
         let moved = DVec3::X * (beside * normal(rng)) + DVec3::Y * (beside * normal(rng));
-        let there = real.index.nearest(real.mesh.point(at) + moved).0;
+        let there = real.mesh.index().nearest(real.mesh.point(at) + moved).0;
         let force = FORCE * (1.0 + pressing.force * normal(rng));
         let read = |g: f64| force * g + NOISE[0] * normal(rng);
         Known {

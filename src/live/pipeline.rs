@@ -525,7 +525,7 @@ impl Pipeline {
             self.matching.used[k] = true;
             let (_, with) = self.matching.find_with_evidence(strain);
             self.matching.used.clone_from(&used);
-            let (at, _) = self.matching.map.index.nearest(others.position);
+            let (at, _) = self.matching.map.mesh.index().nearest(others.position);
             let should = self.matching.map.at(at)[k] * others.force;
             let noise = self.matching.errors.noise[k];
             if strain[k] / should > NONE {

@@ -21,7 +21,10 @@ pub fn strain_error(
     places: &[DVec3],
     exact: impl Fn(DVec3) -> [f64; 3],
 ) -> f64 {
-    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
+    let points: Vec<SurfacePoint> = places
+        .iter()
+        .map(|&p| model.mesh.index().nearest(p).0)
+        .collect();
     let observer = model.observer(&points, Face::Inside);
     let (mut sum, mut largest) = (0.0, 0.0f64);
     for ((&p, strain), frame) in places

@@ -206,7 +206,7 @@ fn strain_on_the_faces_of_a_clamped_beam() {
     };
     let forces = end.iter().map(|&v| (v, DVec3::NEG_Z * share(v))).collect();
     let u = model.solve(&forces);
-    let middle = model.index.nearest(DVec3::new(0.051, 0.0052, 0.0)).0;
+    let middle = model.mesh.index().nearest(DVec3::new(0.051, 0.0052, 0.0)).0;
     let at: [SurfacePoint; 1] = [middle];
     let expected = 6.0 * (length - mesh.point(middle).x) / (e * width * t * t);
     for (face, sign) in [(Face::Outside, 1.0), (Face::Inside, -1.0)] {

@@ -90,7 +90,7 @@ fn matching_is_as_good_as_can_be() {
                     );
                 }
             }
-            let at = sensing.drawn.map.index.nearest(touch.position).0;
+            let at = sensing.drawn.map.mesh.index().nearest(touch.position).0;
             let (bound, _) = cramer_rao(&sensing.drawn.map, at, force, &vec![NOISE; gauges]);
             ratios.push(squares.sqrt() / bound);
         }
@@ -158,7 +158,7 @@ fn known_touches_show_how_gauges_are_glued() {
     let known: Vec<Known> = touches(24, 8, 10.0)
         .iter()
         .map(|t| {
-            let at = real.index.nearest(t.position).0;
+            let at = real.mesh.index().nearest(t.position).0;
             let clean: Vec<f64> = real.at(at).iter().map(|g| 10.0 * g).collect();
             Known {
                 at,
@@ -181,7 +181,7 @@ fn known_touches_show_how_gauges_are_glued() {
     let mut before = 0.0;
     let mut after = 0.0;
     for t in touches(50, 9, 1.0) {
-        let at = real.index.nearest(t.position).0;
+        let at = real.mesh.index().nearest(t.position).0;
         let off = |map: &hapdef::inference::ResponseMap| {
             let pairs = map.at(at).into_iter().zip(real.at(at));
             pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()

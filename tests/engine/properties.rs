@@ -15,7 +15,6 @@ use hapdef::elasticity::respond::{Reading, Responses, Side, respond, respond_fro
 use hapdef::elasticity::support::held_freedoms;
 use hapdef::elasticity::{Freedoms, Model as _, ShellModel, Touch};
 use hapdef::mesh::TriMesh;
-use hapdef::mesh::locate::SurfaceIndex;
 use hapdef::placement::SelectorKind;
 use hapdef::regression::tune::Effort;
 use hapdef::regression::{Hyper, PositionModel};
@@ -35,7 +34,7 @@ fn model(inputs: &Inputs) -> ShellModel {
 }
 
 fn touch(inputs: &Inputs, toward: DVec3) -> Touch {
-    let index = SurfaceIndex::new(&inputs.part);
+    let index = inputs.part.index();
     let (at, _) = index.nearest(toward);
     Touch {
         position: inputs.part.point(at),
@@ -268,7 +267,7 @@ fn the_inside_face_is_the_outside_face_of_the_shell_turned_over() {
     let u = m.solve(&m.forces(&touch(&inputs, DVec3::new(0.03, 0.01, 0.07))));
     let place = DVec3::new(0.028, 0.012, 0.06);
     let size = |m: &ShellModel, face| {
-        let at = m.index.nearest(place).0;
+        let at = m.mesh.index().nearest(place).0;
         let [xx, yy, xy] = m.observer(&[at], face).strain_of(m, &u)[0];
         (f64::midpoint(xx, yy), ((xx - yy) / 2.0).hypot(xy / 2.0))
     };

@@ -211,7 +211,7 @@ impl Designed {
             .map(|(k, asked)| {
                 let read = truth.read(&self.by_hand(asked, k));
                 Known {
-                    at: drawn.map.index.nearest(asked.position).0,
+                    at: drawn.map.mesh.index().nearest(asked.position).0,
                     force: asked.force,
                     reading: read.iter().zip(&gains).map(|(x, gain)| x * gain).collect(),
                 }
@@ -235,7 +235,7 @@ impl Designed {
         let along = asked.normal.any_orthonormal_vector();
         let across = asked.normal.cross(along);
         let beside = asked.position + (along * cos + across * sin) * hand.place;
-        let at = map.index.nearest(beside).0;
+        let at = map.mesh.index().nearest(beside).0;
         let off = if k.is_multiple_of(2) {
             hand.force
         } else {

@@ -17,7 +17,7 @@ use crate::dataset::SignalMatrix;
 use crate::design::drawn::{MOVES, POINT, drawn_on, gauge_at, map_size};
 use crate::design::known;
 use crate::design::truth::{Truth, noisy};
-use crate::design::{DesignError, Inputs, Simulated};
+use crate::design::{DesignError, Ground, Inputs, Simulated};
 use crate::draw::normal;
 use crate::elasticity::sensitivity::Gauge;
 use crate::elasticity::{Model, Touch};
@@ -82,7 +82,7 @@ impl ByMatching<'_> {
         let heard = self.heard();
         let middle = &heard[self.forces.middle()];
         let model = self.simulated.model()?;
-        let ground = self.simulated.meshed.ground();
+        let ground = Ground::of(&self.simulated.meshed);
         let mesh = ground.of_size(map_size(&ground, self.tip_radius()));
         let mut work = model.system().work();
         let (mut found, mut failures) = (Vec::new(), Vec::new());
@@ -287,7 +287,7 @@ impl<'a> Set<'a> {
         let known = |k: usize| {
             let press = &pressed.presses[k];
             Known {
-                at: drawn.map.index.nearest(press.asked.position).0,
+                at: drawn.map.mesh.index().nearest(press.asked.position).0,
                 force: press.asked.force,
                 reading: reading(&x, k),
             }

@@ -13,7 +13,6 @@ use crate::elasticity::error::ElasticError;
 use crate::elasticity::solver::SymmetricMatrix;
 use crate::elasticity::system::HELD;
 use crate::elasticity::{Freedoms, Material};
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// What is held.
@@ -150,10 +149,10 @@ impl Grip {
     }
 
     /// The vertices of a surface that have springs on a facet around them.
-    pub(super) fn near(&self, mesh: &TriMesh, index: &SurfaceIndex) -> Vec<bool> {
+    pub(super) fn near(&self, mesh: &TriMesh) -> Vec<bool> {
         let mut near = vec![false; mesh.positions().len()];
         for spring in &self.springs {
-            let at = index.nearest(spring.point).0;
+            let at = mesh.index().nearest(spring.point).0;
             for v in mesh.triangles()[at.triangle as usize] {
                 near[v as usize] = true;
             }

@@ -24,7 +24,6 @@ use crate::elasticity::error::ElasticError;
 use crate::elasticity::grade::even_size;
 use crate::elasticity::load::Touch;
 use crate::elasticity::{Freedoms, Material, Support};
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::reach::{FINGERTIP, Reach};
 use crate::mesh::remesh::remesh;
 use crate::mesh::room::Room;
@@ -92,10 +91,9 @@ impl SolidGround {
         let size = even_size(held.mesh.area(), 0.0, VERTICES);
         let laid = remesh(&surface, &|_| size);
         let whole = laid.mesh;
-        let index = SurfaceIndex::new(&whole);
-        let mut walls = Walls::of(&whole, &index, watch)?;
+        let mut walls = Walls::of(&whole, watch)?;
         let mounts = held.mounts(supports.len());
-        let mut reach = Reach::of(&whole, &index, &walls, fingertip, &mounts, watch)?;
+        let mut reach = Reach::of(&whole, &walls, fingertip, &mounts, watch)?;
         for t in 0..whole.triangles().len() as u32 {
             let middle = whole.corners(t).iter().sum::<DVec3>() / 3.0;
             if let Some(side) = told(middle) {
@@ -145,8 +143,7 @@ impl SolidGround {
     /// # Errors
     /// [`Cancelled`].
     pub fn room(&self, points: &[SurfacePoint], watch: Watch) -> Result<Vec<f64>, Cancelled> {
-        let index = SurfaceIndex::new(&self.whole);
-        let room = Room::of(&self.whole, &index, watch)?;
+        let room = Room::of(&self.whole, watch)?;
         let at = |&at: &SurfacePoint| {
             room.at(self.inside.point(at), self.inside.facet_normal(at.triangle))
         };
@@ -169,7 +166,7 @@ impl SolidGround {
     #[must_use]
     pub fn outside_of_size(&self, size: f64) -> Arc<TriMesh> {
         let laid = remesh(&self.surface, &|_| size).mesh;
-        let index = SurfaceIndex::new(&self.whole);
+        let index = self.whole.index();
         let outside = laid.part_of(|t| {
             let middle = laid.corners(t).iter().sum::<DVec3>() / 3.0;
             self.walls.sides[index.nearest(middle).0.triangle as usize] == Side::Outside

@@ -39,7 +39,7 @@ impl Matching {
         // Noise alone makes them differ by a few deviations of χ².
         let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
         let explained = |cost: f64| 2.0 * cost <= last.unexplained + differs;
-        let start = self.map.index.nearest(last.position).0;
+        let start = self.map.mesh.index().nearest(last.position).0;
         let mode = self.follow(&measured, start, Some(last.force));
         let broad = BROAD * self.map.spacing();
         (explained(mode.cost) && widest(mode.covariance) <= broad * broad)
@@ -65,7 +65,7 @@ impl Matching {
         }
         let mut modes: Vec<Mode> = Vec::with_capacity(STARTS);
         for start in starts {
-            let at = self.map.index.nearest(self.map.places[start]).0;
+            let at = self.map.mesh.index().nearest(self.map.places[start]).0;
             let mode = self.follow(measured, at, None);
             // Two starts may end at the same place.
             let same = |m: &Mode| m.position.distance(mode.position) < 0.5 * self.map.spacing();

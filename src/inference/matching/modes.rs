@@ -83,7 +83,7 @@ impl Matching {
             // No farther than the quadratic pieces can be trusted.
             let within = (3.0 * map.spacing() / length.max(f64::MIN_POSITIVE)).min(1.0);
             let moved = slope.plane[0] * (step[0] * within) + slope.plane[1] * (step[1] * within);
-            let there = map.index.nearest(map.mesh.point(at) + moved).0;
+            let there = map.mesh.index().nearest(map.mesh.point(at) + moved).0;
             let next = map.slope(there);
             let (next_force, next_cost) = measured.fit(&next.reading, self.most_force);
             if next_cost < cost {
@@ -156,7 +156,7 @@ impl Matching {
             modes.iter().map(|m| weight(m) * value(m)).sum::<f64>() / total
         };
         let centre: DVec3 = modes.iter().map(|m| m.position * (weight(m) / total)).sum();
-        let at = self.map.index.nearest(centre).0;
+        let at = self.map.mesh.index().nearest(centre).0;
         let force = mean(&|m| m.force);
         let variance = mean(&|m| m.force_variance + (m.force - force).powi(2));
         let places: Vec<(DVec3, f64)> = modes.iter().flat_map(|m| spread(m, weight(m))).collect();

@@ -86,7 +86,7 @@ impl Matching {
         if total <= 0.0 || !total.is_finite() {
             return self.contact_at(heard, best, false);
         }
-        let at = map.index.nearest(centre / total).0;
+        let at = map.mesh.index().nearest(centre / total).0;
         let force = force / total;
         let variance = (squares / total - force * force).max(0.0);
         let region = Region::of_places(&places, map.mesh.point(at), map.mesh.normal(at));
