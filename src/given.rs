@@ -137,15 +137,15 @@ fn observed(model: &dyn Model, sites: &[GivenSite], rows: &mut Sifted) -> (Obser
         model.observer(&points, Face::Inside)
     };
     let observer = on(&rows.sites);
-    let laid: Vec<Result<f64, f64>> = (rows.sites.iter().zip(observer.frames()))
+    let projected: Vec<Result<f64, f64>> = (rows.sites.iter().zip(observer.frames()))
         .map(|(&k, frame)| angle_within(sites[k].direction, frame))
         .collect();
-    let angles: Vec<f64> = laid.iter().flatten().copied().collect();
-    if laid.iter().all(Result::is_ok) {
+    let angles: Vec<f64> = projected.iter().flatten().copied().collect();
+    if projected.iter().all(Result::is_ok) {
         return (observer, angles);
     }
     let tried = std::mem::take(&mut rows.sites);
-    for (row, angle) in tried.into_iter().zip(laid) {
+    for (row, angle) in tried.into_iter().zip(projected) {
         match angle {
             Ok(_) => rows.sites.push(row),
             Err(angle_deg) => rows.left_out.push(LeftOut {

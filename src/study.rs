@@ -13,7 +13,7 @@ use crate::evaluation::add_noise;
 use crate::gaussian_process::GpKernel;
 use crate::placement::expected_error::{Detail, Forces, Knowledge, Variance};
 use crate::placement::greedy_svr::GreedySvr;
-use crate::placement::{PlacementError, Pool, Selection, SelectorKind, Wishes};
+use crate::placement::{Constraints, PlacementError, Pool, Selection, SelectorKind};
 use crate::regression::Standardizer;
 use crate::regression::folds::{Folds, number_of};
 use crate::statistics::median;
@@ -106,7 +106,7 @@ fn forces_of(data: &Data) -> Option<&[f64]> {
 pub fn add_criteria(
     data: &Data,
     selection: &mut Selection,
-    wishes: &Wishes,
+    constraints: &Constraints,
     settings: &Settings,
     watch: Watch,
 ) -> Result<(), PlacementError> {
@@ -127,7 +127,7 @@ pub fn add_criteria(
                 .criteria(&pool, std::slice::from_ref(&set.sites), watch)?[0],
         };
         set.criterion_mm = Some(error);
-        if wishes.target_mm.is_some_and(|t| error <= t) {
+        if constraints.target_mm.is_some_and(|t| error <= t) {
             keep = k + 1;
             break;
         }

@@ -305,7 +305,7 @@ fn build(
     watch: Watch,
 ) -> anyhow::Result<SimulatedBoard> {
     let seed = inputs.project.budget.seed;
-    let sensing = design::sense(inputs, &inputs.project.budget.budget(), watch)?;
+    let sensing = design::sensing(inputs, &inputs.project.budget.budget(), watch)?;
     let script = match &plan.presses {
         Some(presses) => on_surface(presses, inputs, &sensing),
         None => Script::random(

@@ -3,19 +3,19 @@
 use glam::DVec3;
 
 use super::known::{Known, detail};
-use super::reduce::{Located, Reduced, heard};
+use super::reduce::{Located, Reduced, noisy_signals};
 use super::{DesignError, Inputs, Simulated};
 use crate::budget::{Budget, Watch};
 use crate::dataset::{SignalMatrix, Site};
+use crate::placement::constraints::Thorough;
 use crate::placement::entropy::Entropy;
 use crate::placement::expected_error::{self, ExpectedError};
 use crate::placement::greedy_svr::{self, GreedySvr};
 use crate::placement::information::Geometry;
 use crate::placement::mutual_information::MutualInformation;
-use crate::placement::wishes::Thorough;
 use crate::placement::{
-    PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes, lead,
-    pca_qr,
+    Constraints, PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet,
+    margin, pca_qr,
 };
 use crate::project::Elements;
 use crate::regression::Grouping;
@@ -27,7 +27,7 @@ struct Offer<'a> {
     /// As numbered in the dataset.
     sites: &'a [usize],
     positions: Vec<DVec3>,
-    wishes: Wishes,
+    constraints: Constraints,
 }
 
 impl<'a> Offer<'a> {
@@ -43,7 +43,7 @@ impl<'a> Offer<'a> {
         let near = |at: &[f64; 3]| nearest(&positions, *at).ok_or(PlacementError::NoSites);
         let required: Result<Vec<usize>, PlacementError> =
             keys.required_mm.iter().map(near).collect();
-        let wishes = Wishes {
+        let constraints = Constraints {
             sensors: keys.sensors,
             required: required?,
             spacing: keys.spacing_mm / 1000.0,
@@ -60,7 +60,7 @@ impl<'a> Offer<'a> {
         Ok(Self {
             sites,
             positions,
-            wishes,
+            constraints,
         })
     }
 
@@ -79,7 +79,7 @@ impl<'a> Offer<'a> {
             positions: &self.positions,
         };
         let request = Request {
-            wishes: &self.wishes,
+            constraints: &self.constraints,
             watch,
             found,
         };
@@ -132,7 +132,7 @@ pub fn select_step_by_step(
     // its picks are firm is not known.
     if kind != SelectorKind::ExpectedError {
         let tolerance = model_tolerance(inputs, simulated);
-        let firm = lead::within_model(&selection.sets, tolerance);
+        let firm = margin::within_model(&selection.sets, tolerance);
         selection.achieved.notes.extend(firm);
     }
     Ok(selection)
@@ -194,7 +194,7 @@ fn select_by_pivots(
     telling: Telling,
 ) -> Result<Selection, DesignError> {
     let offer = Offer::new(inputs, simulated, &reduced.feasible)?;
-    let x = heard(inputs, reduced);
+    let x = noisy_signals(inputs, reduced);
     let with_noise = inputs.project.selection.with_noise;
     let targets = simulated.dataset.targets_mm();
     let selection = offer.choose(&x, &targets, telling, |pool, request| {
@@ -292,8 +292,8 @@ fn select_by_svr(
     }
     let sites: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
     let touches = evenly(all.len(), budget.selection_touches);
-    let heard = heard(inputs, reduced);
-    let x = heard.select_rows(&rows).select_columns(&touches);
+    let noisy_signals = noisy_signals(inputs, reduced);
+    let x = noisy_signals.select_rows(&rows).select_columns(&touches);
     let targets: Vec<[f64; 3]> = touches.iter().map(|&t| all[t]).collect();
     let selector = GreedySvr {
         hyper: inputs.project.hyper(),

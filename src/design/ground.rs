@@ -70,12 +70,18 @@ pub(super) fn solid_ground(inputs: &Inputs, watch: Watch) -> Result<SolidGround,
     let project = &inputs.project;
     let supports = project.supports(&inputs.masks)?;
     check_shape(&inputs.part)?;
-    let told = told(inputs)?;
+    let declared_faces = declared_faces(inputs)?;
     let material = project.section().material;
     material.check()?;
     let fingertip = project.fingertip();
-    let solid =
-        SolidGround::touched_by(fingertip, &inputs.part, material, &supports, &told, watch)?;
+    let solid = SolidGround::touched_by(
+        fingertip,
+        &inputs.part,
+        material,
+        &supports,
+        &declared_faces,
+        watch,
+    )?;
     Ok(solid)
 }
 
@@ -105,7 +111,7 @@ pub fn open_solid(inputs: &Inputs) -> Option<String> {
 }
 
 /// What the user has said of the faces of a solid, by place (m).
-fn told(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, DesignError> {
+fn declared_faces(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, DesignError> {
     let part = Arc::clone(&inputs.part);
     let keys = &inputs.project.part;
     let mask = |key: &str, name: Option<&String>| {
@@ -265,7 +271,7 @@ impl Ground {
         match self {
             Self::Shell(shell) => {
                 let Graded {
-                    laid,
+                    remeshed,
                     model,
                     estimate,
                     linearity,
@@ -275,7 +281,7 @@ impl Ground {
                     ..
                 } = shell.grade(touches, places, aim, watch)?;
                 Ok(Built {
-                    meshed: Meshed::Shell(Arc::clone(shell), laid),
+                    meshed: Meshed::Shell(Arc::clone(shell), remeshed),
                     model: Box::new(model),
                     estimate,
                     linearity: Some(linearity),

@@ -196,7 +196,7 @@ pub(super) fn touches_on(
         contains: &contains,
     };
     let tip = project.tip();
-    let touches = dataset::spread_touches(mesh, count, seed, margin, even, tip, Some(&region));
+    let touches = dataset::distribute_touches(mesh, count, seed, margin, even, tip, Some(&region));
     if touches.is_empty() {
         return Err(no_touches(mesh, inputs));
     }
@@ -211,12 +211,12 @@ fn reached_places(inputs: &Inputs) -> Result<impl Fn(DVec3) -> bool + Sync, Desi
     let (project, part) = (&inputs.project, &*inputs.part);
     let solid = project.part.model == PartModel::Solid;
     let outside = project.part.outside.as_ref().filter(|_| solid);
-    let told = Project::mask("part.outside", outside, &inputs.masks)?;
+    let declared = Project::mask("part.outside", outside, &inputs.masks)?;
     let finger = Finger::new(part, project.fingertip());
     Ok(move |place: DVec3| {
         let at = part.index().nearest(place).0;
         let (point, normal) = (part.point(at), part.facet_normal(at.triangle));
-        told.is_some_and(|mask| part.mostly_in(mask, at))
+        declared.is_some_and(|mask| part.mostly_in(mask, at))
             || finger.reaches(point, normal)
             // An open mid-surface faces as its file says: either side of it may be the outside.
             || !solid && finger.reaches(point, -normal)
@@ -247,7 +247,7 @@ fn no_touches(mesh: &TriMesh, inputs: &Inputs) -> DesignError {
     let (seed, margin_mm) = (project.budget.seed, project.touch.edge_margin_mm);
     let region = project.touch.region.as_ref();
     let anywhere = || {
-        dataset::spread_touches(
+        dataset::distribute_touches(
             mesh,
             TRIED,
             seed,

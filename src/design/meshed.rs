@@ -6,7 +6,7 @@ use super::DesignError;
 use crate::budget::Watch;
 use crate::elasticity::solid::ground::SolidGround;
 use crate::elasticity::solid::immersed::Fineness;
-use crate::elasticity::{Freedoms, Model, grade};
+use crate::elasticity::{DofSet, Model, grade};
 use crate::mesh::TriMesh;
 use crate::mesh::remesh::Remeshed;
 
@@ -20,9 +20,9 @@ pub enum Meshed {
 impl Meshed {
     /// The surface that gauges are glued to, and what is held at its vertices.
     #[must_use]
-    pub fn gauge_surface(&self) -> (Arc<TriMesh>, Vec<Freedoms>) {
+    pub fn gauge_surface(&self) -> (Arc<TriMesh>, Vec<DofSet>) {
         match self {
-            Self::Shell(shell, laid) => (Arc::clone(&laid.mesh), shell.held(laid)),
+            Self::Shell(shell, remeshed) => (Arc::clone(&remeshed.mesh), shell.held(remeshed)),
             Self::Solid(solid, _) => (Arc::clone(&solid.inside), solid.inside_held.clone()),
         }
     }
@@ -31,7 +31,7 @@ impl Meshed {
     #[must_use]
     pub fn touched_surface(&self) -> Arc<TriMesh> {
         match self {
-            Self::Shell(_, laid) => Arc::clone(&laid.mesh),
+            Self::Shell(_, remeshed) => Arc::clone(&remeshed.mesh),
             Self::Solid(solid, _) => Arc::clone(&solid.outside),
         }
     }
@@ -49,7 +49,7 @@ impl Meshed {
     #[must_use]
     pub fn element_mm(&self) -> f64 {
         match self {
-            Self::Shell(_, laid) => laid.mesh.mean_edge() * 1e3,
+            Self::Shell(_, remeshed) => remeshed.mesh.mean_edge() * 1e3,
             Self::Solid(_, fineness) => fineness.size * 1e3 / f64::from(1 << fineness.halvings),
         }
     }
@@ -58,7 +58,7 @@ impl Meshed {
     /// higher.
     fn finer(&self) -> Self {
         match self {
-            Self::Shell(shell, laid) => Self::Shell(Arc::clone(shell), shell.halved(laid)),
+            Self::Shell(shell, remeshed) => Self::Shell(Arc::clone(shell), shell.halved(remeshed)),
             Self::Solid(solid, fineness) => Self::Solid(Arc::clone(solid), solid.finer(fineness)),
         }
     }
@@ -69,7 +69,7 @@ impl Meshed {
     /// [`DesignError`] for what cannot be computed.
     pub fn model(&self, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
         Ok(match self {
-            Self::Shell(shell, laid) => Box::new(shell.model(laid, watch)?),
+            Self::Shell(shell, remeshed) => Box::new(shell.model(remeshed, watch)?),
             Self::Solid(solid, fineness) => Box::new(solid.model(fineness, watch)?),
         })
     }
@@ -79,7 +79,7 @@ impl Meshed {
     ///
     /// # Errors
     /// [`DesignError`] for what cannot be computed.
-    pub fn truth(&self, watch: Watch) -> Result<(Self, Box<dyn Model>), DesignError> {
+    pub fn reference_model(&self, watch: Watch) -> Result<(Self, Box<dyn Model>), DesignError> {
         let finer = self.finer();
         match finer.model(watch) {
             Ok(model) => Ok((finer, model)),

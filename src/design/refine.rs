@@ -29,7 +29,7 @@ use crate::elasticity::support::supported_vertices;
 use crate::feasible::{FeasibleInput, FeasibleRules, Surroundings, clearance, feasible_beside};
 use crate::mesh::SurfacePoint;
 use crate::placement::expected_error::Moving;
-use crate::placement::{Selection, SensorSet, Wishes};
+use crate::placement::{Constraints, Selection, SensorSet};
 
 const REFINING: &str = "Refining places";
 /// Most rounds.
@@ -134,7 +134,7 @@ impl Refined {
         set.criterion = Some(self.after_mm);
         set.criterion_mm = Some(self.after_mm);
         // What was said of the choice of sites.
-        (set.gap, set.lead) = (None, None);
+        (set.gap, set.margin) = (None, None);
         set.certificate = set.certificate.map(|c| c.refined(self.local_mm));
     }
 }
@@ -154,12 +154,12 @@ fn search(
     let own = known.knowledge(&unasked);
     let mut confirmed = known.knowledge(&unasked);
     confirmed.seed = own.seed.wrapping_add(CONFIRM_SEED);
-    let wishes = Wishes {
+    let constraints = Constraints {
         failure: keys.failure,
         loss: keys.loss(),
-        ..Wishes::count(set.len())
+        ..Constraints::count(set.len())
     };
-    let whole = Wishes::count(set.len());
+    let whole = Constraints::count(set.len());
     let (x, targets) = (&reduced.x, simulated.dataset.targets_mm());
     let seats = set.len();
     let criterion = Moving::new(
@@ -167,7 +167,7 @@ fn search(
         &targets,
         &own,
         (detail(budget), seats + MOVES),
-        &wishes,
+        &constraints,
         watch,
     )?;
     let confirming = Moving::new(x, &targets, &confirmed, (FINE, seats + 1), &whole, watch)?;

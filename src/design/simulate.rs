@@ -13,7 +13,7 @@ use crate::dataset::{self, Dataset, Surveyed};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::support::Region;
-use crate::elasticity::{Freedoms, Model, Support, Touch};
+use crate::elasticity::{DofSet, Model, Support, Touch};
 use crate::feasible::Surroundings;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain::digits;
@@ -29,7 +29,7 @@ pub struct Simulated {
     pub element_mm: f64,
     pub(super) meshed: Meshed,
     /// What is held at its vertices.
-    pub held: Vec<Freedoms>,
+    pub held: Vec<DofSet>,
     /// Where the vertices of the part that is shown lie on it.
     pub carried: Vec<SurfacePoint>,
     pub discretization: Discretization,

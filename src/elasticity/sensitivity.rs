@@ -134,7 +134,7 @@ fn mean_rows(model: &dyn Model, gauges: &[Gauge]) -> Rows {
 mod tests {
     use super::*;
     use crate::budget::unwatched;
-    use crate::elasticity::Freedoms;
+    use crate::elasticity::DofSet;
     use crate::elasticity::ShellModel;
     use crate::elasticity::respond::respond;
     use crate::limb::LimbSpec;
@@ -147,12 +147,12 @@ mod tests {
         let mesh = Arc::new(mesh);
         let low = |p: &DVec3| {
             if p.z < 5e-3 {
-                Freedoms::ALL
+                DofSet::ALL
             } else {
-                Freedoms::default()
+                DofSet::default()
             }
         };
-        let held: Vec<Freedoms> = mesh.positions().iter().map(low).collect();
+        let held: Vec<DofSet> = mesh.positions().iter().map(low).collect();
         let section = crate::project::Project::around("", None).section();
         let model = ShellModel::new(&mesh, section, &held, &unwatched).unwrap();
         let points = sample::random(&mesh, 5, 3, |_| true);

@@ -448,8 +448,8 @@ mod tests {
         let found = calibrate(&drawn, &[], &NOISE, &off);
         assert_eq!(found.glued, [[1.0, 0.0, 0.0, 0.0]; CHANNELS]);
         assert!((found.relative - off.elements).abs() < 1e-6);
-        let before = drawn.spread(&off);
-        let after = drawn.spread_of(&found.doubts, &off);
+        let before = drawn.gluing_deviation(&off);
+        let after = drawn.gluing_deviation_of(&found.doubts, &off);
         for node in 0..6 {
             for (a, b) in before.node(node).iter().zip(after.node(node)) {
                 assert!((a - b).abs() < 1e-6 * a, "{a} {b}");

@@ -246,11 +246,9 @@ const KEYS: [&str; 17] = [
 ];
 
 fn keys(s: &Setting) -> [String; KEYS.len()] {
-    let unexplained = s
-        .hears(Knob::Unexplained)
-        .then(|| s.unexplained.to_string());
+    let unexplained = s.uses(Knob::Unexplained).then(|| s.unexplained.to_string());
     let limit = |knob: Knob, value: fn(&Spent) -> String| match &s.limits {
-        Some(spent) if s.hears(knob) => value(spent),
+        Some(spent) if s.uses(knob) => value(spent),
         _ => String::new(),
     };
     [

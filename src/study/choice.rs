@@ -17,7 +17,7 @@ use crate::placement::information::{Geometry, GeometrySummary};
 use crate::placement::mutual_information::MutualInformation;
 use crate::placement::pca_qr::PcaQr;
 use crate::placement::{
-    PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes,
+    Constraints, PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet,
 };
 
 /// A choice with what it was made from.
@@ -61,14 +61,14 @@ pub struct ChoiceSeconds {
 pub fn select(
     data: &Data,
     kept_out: &[usize],
-    wishes: &Wishes,
+    constraints: &Constraints,
     settings: &Settings,
     clock: &dyn Fn() -> f64,
     watch: Watch,
     found: &(dyn Fn(&SensorSet) + Sync),
 ) -> Result<Choice, PlacementError> {
     enough_touches(data, settings)?;
-    let offer = Offer::new(data, kept_out, wishes, settings)?;
+    let offer = Offer::new(data, kept_out, constraints, settings)?;
     let pool = Pool {
         x: &offer.x,
         targets: &data.targets,
@@ -76,7 +76,7 @@ pub fn select(
         positions: &offer.positions,
     };
     let request = Request {
-        wishes: &offer.wishes,
+        constraints: &offer.constraints,
         watch,
         found,
     };
@@ -126,14 +126,14 @@ struct Offer<'a> {
     /// m; empty where nobody knows them.
     positions: Vec<DVec3>,
     /// As numbered among the open sites.
-    wishes: Wishes,
+    constraints: Constraints,
 }
 
 impl<'a> Offer<'a> {
     fn new(
         data: &'a Data,
         kept_out: &[usize],
-        wishes: &Wishes,
+        constraints: &Constraints,
         settings: &Settings,
     ) -> Result<Self, PlacementError> {
         // Expected error knows the noise; to the others it is added.
@@ -147,11 +147,11 @@ impl<'a> Offer<'a> {
             .filter(|s| !kept_out.contains(s))
             .collect();
         if open.is_empty() {
-            return Err(PlacementError::Wish {
+            return Err(PlacementError::Constraint {
                 what: "every site is kept out: leave some to choose from",
             });
         }
-        let wishes = among(wishes, &open, &data.costs)?;
+        let constraints = among(constraints, &open, &data.costs)?;
         let positions: Vec<DVec3> = if data.positions.is_empty() {
             Vec::new()
         } else {
@@ -166,21 +166,25 @@ impl<'a> Offer<'a> {
             open,
             x,
             positions,
-            wishes,
+            constraints,
         })
     }
 }
 
 /// Wishes by the numbers of the sites that are open, with what those cost.
-fn among(wishes: &Wishes, open: &[usize], costs: &[f64]) -> Result<Wishes, PlacementError> {
+fn among(
+    constraints: &Constraints,
+    open: &[usize],
+    costs: &[f64],
+) -> Result<Constraints, PlacementError> {
     let place = |site: &usize| open.iter().position(|o| o == site);
-    let required: Option<Vec<usize>> = wishes.required.iter().map(place).collect();
-    Ok(Wishes {
-        required: required.ok_or(PlacementError::Wish {
+    let required: Option<Vec<usize>> = constraints.required.iter().map(place).collect();
+    Ok(Constraints {
+        required: required.ok_or(PlacementError::Constraint {
             what: "a gauge that must be there is not among the sites, or is kept out",
         })?,
         costs: (!costs.is_empty()).then(|| open.iter().map(|&s| costs[s]).collect()),
-        ..wishes.clone()
+        ..constraints.clone()
     })
 }
 
@@ -278,7 +282,7 @@ fn straight(
     /// Locations nearer than this share of the whole are one.
     const SAME: f64 = 1e-6;
     if pool.positions.is_empty() {
-        return Err(PlacementError::Wish {
+        return Err(PlacementError::Constraint {
             what: "entropy and mutual information need the positions of the sites (site_m)",
         });
     }

@@ -9,7 +9,7 @@ use hapdef::elasticity::estimate::under_load;
 use hapdef::elasticity::grade::{Graded, Ground};
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::support::Region;
-use hapdef::elasticity::{Freedoms, Model as _, Section, ShellModel, Support, Touch};
+use hapdef::elasticity::{DofSet, Model as _, Section, ShellModel, Support, Touch};
 use hapdef::mesh::{SurfacePoint, TriMesh};
 
 use super::section;
@@ -105,7 +105,7 @@ impl Disc {
         let mask = self.part.positions().iter().map(|p| p.length() > edge);
         Support {
             region: Region::Vertices(Arc::new(mask.collect())),
-            held: Freedoms::ALL,
+            held: DofSet::ALL,
         }
     }
 

@@ -27,7 +27,7 @@ struct Lab {
 fn lab() -> &'static Lab {
     static LAB: LazyLock<Lab> = LazyLock::new(|| {
         let inputs = hapdef::cli::bundled().unwrap().inputs;
-        let sensing = design::sense(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
+        let sensing = design::sensing(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
         Lab { inputs, sensing }
     });
     &LAB
@@ -236,7 +236,7 @@ impl Bench {
         for _ in 0..milliseconds {
             let (mut bytes, mut truths) = (Vec::new(), Vec::new());
             self.board
-                .hear(&std::mem::take(&mut to_board), self.now_us, &mut bytes);
+                .receive(&std::mem::take(&mut to_board), self.now_us, &mut bytes);
             self.board.say(self.now_us, &mut bytes, |t| truths.push(t));
             let pipeline = &mut self.pipeline;
             self.receiver
@@ -347,7 +347,8 @@ fn the_same_on_any_number_of_threads() {
             .build()
             .unwrap();
         pool.install(|| {
-            let sensing = design::sense(&lab.inputs, &Quality::Draft.budget(), &unwatched).unwrap();
+            let sensing =
+                design::sensing(&lab.inputs, &Quality::Draft.budget(), &unwatched).unwrap();
             let mut matching = Matching::new(
                 Arc::clone(&sensing.drawn.map),
                 Errors::of_noise(NOISE, 10),

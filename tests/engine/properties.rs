@@ -13,7 +13,7 @@ use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::respond::{Reading, Responses, Side, respond, respond_from};
 use hapdef::elasticity::support::held_freedoms;
-use hapdef::elasticity::{Freedoms, Model as _, ShellModel, Touch};
+use hapdef::elasticity::{DofSet, Model as _, ShellModel, Touch};
 use hapdef::mesh::TriMesh;
 use hapdef::placement::SelectorKind;
 use hapdef::regression::tune::Effort;
@@ -23,7 +23,7 @@ fn bundled() -> Inputs {
     hapdef::cli::bundled().unwrap().inputs
 }
 
-fn held(inputs: &Inputs) -> Vec<Freedoms> {
+fn held(inputs: &Inputs) -> Vec<DofSet> {
     let supports = inputs.project.supports(&inputs.masks).unwrap();
     held_freedoms(&inputs.part, &supports)
 }
@@ -426,7 +426,7 @@ fn the_work_is_counted_and_nothing_is_done_twice() {
     .unwrap();
     let total = design.work();
     // The truth is the only other model, and on it the fewer of sites and test touches are solved for.
-    let truth = design.truth.work;
+    let truth = design.reference.work;
     assert_eq!((truth.assemblies, truth.factorizations), (1, 1));
     assert!(truth.solves <= 60, "{truth:?}");
     assert_eq!(total.assemblies, work.assemblies + 1);

@@ -237,7 +237,7 @@ fn what_is_known_of_a_refined_design_is_taken_over() {
     let known = Known {
         reduced: Some((Arc::clone(&design.feasibility), Arc::clone(&design.reduced))),
         selections: Some(Arc::clone(&design.selections)),
-        truth: Some(Arc::clone(&design.truth)),
+        reference: Some(Arc::clone(&design.reference)),
         evaluation: Some(Arc::clone(&design.evaluation)),
     };
     let hooks = Hooks {
@@ -252,11 +252,11 @@ fn what_is_known_of_a_refined_design_is_taken_over() {
     assert_eq!(again.chosen(), design.chosen());
     assert_eq!(again.chosen_row(), design.chosen_row());
     // What was measured there is of gauges there, and of no others that come to have their numbers.
-    let (truth, off) = (&design.truth, &design.truth.off);
+    let (reference, off) = (&design.reference, &design.reference.off);
     let mut sites = again.simulated.dataset.sites.clone();
-    assert!(truth.measures(&truth.sites, &sites, off, &asked.project));
+    assert!(reference.measures(&reference.sites, &sites, off, &asked.project));
     sites[design.simulated.lattice].position.x += 1e-4;
-    assert!(!truth.measures(&truth.sites, &sites, off, &asked.project));
+    assert!(!reference.measures(&reference.sites, &sites, off, &asked.project));
 }
 
 #[test]

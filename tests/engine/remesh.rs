@@ -161,7 +161,7 @@ fn halving_gives_back_the_corners_of_openings() {
     let surface = plain(&part);
     let coarse = remesh(&surface, &|_: DVec3| 6.5e-3);
     let fine = quarter(&surface, &coarse);
-    let excess = [&coarse, &fine].map(|laid| laid.mesh.area() - part.area());
+    let excess = [&coarse, &fine].map(|remeshed| remeshed.mesh.area() - part.area());
     println!(
         "area too much: {:.0} and {:.0} mm²",
         excess[0] * 1e6,

@@ -100,7 +100,7 @@ impl Designed {
         let inputs = hapdef::cli::open(&report.join("design.hapdef.toml"), None)
             .unwrap()
             .inputs;
-        let sensing = design::sense(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
+        let sensing = design::sensing(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
         Self {
             folder,
             rows: summary["evaluation"].as_array().unwrap().clone(),
@@ -206,7 +206,7 @@ impl Designed {
     /// The project after known presses, made by hand, on the gauges of a workshop.
     fn calibrated(&self, seed: u64) -> PathBuf {
         let (drawn, gluing) = (&self.sensing.drawn, self.inputs.project.gluing());
-        let (truth, gains) = self.sensing.truth(&gluing, seed, &unwatched).unwrap();
+        let (truth, gains) = self.sensing.reference(&gluing, seed, &unwatched).unwrap();
         let known: Vec<Known> = (self.sensing.proposed.iter().enumerate())
             .map(|(k, asked)| {
                 let read = truth.read(&self.by_hand(asked, k));

@@ -1,7 +1,7 @@
 //! From a reading to the touch: the likeliest places, or the mean over all where that is what is known.
 
 use super::modes::{Mode, widest};
-use super::weighed::Heard;
+use super::weighed::Observation;
 use super::{Contact, Matching};
 
 impl Matching {
@@ -13,7 +13,7 @@ impl Matching {
     /// As [`Self::find`], and the logarithm of the reading's density over all touches there may be, but for a constant
     /// that depends neither on the reading nor on the channels that are trusted.
     pub fn find_with_evidence(&mut self, reading: &[f64]) -> (Contact, f64) {
-        let measured = Heard::new(reading, &self.errors, &self.used);
+        let measured = Observation::new(reading, &self.errors, &self.used);
         self.score(&measured);
         let mut modes = self.modes(&measured);
         modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
@@ -35,7 +35,7 @@ impl Matching {
     /// Nothing where that does not explain the reading any more, or no longer clearly.
     #[must_use]
     pub fn track(&self, reading: &[f64], last: &Contact) -> Option<Contact> {
-        let measured = Heard::new(reading, &self.errors, &self.used);
+        let measured = Observation::new(reading, &self.errors, &self.used);
         // Noise alone makes them differ by a few deviations of χ².
         let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
         let explained = |cost: f64| 2.0 * cost <= last.unexplained + differs;
@@ -50,7 +50,7 @@ impl Matching {
 impl Matching {
     /// The best templates, apart from each other, each followed to the best place near it. There is one at least: the
     /// first template where none says anything.
-    fn modes(&self, measured: &Heard) -> Vec<Mode> {
+    fn modes(&self, measured: &Observation) -> Vec<Mode> {
         let reach = APART * self.map.spacing();
         let mut starts: Vec<usize> = Vec::with_capacity(STARTS);
         for _ in 0..STARTS {

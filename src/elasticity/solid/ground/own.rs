@@ -8,7 +8,7 @@ use super::solved::{SAFETY, SolidGraded, Solved};
 use crate::budget::{Elements, Watch};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::estimate::{self, Discretization};
-use crate::elasticity::grade::{PLACES, sample, spread};
+use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::solid::immersed::Fineness;
 use crate::elasticity::solid::orders::{self, FIRST};
@@ -52,7 +52,7 @@ impl Climb {
     fn new(touches: &[Touch], places: &[DVec3]) -> Self {
         Self {
             touches: sample(touches),
-            places: spread(places, PLACES),
+            places: subsample(places, PLACES),
             changes: Vec::new(),
         }
     }
@@ -279,7 +279,7 @@ impl SolidGround {
             return Ok(estimate::unknown(0, 0));
         };
         let mut found = Vec::new();
-        for touch in spread(&climb.touches, PIECES) {
+        for touch in subsample(&climb.touches, PIECES) {
             let piece = Piece::around(own, touch.position);
             let near: Vec<DVec3> = piece.within(&climb.places);
             let solved = |order| -> Result<Solved, ElasticError> {
