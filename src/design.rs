@@ -1,4 +1,4 @@
-//! The whole road, stage by stage: simulate, filter, reduce, select, evaluate.
+//! The whole pipeline, stage by stage: simulate, filter, reduce, select, evaluate.
 //!
 //! Each stage is a pure function of the ones before it, so that a caller can keep what has not changed.
 

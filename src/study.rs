@@ -99,7 +99,7 @@ fn forces_of(data: &Data) -> Option<&[f64]> {
 }
 
 /// Computes the criterion in mm of every set that has none, with the settings of greedy SVR; sets beyond
-/// the first that reaches the wished error are dropped.
+/// the first that reaches the error asked for are dropped.
 ///
 /// # Errors
 /// [`PlacementError`] for too few touches, or when the watch asks for a stop.

@@ -182,7 +182,7 @@ fn say(set: &SensorSet) {
 }
 
 impl SelectArgs {
-    /// The choice, the processor time (s) of its criterion, and what was asked beside it.
+    /// The choice, the CPU time (s) of its criterion, and what was asked beside it.
     fn chosen(
         &self,
         data: &Data,

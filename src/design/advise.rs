@@ -51,7 +51,7 @@ pub struct Cost {
     /// Size of its elements (mm).
     pub element_mm: f64,
     pub unknowns: f64,
-    /// Processor time of all its stages (s), and memory of the largest (GB).
+    /// CPU time of all its stages (s), and memory of the largest (GB).
     pub seconds: f64,
     pub memory_gb: f64,
     /// Error of the displacement under a touch (%) that finer elements would take away; no number where it could not
@@ -214,7 +214,7 @@ impl Asked {
     }
 }
 
-/// Processor time (s) of each entry of an element's matrix, each multiplication of a factorization, each entry of a
+/// CPU time (s) of each entry of an element's matrix, each multiplication of a factorization, each entry of a
 /// factor that a touch is solved with, and each weight that a site is read with: as on a limb with tetrahedra.
 const ASSEMBLE: f64 = 4e-8;
 const FACTOR: f64 = 5e-11;
@@ -233,7 +233,7 @@ const MOST_THEORY: f64 = 5.0;
 /// Cells that are this many times as wrong as a shell do not fit.
 const MUCH: f64 = 3.0;
 
-/// Processor time and memory of a model, as they were on limbs and shins.
+/// CPU time and memory of a model, as they were on limbs and shins.
 struct Measured {
     /// Once (s); for each unknown of every factor (s); for each unknown and touch, less its growth (s).
     once: f64,

@@ -95,7 +95,7 @@ fn nearest(positions: &[DVec3], at_mm: [f64; 3]) -> Option<usize> {
     })
 }
 
-/// Told of every set as soon as it is found, with the sites it counts in.
+/// Called with every set as soon as it is found, with the sites it counts in.
 pub type Found<'a> = &'a (dyn Fn(SelectorKind, &SensorSet, &[Site]) + Sync);
 
 /// Runs one selector.

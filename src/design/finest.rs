@@ -14,7 +14,7 @@ use crate::evaluation::{Candidate, EvaluationRow, Judging};
 pub const JUDGED: usize = 1500;
 /// Their seed, apart from those of training and of a design's own tests.
 const JUDGE_SEED: u64 = 0x41d6e;
-/// Touches that its elements are laid for.
+/// Touches that its elements are graded for.
 const GRADED_FOR: usize = 200;
 /// Finer than the finest that a project can ask for by a quality.
 const FINEST: Elements = Elements {
@@ -155,7 +155,7 @@ impl Finest {
     }
 }
 
-/// The rows of a truth that some sites have.
+/// The rows of a reference that some sites have.
 fn rows_of(reference: &Reference, sites: &[usize]) -> Vec<usize> {
     let row = |s: &usize| reference.sites.binary_search(s).ok();
     sites.iter().filter_map(row).collect()

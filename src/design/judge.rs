@@ -25,7 +25,7 @@ pub(super) use self::matched::ByMatching;
 pub use self::presses::{Press, Pressed};
 pub use crate::placement::expected_error::BLIND;
 
-/// Measures sites on the truth: a mesh of half the element size, test touches drawn uniformly at random
+/// Measures sites on the reference model: a mesh of half the element size, test touches drawn uniformly at random
 /// with a seed of their own, so that they lie off any node and are nobody's training touches.
 ///
 /// # Errors
@@ -150,7 +150,7 @@ pub(super) fn measured_by(
     })
 }
 
-/// Judges selections on the truth by the project's estimator; by regression with all candidates as the baseline, where
+/// Judges selections on the reference model by the project's estimator; by regression with all candidates as the baseline, where
 /// there are any.
 ///
 /// # Errors

@@ -54,7 +54,7 @@ impl Meshed {
         }
     }
 
-    /// Finer elements, for the truth: half as large for a shell, two thirds for a solid, its own tetrahedra one order
+    /// Finer elements, for the reference model: half as large for a shell, two thirds for a solid, its own tetrahedra one order
     /// higher.
     fn finer(&self) -> Self {
         match self {

@@ -1,4 +1,4 @@
-//! The whole road in one go, and what comes out of it.
+//! The whole pipeline in one go, and what comes out of it.
 
 use std::sync::Arc;
 
@@ -44,7 +44,7 @@ pub struct Known {
     pub selections: Option<Arc<Vec<Selection>>>,
     /// Of the same simulation.
     pub reference: Option<Arc<Reference>>,
-    /// Of these selections on this truth, in whatever regions.
+    /// Of these selections on this reference model, in whatever regions.
     pub evaluation: Option<Arc<Evaluation>>,
 }
 
@@ -107,7 +107,7 @@ impl Design {
         rows.find(|r| r.selector == name && r.sensors == count)
     }
 
-    /// Errors touch by touch (mm) of a selector's set of so many gauges, beside the truth's touches.
+    /// Errors touch by touch (mm) of a selector's set of so many gauges, beside the held-out touches of the reference model.
     #[must_use]
     pub fn touch_errors(&self, kind: SelectorKind, sensors: usize) -> Option<&[f64]> {
         let mut sets = (self.selections.iter())
@@ -210,7 +210,7 @@ fn named(selection: &Selection, words: &[String]) -> Vec<String> {
     words.iter().map(|w| format!("{title}: {w}")).collect()
 }
 
-/// Runs the whole road. `clock` gives seconds since any fixed moment: the core has no clock of its own.
+/// Runs the whole pipeline. `clock` gives seconds since any fixed moment: the core has no clock of its own.
 ///
 /// # Errors
 /// [`DesignError`] from the stage that could not end.
@@ -229,7 +229,7 @@ pub fn run(
     Ok(design)
 }
 
-/// Runs the road from a simulation that is there already.
+/// Runs the pipeline from a simulation that is there already.
 ///
 /// # Errors
 /// [`DesignError`] from the stage that could not end.

@@ -14,7 +14,7 @@ use crate::uncertainty::Uncertainty;
 pub struct Reference {
     pub touches: Vec<Touch>,
     pub regions: Vec<Region>,
-    /// Element size of the truth (mm).
+    /// Element size of the reference model (mm).
     pub element_mm: f64,
     pub work: Work,
     /// Dataset sites that were measured, rising, and their signals.

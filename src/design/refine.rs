@@ -46,7 +46,7 @@ const LEAST: f64 = 1e-4;
 const WAYS: usize = 8;
 /// Moves that are tried: every way unturned and turned either way, and turned on the spot.
 const MOVES: usize = 3 * WAYS + 2;
-/// Whose noise the presses that confirm a move hear.
+/// Whose noise the presses that confirm a move have.
 const CONFIRM_SEED: u64 = 0xc0f1;
 
 /// Moves the gauges of the largest set of a choice by expected error to where it is expected to err least; gauges that

@@ -7,7 +7,7 @@ use crate::pca::PcaError;
 use crate::plain;
 use crate::regression::Standardizer;
 
-/// Wishes; the default asks for nothing but the count.
+/// What is asked of a choice; the default asks for nothing but the count.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Constraints {
     /// Most gauges.
@@ -185,7 +185,7 @@ impl<'a> Field<'a> {
     /// Nothing chosen yet.
     ///
     /// # Errors
-    /// [`PlacementError`] for wishes that cannot be met.
+    /// [`PlacementError`] for constraints that cannot be met.
     pub fn new(pool: &'a Pool<'a>, constraints: &'a Constraints) -> Result<Self, PlacementError> {
         let available = pool.sites.len();
         if available == 0 {

@@ -13,10 +13,10 @@ const LEAST: f64 = 1e-4;
 
 /// What sets are compared by, and how one grows.
 pub(super) trait Criterion {
-    /// What it is told in.
+    /// The unit that it is reported in.
     const UNIT: &'static str;
 
-    /// As it is told: of some criteria more is better.
+    /// As it is reported: of some criteria more is better.
     fn as_reported(value: f64) -> f64 {
         value
     }
@@ -262,7 +262,7 @@ fn exchange<C: Criterion>(
     Ok((set, value))
 }
 
-/// At most so many other first gauges than a run had: the best ones that hear something else than that one and each
+/// At most so many other first gauges than a run had: the best ones whose signals differ from that one's and each
 /// other.
 fn other_starts<C: Criterion>(
     criterion: &mut C,
@@ -297,7 +297,7 @@ fn other_starts<C: Criterion>(
     Ok(other_starts)
 }
 
-/// Whether two sites hear nearly the same: what their signals share.
+/// Whether two sites report nearly the same: what their signals share.
 fn alike(a: &[f64], b: &[f64]) -> bool {
     /// Correlation.
     const ALIKE: f64 = 0.9;

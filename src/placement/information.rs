@@ -56,7 +56,7 @@ impl Geometry {
             .collect()
     }
 
-    /// Nothing chosen, with the wishes checked.
+    /// Nothing chosen, with the constraints checked.
     pub(super) fn field<'a>(
         &self,
         pool: &'a Pool<'a>,

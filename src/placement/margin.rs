@@ -3,7 +3,7 @@
 
 use super::SensorSet;
 
-/// Relative tolerance of picks by criteria without an effort of their own: a lead of less than twice this is a tie.
+/// Relative tolerance of picks by criteria without an effort of their own: a margin of less than twice this is a tie.
 /// It is what a relative change of 1e-6 in the input may grow to on its way through a model.
 pub const TOLERANCE: f64 = 1e-4;
 
@@ -49,7 +49,7 @@ impl Best {
     }
 }
 
-/// A word on the picks whose lead is less than twice the tolerance, where there are any.
+/// A word on the picks whose margin is less than twice the tolerance, where there are any.
 #[must_use]
 pub fn ties(sets: &[SensorSet], tolerance: f64) -> Option<String> {
     let tied: Vec<String> = sets

@@ -27,7 +27,7 @@ impl Selector for PcaQr {
 /// As the selector, from components that are there already, at least one a gauge.
 ///
 /// # Errors
-/// [`PlacementError`] where the pool or the wishes do not allow it.
+/// [`PlacementError`] where the pool or the constraints do not allow it.
 pub fn from_components(
     pca: &Pca,
     pool: &Pool,

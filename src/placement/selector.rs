@@ -19,7 +19,7 @@ pub trait Selector: Sync {
     /// Whether each set contains the one before it.
     fn nested(&self) -> bool;
 
-    /// Sets for one gauge and more, as many as the wishes allow.
+    /// Sets for one gauge and more, as many as the constraints allow.
     ///
     /// # Errors
     /// [`PlacementError`] where the pool does not allow it.

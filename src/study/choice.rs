@@ -27,7 +27,7 @@ pub struct Choice {
     pub geometry: Option<GeometrySummary>,
     /// What a choice by expected error weighed.
     pub weighed: Option<Weighed>,
-    /// Processor seconds of the distances, the search of the kernel, and the choice itself.
+    /// CPU time (s) of the distances, the search of the kernel, and the choice itself.
     pub seconds: ChoiceSeconds,
 }
 
@@ -57,7 +57,7 @@ pub struct ChoiceSeconds {
 /// Chooses among all sites but those kept out.
 ///
 /// # Errors
-/// [`PlacementError`] where the data or the wishes do not allow it.
+/// [`PlacementError`] where the data or the constraints do not allow it.
 pub fn select(
     data: &Data,
     kept_out: &[usize],
@@ -171,7 +171,7 @@ impl<'a> Offer<'a> {
     }
 }
 
-/// Wishes by the numbers of the sites that are open, with what those cost.
+/// Constraints by the numbers of the sites that are open, with what those cost.
 fn among(
     constraints: &Constraints,
     open: &[usize],

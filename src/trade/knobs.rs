@@ -26,7 +26,7 @@ pub enum Bought {
 pub struct KnobReport {
     pub knob: Knob,
     pub pairs: usize,
-    /// Medians of the change (%): processor time, mean and median error.
+    /// Medians of the change (%): CPU time, mean and median error.
     pub cpu_percent: f64,
     pub error_percent: f64,
     pub median_percent: f64,

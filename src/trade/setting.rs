@@ -48,7 +48,7 @@ pub struct Spent {
     pub tuning_touches: usize,
 }
 
-/// Where the ladders begin, and where a knob stands that nothing hears.
+/// Where the ladders begin, and where a knob stands that nothing uses.
 const USUAL: Spent = Spent {
     vertices: 2400,
     touches: 400,
@@ -311,7 +311,7 @@ impl Setting {
             && self.limits.is_none_or(|spent| spent.is_offered())
     }
 
-    /// Whether anything at this setting hears a knob. What greedy SVR scores and regressions are tuned on is nothing to
+    /// Whether anything at this setting uses a knob. What greedy SVR scores and regressions are tuned on is nothing to
     /// expected error and matching; candidates are greedy SVR's, and the baseline of a regression.
     #[must_use]
     pub fn uses(&self, knob: Knob) -> bool {
@@ -329,7 +329,7 @@ impl Setting {
         }
     }
 
-    /// The same with knobs that nothing hears at their usual places, so that equal work is one setting.
+    /// The same with knobs that nothing uses at their usual places, so that equal work is one setting.
     #[must_use]
     pub fn canonical(mut self) -> Self {
         if self.signal != Signal::Strain {
@@ -373,7 +373,7 @@ impl Setting {
         self
     }
 
-    /// The settings one step away along a knob: none where nothing hears it.
+    /// The settings one step away along a knob: none where nothing uses it.
     #[must_use]
     pub fn neighbours(&self, knob: Knob) -> Vec<Self> {
         let mut found: Vec<Self> = match self.limits {
@@ -659,7 +659,7 @@ mod tests {
             setting.apply(&mut applied);
             assert_eq!(applied.judging().estimator(), setting.estimator);
         }
-        // What nobody hears is left as the project has it.
+        // What nobody uses is left as the project has it.
         let mut applied = project.clone();
         centre.apply(&mut applied);
         assert_eq!(applied.candidates, project.candidates);

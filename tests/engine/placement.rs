@@ -1,4 +1,4 @@
-//! The selectors against the slow way, what users may wish of them, and data at the edge.
+//! The selectors against the slow way, the constraints that users may set, and data at the edge.
 
 use glam::DVec3;
 use hapdef::budget::{StopReason, unwatched};

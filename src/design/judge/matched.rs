@@ -1,6 +1,6 @@
 //! Sets of gauges judged by what runs live: the design's elastic model, matched to what a finer one reads.
 //!
-//! The estimator knows what the truth was made with (`Reference::off`), as live touch does: as drawn, that gauges are glued
+//! The estimator knows what the reference was made with (`Reference::off`), as live touch does: as drawn, that gauges are glued
 //! just so; as built, how far off a workshop usually glues them; after known presses, how these gauges were really
 //! glued, as far as the presses tell.
 
@@ -48,13 +48,13 @@ pub(in crate::design) struct ByMatching<'a> {
     pub inputs: &'a Inputs,
     pub simulated: &'a Simulated,
     pub reference: &'a Reference,
-    /// Numbers of the streams of noise, one for each site of the truth.
+    /// Numbers of the streams of noise, one for each site of the reference.
     pub streams: &'a [u64],
     pub forces: &'a Forces,
     pub budget: &'a Budget,
 }
 
-/// Readings of all sites of the truth under touches of one force, with noise.
+/// Readings of all sites of the reference under touches of one force, with noise.
 struct Readings {
     force_n: f64,
     drawn: SignalMatrix,
@@ -63,7 +63,7 @@ struct Readings {
 
 /// What the gauges at some sites read of touches anywhere, by the design's model.
 struct Everywhere {
-    /// Of the truth, rising: a channel each.
+    /// Of the reference, rising: a channel each.
     rows: Vec<usize>,
     drawn: AsDrawn,
     /// What gluing and the tip's size put on the readings.
@@ -122,7 +122,7 @@ impl ByMatching<'_> {
         known::off(&self.inputs.project, self.simulated)
     }
 
-    /// Signals of the truth for a force (N) in place of that of its touches: the model is linear.
+    /// Signals of the reference for a force (N) in place of that of its touches: the model is linear.
     fn at_force(&self, x: &SignalMatrix, force_n: f64) -> SignalMatrix {
         x.scaled(force_n / self.inputs.project.tip().0)
     }

@@ -1,4 +1,4 @@
-//! Who listens, what it is told, and what it tells.
+//! Who listens: the commands that it takes, and the events that it reports.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -24,7 +24,7 @@ pub enum State {
     Ended,
 }
 
-/// What is told while listening.
+/// What is reported while listening.
 pub enum SessionEvent<'a> {
     State(&'a State),
     Hello(&'a Hello),

@@ -1,4 +1,4 @@
-//! What is heard, written down while it is heard.
+//! What arrives, written down while it arrives.
 
 use super::listener::{Listener, SessionEvent};
 use crate::link::Recorder;

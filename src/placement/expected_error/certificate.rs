@@ -279,7 +279,8 @@ fn add(informed: &mut [Matrix3<f64>], rows: &[[f32; 3]], weight: f64) {
     }
 }
 
-/// By how much the best `count` sites are worth more than the weighted ones, as if worths stayed as they are.
+/// By how much the best `count` sites are worth more than the weighted ones, as if worths stayed as they are: the gap of
+/// the convex problem's dual.
 fn duality_gap(worths: &[f64], weights: &[f64], count: usize) -> f64 {
     let mut sorted = worths.to_vec();
     sorted.sort_by(|a, b| b.total_cmp(a));
@@ -287,7 +288,7 @@ fn duality_gap(worths: &[f64], weights: &[f64], count: usize) -> f64 {
     sorted.iter().take(count).sum::<f64>() - weighted.sum::<f64>()
 }
 
-/// Weights in proportion to what is wished, none above one, `count` in all.
+/// Weights in proportion to what is wanted, none above one, `count` in all.
 fn shared_out(wanted: &[f64], count: usize) -> Vec<f64> {
     let mut full = vec![false; wanted.len()];
     loop {

@@ -18,7 +18,7 @@ use crate::memory;
 use crate::mesh::volume::VolumeMesh;
 
 /// Entries of the factor × touches, and multiplications of the factorization, for each vertex × touch of an effort: at
-/// standard quality about two minutes of processor time, and a quarter of one.
+/// standard quality about two minutes of CPU time, and a quarter of one.
 const ENTRIES: f64 = 70_000.0;
 const MULTIPLICATIONS: f64 = 25_000.0;
 /// Pieces that are judged where the whole, one order higher, does not fit into memory.
