@@ -415,22 +415,7 @@ fn summary(
         .flat_map(|s| &s.sites)
         .map(|&s| site_json(data, s))
         .collect();
-    let steps: Vec<Value> = selection
-        .sets
-        .iter()
-        .map(|set| {
-            json!({
-                "sensors": set.sites.len(),
-                "sites": set.sites,
-                "criterion": set.criterion,
-                "criterion_mm": set.criterion_mm,
-                "gap": set.gap,
-                "lead": set.margin,
-                "bound_mm": set.certificate.map(|c| c.bound_mm),
-                "local_mm": set.certificate.map(|c| c.local_mm),
-            })
-        })
-        .collect();
+    let steps: Vec<Value> = selection.sets.iter().map(step_json).collect();
     // What a choice by expected error weighed stands in the place of a regression that nobody trained.
     let (criterion, folds) = match &choice.weighed {
         Some(weighed) => (json!(weighed), Value::Null),
@@ -463,6 +448,19 @@ fn summary(
         "criterion_cpu_seconds": criterion_seconds,
         "achieved": selection.achieved,
         "notes": notes,
+    })
+}
+
+fn step_json(set: &SensorSet) -> Value {
+    json!({
+        "sensors": set.sites.len(),
+        "sites": set.sites,
+        "criterion": set.criterion,
+        "criterion_mm": set.criterion_mm,
+        "gap": set.gap,
+        "lead": set.margin,
+        "bound_mm": set.certificate.map(|c| c.bound_mm),
+        "local_mm": set.certificate.map(|c| c.local_mm),
     })
 }
 

@@ -400,12 +400,7 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
             "A shell fits.".into()
         },
     ];
-    if let Some(within) = part.closes_within() {
-        let mm = digits(within * 1e3);
-        words.push(format!(
-            "If it is meant to be closed: it is when vertices within {mm} mm are joined (part.weld_mm = {mm})."
-        ));
-    }
+    words.extend(meant_closed(part));
     let mut as_shell = inputs.clone();
     as_shell.project.part.model = PartModel::Shell;
     if let Ok(Ground::Shell(shell)) = ground(&as_shell, watch) {
@@ -422,6 +417,14 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
         words,
         faces: None,
     }
+}
+
+/// What closes an open part, where joining near vertices does.
+fn meant_closed(part: &TriMesh) -> Option<String> {
+    let mm = digits(part.closes_within()? * 1e3);
+    Some(format!(
+        "If it is meant to be closed: it is when vertices within {mm} mm are joined (part.weld_mm = {mm})."
+    ))
 }
 
 fn bent(radius: [f64; 2]) -> String {

@@ -77,54 +77,60 @@ impl Design {
             }
         }
         let evaluation = Arc::make_mut(&mut design.evaluation);
-        let rows = judged.rows.iter().map(|r| EvaluationRow {
-            selector: name.to_owned(),
-            sensors: count,
-            ..r.clone()
-        });
-        let is_old = |selector: &str, sensors: usize| selector == name && sensors == old;
-        put_in_place(
-            &mut evaluation.rows,
-            |r| is_old(&r.selector, r.sensors),
-            rows,
-        );
-        let found = judged.found.iter().map(|m| Matched {
-            selector: name.to_owned(),
-            sensors: count,
-            ..m.clone()
-        });
-        put_in_place(
-            &mut evaluation.found,
-            |m| is_old(&m.selector, m.sensors),
-            found,
-        );
-        let matched = judged.matched.iter().map(|r| MatchedRow {
-            selector: name.to_owned(),
-            sensors: count,
-            ..r.clone()
-        });
-        put_in_place(
-            &mut evaluation.matched,
-            |r| is_old(&r.selector, r.sensors),
-            matched,
-        );
+        replace_rows(evaluation, (name, old), count, judged);
         if let (Some(k), Some(errors), Some(built)) =
             (set, judged.errors.first(), judged.built.first())
         {
             evaluation.errors[k].clone_from(errors);
             evaluation.built[k].clone_from(built);
         }
-        if let Some(failed) = judged.failures.first() {
-            for own in evaluation
-                .failures
-                .iter_mut()
-                .filter(|f| f.selector == name)
-            {
-                own.sensors = count;
-                own.rows.clone_from(&failed.rows);
-            }
-        }
         design
+    }
+}
+
+/// Puts what was judged of a set of `count` gauges in the place of a selector's set of so many (`old`).
+fn replace_rows(
+    evaluation: &mut Evaluation,
+    (name, old): (&str, usize),
+    count: usize,
+    judged: &Evaluation,
+) {
+    let is_old = |selector: &str, sensors: usize| selector == name && sensors == old;
+    let rows = judged.rows.iter().map(|r| EvaluationRow {
+        selector: name.to_owned(),
+        sensors: count,
+        ..r.clone()
+    });
+    put_in_place(
+        &mut evaluation.rows,
+        |r| is_old(&r.selector, r.sensors),
+        rows,
+    );
+    let found = judged.found.iter().map(|m| Matched {
+        selector: name.to_owned(),
+        sensors: count,
+        ..m.clone()
+    });
+    put_in_place(
+        &mut evaluation.found,
+        |m| is_old(&m.selector, m.sensors),
+        found,
+    );
+    let matched = judged.matched.iter().map(|r| MatchedRow {
+        selector: name.to_owned(),
+        sensors: count,
+        ..r.clone()
+    });
+    put_in_place(
+        &mut evaluation.matched,
+        |r| is_old(&r.selector, r.sensors),
+        matched,
+    );
+    if let Some(failed) = judged.failures.first() {
+        for own in (evaluation.failures.iter_mut()).filter(|f| f.selector == name) {
+            own.sensors = count;
+            own.rows.clone_from(&failed.rows);
+        }
     }
 }
 

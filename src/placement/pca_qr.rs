@@ -1,6 +1,6 @@
 //! PCA with pivoted QR as a selector: exact, deterministic, without a seed.
 
-use super::constraints::{self, Field};
+use super::constraints::{self, Constraints, Field};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, margin};
 use crate::budget::{Achieved, StopReason, Work, report};
 use crate::pca::Pca;
@@ -87,33 +87,44 @@ pub fn from_components(
             None => PlacementError::NoSites,
         });
     }
-    let reached = sets.last().map_or(0, |s| s.sites.len());
-    let wanted = constraints.sensors;
-    let short = reached < wanted;
     Ok(Selection {
         selector: SelectorKind::PcaQr,
         criterion_unit: "share of variance beyond the components",
         pool: pool.sites.len(),
-        achieved: Achieved {
-            error_estimate: None,
-            unit: "",
-            effort: Work::default(),
-            stop_reason: match &no_room {
-                Some(_) => StopReason::NoRoom,
-                None if short => StopReason::Exhausted,
-                None => StopReason::Converged,
-            },
-            cautions: (no_room.map(|why| constraints::shortage(&why, reached, wanted)))
-                .or_else(|| short.then(|| shortage(pca, reached, wanted)))
-                .into_iter()
-                .collect(),
-            notes: (whole.constant_notes().into_iter())
-                .chain(margin::ties(&sets, margin::TOLERANCE))
-                .chain(constraints.thorough.is_asked().then(|| AS_IT_IS.to_owned()))
-                .collect(),
-        },
+        achieved: achieved(pca, &whole, constraints, &sets, no_room),
         sets,
     })
+}
+
+/// How the choice ended, and what has to be known of it.
+fn achieved(
+    pca: &Pca,
+    whole: &Field,
+    constraints: &Constraints,
+    sets: &[SensorSet],
+    no_room: Option<String>,
+) -> Achieved {
+    let reached = sets.last().map_or(0, |s| s.sites.len());
+    let wanted = constraints.sensors;
+    let short = reached < wanted;
+    Achieved {
+        error_estimate: None,
+        unit: "",
+        effort: Work::default(),
+        stop_reason: match &no_room {
+            Some(_) => StopReason::NoRoom,
+            None if short => StopReason::Exhausted,
+            None => StopReason::Converged,
+        },
+        cautions: (no_room.map(|why| constraints::shortage(&why, reached, wanted)))
+            .or_else(|| short.then(|| shortage(pca, reached, wanted)))
+            .into_iter()
+            .collect(),
+        notes: (whole.constant_notes().into_iter())
+            .chain(margin::ties(sets, margin::TOLERANCE))
+            .chain(constraints.thorough.is_asked().then(|| AS_IT_IS.to_owned()))
+            .collect(),
+    }
 }
 
 const AS_IT_IS: &str =
