@@ -208,8 +208,10 @@ fn trade(text: &mut String) {
         unreachable!("the limb is a shell")
     };
     let (force, tip) = inputs.project.tip();
-    let touches = dataset::spread_touches(&inputs.part, 64, 99, 2.4e-3, false, (force, tip), None);
-    let many = dataset::spread_touches(&inputs.part, 1000, 98, 2.4e-3, false, (force, tip), None);
+    let touches =
+        dataset::distribute_touches(&inputs.part, 64, 99, 2.4e-3, false, (force, tip), None);
+    let many =
+        dataset::distribute_touches(&inputs.part, 1000, 98, 2.4e-3, false, (force, tip), None);
     let draft = design::simulate(&inputs, &Quality::Draft.budget(), &unwatched).expect("simulates");
     let places: Vec<DVec3> = draft.dataset.sites.iter().map(|s| s.position).collect();
     let chosen: Vec<_> = sample::random(&inputs.part, 300, 97, |_| true)
@@ -237,7 +239,10 @@ fn trade(text: &mut String) {
         let (graded, build) =
             on_one_core(|| ground.grade(&touches, &places, &aim(vertices, 2), &unwatched));
         let model = graded.expect("grades").model;
-        let points: Vec<_> = places.iter().map(|&p| model.index.nearest(p).0).collect();
+        let points: Vec<_> = places
+            .iter()
+            .map(|&p| model.mesh.index().nearest(p).0)
+            .collect();
         let solve = |signal| {
             on_one_core(|| {
                 dataset::simulate(&model, many.clone(), &points, signal, 1, &[], &unwatched)

@@ -177,8 +177,8 @@ fn compare(text: &mut String, mut inputs: Inputs, quality: Quality) {
         design.reduced.feasible.len(),
         design.simulated.dataset.touches.len(),
         design.simulated.element_mm,
-        design.truth.touches.len(),
-        design.truth.element_mm,
+        design.reference.touches.len(),
+        design.reference.element_mm,
         in_words(&design)
     );
     let part = Part {
@@ -304,10 +304,10 @@ impl Part {
             .flat_map(|s| &s.sets)
             .flat_map(|s| s.sites.iter().copied())
             .collect();
-        design::truth(inputs, simulated, &sites, &budget, &unwatched)
-            .and_then(|truth| {
+        design::reference(inputs, simulated, &sites, &budget, &unwatched)
+            .and_then(|reference| {
                 design::evaluate(
-                    inputs, simulated, reduced, selections, &truth, &budget, &unwatched,
+                    inputs, simulated, reduced, selections, &reference, &budget, &unwatched,
                 )
             })
             .expect("sets can be judged")

@@ -21,7 +21,7 @@ use hapdef::elasticity::sensitivity::Sensitivity;
 use hapdef::inference::{
     Errors, Features, Known, Lessons, Matching, ResponseMap, Trained, calibrate, cramer_rao,
 };
-use hapdef::link::{Address, BAUD, Doorway, Heard, Listener, Pace, State, host};
+use hapdef::link::{Address, BAUD, Doorway, Listener, Pace, SessionEvent, State, host};
 use hapdef::live::{Input, Pipeline, Receiver};
 use hapdef::regression::Hyper;
 use hapdef::uncertainty::{Gluing, Pressing, Uncertainty};
@@ -96,7 +96,7 @@ struct Scene<'a> {
     map: Arc<ResponseMap>,
     relative: f64,
     /// What gluing may put on the readings, where the estimator is told of it.
-    spread: Option<Arc<ResponseMap>>,
+    gluing_deviation: Option<Arc<ResponseMap>>,
 }
 
 /// Errors of one estimator: places (mm) and forces (N).
@@ -123,7 +123,7 @@ fn median(values: &[f64]) -> f64 {
     sorted[sorted.len() / 2]
 }
 
-fn spread(values: &[f64]) -> String {
+fn quartiles(values: &[f64]) -> String {
     let m = mean(values);
     let deviation = mean(&values.iter().map(|v| (v - m).powi(2)).collect::<Vec<_>>()).sqrt();
     format!("{m:.2} ± {deviation:.2}")
@@ -132,7 +132,7 @@ fn spread(values: &[f64]) -> String {
 impl Lab {
     fn new(inputs: Inputs) -> Self {
         let sensing =
-            design::sense(&inputs, &Quality::Standard.budget(), &unwatched).expect("the model");
+            design::sensing(&inputs, &Quality::Standard.budget(), &unwatched).expect("the model");
         let touches = sensing
             .touches(&inputs, 2 * TOUCHES, SEED + 0x7e57, false)
             .expect("touches");
@@ -165,7 +165,7 @@ impl Lab {
             gains: gains.to_vec(),
             map: Arc::clone(drawn),
             relative,
-            spread: None,
+            gluing_deviation: None,
         };
         let mut scenes = vec![
             scene(
@@ -177,7 +177,7 @@ impl Lab {
             scene("Truth from elements of half the size", finer, &none, 0.03),
             scene("Half the size, gains off by 3 %", finer, gains, 0.05),
             Scene {
-                spread: Some(Arc::clone(&self.sensing.spread)),
+                gluing_deviation: Some(Arc::clone(&self.sensing.gluing_deviation)),
                 ..scene(
                     "Half the size; gains off by 3 %, places by 1 mm, directions by 3°",
                     built,
@@ -202,10 +202,10 @@ impl Lab {
                 gains: gains.to_vec(),
                 map,
                 relative: found.relative,
-                spread: Some(Arc::new(
+                gluing_deviation: Some(Arc::new(
                     self.sensing
                         .drawn
-                        .spread_of(&found.doubts, &self.sensing.off),
+                        .gluing_deviation_of(&found.doubts, &self.sensing.off),
                 )),
             });
         }
@@ -222,7 +222,7 @@ impl Lab {
         let known: Vec<Known> = places
             .iter()
             .map(|t| Known {
-                at: self.sensing.drawn.map.index.nearest(t.position).0,
+                at: self.sensing.drawn.map.mesh.index().nearest(t.position).0,
                 force: 10.0,
                 reading: read(
                     truth,
@@ -243,11 +243,11 @@ impl Lab {
     fn accuracy(&self, text: &mut String) {
         let (finer, _) = self
             .sensing
-            .truth(&Gluing::EXACT, SEED, &unwatched)
+            .reference(&Gluing::EXACT, SEED, &unwatched)
             .expect("the truth");
         let (built, gains) = self
             .sensing
-            .truth(&Gluing::default(), SEED, &unwatched)
+            .reference(&Gluing::default(), SEED, &unwatched)
             .expect("the truth");
         let _ = writeln!(
             text,
@@ -285,12 +285,12 @@ impl Lab {
                 "| {}–{} | {place} | {} | {} | **{}** | {amplitude} | {} | {} | **{}** | {:.0} % | {:.2} |",
                 forces[0],
                 forces[1],
-                spread(&raw.place),
-                spread(&normalized.place),
-                spread(&matching.place),
-                spread(&raw.force),
-                spread(&normalized.force),
-                spread(&matching.force),
+                quartiles(&raw.place),
+                quartiles(&normalized.place),
+                quartiles(&matching.place),
+                quartiles(&raw.force),
+                quartiles(&normalized.force),
+                quartiles(&matching.force),
                 100.0 * row.held,
                 row.bound
             );
@@ -303,7 +303,7 @@ impl Lab {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let errors = Errors {
             relative: scene.relative,
-            spread: scene.spread.clone(),
+            gluing_deviation: scene.gluing_deviation.clone(),
             ..Errors::of_noise(NOISE, gauges)
         };
         let mut matching = Matching::new(Arc::clone(&scene.map), errors, 60.0);
@@ -319,7 +319,14 @@ impl Lab {
         for touch in &self.touches {
             let force = forces[0] + (forces[1] - forces[0]) * rng.random::<f64>();
             let touch = Touch { force, ..*touch };
-            let at = self.sensing.drawn.map.index.nearest(touch.position).0;
+            let at = self
+                .sensing
+                .drawn
+                .map
+                .mesh
+                .index()
+                .nearest(touch.position)
+                .0;
             let mut squares = 0.0;
             for draw in 0..DRAWS {
                 let x = read(scene.truth, &scene.gains, &touch, NOISE, &mut rng);
@@ -421,9 +428,9 @@ impl Lab {
         let (mut gone, mut back, mut delays) = (Vec::new(), Vec::new(), None);
         Listener::new(address, pipeline)
             .run(&stop, &inbox, |heard| match heard {
-                Heard::State(State::Gone) => gone.push(hosted.seconds()),
-                Heard::State(State::Live) => back.push(hosted.seconds()),
-                Heard::Turn { timing, .. } if hosted.seconds() > 17.0 => {
+                SessionEvent::State(State::Gone) => gone.push(hosted.seconds()),
+                SessionEvent::State(State::Live) => back.push(hosted.seconds()),
+                SessionEvent::Turn { timing, .. } if hosted.seconds() > 17.0 => {
                     delays = timing.quantile(0.5).zip(timing.quantile(0.99));
                     stop.store(true, Ordering::Relaxed);
                 }
@@ -693,7 +700,7 @@ fn soak(minutes: f64) {
     let (_board, port) = start_board(&more);
     let loaded = hapdef::cli::bundled().expect("the bundled limb");
     let sensing =
-        design::sense(&loaded.inputs, &Quality::Draft.budget(), &unwatched).expect("the model");
+        design::sensing(&loaded.inputs, &Quality::Draft.budget(), &unwatched).expect("the model");
     let live = &loaded.inputs.project.live;
     let pipeline = Pipeline::new(sensing.map_for(live), live.settings(sensing.gauges.len()));
     let address = Address::parse(&port, BAUD, Pace::Real);
@@ -706,14 +713,14 @@ fn soak(minutes: f64) {
     let mut backwards = 0;
     Listener::new(address, pipeline)
         .run(&stop, &inbox, |heard| match heard {
-            Heard::State(State::Gone) => unplugs += 1,
-            Heard::Sample { update, .. } => {
+            SessionEvent::State(State::Gone) => unplugs += 1,
+            SessionEvent::Sample { update, .. } => {
                 touched += u64::from(update.contact.is_some());
                 left_out += u64::from(update.strain.is_some() && update.good < 10);
                 backwards += u64::from(last.is_some_and(|l| update.time_us <= l));
                 last = Some(update.time_us);
             }
-            Heard::Turn { traffic, timing, .. } => {
+            SessionEvent::Turn { traffic, timing, .. } => {
                 if begun.elapsed().as_secs() >= 60 {
                     early.get_or_insert_with(resident_megabytes);
                 }

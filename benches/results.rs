@@ -217,7 +217,8 @@ fn limb(text: &mut String) {
 }
 
 fn touches(part: &TriMesh, inputs: &Inputs, count: usize) -> Vec<Touch> {
-    let all = dataset::spread_touches(part, count, 77, 2.4e-3, false, inputs.project.tip(), None);
+    let all =
+        dataset::distribute_touches(part, count, 77, 2.4e-3, false, inputs.project.tip(), None);
     all.into_iter()
         .filter(|t| (0.012..=0.108).contains(&t.position.z))
         .collect()
@@ -226,17 +227,19 @@ fn touches(part: &TriMesh, inputs: &Inputs, count: usize) -> Vec<Touch> {
 /// Displacement along the normal under each touch (m), and strain at the feasible sites.
 fn solve(
     ground: &Ground,
-    laid: &Remeshed,
+    remeshed: &Remeshed,
     inputs: &Inputs,
     touches: &[Touch],
 ) -> (Vec<f64>, dataset::SignalMatrix) {
-    let model = ground.model(laid, &unwatched).expect("the limb is held");
+    let model = ground
+        .model(remeshed, &unwatched)
+        .expect("the limb is held");
     let loads: Vec<_> = touches.iter().map(|t| model.forces(t)).collect();
     let under = touches
         .iter()
         .zip(model.solve_many(&loads))
         .map(|(touch, u)| {
-            let at = model.index.nearest(touch.position).0;
+            let at = model.mesh.index().nearest(touch.position).0;
             let tri = model.mesh.triangles()[at.triangle as usize];
             let moved: DVec3 = (0..3)
                 .map(|k| DVec3::from_slice(&u[6 * tri[k] as usize..]) * at.barycentric[k])

@@ -141,14 +141,14 @@ impl SimulatedBoard {
     }
 
     /// Bytes from the studio.
-    pub fn hear(&mut self, bytes: &[u8], now_us: u64, out: &mut Vec<u8>) {
-        let mut heard = Vec::new();
+    pub fn receive(&mut self, bytes: &[u8], now_us: u64, out: &mut Vec<u8>) {
+        let mut received = Vec::new();
         self.ears.push(bytes, |event| {
             if let Event::Message { message, .. } = event {
-                heard.push(message);
+                received.push(message);
             }
         });
-        for message in heard {
+        for message in received {
             match message {
                 Message::AskHello => self.send(&Message::Hello(self.hello()), now_us, out),
                 Message::Start => {

@@ -79,7 +79,7 @@ pub enum StopReason {
     EffortSpent,
     /// The data carry no more information (numerical rank reached).
     Exhausted,
-    /// What was wished (spacing, what all may cost) leaves no room for more.
+    /// What was asked for (spacing, what all may cost) leaves no room for more.
     NoRoom,
 }
 
@@ -263,7 +263,7 @@ fn or_null<S: Serializer>(limit: &usize, serializer: S) -> Result<S::Ok, S::Erro
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Budget {
     pub quality: Quality,
-    /// Size of the elastic model. The truth that accuracy is quoted against always has elements of half
+    /// Size of the elastic model. The reference model that accuracy is quoted against always has elements of half
     /// their size; of a solid two thirds.
     pub elements: Elements,
     /// Most touches the model is asked for.

@@ -48,7 +48,7 @@ pub struct Cli {
 #[derive(Subcommand, Debug)]
 #[allow(clippy::large_enum_variant, reason = "there is one, parsed once")]
 pub enum Command {
-    /// The whole road: simulate, filter, reduce, select, evaluate, report.
+    /// The whole pipeline: simulate, filter, reduce, select, evaluate, report.
     Design(design::DesignArgs),
     /// The elastic model only: writes the dataset.
     Simulate(simulate::SimulateArgs),

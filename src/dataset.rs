@@ -169,7 +169,7 @@ pub struct TouchRegion<'a> {
 /// `count` touches spread over the surface, at least `margin` (m) from free edges: evenly for a model
 /// to learn from, uniformly at random for tests.
 #[must_use]
-pub fn spread_touches(
+pub fn distribute_touches(
     mesh: &TriMesh,
     count: usize,
     seed: u64,

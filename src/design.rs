@@ -1,4 +1,4 @@
-//! The whole road, stage by stage: simulate, filter, reduce, select, evaluate.
+//! The whole pipeline, stage by stage: simulate, filter, reduce, select, evaluate.
 //!
 //! Each stage is a pure function of the ones before it, so that a caller can keep what has not changed.
 
@@ -9,6 +9,7 @@ mod choose;
 pub mod curves;
 mod doubt;
 mod drawn;
+mod filter;
 mod finest;
 mod ground;
 mod in_hand;
@@ -17,14 +18,14 @@ mod judge;
 mod known;
 mod layout;
 mod meshed;
+mod pipeline;
 mod reduce;
+mod reference;
 mod refine;
-mod road;
-mod sense;
+mod sensing;
 mod shortage;
 mod simulate;
 pub mod simulated_board;
-mod truth;
 mod walled;
 
 use glam::DVec3;
@@ -40,6 +41,7 @@ pub use self::by_hand::judge_set;
 pub use self::choose::*;
 pub use self::doubt::*;
 pub use self::drawn::PROPOSED;
+pub use self::filter::filter;
 pub use self::finest::*;
 pub use self::ground::*;
 pub use self::in_hand::*;
@@ -48,13 +50,13 @@ pub use self::judge::*;
 pub use self::known::expected_errors;
 pub use self::layout::*;
 pub use self::meshed::Meshed;
+pub use self::pipeline::*;
 pub use self::reduce::{Located, Reduced, reduce_sites};
+pub use self::reference::Reference;
 pub use self::refine::refine;
-pub use self::road::*;
-pub use self::sense::*;
+pub use self::sensing::*;
 pub use self::shortage::*;
 pub use self::simulate::*;
-pub use self::truth::Truth;
 pub use self::walled::*;
 
 /// Why a stage ended without a result.
@@ -202,6 +204,6 @@ pub const LAYOUT: usize = 3500;
 /// Seeds of the independent draws, apart from each other.
 const TEST_SEED: u64 = 0x7e57;
 const NOISE_SEED: u64 = 0x0153;
-const HEARD_SEED: u64 = 0x4ea8d;
+const SELECTION_NOISE_SEED: u64 = 0x4ea8d;
 const WORKSHOP_SEED: u64 = 0x30b0;
 const PRESS_SEED: u64 = 0x94e55;

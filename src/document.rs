@@ -2,6 +2,7 @@
 
 mod inputs;
 mod paint;
+mod state;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -11,22 +12,14 @@ use crate::io::project_file::LoadedProject;
 use crate::mesh::geodesic::{March, Scratch};
 use crate::mesh::repair::Repair;
 use crate::mesh::{RepairReport, TriMesh};
-use crate::project::{ChosenSite, Masks, PartModel, Project};
+use crate::project::{ChosenSite, PartModel};
 
 pub use inputs::{
     DesignInputs, ElementInputs, ExpectedInputs, FilterInputs, ModelInputs, PaintInputs,
     ReductionInputs, SelectionInputs, SensingInputs, SimulationInputs, TradeInputs, WallInputs,
 };
-pub use paint::{Brush, Layer};
-
-/// What undo brings back. The mesh is not part of it: opening a file begins a new history.
-#[derive(Clone, PartialEq)]
-pub struct State {
-    pub project: Project,
-    pub painted: Option<Arc<Vec<bool>>>,
-    /// Masks of the part's vertices that supports may name.
-    pub masks: Masks,
-}
+pub use paint::Brush;
+pub use state::{Layer, State};
 
 /// An open project.
 pub struct Document {
@@ -114,7 +107,7 @@ impl Document {
 
     /// Ends a gesture: what changed since the last one becomes one undo step.
     pub fn settle(&mut self) {
-        self.drop_empty_layers();
+        self.state.drop_empty_layers();
         if self.state == self.settled {
             return;
         }
@@ -203,6 +196,7 @@ mod tests {
     use crate::evaluation::EstimatorKind;
     use crate::mesh::SurfacePoint;
     use crate::placement::SelectorKind;
+    use crate::project::Project;
 
     fn document() -> Document {
         Document::new(crate::io::opening::bundled().unwrap(), None)

@@ -1,4 +1,4 @@
-//! Linear elasticity of a thin shell: flat triangular facets with six freedoms a node.
+//! Linear elasticity of a thin shell: flat triangular facets with six degrees of freedom a node.
 //!
 //! Membrane: the optimal triangle with drilling freedoms (Felippa 2003). Bending: the shear-flexible
 //! discrete Kirchhoff–Mindlin triangle (Katili 1993). Assembled once, factored once, all loads solved
@@ -32,4 +32,4 @@ pub use load::{NodalForces, Touch};
 pub use material::{Material, Section};
 pub use model::Model;
 pub use shell::ShellModel;
-pub use support::{Freedoms, Support};
+pub use support::{DofSet, Support};

@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use crate::bounds::Bounds;
 use crate::dataset::Site;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 use crate::statistics::median;
 
@@ -145,7 +144,6 @@ impl Surroundings {
 /// Everything the filters look at.
 pub struct FeasibleInput<'a> {
     pub mesh: &'a TriMesh,
-    pub index: &'a SurfaceIndex,
     /// Vertices with anything held.
     pub supported: &'a [u32],
     pub points: &'a [SurfacePoint],
@@ -319,7 +317,7 @@ impl<'a> Filters<'a> {
 
     fn footprint(&self, i: usize) -> Footprint {
         let input = self.input;
-        footprint(input.mesh, input.index, &input.sites[i], self.rules)
+        footprint(input.mesh, &input.sites[i], self.rules)
     }
 }
 
@@ -409,12 +407,7 @@ struct Footprint {
 }
 
 /// Lays the gauge's grid into the tangent plane and looks for the surface under it.
-fn footprint(
-    mesh: &TriMesh,
-    index: &SurfaceIndex,
-    site: &Site,
-    rules: &FeasibleRules,
-) -> Footprint {
+fn footprint(mesh: &TriMesh, site: &Site, rules: &FeasibleRules) -> Footprint {
     /// Overhang allowed, as a share of the grid's width.
     const SLACK: f64 = 0.05;
     let across = site.normal.cross(site.direction);
@@ -429,7 +422,7 @@ fn footprint(
         let offset =
             site.direction * (a * rules.grid_length / 2.0) + across * (b * rules.grid_width / 2.0);
         let target = site.position + offset;
-        let (at, _) = index.nearest(target);
+        let (at, _) = mesh.index().nearest(target);
         let gap = mesh.point(at) - target;
         let height = gap.dot(site.normal);
         let sideways = (gap - site.normal * height).length();

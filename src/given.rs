@@ -13,7 +13,6 @@ use crate::elasticity::linearity::Linearity;
 use crate::elasticity::observe::{Face, Observer, SiteFrame};
 use crate::elasticity::respond::{Reading, Responses, respond};
 use crate::elasticity::{Model, Touch};
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
 pub use sift::{GivenSite, LeftOut, Sifted, Table, check_reach, sift};
@@ -87,8 +86,7 @@ pub fn answer_sifted(
     let touches: Vec<Touch> = rows.touches.iter().map(|&k| touches[k]).collect();
     let places: Vec<DVec3> = rows.sites.iter().map(|&k| sites[k].position).collect();
     let mut notes = Vec::new();
-    let index = SurfaceIndex::new(&inputs.part);
-    let inputs = facing_touches(inputs, &touches, &index, &mut notes);
+    let inputs = facing_touches(inputs, &touches, &mut notes);
     askew(&touches, &rows, &inputs.part, &mut notes);
 
     let ground = design::ground(&inputs, watch)?;
@@ -139,15 +137,15 @@ fn observed(model: &dyn Model, sites: &[GivenSite], rows: &mut Sifted) -> (Obser
         model.observer(&points, Face::Inside)
     };
     let observer = on(&rows.sites);
-    let laid: Vec<Result<f64, f64>> = (rows.sites.iter().zip(observer.frames()))
+    let projected: Vec<Result<f64, f64>> = (rows.sites.iter().zip(observer.frames()))
         .map(|(&k, frame)| angle_within(sites[k].direction, frame))
         .collect();
-    let angles: Vec<f64> = laid.iter().flatten().copied().collect();
-    if laid.iter().all(Result::is_ok) {
+    let angles: Vec<f64> = projected.iter().flatten().copied().collect();
+    if projected.iter().all(Result::is_ok) {
         return (observer, angles);
     }
     let tried = std::mem::take(&mut rows.sites);
-    for (row, angle) in tried.into_iter().zip(laid) {
+    for (row, angle) in tried.into_iter().zip(projected) {
         match angle {
             Ok(_) => rows.sites.push(row),
             Err(angle_deg) => rows.left_out.push(LeftOut {
@@ -218,15 +216,10 @@ fn under_tips(touches: &[Touch], sites: &[GivenSite], rows: &[usize]) -> Option<
 }
 
 /// Touches come from outside: an open part that winds the other way is turned over.
-fn facing_touches(
-    inputs: &Inputs,
-    touches: &[Touch],
-    index: &SurfaceIndex,
-    notes: &mut Vec<String>,
-) -> Inputs {
+fn facing_touches(inputs: &Inputs, touches: &[Touch], notes: &mut Vec<String>) -> Inputs {
     let part = &inputs.part;
     let facing = |touch: &Touch| {
-        let at = index.nearest(touch.position).0;
+        let at = part.index().nearest(touch.position).0;
         part.facet_normal(at.triangle).dot(touch.normal)
     };
     // Normals along the surface say nothing about its sides.
@@ -246,7 +239,7 @@ fn facing_touches(
 
 /// Remarks on touches that press along what is not nearly the surface's normal.
 fn askew(touches: &[Touch], rows: &Sifted, part: &TriMesh, notes: &mut Vec<String>) {
-    let index = SurfaceIndex::new(part);
+    let index = part.index();
     let turned: Vec<usize> = (touches.iter().zip(&rows.touches))
         .filter(|(t, _)| part.normal(index.nearest(t.position).0).dot(t.normal) < ASKEW)
         .map(|(_, &row)| row)

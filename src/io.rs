@@ -23,7 +23,7 @@ pub mod vtu;
 
 use std::path::PathBuf;
 
-/// Processor seconds of this process so far.
+/// CPU time (s) of this process so far.
 #[cfg(unix)]
 #[must_use]
 pub fn cpu_seconds() -> f64 {

@@ -465,16 +465,12 @@ impl Grid {
                     break;
                 }
                 let at = DVec2::new(self.lines_s[a as usize], self.lines_z[b as usize]);
-                let distance = if along_s {
+                let away = (at - corner).abs();
+                let distance = match along_s {
                     // The seam of a closed limb is one step like any other.
-                    let d = (at.x - corner.x).abs();
-                    if self.closed {
-                        d.min(self.around() - d)
-                    } else {
-                        d
-                    }
-                } else {
-                    (at.y - corner.y).abs()
+                    true if self.closed => away.x.min(self.around() - away.x),
+                    true => away.x,
+                    false => away.y,
                 };
                 if distance >= radius {
                     break;

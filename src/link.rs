@@ -19,7 +19,7 @@ pub use port::{Got, Pace, Port};
 pub use ports::{PortInfo, ports};
 pub use recorded::{check_length, record};
 pub use recording::{Recorder, old_note};
-pub use session::{Command, Connection, Heard, Listener, State, Timing};
+pub use session::{Command, Connection, Listener, SessionEvent, State, Timing};
 pub use table::{Table, write_table};
 
 /// Where a board is found.

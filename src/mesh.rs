@@ -16,6 +16,7 @@ pub mod mount;
 mod numbers;
 mod orientation;
 pub mod oriented_box;
+mod point;
 pub mod reach;
 pub mod remesh;
 pub mod repair;
@@ -33,16 +34,18 @@ pub mod volume;
 pub mod walls;
 pub mod winding;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
 use crate::bounds::Bounds;
+use locate::SurfaceIndex;
 use topology::Sides;
 use volume::VolumeMesh;
 
 pub use error::MeshError;
 pub use intake::TakenIn;
+pub use point::SurfacePoint;
 pub use report::RepairReport;
 pub use topology::Edge;
 pub(crate) use topology::components;
@@ -66,6 +69,8 @@ pub struct TriMesh {
     volume: Option<Arc<VolumeMesh>>,
     /// It is open, and closes where vertices of its file within so much (m) of each other are joined.
     closes_within: Option<f64>,
+    /// Where its points are found, once somebody has asked; copies share it.
+    index: OnceLock<Arc<SurfaceIndex>>,
 }
 
 impl TriMesh {
@@ -111,6 +116,7 @@ impl TriMesh {
             vertex_normals,
             volume: None,
             closes_within: None,
+            index: OnceLock::new(),
         }
     }
 
@@ -133,6 +139,16 @@ impl TriMesh {
     #[must_use]
     pub fn closes_within(&self) -> Option<f64> {
         self.closes_within
+    }
+
+    /// The tree that finds places on it: grown when it is first asked for, and kept.
+    ///
+    /// # Panics
+    /// Never: a mesh has triangles, and its indices were checked.
+    #[must_use]
+    pub fn index(&self) -> &Arc<SurfaceIndex> {
+        let grown = || SurfaceIndex::of(self.positions.clone(), &self.triangles);
+        self.index.get_or_init(|| Arc::new(grown()))
     }
 
     #[must_use]
@@ -338,13 +354,6 @@ impl TriMesh {
             .map(|i| values[tri[i] as usize] * at.barycentric[i])
             .sum()
     }
-}
-
-/// A point of the surface: a triangle and the weights of its corners (they sum to one).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfacePoint {
-    pub triangle: u32,
-    pub barycentric: [f64; 3],
 }
 
 fn vertex_normals(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<DVec3> {

@@ -1,16 +1,16 @@
 //! Choosing sites.
 
 pub mod candidates;
+pub mod constraints;
 pub mod entropy;
 mod exchange;
 pub mod expected_error;
 pub mod greedy_svr;
 pub mod information;
-pub mod lead;
+pub mod margin;
 pub mod mutual_information;
 pub mod pca_qr;
 mod selector;
-pub mod wishes;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -19,9 +19,9 @@ use crate::budget::{Achieved, Cancelled};
 use crate::dataset::SignalMatrix;
 use crate::pca::PcaError;
 use crate::plain;
+pub use constraints::{Constraints, LostBy};
 pub use expected_error::Certificate;
 pub use selector::{Request, Selector};
-pub use wishes::{LostBy, Wishes};
 
 /// The selectors a project can name.
 #[derive(
@@ -139,8 +139,8 @@ pub struct SensorSet {
     /// How far the last pick was ahead of the next best site, as a share of the criterion (greedy SVR) or of what
     /// the pick adds to it; where each set is chosen for itself, of the least certain of its picks. Absent where
     /// there was no choice.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lead: Option<f64>,
+    #[serde(rename = "lead", skip_serializing_if = "Option::is_none")]
+    pub margin: Option<f64>,
     /// How far the set is at most from the best of as many gauges; only of the last set of a choice by expected error.
     #[serde(flatten)]
     pub certificate: Option<Certificate>,
@@ -210,7 +210,7 @@ pub enum PlacementError {
     )]
     Singular,
     #[error("{what}")]
-    Wish { what: &'static str },
+    Constraint { what: &'static str },
     #[error("{selector} cannot take this into account: {why}")]
     Refused {
         selector: &'static str,

@@ -1,4 +1,4 @@
-//! Speed against accuracy, measured: the whole road at many settings, all judged by one model that is finer
+//! Speed against accuracy, measured: the whole pipeline at many settings, all judged by one model that is finer
 //! than any of theirs, and what each setting's knobs buy.
 //!
 //! A [`Setting`] says how much is spent at every stage. [`measure`] runs it and asks the judge; [`Sweep`] says
@@ -24,12 +24,12 @@ pub use self::sweep::{Sweep, standards};
 /// What a setting costs and achieves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// Processor seconds from the project to the judged answer, and the same by the clock.
+    /// CPU time (s) from the project to the judged answer, and the same by the clock.
     pub cpu_seconds: f64,
     pub seconds: f64,
     /// By the clock, stage by stage.
     pub stages: Vec<StageSeconds>,
-    /// Processor seconds that the judge took beside it.
+    /// CPU time (s) that the judge took beside it.
     pub judge_cpu_seconds: f64,
     /// Most memory that it took (MB), where the system says so; what an allocator kept from runs before is in it.
     pub memory_mb: Option<f64>,
@@ -92,7 +92,7 @@ impl Point {
 
 /// Clock and memory, which the core does not have of its own.
 pub trait Meter: Sync {
-    /// Processor seconds of this process so far.
+    /// CPU time (s) of this process so far.
     fn cpu_seconds(&self) -> f64;
     /// Seconds by the clock since any fixed moment.
     fn seconds(&self) -> f64;
@@ -102,7 +102,7 @@ pub trait Meter: Sync {
     fn most_memory_mb(&self) -> Option<f64>;
 }
 
-/// Runs the road at a setting and judges what it chose.
+/// Runs the pipeline at a setting and judges what it chose.
 ///
 /// # Errors
 /// [`DesignError`] only for a stop; what cannot be computed at this setting is its outcome.
@@ -178,7 +178,7 @@ fn attempt(
 
 #[cfg(test)]
 impl Measured {
-    /// A made-up measurement of these processor seconds and this error (mm).
+    /// A made-up measurement of this CPU time (s) and this error (mm).
     fn made_up(cpu_seconds: f64, error_mm: f64) -> Self {
         Self {
             cpu_seconds,

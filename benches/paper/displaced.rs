@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use hapdef::budget::{Budget, unwatched};
-use hapdef::design::{self, DesignError, Inputs, Reduced, Simulated, Truth};
+use hapdef::design::{self, DesignError, Inputs, Reduced, Reference, Simulated};
 use hapdef::evaluation::{BASELINE, EVERYWHERE, EstimatorKind, Evaluation, EvaluationRow};
 use hapdef::feasible::Feasibility;
 use hapdef::placement::{Selection, SelectorKind};
@@ -60,7 +60,7 @@ impl Displaced {
         let mut all = self.selections.clone();
         all.extend(theirs.iter().flat_map(|k| k.selections.iter().cloned()));
         let sites = design::sites_to_judge(EstimatorKind::Svr, &self.reduced, &all);
-        let truth = design::truth(
+        let reference = design::reference(
             &self.inputs,
             &self.simulated,
             &sites,
@@ -68,19 +68,19 @@ impl Displaced {
             &unwatched,
         )?;
         stages.end("measuring on a finer model");
-        let evaluation = self.judge(&self.selections, &truth, &self.budget)?;
+        let evaluation = self.judge(&self.selections, &reference, &self.budget)?;
         stages.end("judging by regression");
         let whole = Budget {
             failure_subsets: 0,
             ..self.budget
         };
         let theirs: Result<Vec<Evaluation>, DesignError> = (theirs.iter())
-            .map(|kernel| self.judge(&kernel.selections, &truth, &whole))
+            .map(|kernel| self.judge(&kernel.selections, &reference, &whole))
             .collect();
         let theirs = theirs?;
         stages.end("judging their kernel");
         Ok(Judged {
-            touches: truth.touches.len(),
+            touches: reference.touches.len(),
             evaluation,
             theirs,
         })
@@ -89,7 +89,7 @@ impl Displaced {
     fn judge(
         &self,
         selections: &[Selection],
-        truth: &Truth,
+        reference: &Reference,
         budget: &Budget,
     ) -> Result<Evaluation, DesignError> {
         design::evaluate(
@@ -97,7 +97,7 @@ impl Displaced {
             &self.simulated,
             &self.reduced,
             selections,
-            truth,
+            reference,
             budget,
             &unwatched,
         )

@@ -12,7 +12,9 @@ use hapdef::gaussian_process::{self, Covariance, Distances, GpKernel};
 use hapdef::placement::entropy::Entropy;
 use hapdef::placement::information::Geometry;
 use hapdef::placement::mutual_information::MutualInformation;
-use hapdef::placement::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, Wishes};
+use hapdef::placement::{
+    Constraints, PlacementError, Pool, Request, Selection, Selector, SelectorKind,
+};
 
 use crate::displaced::{Displaced, Judged, of_sizes, row};
 use crate::{FEW, MANY, cell};
@@ -115,9 +117,9 @@ fn arc(a: DVec3, b: DVec3) -> f64 {
 
 /// What entropy and mutual information choose; nothing of one that the covariance leaves undefined.
 fn chosen(geometry: &Geometry, pool: &Pool) -> Result<Vec<Selection>, PlacementError> {
-    let wishes = Wishes::count(MANY);
+    let constraints = Constraints::count(MANY);
     let request = Request {
-        wishes: &wishes,
+        constraints: &constraints,
         watch: &unwatched,
         found: &|_| (),
     };

@@ -37,14 +37,14 @@ pub fn judged(displaced: &Displaced, stages: &mut Stages) -> Result<Evaluation, 
         .collect();
     let selections = [Selection { sets, ..many }];
     let sites = design::sites_to_judge(EstimatorKind::Matching, &reduced, &selections);
-    let truth = design::truth(&inputs, &simulated, &sites, budget, &unwatched)?;
+    let reference = design::reference(&inputs, &simulated, &sites, budget, &unwatched)?;
     stages.end("measuring on a finer model");
     let evaluation = design::evaluate(
         &inputs,
         &simulated,
         &reduced,
         &selections,
-        &truth,
+        &reference,
         budget,
         &unwatched,
     )?;

@@ -1,9 +1,9 @@
-//! Processor time, and something to compare it with.
+//! CPU time, and something to compare it with.
 #![allow(dead_code, reason = "each benchmark uses its own part of these")]
 
 pub use hapdef::io::cpu_seconds;
 
-/// Processor seconds of a 4000 × 4000 matrix product on one core.
+/// CPU time (s) of a 4000 × 4000 matrix product on one core.
 pub fn reference_seconds() -> f64 {
     let a = faer::Mat::<f64>::from_fn(4000, 4000, |i, j| ((i * 7 + j * 3) % 11) as f64);
     let before = cpu_seconds();

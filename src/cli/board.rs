@@ -305,7 +305,7 @@ fn build(
     watch: Watch,
 ) -> anyhow::Result<SimulatedBoard> {
     let seed = inputs.project.budget.seed;
-    let sensing = design::sense(inputs, &inputs.project.budget.budget(), watch)?;
+    let sensing = design::sensing(inputs, &inputs.project.budget.budget(), watch)?;
     let script = match &plan.presses {
         Some(presses) => on_surface(presses, inputs, &sensing),
         None => Script::random(
@@ -356,7 +356,7 @@ fn read_script(path: &Path, part: &TriMesh) -> anyhow::Result<Vec<GivenPress>> {
 fn on_surface(presses: &[GivenPress], inputs: &Inputs, sensing: &Sensing) -> Script {
     let map = &sensing.drawn.map;
     let press = |asked: &GivenPress| {
-        let (at, _) = map.index.nearest(asked.position);
+        let (at, _) = map.mesh.index().nearest(asked.position);
         Press {
             start_s: asked.start_s,
             duration_s: asked.duration_s,

@@ -1,4 +1,4 @@
-//! `hapdef design`: the whole road.
+//! `hapdef design`: the whole pipeline.
 
 use std::path::PathBuf;
 use std::time::Instant;

@@ -15,7 +15,7 @@ use super::spared::Spared;
 use super::{out, progress::Bar};
 use crate::design;
 use crate::io::project_file::LoadedProject;
-use crate::link::{Address, BAUD, Heard, Listener, Pace, Recorder, State, Table};
+use crate::link::{Address, BAUD, Listener, Pace, Recorder, SessionEvent, State, Table};
 use crate::live::{Pipeline, Sample, Update};
 use crate::plain;
 use crate::wire::Hello;
@@ -77,17 +77,17 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     let stop = AtomicBool::new(false);
     let (_commands, inbox) = channel();
     let begun = std::time::Instant::now();
-    let mut told: anyhow::Result<()> = Ok(());
-    let ended = listener.run(&stop, &inbox, |heard| {
+    let mut shown: anyhow::Result<()> = Ok(());
+    let ended = listener.run(&stop, &inbox, |event| {
         let over = |s: f64| begun.elapsed().as_secs_f64() >= s;
-        if told.is_ok() {
-            told = output.hear(&heard);
+        if shown.is_ok() {
+            shown = output.on_event(&event);
         }
-        if told.is_err() || args.seconds.is_some_and(over) {
+        if shown.is_err() || args.seconds.is_some_and(over) {
             stop.store(true, Ordering::Relaxed);
         }
     });
-    told?;
+    shown?;
     ended.map_err(anyhow::Error::msg)?;
     output.flush()
 }
@@ -122,7 +122,7 @@ fn pipeline(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Pipelin
     let bar = Bar::default();
     let sensing = args.common.in_pool(|| {
         let watch = |p| bar.show(p);
-        Ok(design::sense(
+        Ok(design::sensing(
             &loaded.inputs,
             &project.budget.budget(),
             &watch,
@@ -165,24 +165,24 @@ impl Output {
         })
     }
 
-    fn hear(&mut self, heard: &Heard) -> anyhow::Result<()> {
-        match heard {
-            Heard::State(state) => say(in_words(state)),
-            Heard::Hello(hello) => self.greet(hello),
-            Heard::Message(text) | Heard::Trouble(text) => say(text),
+    fn on_event(&mut self, event: &SessionEvent) -> anyhow::Result<()> {
+        match event {
+            SessionEvent::State(state) => say(in_words(state)),
+            SessionEvent::Hello(hello) => self.greet(hello),
+            SessionEvent::Message(text) | SessionEvent::Trouble(text) => say(text),
             // Nobody wants to find out afterwards.
-            Heard::Unrecorded(why) => anyhow::bail!("{why}"),
-            Heard::Truth(touch) => {
+            SessionEvent::Unrecorded(why) => anyhow::bail!("{why}"),
+            SessionEvent::Truth(touch) => {
                 if let Some(csv) = &mut self.csv {
                     csv.truth = *touch;
                 }
             }
-            Heard::Sample { sample, update, .. } => {
+            SessionEvent::Sample { sample, update, .. } => {
                 self.row(sample, update)?;
                 self.line(update)?;
             }
             // What waits is written as soon as nothing more is there.
-            Heard::Turn { .. } => self.flush()?,
+            SessionEvent::Turn { .. } => self.flush()?,
         }
         Ok(())
     }

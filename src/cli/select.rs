@@ -14,10 +14,10 @@ use crate::bounds::Bounds;
 use crate::budget::Watch;
 use crate::gaussian_process::GpKernel;
 use crate::io::cpu_seconds;
+use crate::placement::constraints::{Loss, LostBy, Thorough};
 use crate::placement::expected_error::Detail;
 use crate::placement::greedy_svr::{Audit, Comparison};
-use crate::placement::wishes::{Loss, LostBy, Thorough};
-use crate::placement::{SelectorKind, SensorSet, Wishes};
+use crate::placement::{Constraints, SelectorKind, SensorSet};
 use crate::plain;
 use crate::study::{self, Choice, Data, Settings};
 
@@ -125,13 +125,13 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
     let settings = args.settings(&data)?;
     let of_data = &args.data;
     of_data.named(args.check_out(&data))?;
-    let wishes = of_data.named(args.wishes(&data))?;
+    let constraints = of_data.named(args.constraints(&data))?;
     let kept_out = of_data.named(args.kept_out(&data))?;
     let bar = Bar::default();
     let watch = |p| bar.show(p);
     let result = args
         .criterion
-        .in_pool(|| of_data.named(args.chosen(&data, &kept_out, &wishes, &settings, &watch)));
+        .in_pool(|| of_data.named(args.chosen(&data, &kept_out, &constraints, &settings, &watch)));
     bar.finish();
     let (choice, criterion_seconds, audit) = result?;
     for step in &audit {
@@ -182,20 +182,27 @@ fn say(set: &SensorSet) {
 }
 
 impl SelectArgs {
-    /// The choice, the processor time (s) of its criterion, and what was asked beside it.
+    /// The choice, the CPU time (s) of its criterion, and what was asked beside it.
     fn chosen(
         &self,
         data: &Data,
         kept_out: &[usize],
-        wishes: &Wishes,
+        constraints: &Constraints,
         settings: &Settings,
         watch: Watch,
     ) -> anyhow::Result<(Choice, f64, Vec<Comparison>)> {
-        let mut choice =
-            study::select(data, kept_out, wishes, settings, &cpu_seconds, watch, &say)?;
+        let mut choice = study::select(
+            data,
+            kept_out,
+            constraints,
+            settings,
+            &cpu_seconds,
+            watch,
+            &say,
+        )?;
         let before = cpu_seconds();
         if !self.no_criterion {
-            study::add_criteria(data, &mut choice.selection, wishes, settings, watch)
+            study::add_criteria(data, &mut choice.selection, constraints, settings, watch)
                 .context("the criterion in mm (left out with --no-criterion)")?;
         }
         let criterion_seconds = cpu_seconds() - before;
@@ -330,9 +337,9 @@ impl SelectArgs {
         }
     }
 
-    fn wishes(&self, data: &Data) -> anyhow::Result<Wishes> {
+    fn constraints(&self, data: &Data) -> anyhow::Result<Constraints> {
         known("--require", &self.require, data)?;
-        Ok(Wishes {
+        Ok(Constraints {
             sensors: self.sensors,
             required: self.require.clone(),
             spacing: self.spacing_mm * 1e-3,
@@ -408,22 +415,7 @@ fn summary(
         .flat_map(|s| &s.sites)
         .map(|&s| site_json(data, s))
         .collect();
-    let steps: Vec<Value> = selection
-        .sets
-        .iter()
-        .map(|set| {
-            json!({
-                "sensors": set.sites.len(),
-                "sites": set.sites,
-                "criterion": set.criterion,
-                "criterion_mm": set.criterion_mm,
-                "gap": set.gap,
-                "lead": set.lead,
-                "bound_mm": set.certificate.map(|c| c.bound_mm),
-                "local_mm": set.certificate.map(|c| c.local_mm),
-            })
-        })
-        .collect();
+    let steps: Vec<Value> = selection.sets.iter().map(step_json).collect();
     // What a choice by expected error weighed stands in the place of a regression that nobody trained.
     let (criterion, folds) = match &choice.weighed {
         Some(weighed) => (json!(weighed), Value::Null),
@@ -456,6 +448,19 @@ fn summary(
         "criterion_cpu_seconds": criterion_seconds,
         "achieved": selection.achieved,
         "notes": notes,
+    })
+}
+
+fn step_json(set: &SensorSet) -> Value {
+    json!({
+        "sensors": set.sites.len(),
+        "sites": set.sites,
+        "criterion": set.criterion,
+        "criterion_mm": set.criterion_mm,
+        "gap": set.gap,
+        "lead": set.margin,
+        "bound_mm": set.certificate.map(|c| c.bound_mm),
+        "local_mm": set.certificate.map(|c| c.local_mm),
     })
 }
 

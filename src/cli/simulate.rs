@@ -142,7 +142,7 @@ fn at_points(
     }
     let places = off::Places::of(touches_file, sites_file);
     places.say_all(&rows);
-    let told = rows.left_out.len();
+    let said_before = rows.left_out.len();
     let budget = loaded.inputs.project.budget.budget();
     let bar = Bar::default();
     let result = args.common.in_pool(|| {
@@ -155,7 +155,7 @@ fn at_points(
     if args.strict {
         answer.rows.refuse_any().map_err(placed)?;
     }
-    places.say_later(&answer.rows, told);
+    places.say_later(&answer.rows, said_before);
     points::write_answers(&args.out, &answer)?;
     if let Some(path) = &args.vtu {
         let first = answer.rows.touches.iter().take(vtu::TOUCHES);

@@ -14,7 +14,6 @@ use crate::elasticity::solid::simplex::Simplex;
 use crate::elasticity::solid::sizing::Shape;
 use crate::elasticity::{ElasticError, Touch, scope};
 use crate::mesh::TriMesh;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::sample;
 use crate::mesh::walls::Side;
 use crate::plain::{self, digits};
@@ -52,7 +51,7 @@ pub struct Cost {
     /// Size of its elements (mm).
     pub element_mm: f64,
     pub unknowns: f64,
-    /// Processor time of all its stages (s), and memory of the largest (GB).
+    /// CPU time of all its stages (s), and memory of the largest (GB).
     pub seconds: f64,
     pub memory_gb: f64,
     /// Error of the displacement under a touch (%) that finer elements would take away; no number where it could not
@@ -215,7 +214,7 @@ impl Asked {
     }
 }
 
-/// Processor time (s) of each entry of an element's matrix, each multiplication of a factorization, each entry of a
+/// CPU time (s) of each entry of an element's matrix, each multiplication of a factorization, each entry of a
 /// factor that a touch is solved with, and each weight that a site is read with: as on a limb with tetrahedra.
 const ASSEMBLE: f64 = 4e-8;
 const FACTOR: f64 = 5e-11;
@@ -234,7 +233,7 @@ const MOST_THEORY: f64 = 5.0;
 /// Cells that are this many times as wrong as a shell do not fit.
 const MUCH: f64 = 3.0;
 
-/// Processor time and memory of a model, as they were on limbs and shins.
+/// CPU time and memory of a model, as they were on limbs and shins.
 struct Measured {
     /// Once (s); for each unknown of every factor (s); for each unknown and touch, less its growth (s).
     once: f64,
@@ -401,12 +400,7 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
             "A shell fits.".into()
         },
     ];
-    if let Some(within) = part.closes_within() {
-        let mm = digits(within * 1e3);
-        words.push(format!(
-            "If it is meant to be closed: it is when vertices within {mm} mm are joined (part.weld_mm = {mm})."
-        ));
-    }
+    words.extend(meant_closed(part));
     let mut as_shell = inputs.clone();
     as_shell.project.part.model = PartModel::Shell;
     if let Ok(Ground::Shell(shell)) = ground(&as_shell, watch) {
@@ -425,6 +419,14 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
     }
 }
 
+/// What closes an open part, where joining near vertices does.
+fn meant_closed(part: &TriMesh) -> Option<String> {
+    let mm = digits(part.closes_within()? * 1e3);
+    Some(format!(
+        "If it is meant to be closed: it is when vertices within {mm} mm are joined (part.weld_mm = {mm})."
+    ))
+}
+
 fn bent(radius: [f64; 2]) -> String {
     if radius[0].is_finite() {
         format!(
@@ -438,7 +440,7 @@ fn bent(radius: [f64; 2]) -> String {
 
 /// Faces and thickness at the vertices of the part that is shown.
 fn carried(part: &Arc<TriMesh>, solid: &SolidGround) -> Faces {
-    let index = SurfaceIndex::new(&solid.whole);
+    let index = solid.whole.index();
     let (mut sides, mut thickness) = (Vec::new(), Vec::new());
     let over = 0.1 * solid.wall();
     for (p, n) in part.positions().iter().zip(part.vertex_normals()) {

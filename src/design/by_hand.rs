@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::judge::{judge_as_asked, truth};
+use super::judge::{judge_as_asked, reference};
 use super::{Design, DesignError, Inputs};
 use crate::budget::Watch;
 use crate::evaluation::{Candidate, Evaluation, EvaluationRow, Matched, MatchedRow};
@@ -13,7 +13,7 @@ use crate::placement::SensorSet;
 /// the settings of that set's regression. Its name in the rows is `name`.
 ///
 /// # Errors
-/// As [`truth`].
+/// As [`reference`].
 pub fn judge_set(
     inputs: &Inputs,
     design: &Design,
@@ -22,10 +22,10 @@ pub fn judge_set(
     watch: Watch,
 ) -> Result<Evaluation, DesignError> {
     let (simulated, budget) = (&design.simulated, &design.budget);
-    let truth = truth(inputs, simulated, sites, budget, watch)?;
+    let reference = reference(inputs, simulated, sites, budget, watch)?;
     let rows = sites
         .iter()
-        .filter_map(|s| truth.sites.binary_search(s).ok());
+        .filter_map(|s| reference.sites.binary_search(s).ok());
     let own = (design.evaluation.rows.iter())
         .find(|r| r.selector == design.lead.name() && r.sensors == sites.len());
     let set = Candidate {
@@ -34,14 +34,16 @@ pub fn judge_set(
         hyper: own.and_then(|r| r.hyper),
     };
     // Sites that the design has measured keep their noise; others have streams beyond all of its own.
-    let known = &design.truth.sites;
+    let known = &design.reference.sites;
     let stream = |s: &usize| match known.binary_search(s) {
         Ok(row) => row as u64,
         Err(_) => (known.len() + s) as u64,
     };
-    let streams: Vec<u64> = truth.sites.iter().map(stream).collect();
+    let streams: Vec<u64> = reference.sites.iter().map(stream).collect();
     let sets = [set];
-    judge_as_asked(inputs, simulated, &truth, &sets, &streams, budget, watch)
+    judge_as_asked(
+        inputs, simulated, &reference, &sets, &streams, budget, watch,
+    )
 }
 
 impl Design {
@@ -69,60 +71,66 @@ impl Design {
                     criterion: None,
                     criterion_mm: None,
                     gap: None,
-                    lead: None,
+                    margin: None,
                     certificate: None,
                 };
             }
         }
         let evaluation = Arc::make_mut(&mut design.evaluation);
-        let rows = judged.rows.iter().map(|r| EvaluationRow {
-            selector: name.to_owned(),
-            sensors: count,
-            ..r.clone()
-        });
-        let is_old = |selector: &str, sensors: usize| selector == name && sensors == old;
-        put_in_place(
-            &mut evaluation.rows,
-            |r| is_old(&r.selector, r.sensors),
-            rows,
-        );
-        let found = judged.found.iter().map(|m| Matched {
-            selector: name.to_owned(),
-            sensors: count,
-            ..m.clone()
-        });
-        put_in_place(
-            &mut evaluation.found,
-            |m| is_old(&m.selector, m.sensors),
-            found,
-        );
-        let matched = judged.matched.iter().map(|r| MatchedRow {
-            selector: name.to_owned(),
-            sensors: count,
-            ..r.clone()
-        });
-        put_in_place(
-            &mut evaluation.matched,
-            |r| is_old(&r.selector, r.sensors),
-            matched,
-        );
+        replace_rows(evaluation, (name, old), count, judged);
         if let (Some(k), Some(errors), Some(built)) =
             (set, judged.errors.first(), judged.built.first())
         {
             evaluation.errors[k].clone_from(errors);
             evaluation.built[k].clone_from(built);
         }
-        if let Some(failed) = judged.failures.first() {
-            for own in evaluation
-                .failures
-                .iter_mut()
-                .filter(|f| f.selector == name)
-            {
-                own.sensors = count;
-                own.rows.clone_from(&failed.rows);
-            }
-        }
         design
+    }
+}
+
+/// Puts what was judged of a set of `count` gauges in the place of a selector's set of so many (`old`).
+fn replace_rows(
+    evaluation: &mut Evaluation,
+    (name, old): (&str, usize),
+    count: usize,
+    judged: &Evaluation,
+) {
+    let is_old = |selector: &str, sensors: usize| selector == name && sensors == old;
+    let rows = judged.rows.iter().map(|r| EvaluationRow {
+        selector: name.to_owned(),
+        sensors: count,
+        ..r.clone()
+    });
+    put_in_place(
+        &mut evaluation.rows,
+        |r| is_old(&r.selector, r.sensors),
+        rows,
+    );
+    let found = judged.found.iter().map(|m| Matched {
+        selector: name.to_owned(),
+        sensors: count,
+        ..m.clone()
+    });
+    put_in_place(
+        &mut evaluation.found,
+        |m| is_old(&m.selector, m.sensors),
+        found,
+    );
+    let matched = judged.matched.iter().map(|r| MatchedRow {
+        selector: name.to_owned(),
+        sensors: count,
+        ..r.clone()
+    });
+    put_in_place(
+        &mut evaluation.matched,
+        |r| is_old(&r.selector, r.sensors),
+        matched,
+    );
+    if let Some(failed) = judged.failures.first() {
+        for own in (evaluation.failures.iter_mut()).filter(|f| f.selector == name) {
+            own.sensors = count;
+            own.rows.clone_from(&failed.rows);
+        }
     }
 }
 

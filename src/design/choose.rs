@@ -1,110 +1,33 @@
 //! Which sites gauges may have, and which they get.
 
-use std::cell::LazyCell;
-use std::sync::Arc;
-
 use glam::DVec3;
 
 use super::known::{Known, detail};
-use super::reduce::{Located, Reduced, heard};
-use super::{DesignError, Inputs, Shortage, Simulated};
+use super::reduce::{Located, Reduced, noisy_signals};
+use super::{DesignError, Inputs, Simulated};
 use crate::budget::{Budget, Watch};
 use crate::dataset::{SignalMatrix, Site};
-use crate::elasticity::support::supported_vertices;
-use crate::feasible::{Feasibility, FeasibleInput, blame, feasible};
-use crate::mesh::TriMesh;
-use crate::mesh::locate::SurfaceIndex;
+use crate::placement::constraints::Thorough;
 use crate::placement::entropy::Entropy;
 use crate::placement::expected_error::{self, ExpectedError};
 use crate::placement::greedy_svr::{self, GreedySvr};
+use crate::placement::information::Geometry;
 use crate::placement::mutual_information::MutualInformation;
-use crate::placement::wishes::Thorough;
 use crate::placement::{
-    PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, Wishes, lead,
-    pca_qr,
+    Constraints, PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet,
+    margin, pca_qr,
 };
 use crate::project::Elements;
 use crate::regression::Grouping;
 use crate::regression::folds::evenly;
 use crate::regression::tune::Effort;
 
-/// Filters the sites.
-#[must_use]
-pub fn filter(inputs: &Inputs, simulated: &Simulated) -> Feasibility {
-    let looked = LookedAt::of(inputs, simulated);
-    feasible(&looked.input(simulated), &inputs.project.feasible_rules())
-}
-
-/// Why so many gauges have no room.
-pub(super) fn shortage(
-    inputs: &Inputs,
-    simulated: &Simulated,
-    feasibility: &Feasibility,
-    wanted: usize,
-) -> Shortage {
-    let looked = LookedAt::of(inputs, simulated);
-    let rules = inputs.project.feasible_rules();
-    let more = wanted.saturating_sub(feasibility.sites().len());
-    let blame = blame(&looked.input(simulated), &rules, feasibility, more);
-    Shortage::of(inputs, feasibility, wanted, blame)
-}
-
-/// What the filters look at, beside the simulation.
-struct LookedAt {
-    index: SurfaceIndex,
-    supported: Vec<u32>,
-    painted: Option<Vec<bool>>,
-    kept_out: Option<Vec<bool>>,
-}
-
-impl LookedAt {
-    fn of(inputs: &Inputs, simulated: &Simulated) -> Self {
-        let part = LazyCell::new(|| SurfaceIndex::new(&inputs.part));
-        // Gauges that were moved off the lattice are no sites to choose.
-        let sites = &simulated.dataset.sites[..simulated.lattice];
-        let on = |mask: &Arc<Vec<bool>>| painted_sites(&inputs.part, &part, mask, sites);
-        let named = inputs.project.feasible.keep_out.as_ref();
-        Self {
-            index: SurfaceIndex::new(&simulated.mesh),
-            supported: supported_vertices(&simulated.held),
-            painted: inputs.painted.as_ref().map(on),
-            kept_out: named.and_then(|name| inputs.masks.get(name)).map(on),
-        }
-    }
-
-    fn input<'a>(&'a self, simulated: &'a Simulated) -> FeasibleInput<'a> {
-        FeasibleInput {
-            mesh: &simulated.mesh,
-            index: &self.index,
-            supported: &self.supported,
-            points: &simulated.points[..simulated.lattice],
-            sites: &simulated.dataset.sites[..simulated.lattice],
-            surroundings: simulated.surroundings.as_ref(),
-            painted: self.painted.as_deref(),
-            kept_out: self.kept_out.as_deref(),
-        }
-    }
-}
-
-/// Whether each site lies where the mask (one value a vertex of the part) is mostly set.
-pub(super) fn painted_sites(
-    part: &TriMesh,
-    index: &SurfaceIndex,
-    mask: &[bool],
-    sites: &[Site],
-) -> Vec<bool> {
-    sites
-        .iter()
-        .map(|site| part.mostly_in(mask, index.nearest(site.position).0))
-        .collect()
-}
-
 /// Sites that a selector may choose from, with what the project asks of the choice.
 struct Offer<'a> {
     /// As numbered in the dataset.
     sites: &'a [usize],
     positions: Vec<DVec3>,
-    wishes: Wishes,
+    constraints: Constraints,
 }
 
 impl<'a> Offer<'a> {
@@ -120,7 +43,7 @@ impl<'a> Offer<'a> {
         let near = |at: &[f64; 3]| nearest(&positions, *at).ok_or(PlacementError::NoSites);
         let required: Result<Vec<usize>, PlacementError> =
             keys.required_mm.iter().map(near).collect();
-        let wishes = Wishes {
+        let constraints = Constraints {
             sensors: keys.sensors,
             required: required?,
             spacing: keys.spacing_mm / 1000.0,
@@ -137,7 +60,7 @@ impl<'a> Offer<'a> {
         Ok(Self {
             sites,
             positions,
-            wishes,
+            constraints,
         })
     }
 
@@ -156,7 +79,7 @@ impl<'a> Offer<'a> {
             positions: &self.positions,
         };
         let request = Request {
-            wishes: &self.wishes,
+            constraints: &self.constraints,
             watch,
             found,
         };
@@ -172,7 +95,7 @@ fn nearest(positions: &[DVec3], at_mm: [f64; 3]) -> Option<usize> {
     })
 }
 
-/// Told of every set as soon as it is found, with the sites it counts in.
+/// Called with every set as soon as it is found, with the sites it counts in.
 pub type Found<'a> = &'a (dyn Fn(SelectorKind, &SensorSet, &[Site]) + Sync);
 
 /// Runs one selector.
@@ -209,7 +132,7 @@ pub fn select_step_by_step(
     // its picks are firm is not known.
     if kind != SelectorKind::ExpectedError {
         let tolerance = model_tolerance(inputs, simulated);
-        let firm = lead::within_model(&selection.sets, tolerance);
+        let firm = margin::within_model(&selection.sets, tolerance);
         selection.achieved.notes.extend(firm);
     }
     Ok(selection)
@@ -248,8 +171,15 @@ fn choose(
         }
         SelectorKind::GreedySvr => select_by_svr(inputs, simulated, reduced, budget, telling),
         SelectorKind::PcaQr => select_by_pivots(inputs, simulated, reduced, telling),
-        SelectorKind::Entropy | SelectorKind::MutualInformation => {
-            select_by_geometry(inputs, simulated, reduced, kind, budget, telling)
+        SelectorKind::Entropy => {
+            let by: ByGeometry =
+                &|geometry, pool, request| Entropy { geometry }.select(pool, request);
+            select_by_geometry(inputs, simulated, reduced, by, budget, telling)
+        }
+        SelectorKind::MutualInformation => {
+            let by: ByGeometry =
+                &|geometry, pool, request| MutualInformation { geometry }.select(pool, request);
+            select_by_geometry(inputs, simulated, reduced, by, budget, telling)
         }
     }
 }
@@ -264,7 +194,7 @@ fn select_by_pivots(
     telling: Telling,
 ) -> Result<Selection, DesignError> {
     let offer = Offer::new(inputs, simulated, &reduced.feasible)?;
-    let x = heard(inputs, reduced);
+    let x = noisy_signals(inputs, reduced);
     let with_noise = inputs.project.selection.with_noise;
     let targets = simulated.dataset.targets_mm();
     let selection = offer.choose(&x, &targets, telling, |pool, request| {
@@ -277,11 +207,14 @@ fn select_by_pivots(
     Ok(selection)
 }
 
+/// A selector that asks a Gaussian process over the sites.
+type ByGeometry<'a> = &'a dyn Fn(&Geometry, &Pool, &Request) -> Result<Selection, PlacementError>;
+
 fn select_by_geometry(
     inputs: &Inputs,
     simulated: &Simulated,
     reduced: &Reduced,
-    kind: SelectorKind,
+    by: ByGeometry,
     budget: &Budget,
     telling: Telling,
 ) -> Result<Selection, DesignError> {
@@ -292,11 +225,7 @@ fn select_by_geometry(
     let x = reduced.x.select_rows(rows);
     let targets = simulated.dataset.targets_mm();
     let mut selection = offer.choose(&x, &targets, telling, |pool, request| {
-        if kind == SelectorKind::Entropy {
-            Entropy { geometry }.select(pool, request)
-        } else {
-            MutualInformation { geometry }.select(pool, request)
-        }
+        by(geometry, pool, request)
     })?;
     if known.len() < reduced.feasible.len() {
         selection.achieved.notes.push(format!(
@@ -363,8 +292,8 @@ fn select_by_svr(
     }
     let sites: Vec<usize> = rows.iter().map(|&r| reduced.feasible[r]).collect();
     let touches = evenly(all.len(), budget.selection_touches);
-    let heard = heard(inputs, reduced);
-    let x = heard.select_rows(&rows).select_columns(&touches);
+    let noisy_signals = noisy_signals(inputs, reduced);
+    let x = noisy_signals.select_rows(&rows).select_columns(&touches);
     let targets: Vec<[f64; 3]> = touches.iter().map(|&t| all[t]).collect();
     let selector = GreedySvr {
         hyper: inputs.project.hyper(),

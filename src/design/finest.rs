@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::judge::{ByMatching, judge, measured_by};
 use super::layout::{lay_out_sites, touches_on};
-use super::truth::grid;
-use super::{Design, DesignError, Inputs, Meshed, Simulated, Truth, ground};
+use super::reference::grid;
+use super::{Design, DesignError, Inputs, Meshed, Reference, Simulated, ground};
 use crate::budget::{Budget, Elements, Watch};
 use crate::elasticity::{Model, Touch};
 use crate::evaluation::{Candidate, EvaluationRow, Judging};
@@ -14,8 +14,8 @@ use crate::evaluation::{Candidate, EvaluationRow, Judging};
 pub const JUDGED: usize = 1500;
 /// Their seed, apart from those of training and of a design's own tests.
 const JUDGE_SEED: u64 = 0x41d6e;
-/// Touches that its elements are laid for.
-const LAID_FOR: usize = 200;
+/// Touches that its elements are graded for.
+const GRADED_FOR: usize = 200;
 /// Finer than the finest that a project can ask for by a quality.
 const FINEST: Elements = Elements {
     vertices: 12_000,
@@ -58,9 +58,9 @@ impl Finest {
             .map(|&at| layout.point(at))
             .collect();
         let surface = ground.touch_layout(&inputs.part);
-        let sample = touches_on(&surface, inputs, LAID_FOR, project.budget.seed, true)?;
+        let sample = touches_on(&surface, inputs, GRADED_FOR, project.budget.seed, true)?;
         let coarse = ground.build(&sample, &places, &FINEST, watch)?.meshed;
-        let (meshed, model) = coarse.truth(watch)?;
+        let (meshed, model) = coarse.reference_model(watch)?;
         let surface = meshed.touched_surface();
         let seed = project.budget.seed.wrapping_add(JUDGE_SEED);
         Ok(Self {
@@ -101,26 +101,28 @@ impl Finest {
         watch: Watch,
     ) -> Result<Judged, DesignError> {
         let (simulated, chosen) = (&*design.simulated, design.chosen());
-        let mut truth = self.truth(inputs, simulated, chosen, watch)?;
-        for touch in &mut truth.touches {
+        let mut reference = self.reference(inputs, simulated, chosen, watch)?;
+        for touch in &mut reference.touches {
             touch.position += touch.normal * raised;
         }
         let sets = [Candidate {
             selector: design.lead.name().to_owned(),
-            rows: rows_of(&truth, chosen),
+            rows: rows_of(&reference, chosen),
             hyper: design.chosen_row().and_then(|r| r.hyper),
         }];
         let budget = Budget {
             failure_subsets: 0,
             ..design.budget
         };
-        let streams: Vec<u64> = truth.sites.iter().map(|&s| s as u64).collect();
+        let streams: Vec<u64> = reference.sites.iter().map(|&s| s as u64).collect();
         let found = match &inputs.project.judging().at_middle() {
-            Judging::Svr => judge(inputs, simulated, &truth, &sets, &streams, &budget, watch)?,
+            Judging::Svr => judge(
+                inputs, simulated, &reference, &sets, &streams, &budget, watch,
+            )?,
             Judging::Matching(forces) => ByMatching {
                 inputs,
                 simulated,
-                truth: &truth,
+                reference: &reference,
                 streams: &streams,
                 forces,
                 budget: &budget,
@@ -137,24 +139,24 @@ impl Finest {
         })
     }
 
-    fn truth(
+    fn reference(
         &self,
         inputs: &Inputs,
         simulated: &Simulated,
         sites: &[usize],
         watch: Watch,
-    ) -> Result<Truth, DesignError> {
+    ) -> Result<Reference, DesignError> {
         let (touches, grid) = (self.touches.clone(), grid(&inputs.project));
-        let truth = measured_by(&*self.model, inputs, simulated, sites, touches, grid, watch)?;
-        Ok(Truth {
+        let reference = measured_by(&*self.model, inputs, simulated, sites, touches, grid, watch)?;
+        Ok(Reference {
             element_mm: self.element_mm(),
-            ..truth
+            ..reference
         })
     }
 }
 
-/// The rows of a truth that some sites have.
-fn rows_of(truth: &Truth, sites: &[usize]) -> Vec<usize> {
-    let row = |s: &usize| truth.sites.binary_search(s).ok();
+/// The rows of a reference that some sites have.
+fn rows_of(reference: &Reference, sites: &[usize]) -> Vec<usize> {
+    let row = |s: &usize| reference.sites.binary_search(s).ok();
     sites.iter().filter_map(row).collect()
 }

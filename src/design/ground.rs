@@ -15,7 +15,6 @@ use crate::elasticity::shell::check_section;
 use crate::elasticity::solid::ground::SolidGround;
 use crate::elasticity::{Model, Touch};
 use crate::feasible::Surroundings;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::walls::Side;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain;
@@ -71,12 +70,18 @@ pub(super) fn solid_ground(inputs: &Inputs, watch: Watch) -> Result<SolidGround,
     let project = &inputs.project;
     let supports = project.supports(&inputs.masks)?;
     check_shape(&inputs.part)?;
-    let told = told(inputs)?;
+    let declared_faces = declared_faces(inputs)?;
     let material = project.section().material;
     material.check()?;
     let fingertip = project.fingertip();
-    let solid =
-        SolidGround::touched_by(fingertip, &inputs.part, material, &supports, &told, watch)?;
+    let solid = SolidGround::touched_by(
+        fingertip,
+        &inputs.part,
+        material,
+        &supports,
+        &declared_faces,
+        watch,
+    )?;
     Ok(solid)
 }
 
@@ -106,7 +111,7 @@ pub fn open_solid(inputs: &Inputs) -> Option<String> {
 }
 
 /// What the user has said of the faces of a solid, by place (m).
-fn told(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, DesignError> {
+fn declared_faces(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, DesignError> {
     let part = Arc::clone(&inputs.part);
     let keys = &inputs.project.part;
     let mask = |key: &str, name: Option<&String>| {
@@ -114,9 +119,12 @@ fn told(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, Desig
     };
     let inside = mask("part.inside", keys.inside.as_ref())?;
     let outside = mask("part.outside", keys.outside.as_ref())?;
-    let index = (inside.is_some() || outside.is_some()).then(|| SurfaceIndex::new(&part));
+    let is_said = inside.is_some() || outside.is_some();
     Ok(move |place: DVec3| {
-        let at = index.as_ref()?.nearest(place).0;
+        if !is_said {
+            return None;
+        }
+        let at = part.index().nearest(place).0;
         let set = |mask: &Option<Arc<Vec<bool>>>| {
             mask.as_ref().is_some_and(|mask| part.mostly_in(mask, at))
         };
@@ -129,6 +137,15 @@ fn told(inputs: &Inputs) -> Result<impl Fn(DVec3) -> Option<Side> + use<>, Desig
 }
 
 impl Ground {
+    /// What elements were laid on.
+    #[must_use]
+    pub fn of(meshed: &Meshed) -> Self {
+        match meshed {
+            Meshed::Shell(shell, _) => Self::Shell(Arc::clone(shell)),
+            Meshed::Solid(solid, _) => Self::Solid(Arc::clone(solid)),
+        }
+    }
+
     /// Refuses at once what cannot be computed at all: a part that nothing holds is the likeliest mistake.
     ///
     /// # Errors
@@ -254,7 +271,7 @@ impl Ground {
         match self {
             Self::Shell(shell) => {
                 let Graded {
-                    laid,
+                    remeshed,
                     model,
                     estimate,
                     linearity,
@@ -264,7 +281,7 @@ impl Ground {
                     ..
                 } = shell.grade(touches, places, aim, watch)?;
                 Ok(Built {
-                    meshed: Meshed::Shell(Arc::clone(shell), laid),
+                    meshed: Meshed::Shell(Arc::clone(shell), remeshed),
                     model: Box::new(model),
                     estimate,
                     linearity: Some(linearity),

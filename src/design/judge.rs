@@ -9,7 +9,7 @@ use super::as_built::{gains, sites_as_built};
 use super::drawn::{gauge_at, proposed};
 use super::known;
 use super::layout::touches_on;
-use super::truth::{Truth, grid, regions};
+use super::reference::{Reference, grid, regions};
 use super::{DesignError, Inputs, NOISE_SEED, PRESS_SEED, Reduced, Simulated, TEST_SEED};
 use crate::budget::{Budget, Cancelled, Watch, Work};
 use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
@@ -25,34 +25,34 @@ pub(super) use self::matched::ByMatching;
 pub use self::presses::{Press, Pressed};
 pub use crate::placement::expected_error::BLIND;
 
-/// Measures sites on the truth: a mesh of half the element size, test touches drawn uniformly at random
+/// Measures sites on the reference model: a mesh of half the element size, test touches drawn uniformly at random
 /// with a seed of their own, so that they lie off any node and are nobody's training touches.
 ///
 /// # Errors
 /// [`DesignError`] as for [`simulate`].
-pub fn truth(
+pub fn reference(
     inputs: &Inputs,
     simulated: &Simulated,
     sites: &[usize],
     budget: &Budget,
     watch: Watch,
-) -> Result<Truth, DesignError> {
-    let (meshed, model) = simulated.meshed.truth(watch)?;
+) -> Result<Reference, DesignError> {
+    let (meshed, model) = simulated.meshed.reference_model(watch)?;
     let mesh = meshed.touched_surface();
     let seed = inputs.project.budget.seed.wrapping_add(TEST_SEED);
     let touches = touches_on(&mesh, inputs, budget.test_touches, seed, false)?;
     let grid = grid(&inputs.project);
-    let mut truth = measured_by(&*model, inputs, simulated, sites, touches, grid, watch)?;
+    let mut reference = measured_by(&*model, inputs, simulated, sites, touches, grid, watch)?;
     if inputs.project.judging().estimator() == EstimatorKind::Matching {
-        truth.press(&*model, &mesh, inputs, simulated, watch)?;
+        reference.press(&*model, &mesh, inputs, simulated, watch)?;
     }
     let work = model.system().work();
-    truth.work += work;
-    truth.element_mm = meshed.element_mm();
-    Ok(truth)
+    reference.work += work;
+    reference.element_mm = meshed.element_mm();
+    Ok(reference)
 }
 
-impl Truth {
+impl Reference {
     /// Presses on a surface of the model as somebody does who calibrates, and reads the gauges as they are built.
     fn press(
         &mut self,
@@ -116,7 +116,7 @@ pub(super) fn measured_by(
     touches: Vec<Touch>,
     grid: Option<[f64; 2]>,
     watch: Watch,
-) -> Result<Truth, DesignError> {
+) -> Result<Reference, DesignError> {
     let project = &inputs.project;
     let mut rows = sites.to_vec();
     rows.sort_unstable();
@@ -132,7 +132,7 @@ pub(super) fn measured_by(
         |k: usize| signals.select_rows(&(k * rows.len()..(k + 1) * rows.len()).collect::<Vec<_>>());
     let (x, workshop) = (half(0), half(1));
     let workshop = workshop.scaled_rows(gains(&rows, &off.gluing, seed));
-    Ok(Truth {
+    Ok(Reference {
         regions: regions(project, &touches),
         element_mm: f64::NAN,
         touches,
@@ -150,7 +150,7 @@ pub(super) fn measured_by(
     })
 }
 
-/// Judges selections on the truth by the project's estimator; by regression with all candidates as the baseline, where
+/// Judges selections on the reference model by the project's estimator; by regression with all candidates as the baseline, where
 /// there are any.
 ///
 /// # Errors
@@ -160,11 +160,11 @@ pub fn evaluate(
     simulated: &Simulated,
     reduced: &Reduced,
     selections: &[Selection],
-    truth: &Truth,
+    reference: &Reference,
     budget: &Budget,
     watch: Watch,
 ) -> Result<Evaluation, DesignError> {
-    let row_of = |site: &usize| truth.sites.binary_search(site).ok();
+    let row_of = |site: &usize| reference.sites.binary_search(site).ok();
     let mut sets = Vec::new();
     for selection in selections {
         for set in &selection.sets {
@@ -183,15 +183,15 @@ pub fn evaluate(
             hyper: None,
         });
     }
-    let streams: Vec<u64> = (0..truth.sites.len() as u64).collect();
-    judge_as_asked(inputs, simulated, truth, &sets, &streams, budget, watch)
+    let streams: Vec<u64> = (0..reference.sites.len() as u64).collect();
+    judge_as_asked(inputs, simulated, reference, &sets, &streams, budget, watch)
 }
 
 /// Judges sets by the estimator that the project asks for.
 pub(super) fn judge_as_asked(
     inputs: &Inputs,
     simulated: &Simulated,
-    truth: &Truth,
+    reference: &Reference,
     sets: &[Candidate],
     streams: &[u64],
     budget: &Budget,
@@ -202,14 +202,14 @@ pub(super) fn judge_as_asked(
         let trial = ByMatching {
             inputs,
             simulated,
-            truth,
+            reference,
             streams,
             forces,
             budget,
         };
         return trial.judge(sets, watch);
     }
-    let mut found = judge(inputs, simulated, truth, sets, streams, budget, watch)?;
+    let mut found = judge(inputs, simulated, reference, sets, streams, budget, watch)?;
     if project.evaluation.estimator != EstimatorKind::Svr {
         found.notes.push(format!(
             "Judged by regression, although evaluation.estimator asks for matching: that knows strain only, and gauge.signal is {}.",
@@ -223,14 +223,14 @@ pub(super) fn judge_as_asked(
 pub(super) fn judge(
     inputs: &Inputs,
     simulated: &Simulated,
-    truth: &Truth,
+    reference: &Reference,
     sets: &[Candidate],
     streams: &[u64],
     budget: &Budget,
     watch: Watch,
 ) -> Result<Evaluation, Cancelled> {
-    let train = simulated.dataset.x.select_rows(&truth.sites);
-    let test_targets: Vec<[f64; 3]> = truth
+    let train = simulated.dataset.x.select_rows(&reference.sites);
+    let test_targets: Vec<[f64; 3]> = reference
         .touches
         .iter()
         .map(|t| (t.position * 1000.0).to_array())
@@ -240,10 +240,10 @@ pub(super) fn judge(
             signal: simulated.dataset.signal,
             train: &train,
             train_targets: &simulated.dataset.targets_mm(),
-            test: &truth.x,
-            workshop: &truth.workshop,
+            test: &reference.x,
+            workshop: &reference.workshop,
             test_targets: &test_targets,
-            regions: &truth.regions,
+            regions: &reference.regions,
             noise: inputs.project.gauge.noise_microstrain * 1e-6,
             streams,
             seed: inputs.project.budget.seed.wrapping_add(NOISE_SEED),

@@ -5,7 +5,7 @@
 //! take an unknown more in every filter. And the tip's size counts for nothing: a tip of another size blurs readings
 //! alike at most sites, and what it does under every touch would take as many solves again.
 
-use super::{HEARD_SEED, Inputs, Simulated};
+use super::{Inputs, SELECTION_NOISE_SEED, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::{GluingSlopes, Signal};
 use crate::placement::expected_error::{Detail, Forces, Knowledge, Scene, Variance, expected};
@@ -40,7 +40,7 @@ impl<'a> Known<'a> {
                 .collect(),
             range: project.touch.forces_n,
             possible: project.live.largest_force_n.max(project.touch.forces_n[1]),
-            seed: project.budget.seed.wrapping_add(HEARD_SEED),
+            seed: project.budget.seed.wrapping_add(SELECTION_NOISE_SEED),
         }
     }
 

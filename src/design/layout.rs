@@ -10,7 +10,6 @@ use crate::budget::Budget;
 use crate::dataset::{self, GluingSlopes, Signal, TouchRegion};
 use crate::elasticity::load::Touch;
 use crate::memory;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::reach::Finger;
 use crate::mesh::unroll::Unrolling;
 use crate::mesh::{Edge, SurfacePoint, TriMesh, sample};
@@ -149,7 +148,7 @@ fn unrolled_sites(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<SurfacePoint>, 
             spacing_mm: project.sites.spacing_mm,
         });
     }
-    Ok(unrolling.lattice(&SurfaceIndex::new(mesh), spacing))
+    Ok(unrolling.lattice(mesh.index(), spacing))
 }
 
 pub(super) fn lay_out_touches(
@@ -179,13 +178,13 @@ pub(super) fn touches_on(
     let project = &inputs.project;
     let margin = project.touch.edge_margin_mm * 1e-3;
     let mask = Project::mask("touch.region", project.touch.region.as_ref(), &inputs.masks)?;
-    let index = SurfaceIndex::new(&inputs.part);
-    let reached = reached_places(inputs, &index)?;
+    let index = inputs.part.index();
+    let reached = reached_places(inputs)?;
     let contains = |p: DVec3| {
         mask.is_none_or(|mask| inputs.part.mostly_in(mask, index.nearest(p).0)) && reached(p)
     };
     let mut triangles = match mask {
-        Some(mask) => near_mask(mesh, &inputs.part, &index, mask),
+        Some(mask) => near_mask(mesh, &inputs.part, mask),
         None => vec![true; mesh.triangles().len()],
     };
     if project.part.model == PartModel::Shell {
@@ -197,7 +196,7 @@ pub(super) fn touches_on(
         contains: &contains,
     };
     let tip = project.tip();
-    let touches = dataset::spread_touches(mesh, count, seed, margin, even, tip, Some(&region));
+    let touches = dataset::distribute_touches(mesh, count, seed, margin, even, tip, Some(&region));
     if touches.is_empty() {
         return Err(no_touches(mesh, inputs));
     }
@@ -208,19 +207,16 @@ pub(super) fn touches_on(
 ///
 /// # Errors
 /// [`DesignError`] for a mask that is not there.
-fn reached_places<'a>(
-    inputs: &'a Inputs,
-    index: &'a SurfaceIndex,
-) -> Result<impl Fn(DVec3) -> bool + Sync + 'a, DesignError> {
+fn reached_places(inputs: &Inputs) -> Result<impl Fn(DVec3) -> bool + Sync, DesignError> {
     let (project, part) = (&inputs.project, &*inputs.part);
     let solid = project.part.model == PartModel::Solid;
     let outside = project.part.outside.as_ref().filter(|_| solid);
-    let told = Project::mask("part.outside", outside, &inputs.masks)?;
-    let finger = Finger::new(part, index, project.fingertip());
+    let declared = Project::mask("part.outside", outside, &inputs.masks)?;
+    let finger = Finger::new(part, project.fingertip());
     Ok(move |place: DVec3| {
-        let at = index.nearest(place).0;
+        let at = part.index().nearest(place).0;
         let (point, normal) = (part.point(at), part.facet_normal(at.triangle));
-        told.is_some_and(|mask| part.mostly_in(mask, at))
+        declared.is_some_and(|mask| part.mostly_in(mask, at))
             || finger.reaches(point, normal)
             // An open mid-surface faces as its file says: either side of it may be the outside.
             || !solid && finger.reaches(point, -normal)
@@ -251,7 +247,7 @@ fn no_touches(mesh: &TriMesh, inputs: &Inputs) -> DesignError {
     let (seed, margin_mm) = (project.budget.seed, project.touch.edge_margin_mm);
     let region = project.touch.region.as_ref();
     let anywhere = || {
-        dataset::spread_touches(
+        dataset::distribute_touches(
             mesh,
             TRIED,
             seed,
@@ -285,9 +281,9 @@ fn no_touches(mesh: &TriMesh, inputs: &Inputs) -> DesignError {
 
 /// For each triangle of a mesh whether a mask of the part's vertices may reach into it: whether any of its
 /// corners, middles of sides and centre lies on a triangle of the part with a vertex that is set.
-fn near_mask(mesh: &TriMesh, part: &TriMesh, index: &SurfaceIndex, mask: &[bool]) -> Vec<bool> {
+fn near_mask(mesh: &TriMesh, part: &TriMesh, mask: &[bool]) -> Vec<bool> {
     let near = |p: DVec3| {
-        let corners = part.triangles()[index.nearest(p).0.triangle as usize];
+        let corners = part.triangles()[part.index().nearest(p).0.triangle as usize];
         corners.iter().any(|&v| mask[v as usize])
     };
     (0..mesh.triangles().len() as u32)

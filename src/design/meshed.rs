@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::{DesignError, Ground};
+use super::DesignError;
 use crate::budget::Watch;
 use crate::elasticity::solid::ground::SolidGround;
 use crate::elasticity::solid::immersed::Fineness;
-use crate::elasticity::{Freedoms, Model, grade};
+use crate::elasticity::{DofSet, Model, grade};
 use crate::mesh::TriMesh;
 use crate::mesh::remesh::Remeshed;
 
@@ -18,20 +18,11 @@ pub enum Meshed {
 }
 
 impl Meshed {
-    /// What they were laid on.
-    #[must_use]
-    pub fn ground(&self) -> Ground {
-        match self {
-            Self::Shell(shell, _) => Ground::Shell(Arc::clone(shell)),
-            Self::Solid(solid, _) => Ground::Solid(Arc::clone(solid)),
-        }
-    }
-
     /// The surface that gauges are glued to, and what is held at its vertices.
     #[must_use]
-    pub fn gauge_surface(&self) -> (Arc<TriMesh>, Vec<Freedoms>) {
+    pub fn gauge_surface(&self) -> (Arc<TriMesh>, Vec<DofSet>) {
         match self {
-            Self::Shell(shell, laid) => (Arc::clone(&laid.mesh), shell.held(laid)),
+            Self::Shell(shell, remeshed) => (Arc::clone(&remeshed.mesh), shell.held(remeshed)),
             Self::Solid(solid, _) => (Arc::clone(&solid.inside), solid.inside_held.clone()),
         }
     }
@@ -40,7 +31,7 @@ impl Meshed {
     #[must_use]
     pub fn touched_surface(&self) -> Arc<TriMesh> {
         match self {
-            Self::Shell(_, laid) => Arc::clone(&laid.mesh),
+            Self::Shell(_, remeshed) => Arc::clone(&remeshed.mesh),
             Self::Solid(solid, _) => Arc::clone(&solid.outside),
         }
     }
@@ -58,16 +49,16 @@ impl Meshed {
     #[must_use]
     pub fn element_mm(&self) -> f64 {
         match self {
-            Self::Shell(_, laid) => laid.mesh.mean_edge() * 1e3,
+            Self::Shell(_, remeshed) => remeshed.mesh.mean_edge() * 1e3,
             Self::Solid(_, fineness) => fineness.size * 1e3 / f64::from(1 << fineness.halvings),
         }
     }
 
-    /// Finer elements, for the truth: half as large for a shell, two thirds for a solid, its own tetrahedra one order
+    /// Finer elements, for the reference model: half as large for a shell, two thirds for a solid, its own tetrahedra one order
     /// higher.
     fn finer(&self) -> Self {
         match self {
-            Self::Shell(shell, laid) => Self::Shell(Arc::clone(shell), shell.halved(laid)),
+            Self::Shell(shell, remeshed) => Self::Shell(Arc::clone(shell), shell.halved(remeshed)),
             Self::Solid(solid, fineness) => Self::Solid(Arc::clone(solid), solid.finer(fineness)),
         }
     }
@@ -78,7 +69,7 @@ impl Meshed {
     /// [`DesignError`] for what cannot be computed.
     pub fn model(&self, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
         Ok(match self {
-            Self::Shell(shell, laid) => Box::new(shell.model(laid, watch)?),
+            Self::Shell(shell, remeshed) => Box::new(shell.model(remeshed, watch)?),
             Self::Solid(solid, fineness) => Box::new(solid.model(fineness, watch)?),
         })
     }
@@ -88,7 +79,7 @@ impl Meshed {
     ///
     /// # Errors
     /// [`DesignError`] for what cannot be computed.
-    pub fn truth(&self, watch: Watch) -> Result<(Self, Box<dyn Model>), DesignError> {
+    pub fn reference_model(&self, watch: Watch) -> Result<(Self, Box<dyn Model>), DesignError> {
         let finer = self.finer();
         match finer.model(watch) {
             Ok(model) => Ok((finer, model)),

@@ -5,8 +5,8 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
-use super::choose::shortage;
-use super::{DesignError, HEARD_SEED, Inputs, LEAST_TOUCHES, Simulated};
+use super::filter::shortage;
+use super::{DesignError, Inputs, LEAST_TOUCHES, SELECTION_NOISE_SEED, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
 use crate::dataset::{Signal, SignalMatrix, Site};
 use crate::evaluation;
@@ -248,7 +248,7 @@ pub fn geometry(
         };
         (kernel, Vec::new())
     } else {
-        let x = heard(inputs, reduced).select_rows(&rows);
+        let x = noisy_signals(inputs, reduced).select_rows(&rows);
         let map = gaussian_process::search(&x, &distances, noise, watch)?;
         (gaussian_process::best(&map).unwrap_or_default(), map)
     };
@@ -267,13 +267,13 @@ pub fn geometry(
 }
 
 /// The signals of the feasible sites that selectors choose from, with noise where that is asked for.
-pub(super) fn heard<'a>(inputs: &Inputs, reduced: &'a Reduced) -> Cow<'a, SignalMatrix> {
+pub(super) fn noisy_signals<'a>(inputs: &Inputs, reduced: &'a Reduced) -> Cow<'a, SignalMatrix> {
     let project = &inputs.project;
     let noise = if project.selection.with_noise && project.gauge.signal == Signal::Strain {
         project.gauge.noise_microstrain * 1e-6
     } else {
         0.0
     };
-    let seed = project.budget.seed.wrapping_add(HEARD_SEED);
+    let seed = project.budget.seed.wrapping_add(SELECTION_NOISE_SEED);
     evaluation::add_noise(&reduced.x, noise, seed)
 }

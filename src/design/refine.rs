@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::choose::painted_sites;
+use super::filter::painted_sites;
 use super::known::{FINE, Known, detail};
 use super::{DesignError, Inputs, Reduced, Simulated};
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
@@ -28,9 +28,8 @@ use crate::elasticity::respond::Pressed;
 use crate::elasticity::support::supported_vertices;
 use crate::feasible::{FeasibleInput, FeasibleRules, Surroundings, clearance, feasible_beside};
 use crate::mesh::SurfacePoint;
-use crate::mesh::locate::SurfaceIndex;
 use crate::placement::expected_error::Moving;
-use crate::placement::{Selection, SensorSet, Wishes};
+use crate::placement::{Constraints, Selection, SensorSet};
 
 const REFINING: &str = "Refining places";
 /// Most rounds.
@@ -47,7 +46,7 @@ const LEAST: f64 = 1e-4;
 const WAYS: usize = 8;
 /// Moves that are tried: every way unturned and turned either way, and turned on the spot.
 const MOVES: usize = 3 * WAYS + 2;
-/// Whose noise the presses that confirm a move hear.
+/// Whose noise the presses that confirm a move have.
 const CONFIRM_SEED: u64 = 0xc0f1;
 
 /// Moves the gauges of the largest set of a choice by expected error to where it is expected to err least; gauges that
@@ -135,7 +134,7 @@ impl Refined {
         set.criterion = Some(self.after_mm);
         set.criterion_mm = Some(self.after_mm);
         // What was said of the choice of sites.
-        (set.gap, set.lead) = (None, None);
+        (set.gap, set.margin) = (None, None);
         set.certificate = set.certificate.map(|c| c.refined(self.local_mm));
     }
 }
@@ -155,12 +154,12 @@ fn search(
     let own = known.knowledge(&unasked);
     let mut confirmed = known.knowledge(&unasked);
     confirmed.seed = own.seed.wrapping_add(CONFIRM_SEED);
-    let wishes = Wishes {
+    let constraints = Constraints {
         failure: keys.failure,
         loss: keys.loss(),
-        ..Wishes::count(set.len())
+        ..Constraints::count(set.len())
     };
-    let whole = Wishes::count(set.len());
+    let whole = Constraints::count(set.len());
     let (x, targets) = (&reduced.x, simulated.dataset.targets_mm());
     let seats = set.len();
     let criterion = Moving::new(
@@ -168,7 +167,7 @@ fn search(
         &targets,
         &own,
         (detail(budget), seats + MOVES),
-        &wishes,
+        &constraints,
         watch,
     )?;
     let confirming = Moving::new(x, &targets, &confirmed, (FINE, seats + 1), &whole, watch)?;
@@ -392,9 +391,6 @@ struct Room<'a> {
     inputs: &'a Inputs,
     simulated: &'a Simulated,
     rules: FeasibleRules,
-    /// Of the surface that gauges are glued to, and of the part that masks are painted on.
-    surface: SurfaceIndex,
-    part: SurfaceIndex,
     /// From what is held (m), a vertex of the surface.
     clearance: Vec<f64>,
     /// Where the sites of the lattice are (m), and how far from each other.
@@ -408,8 +404,6 @@ impl<'a> Room<'a> {
         let held = supported_vertices(&simulated.held);
         Self {
             rules: inputs.project.feasible_rules(),
-            surface: SurfaceIndex::new(&simulated.mesh),
-            part: SurfaceIndex::new(&inputs.part),
             clearance: clearance(&simulated.mesh, &held),
             lattice: sites.iter().map(|site| site.position).collect(),
             spacing: inputs.project.sites.spacing_mm * 1e-3,
@@ -435,8 +429,8 @@ impl<'a> Room<'a> {
             });
         }
         let aim = gauge.position + step;
-        let at = self.surface.nearest(aim).0;
         let mesh = &self.simulated.mesh;
+        let at = mesh.index().nearest(aim).0;
         let (position, normal) = (mesh.point(at), mesh.normal(at));
         let on = position.distance(aim) <= OFF * step.length() && normal.dot(gauge.normal) >= BENT;
         let flat = (direction - normal * direction.dot(normal)).try_normalize();
@@ -461,7 +455,8 @@ impl<'a> Room<'a> {
     }
 
     fn points(&self, gauges: &[Site]) -> Vec<SurfacePoint> {
-        let at = |gauge: &Site| self.surface.nearest(gauge.position).0;
+        let index = self.simulated.mesh.index();
+        let at = |gauge: &Site| index.nearest(gauge.position).0;
         gauges.iter().map(at).collect()
     }
 
@@ -471,13 +466,12 @@ impl<'a> Room<'a> {
         points: &[SurfacePoint],
         surroundings: Option<&Surroundings>,
     ) -> Vec<bool> {
-        let on = |mask: &Arc<Vec<bool>>| painted_sites(&self.inputs.part, &self.part, mask, gauges);
+        let on = |mask: &Arc<Vec<bool>>| painted_sites(&self.inputs.part, mask, gauges);
         let named = self.inputs.project.feasible.keep_out.as_ref();
         let painted = self.inputs.painted.as_ref().map(on);
         let kept_out = named.and_then(|name| self.inputs.masks.get(name)).map(on);
         let input = FeasibleInput {
             mesh: &self.simulated.mesh,
-            index: &self.surface,
             supported: &[],
             points,
             sites: gauges,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::ground::{Built, ground, open_solid, wide_tip};
+use super::ground::{Built, Ground, ground, open_solid, wide_tip};
 use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches};
 use super::{DesignError, Inputs, Meshed, SLOPE_TOUCHES};
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
@@ -13,9 +13,8 @@ use crate::dataset::{self, Dataset, Surveyed};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::support::Region;
-use crate::elasticity::{Freedoms, Model, Support, Touch};
+use crate::elasticity::{DofSet, Model, Support, Touch};
 use crate::feasible::Surroundings;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain::digits;
 use crate::project::{Elements as ElementKind, PartModel, Project};
@@ -30,7 +29,7 @@ pub struct Simulated {
     pub element_mm: f64,
     pub(super) meshed: Meshed,
     /// What is held at its vertices.
-    pub held: Vec<Freedoms>,
+    pub held: Vec<DofSet>,
     /// Where the vertices of the part that is shown lie on it.
     pub carried: Vec<SurfacePoint>,
     pub discretization: Discretization,
@@ -77,7 +76,7 @@ impl Simulated {
         let Some(known) = &self.surroundings else {
             return Ok(None);
         };
-        let found = self.meshed.ground().surroundings(points, watch)?;
+        let found = Ground::of(&self.meshed).surroundings(points, watch)?;
         // What is closed was opened for all of it.
         let opened = known.room.iter().all(|room| room.is_infinite());
         Ok(found.map(|found| if opened { found.open() } else { found }))
@@ -93,7 +92,7 @@ impl Simulated {
         gauges: &[&Surveyed],
         watch: Watch,
     ) -> Result<Self, Cancelled> {
-        let index = SurfaceIndex::new(&self.mesh);
+        let index = self.mesh.index();
         let at = |gauge: &&Surveyed| index.nearest(gauge.site.position).0;
         let points: Vec<SurfacePoint> = gauges.iter().map(at).collect();
         let around = self.surroundings_of(&points, watch)?;
@@ -173,7 +172,7 @@ pub fn simulate_again(
 ) -> Result<Simulated, DesignError> {
     let project = &inputs.project;
     project.check()?;
-    let layout = last.meshed.ground().site_layout(&inputs.part);
+    let layout = Ground::of(&last.meshed).site_layout(&inputs.part);
     let sites = lay_out_sites(&layout, inputs)?;
     check_memory(
         sites.len(),
@@ -249,13 +248,13 @@ fn read(
     cautious.extend(open_solid(inputs));
     cautious.extend(on_supports(inputs, &dataset.touches)?);
     let (mesh, held) = meshed.gauge_surface();
-    let index = SurfaceIndex::new(&mesh);
+    let index = mesh.index();
     let points: Vec<SurfacePoint> = places.iter().map(|&p| index.nearest(p).0).collect();
-    let ground = meshed.ground();
+    let ground = Ground::of(&meshed);
     let surroundings = ground.surroundings(&points, watch)?;
     notes.extend(ground.left_out(surroundings.as_ref()));
     let surroundings = surroundings.map(Surroundings::opened);
-    let carried = carry(&index, &inputs.part);
+    let carried = carry(&mesh, &inputs.part);
     Ok(Simulated {
         achieved: Achieved {
             error_estimate: Some(estimate.strain_percent),
@@ -290,7 +289,7 @@ impl Simulated {
     /// How thick the walls of a solid usually are, as measured (m).
     #[must_use]
     pub fn usual_wall(&self) -> Option<f64> {
-        self.meshed.ground().usual_wall()
+        Ground::of(&self.meshed).usual_wall()
     }
 }
 
@@ -302,7 +301,7 @@ fn on_supports(inputs: &Inputs, touches: &[Touch]) -> Result<Option<String>, Des
     let supports = inputs.project.supports(&inputs.masks)?;
     let holds = |s: &&Support| (0..3).all(|i| s.held.holds(i));
     let held: Vec<&Support> = supports.iter().filter(holds).collect();
-    let index = SurfaceIndex::new(&inputs.part);
+    let index = inputs.part.index();
     let is_held = |touch: &&Touch| {
         held.iter().any(|support| match &support.region {
             Region::Box(held) => held.contains(touch.position, 0.0),
@@ -418,9 +417,9 @@ fn finer(project: &Project, budget: &Budget) -> String {
     }
 }
 
-/// Where the vertices of the part that is shown lie on the mesh that was computed on.
+/// Where the vertices of the part that is shown lie on the mesh that was computed on (`from`).
 #[must_use]
-pub fn carry(index: &SurfaceIndex, part: &TriMesh) -> Vec<SurfacePoint> {
-    let nearest = |&p: &DVec3| index.nearest(p).0;
+pub fn carry(from: &TriMesh, part: &TriMesh) -> Vec<SurfacePoint> {
+    let nearest = |&p: &DVec3| from.index().nearest(p).0;
     part.positions().iter().map(nearest).collect()
 }

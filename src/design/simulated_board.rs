@@ -34,7 +34,7 @@ pub fn places(inputs: &Inputs, sensing: &Sensing, seed: u64) -> Result<Vec<Touch
 /// A board whose gain suits touches up to a force (N).
 ///
 /// # Errors
-/// As [`Sensing::truth`].
+/// As [`Sensing::reference`].
 #[allow(clippy::too_many_arguments)]
 pub fn simulated(
     inputs: &Inputs,
@@ -47,11 +47,14 @@ pub fn simulated(
     watch: Watch,
 ) -> Result<SimulatedBoard, DesignError> {
     let seed = inputs.project.budget.seed;
-    let (truth, gains) = sensing.truth(&workshop.of(inputs.project.gluing()), seed, watch)?;
+    let (reference, gains) =
+        sensing.reference(&workshop.of(inputs.project.gluing()), seed, watch)?;
     let typical: Vec<Touch> = places(inputs, sensing, seed)?
         .into_iter()
         .take(300)
         .collect();
-    options.chain.gain = fitting_gain(&truth, &gains, &typical, most_force, &options.chain);
-    Ok(SimulatedBoard::new(truth, gains, script, options, faults))
+    options.chain.gain = fitting_gain(&reference, &gains, &typical, most_force, &options.chain);
+    Ok(SimulatedBoard::new(
+        reference, gains, script, options, faults,
+    ))
 }

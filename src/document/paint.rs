@@ -1,67 +1,10 @@
-//! Painting on the part: layers of vertices, and what a hand does to them.
+//! Painting on the part: what a hand does to the layers of a document.
 
 use std::sync::Arc;
 
 use super::Document;
+use super::state::Layer;
 use crate::mesh::SurfacePoint;
-use crate::mesh::unroll::Axis;
-use crate::project::{SupportKeys, SupportKind};
-
-/// What is painted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Layer {
-    /// Where gauges may go: everywhere when nothing is painted.
-    #[default]
-    Feasible,
-    /// Where no gauge may go.
-    KeepOut,
-    /// What the last of the painted supports holds.
-    Support,
-    /// Where touches come: everywhere when nothing is painted.
-    Touch,
-    /// Of a solid: the face that gauges are glued to, and the one that is touched, where what was found by
-    /// itself is wrong.
-    Inside,
-    Outside,
-}
-
-impl Layer {
-    pub const ALL: [Self; 6] = [
-        Self::Feasible,
-        Self::KeepOut,
-        Self::Support,
-        Self::Touch,
-        Self::Inside,
-        Self::Outside,
-    ];
-
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Feasible => "Feasible",
-            Self::KeepOut => "Keep out",
-            Self::Support => "Support",
-            Self::Touch => "Touch region",
-            Self::Inside => "Inside face",
-            Self::Outside => "Outside face",
-        }
-    }
-
-    /// Whether it says something of a solid only.
-    #[must_use]
-    pub fn is_face(self) -> bool {
-        matches!(self, Self::Inside | Self::Outside)
-    }
-
-    /// The layer that a vertex cannot be on at the same time.
-    fn excluded(self) -> Option<Self> {
-        match self {
-            Self::Inside => Some(Self::Outside),
-            Self::Outside => Some(Self::Inside),
-            _ => None,
-        }
-    }
-}
 
 /// Whether a stroke adds to a layer or takes from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,176 +13,27 @@ pub enum Brush {
     Erase,
 }
 
-const KEEP_OUT: &str = "keep-out";
-const TOUCH: &str = "touch-region";
-const INSIDE: &str = "inside-face";
-const OUTSIDE: &str = "outside-face";
-
 impl Document {
     /// The vertices of a layer, where any were painted.
     #[must_use]
     pub fn layer(&self, layer: Layer) -> Option<&Arc<Vec<bool>>> {
-        let state = &self.state;
-        match layer {
-            Layer::Feasible => state.painted.as_ref(),
-            Layer::KeepOut => state.masks.get(state.project.feasible.keep_out.as_ref()?),
-            Layer::Touch => state.masks.get(state.project.touch.region.as_ref()?),
-            Layer::Support => state.masks.get(self.painted_support()?),
-            Layer::Inside => state.masks.get(state.project.part.inside.as_ref()?),
-            Layer::Outside => state.masks.get(state.project.part.outside.as_ref()?),
-        }
-    }
-
-    /// The name of the last support that is a mask of vertices.
-    fn painted_support(&self) -> Option<&String> {
-        let supports = self.state.project.supports.iter().rev();
-        { supports }.find_map(|s| s.vertices.as_ref())
+        self.state.layer(layer)
     }
 
     /// A support on vertices still to be painted.
     pub fn add_painted_support(&mut self) {
-        let free = |name: &String| !self.state.masks.contains_key(name);
-        let numbered = (1..).map(|k| format!("support-{k}"));
-        let Some(name) = numbered.take(10_000).find(free) else {
-            return;
-        };
-        let none = Arc::new(vec![false; self.part.positions().len()]);
-        self.state.masks.insert(name.clone(), none);
-        self.state.project.supports.push(SupportKeys {
-            kind: SupportKind::Clamped,
-            box_mm: None,
-            box_axis: None,
-            vertices: Some(name),
-            normal: Axis::Z,
-        });
+        self.state.add_painted_support(self.part.positions().len());
     }
 
-    /// The mask of a layer, to be changed: it begins as `first` where there is none yet.
     fn layer_mut(&mut self, layer: Layer, first: bool) -> &mut Vec<bool> {
         let vertices = self.part.positions().len();
-        let name = match layer {
-            Layer::Feasible => {
-                let mask = self
-                    .state
-                    .painted
-                    .get_or_insert_with(|| Arc::new(vec![first; vertices]));
-                return Arc::make_mut(mask);
-            }
-            Layer::KeepOut => {
-                let name = self.own_name(self.state.project.feasible.keep_out.clone(), KEEP_OUT);
-                self.state.project.feasible.keep_out = Some(name.clone());
-                name
-            }
-            Layer::Touch => {
-                let name = self.own_name(self.state.project.touch.region.clone(), TOUCH);
-                self.state.project.touch.region = Some(name.clone());
-                name
-            }
-            Layer::Inside => {
-                let name = self.own_name(self.state.project.part.inside.clone(), INSIDE);
-                self.state.project.part.inside = Some(name.clone());
-                name
-            }
-            Layer::Outside => {
-                let name = self.own_name(self.state.project.part.outside.clone(), OUTSIDE);
-                self.state.project.part.outside = Some(name.clone());
-                name
-            }
-            Layer::Support => {
-                if self.painted_support().is_none() {
-                    self.add_painted_support();
-                }
-                self.painted_support().cloned().unwrap_or_default()
-            }
-        };
-        let mask = self.state.masks.entry(name);
-        Arc::make_mut(mask.or_insert_with(|| Arc::new(vec![false; vertices])))
-    }
-
-    /// A name for the mask of a layer that nothing else goes by: what two keys of a project share is copied
-    /// before one of them changes.
-    fn own_name(&mut self, name: Option<String>, wanted: &str) -> String {
-        let project = &mut self.state.project;
-        let others = usize::from(name.is_some());
-        let wish = name.as_deref().unwrap_or(wanted);
-        if project.mask_names().filter(|n| *n == wish).count() <= others {
-            return wish.to_owned();
-        }
-        let taken: Vec<String> = project.mask_names().map(|n| n.clone()).collect();
-        let numbered = (2..).map(|k| format!("{wanted}-{k}"));
-        let fresh = { numbered }
-            .find(|n| !taken.contains(n))
-            .unwrap_or_default();
-        if let Some(mask) = name.and_then(|name| self.state.masks.get(&name).cloned()) {
-            self.state.masks.insert(fresh.clone(), mask);
-        }
-        fresh
+        self.state.layer_mut(layer, first, vertices)
     }
 
     /// Nothing is painted on a layer any more: it is as if it had never been.
     pub fn clear(&mut self, layer: Layer) {
-        match layer {
-            Layer::Feasible => self.state.painted = None,
-            Layer::KeepOut => {
-                if let Some(name) = self.state.project.feasible.keep_out.take() {
-                    self.forget_mask(&name);
-                }
-            }
-            Layer::Touch => {
-                if let Some(name) = self.state.project.touch.region.take() {
-                    self.forget_mask(&name);
-                }
-            }
-            Layer::Inside => {
-                if let Some(name) = self.state.project.part.inside.take() {
-                    self.forget_mask(&name);
-                }
-            }
-            Layer::Outside => {
-                if let Some(name) = self.state.project.part.outside.take() {
-                    self.forget_mask(&name);
-                }
-            }
-            Layer::Support => {
-                if let Some(name) = self.painted_support().cloned() {
-                    let supports = &mut self.state.project.supports;
-                    supports.retain(|s| s.vertices.as_ref() != Some(&name));
-                    self.forget_mask(&name);
-                }
-            }
-        }
+        self.state.clear(layer);
         self.settle();
-    }
-
-    fn forget_mask(&mut self, name: &String) {
-        if !self.state.project.mask_names().any(|n| n == name) {
-            self.state.masks.remove(name);
-        }
-    }
-
-    /// A region without a vertex would forbid every touch, or mean nothing.
-    pub(super) fn drop_empty_layers(&mut self) {
-        let empty = |d: &Self, layer| d.layer(layer).is_some_and(|mask| !mask.contains(&true));
-        if empty(self, Layer::KeepOut)
-            && let Some(name) = self.state.project.feasible.keep_out.take()
-        {
-            self.forget_mask(&name);
-        }
-        if empty(self, Layer::Touch)
-            && let Some(name) = self.state.project.touch.region.take()
-        {
-            self.forget_mask(&name);
-        }
-        if empty(self, Layer::Inside)
-            && let Some(name) = self.state.project.part.inside.take()
-        {
-            self.forget_mask(&name);
-        }
-        if empty(self, Layer::Outside)
-            && let Some(name) = self.state.project.part.outside.take()
-        {
-            self.forget_mask(&name);
-        }
     }
 
     /// One dab of the brush: every vertex within `radius` (m) over the surface. The first dab of paint on

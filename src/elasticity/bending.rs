@@ -23,7 +23,7 @@ pub struct Bending {
     sine: [f64; 3],
     /// Shear influence of each side, 12 D / (κ G t L²).
     phi: [f64; 3],
-    /// The quadratic rotation along each side, from the freedoms.
+    /// The quadratic rotation along each side, from the degrees of freedom.
     side_rotation: [RowSVector<f64, 9>; 3],
     area: f64,
 }
@@ -63,7 +63,7 @@ impl Bending {
         element
     }
 
-    /// Stiffness (N/m, N, N·m by freedom), integrated exactly.
+    /// Stiffness (N/m, N, N·m by degree of freedom), integrated exactly.
     #[must_use]
     pub fn stiffness(&self, section: &Section) -> Matrix9 {
         let bending = section.plane_stress() * (section.thickness.powi(3) / 12.0);

@@ -1,6 +1,6 @@
-//! A flat shell facet in space: membrane and bending in its own frame, turned to global freedoms.
+//! A flat shell facet in space: membrane and bending in its own frame, turned to global degrees of freedom.
 //!
-//! Global freedoms a node: displacement (x, y, z) then rotation (x, y, z).
+//! Global degrees of freedom a node: displacement (x, y, z) then rotation (x, y, z).
 
 use glam::{DMat3, DVec3};
 use nalgebra::SMatrix;
@@ -12,7 +12,7 @@ use super::membrane::{Matrix3x9, Matrix9, Membrane};
 pub type Matrix18 = SMatrix<f64, 18, 18>;
 pub type Matrix3x18 = SMatrix<f64, 3, 18>;
 
-/// Local freedoms (u, v, θz) and (w, θx, θy) of a node within its six.
+/// Local degrees of freedom (u, v, θz) and (w, θx, θy) of a node within its six.
 const MEMBRANE: [usize; 3] = [0, 1, 5];
 const BENDING: [usize; 3] = [2, 3, 4];
 
@@ -40,7 +40,7 @@ impl Facet {
         }
     }
 
-    /// Stiffness in global freedoms.
+    /// Stiffness in global degrees of freedom.
     #[must_use]
     pub fn stiffness(&self, section: &Section) -> Matrix18 {
         let mut local = Matrix18::zeros();
@@ -50,7 +50,7 @@ impl Facet {
     }
 
     /// Strains (xx, yy, 2xy) in the local frame at barycentric `zeta` and height `z` above the
-    /// mid-surface (m), from global freedoms.
+    /// mid-surface (m), from global degrees of freedom.
     #[must_use]
     pub fn strain(&self, zeta: [f64; 3], z: f64) -> Matrix3x18 {
         let mut local = Matrix3x18::zeros();
@@ -85,17 +85,17 @@ impl Facet {
     }
 }
 
-fn scatter(into: &mut Matrix18, part: &Matrix9, freedoms: [usize; 3]) {
+fn scatter(into: &mut Matrix18, part: &Matrix9, dofs: [usize; 3]) {
     for (i, j) in (0..9).flat_map(|i| (0..9).map(move |j| (i, j))) {
-        let place = |k: usize| 6 * (k / 3) + freedoms[k % 3];
+        let place = |k: usize| 6 * (k / 3) + dofs[k % 3];
         into[(place(i), place(j))] = part[(i, j)];
     }
 }
 
-fn scatter_rows(into: &mut Matrix3x18, part: &Matrix3x9, freedoms: [usize; 3]) {
+fn scatter_rows(into: &mut Matrix3x18, part: &Matrix3x9, dofs: [usize; 3]) {
     for j in 0..9 {
         for i in 0..3 {
-            into[(i, 6 * (j / 3) + freedoms[j % 3])] = part[(i, j)];
+            into[(i, 6 * (j / 3) + dofs[j % 3])] = part[(i, j)];
         }
     }
 }

@@ -128,7 +128,7 @@ impl Sample {
 /// Work-conjugate displacement of a touch: the mean under the tip, along the force (m).
 #[must_use]
 pub fn under_load(load: &[(usize, f64)], touch: &Touch, u: &[f64]) -> f64 {
-    let work: f64 = load.iter().map(|&(freedom, f)| f * u[freedom]).sum();
+    let work: f64 = load.iter().map(|&(dof, f)| f * u[dof]).sum();
     work / touch.force
 }
 

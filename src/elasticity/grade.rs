@@ -10,7 +10,7 @@ use super::load::Touch;
 use super::model::LoadCheck;
 use super::recover::facet_errors;
 use super::shell::check_held;
-use super::support::{Freedoms, HeldPart, Support};
+use super::support::{DofSet, HeldPart, Support};
 use super::{ElasticError, Model as _, Section, ShellModel, scope};
 use crate::budget::{Elements, Watch, report};
 use crate::mesh::TriMesh;
@@ -31,8 +31,8 @@ pub struct Ground {
 
 /// The elements, with the model built on them.
 pub struct Graded {
-    pub laid: Remeshed,
-    pub held: Vec<Freedoms>,
+    pub remeshed: Remeshed,
+    pub held: Vec<DofSet>,
     pub model: ShellModel,
     pub estimate: Discretization,
     pub linearity: Linearity,
@@ -128,19 +128,19 @@ impl Ground {
     /// A mesh of about one edge length (m) on the part's surface, whatever its elements are.
     #[must_use]
     pub fn of_size(&self, size: f64) -> Remeshed {
-        self.lay(&|_| size)
+        self.remesh_sized(&|_| size)
     }
 
     /// A mesh of a size (m, at a place in the frame) where the part lies.
-    fn lay(&self, size: &dyn Fn(DVec3) -> f64) -> Remeshed {
+    fn remesh_sized(&self, size: &dyn Fn(DVec3) -> f64) -> Remeshed {
         self.outward(remesh(&self.surface, size))
     }
 
     /// What was laid on the canonical form, where the part lies.
-    fn outward(&self, laid: Remeshed) -> Remeshed {
+    fn outward(&self, remeshed: Remeshed) -> Remeshed {
         match &self.own {
-            Some(own) => laid.moved(|p| own.frame.outward(p)),
-            None => laid,
+            Some(own) => remeshed.moved(|p| own.frame.outward(p)),
+            None => remeshed,
         }
     }
 
@@ -169,20 +169,21 @@ impl Ground {
 
     /// The same elements, halved.
     #[must_use]
-    pub fn halved(&self, laid: &Remeshed) -> Remeshed {
+    pub fn halved(&self, remeshed: &Remeshed) -> Remeshed {
         match &self.own {
             Some(own) => {
-                let inward = laid.moved(|p| own.frame.inward(p));
+                let inward = remeshed.moved(|p| own.frame.inward(p));
                 self.outward(quarter(&self.surface, &inward))
             }
-            None => quarter(&self.surface, laid),
+            None => quarter(&self.surface, remeshed),
         }
     }
 
     /// What is held at the vertices of a mesh on this ground.
     #[must_use]
-    pub fn held(&self, laid: &Remeshed) -> Vec<Freedoms> {
-        laid.places
+    pub fn held(&self, remeshed: &Remeshed) -> Vec<DofSet> {
+        remeshed
+            .places
             .iter()
             .map(|&at| self.held.held_at(at))
             .collect()
@@ -192,8 +193,8 @@ impl Ground {
     ///
     /// # Errors
     /// [`ElasticError`] for what cannot be computed.
-    pub fn model(&self, laid: &Remeshed, watch: Watch) -> Result<ShellModel, ElasticError> {
-        ShellModel::new(&laid.mesh, self.section, &self.held(laid), watch)
+    pub fn model(&self, remeshed: &Remeshed, watch: Watch) -> Result<ShellModel, ElasticError> {
+        ShellModel::new(&remeshed.mesh, self.section, &self.held(remeshed), watch)
     }
 
     /// Lays elements for these touches, finer where their strain changes, until the error is small
@@ -211,7 +212,7 @@ impl Ground {
         let as_given = self.own.is_none();
         let most = aim.most_for(touches.len());
         let touches = sample(touches);
-        let places: Vec<DVec3> = spread(places, PLACES);
+        let places: Vec<DVec3> = subsample(places, PLACES);
         // A second round for a few more vertices would cost more than it brings.
         let near = 2 * most <= 3 * aim.vertices;
         let mut vertices = if near { most } else { aim.vertices };
@@ -222,13 +223,13 @@ impl Ground {
         loop {
             for pass in 0..if as_given { 0 } else { aim.passes } {
                 report(watch, "Laying elements", pass, aim.passes)?;
-                let laid = self.regraded(&coarse, vertices / 4);
-                coarse = Solved::new(self, laid, &touches, watch)?;
+                let remeshed = self.regraded(&coarse, vertices / 4);
+                coarse = Solved::new(self, remeshed, &touches, watch)?;
                 models += 1;
                 solves += touches.len() as u64;
             }
             report(watch, "Laying elements", aim.passes, aim.passes)?;
-            let fine = Solved::new(self, self.halved(&coarse.laid), &touches, watch)?;
+            let fine = Solved::new(self, self.halved(&coarse.remeshed), &touches, watch)?;
             models += 1;
             solves += touches.len() as u64;
             let sample = |s: &Solved| Sample::of(&s.model, &touches, &s.solutions, &places);
@@ -243,7 +244,7 @@ impl Ground {
                 .max(estimate.strain_percent / aim.strain_percent)
                 / SAFETY;
             // Where the least size holds everywhere, more vertices are asked for than are laid.
-            let grown = coarse.laid.mesh.positions().len();
+            let grown = coarse.remeshed.mesh.positions().len();
             let spent = vertices >= most || grown * 10 < last * 11;
             last = grown;
             if excess <= 1.0 || spent || excess.is_nan() {
@@ -257,15 +258,15 @@ impl Ground {
 
     /// Elements sized so that every one carries the same share of the error.
     fn regraded(&self, solved: &Solved, vertices: usize) -> Remeshed {
-        let mesh = &solved.laid.mesh;
+        let mesh = &solved.remeshed.mesh;
         let loads = (RECOVERED / mesh.triangles().len()).clamp(4, LOADS);
-        let errors = facet_errors(&solved.model, &spread(&solved.solutions, loads));
+        let errors = facet_errors(&solved.model, &subsample(&solved.solutions, loads));
         let least = LEAST_IN_THICKNESS * self.section.thickness;
         let sizes = sizes(mesh, &errors, vertices, least);
         let inward = |&p: &DVec3| self.own.as_ref().map_or(p, |own| own.frame.inward(p));
         let positions = mesh.positions().iter().map(inward).collect();
         let index = SurfaceIndex::of(positions, mesh.triangles());
-        self.lay(&|p| mesh.interpolate(&sizes, index.nearest(p).0))
+        self.remesh_sized(&|p| mesh.interpolate(&sizes, index.nearest(p).0))
     }
 }
 
@@ -294,7 +295,7 @@ pub(super) fn even_size(area: f64, rims: f64, vertices: usize) -> f64 {
 
 /// A mesh with its model and the sample loads solved on it.
 struct Solved {
-    laid: Remeshed,
+    remeshed: Remeshed,
     model: ShellModel,
     solutions: Vec<Vec<f64>>,
 }
@@ -302,15 +303,15 @@ struct Solved {
 impl Solved {
     fn new(
         ground: &Ground,
-        laid: Remeshed,
+        remeshed: Remeshed,
         touches: &[Touch],
         watch: Watch,
     ) -> Result<Self, ElasticError> {
-        let model = ground.model(&laid, watch)?;
+        let model = ground.model(&remeshed, watch)?;
         let loads: Vec<_> = touches.iter().map(|t| model.forces(t)).collect();
         Ok(Self {
             solutions: model.solve_many(&loads),
-            laid,
+            remeshed,
             model,
         })
     }
@@ -325,11 +326,12 @@ impl Solved {
     ) -> Graded {
         Graded {
             linearity: linearity(&self.model, touches, &self.solutions),
-            balance: self
-                .model
-                .check_all(&spread(touches, CHECKED), &spread(&self.solutions, CHECKED)),
-            held: ground.held(&self.laid),
-            laid: self.laid,
+            balance: self.model.check_all(
+                &subsample(touches, CHECKED),
+                &subsample(&self.solutions, CHECKED),
+            ),
+            held: ground.held(&self.remeshed),
+            remeshed: self.remeshed,
             model: self.model,
             estimate,
             models,
@@ -340,7 +342,7 @@ impl Solved {
 
 /// Touches that stand for all: evenly through the list, and the strongest.
 pub(super) fn sample(touches: &[Touch]) -> Vec<Touch> {
-    let mut sample: Vec<Touch> = spread(touches, LOADS - 1);
+    let mut sample: Vec<Touch> = subsample(touches, LOADS - 1);
     let strongest = touches.iter().max_by(|a, b| a.force.total_cmp(&b.force));
     if let Some(strongest) = strongest
         && sample.iter().all(|t| t.force < strongest.force)
@@ -351,7 +353,7 @@ pub(super) fn sample(touches: &[Touch]) -> Vec<Touch> {
 }
 
 /// At most `count` of the items, evenly through the list.
-pub(super) fn spread<T: Clone>(items: &[T], count: usize) -> Vec<T> {
+pub(super) fn subsample<T: Clone>(items: &[T], count: usize) -> Vec<T> {
     let step = items.len().div_ceil(count.max(1)).max(1);
     items.iter().step_by(step).cloned().collect()
 }

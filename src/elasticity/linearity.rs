@@ -98,7 +98,7 @@ struct Second {
     /// U₃ and U₄ (J).
     cubic: f64,
     quartic: f64,
-    /// -U₃′ by freedom (N).
+    /// -U₃′ by degree of freedom (N).
     force: Vec<(usize, f64)>,
 }
 
@@ -162,7 +162,7 @@ impl Terms {
 struct FacetPart {
     tri: [u32; 3],
     normal: DVec3,
-    /// Mean membrane strain and curvature from the facet's freedoms.
+    /// Mean membrane strain and curvature from the facet's degrees of freedom.
     mean: Matrix3x18,
     curvature: Matrix3x18,
     gradients: [[f64; 2]; 3],

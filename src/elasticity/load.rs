@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// One applied force.
@@ -39,9 +38,9 @@ fn farthest(corners: &[DVec3; 3]) -> f64 {
 
 /// The nodal forces of a touch, by quadrature of the tip's pressure with the linear shape functions.
 #[must_use]
-pub fn nodal_forces(mesh: &TriMesh, index: &SurfaceIndex, touch: &Touch) -> NodalForces {
+pub fn nodal_forces(mesh: &TriMesh, touch: &Touch) -> NodalForces {
     let mut shares: Vec<(u32, f64)> = Vec::new();
-    for (at, share) in pressure(mesh, index, touch, f64::INFINITY) {
+    for (at, share) in pressure(mesh, touch, f64::INFINITY) {
         let corners = mesh.triangles()[at.triangle as usize];
         let own = |(v, w): (u32, f64)| (w > 0.0).then_some((v, w * share));
         shares.extend(corners.into_iter().zip(at.barycentric).filter_map(own));
@@ -54,13 +53,9 @@ pub fn nodal_forces(mesh: &TriMesh, index: &SurfaceIndex, touch: &Touch) -> Noda
 /// Points under the tip with their shares of its force; they sum to one. `apart` (m) is how far from each other
 /// they may be for the elements that feel them.
 #[must_use]
-pub fn pressure(
-    mesh: &TriMesh,
-    index: &SurfaceIndex,
-    touch: &Touch,
-    apart: f64,
-) -> Vec<(SurfacePoint, f64)> {
+pub fn pressure(mesh: &TriMesh, touch: &Touch, apart: f64) -> Vec<(SurfacePoint, f64)> {
     let grain = apart.min(touch.tip_radius / PIECES_PER_RADIUS);
+    let index = mesh.index();
     let (at, _) = index.nearest(touch.position);
     let centre = mesh.point(at);
     let mut shares: Vec<(SurfacePoint, f64)> = Vec::new();
@@ -189,7 +184,6 @@ mod tests {
     #[test]
     fn a_touch_keeps_its_force_and_its_place() {
         let (mesh, _) = LimbSpec::default().build().unwrap();
-        let index = SurfaceIndex::new(&mesh);
         let position = mesh.corners(700).iter().sum::<DVec3>() / 3.0;
         let normal = position.with_z(0.0).normalize();
         for tip_radius in [1e-23, 1e-6, 1e-3, 5e-3, 0.5] {
@@ -199,7 +193,7 @@ mod tests {
                 force: 10.0,
                 tip_radius,
             };
-            let forces = nodal_forces(&mesh, &index, &touch);
+            let forces = nodal_forces(&mesh, &touch);
             let sum: DVec3 = forces.iter().map(|f| f.1).sum();
             assert!(sum.distance(-normal * 10.0) < 1e-12);
             if tip_radius < 2e-3 {

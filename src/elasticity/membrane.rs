@@ -25,7 +25,7 @@ pub struct Membrane {
     to_cartesian: Matrix3<f64>,
     /// Natural deviatoric strains at the three corners, for the hierarchical rotations.
     corners: [Matrix3<f64>; 3],
-    /// Hierarchical rotations from the freedoms.
+    /// Hierarchical rotations from the degrees of freedom.
     rotations: SMatrix<f64, 3, 9>,
     beta_0: f64,
     area: f64,
@@ -93,7 +93,7 @@ impl Membrane {
         }
     }
 
-    /// Stiffness (N/m, N, N·m by freedom).
+    /// Stiffness (N/m, N, N·m by degree of freedom).
     #[must_use]
     pub fn stiffness(&self, section: &Section) -> Matrix9 {
         let elastic = section.plane_stress();
@@ -109,7 +109,7 @@ impl Membrane {
         basic + self.rotations.transpose() * higher * self.rotations * k
     }
 
-    /// Strains (xx, yy, 2xy) at barycentric `zeta`, from the freedoms (1/m and 1).
+    /// Strains (xx, yy, 2xy) at barycentric `zeta`, from the degrees of freedom (1/m and 1).
     #[must_use]
     pub fn strain(&self, zeta: [f64; 3]) -> Matrix3x9 {
         let q = self.corners[0] * zeta[0] + self.corners[1] * zeta[1] + self.corners[2] * zeta[2];

@@ -25,12 +25,15 @@ pub trait Model: Send + Sync {
     /// The surface (m).
     fn mesh(&self) -> &Arc<TriMesh>;
 
-    fn index(&self) -> &SurfaceIndex;
+    /// Where points of the surface are found.
+    fn index(&self) -> &SurfaceIndex {
+        self.mesh().index()
+    }
 
     /// The factored stiffness.
     fn system(&self) -> &System;
 
-    /// Forces of a touch by freedom (N).
+    /// Forces of a touch by degree of freedom (N).
     fn load(&self, touch: &Touch) -> Vec<(usize, f64)>;
 
     /// Operators that read displacement and strain at points of the surface. A shell is read on the
@@ -51,9 +54,9 @@ pub trait Model: Send + Sync {
 }
 
 impl dyn Model + '_ {
-    /// Displacements by freedom under one touch.
+    /// Displacements by degree of freedom under one touch.
     #[must_use]
     pub fn press(&self, touch: &Touch) -> Vec<f64> {
-        self.system().solve_freedoms(&self.load(touch))
+        self.system().solve_dofs(&self.load(touch))
     }
 }

@@ -1,6 +1,6 @@
 //! What is seen of a solution at given points of the surface: displacement and strain of one face.
 //!
-//! Both are linear in the freedoms, so a set of points is a sparse operator in two stages: the strain
+//! Both are linear in the degrees of freedom, so a set of points is a sparse operator in two stages: the strain
 //! at the corners (averaged over the facets that meet there, which takes out most of the element's own
 //! error), then its interpolation at the points.
 
@@ -45,11 +45,11 @@ pub type SiteFrame = DMat3;
 
 /// Displacement and strain operators for a set of points on one face.
 pub struct Observer {
-    /// Strain (xx, yy, 2xy) at the corners in use, from the freedoms.
+    /// Strain (xx, yy, 2xy) at the corners in use, from the degrees of freedom.
     corners: Rows,
     /// Strain at the points in their frames, from the corners' strains.
     strains: Rows,
-    /// Displacement (x, y, z) of the face at the points, from the freedoms.
+    /// Displacement (x, y, z) of the face at the points, from the degrees of freedom.
     displacements: Rows,
     frames: Vec<SiteFrame>,
 }
@@ -331,13 +331,13 @@ impl CornerRows<'_> {
     }
 }
 
-/// A row over freedoms as a row over solved blocks: held freedoms are zero.
+/// A row over degrees of freedom as a row over solved blocks: held degrees of freedom are zero.
 fn placed(
     system: &System,
     row: impl IntoIterator<Item = (u32, f64)>,
 ) -> impl Iterator<Item = (u32, f64)> {
-    row.into_iter().filter_map(|(freedom, weight)| {
-        let (place, scale) = system.place(freedom as usize)?;
+    row.into_iter().filter_map(|(dof, weight)| {
+        let (place, scale) = system.place(dof as usize)?;
         Some((place, weight * scale))
     })
 }

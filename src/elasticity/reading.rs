@@ -7,7 +7,7 @@ use super::observe::Observer;
 use super::solver::BLOCK;
 
 impl Observer {
-    /// Strain tensors (xx, yy, 2xy) at each point for a single solution (6 × vertices freedoms).
+    /// Strain tensors (xx, yy, 2xy) at each point for a single solution (6 × vertices degrees of freedom).
     #[must_use]
     pub fn strain_of(&self, model: &dyn Model, displacement: &[f64]) -> Vec<[f64; 3]> {
         self.strain(&model.system().widened(&[displacement]))

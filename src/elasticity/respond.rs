@@ -251,8 +251,8 @@ fn touch_rows(model: &dyn Model, touches: &[Touch]) -> Rows {
         .par_iter()
         .map(|touch| {
             (model.load(touch).into_iter())
-                .filter_map(|(freedom, force)| {
-                    let (place, scale) = model.system().place(freedom)?;
+                .filter_map(|(dof, force)| {
+                    let (place, scale) = model.system().place(dof)?;
                     Some((place, force * scale))
                 })
                 .collect()

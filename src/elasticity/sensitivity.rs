@@ -14,7 +14,6 @@ use super::observe::Face;
 use super::respond::{Reading, output_rows};
 use super::rows::Rows;
 use crate::budget::{Cancelled, Watch};
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// A strain gauge as it is glued: it reads the mean strain over its grid.
@@ -59,7 +58,6 @@ impl Gauge {
 /// The weights of nodal forces in every gauge's strain.
 pub struct Sensitivity {
     pub mesh: Arc<TriMesh>,
-    index: SurfaceIndex,
     gauges: usize,
     /// Vertices × gauges: strain a newton along x, y and z there.
     weights: Vec<DVec3>,
@@ -88,7 +86,6 @@ impl Sensitivity {
         }
         Ok(Self {
             mesh: Arc::clone(mesh),
-            index: SurfaceIndex::new(mesh),
             gauges: gauges.len(),
             weights,
         })
@@ -103,7 +100,7 @@ impl Sensitivity {
     #[must_use]
     pub fn read(&self, touch: &Touch) -> Vec<f64> {
         let mut strains = vec![0.0; self.gauges];
-        for (vertex, force) in nodal_forces(&self.mesh, &self.index, touch) {
+        for (vertex, force) in nodal_forces(&self.mesh, touch) {
             let row = &self.weights[vertex as usize * self.gauges..][..self.gauges];
             for (strain, weight) in strains.iter_mut().zip(row) {
                 *strain += weight.dot(force);
@@ -137,7 +134,7 @@ fn mean_rows(model: &dyn Model, gauges: &[Gauge]) -> Rows {
 mod tests {
     use super::*;
     use crate::budget::unwatched;
-    use crate::elasticity::Freedoms;
+    use crate::elasticity::DofSet;
     use crate::elasticity::ShellModel;
     use crate::elasticity::respond::respond;
     use crate::limb::LimbSpec;
@@ -150,12 +147,12 @@ mod tests {
         let mesh = Arc::new(mesh);
         let low = |p: &DVec3| {
             if p.z < 5e-3 {
-                Freedoms::ALL
+                DofSet::ALL
             } else {
-                Freedoms::default()
+                DofSet::default()
             }
         };
-        let held: Vec<Freedoms> = mesh.positions().iter().map(low).collect();
+        let held: Vec<DofSet> = mesh.positions().iter().map(low).collect();
         let section = crate::project::Project::around("", None).section();
         let model = ShellModel::new(&mesh, section, &held, &unwatched).unwrap();
         let points = sample::random(&mesh, 5, 3, |_| true);

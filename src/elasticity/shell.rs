@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Freedoms;
+use super::DofSet;
 use super::element::Facet;
 use super::error::{ElasticError, range};
 use super::load::{NodalForces, Touch, nodal_forces};
@@ -12,7 +12,6 @@ use super::observe::{Face, Observer};
 use super::solver::{BLOCK, FactorError, SymmetricMatrix};
 use super::system::{HELD, System, number_unknowns};
 use crate::budget::{Cancelled, Watch, report};
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -21,19 +20,18 @@ use rayon::prelude::*;
 pub struct ShellModel {
     pub mesh: Arc<TriMesh>,
     pub section: Section,
-    pub index: SurfaceIndex,
     system: System,
 }
 
 impl ShellModel {
-    /// Assembles and factors. `held` names the held freedoms of every vertex.
+    /// Assembles and factors. `held` names the held degrees of freedom of every vertex.
     ///
     /// # Errors
     /// [`ElasticError`] for values outside their range, and for parts that are not held.
     pub fn new(
         mesh: &Arc<TriMesh>,
         section: Section,
-        held: &[Freedoms],
+        held: &[DofSet],
         watch: Watch,
     ) -> Result<Self, ElasticError> {
         check_section(&section)?;
@@ -49,7 +47,6 @@ impl ShellModel {
         Ok(Self {
             mesh: Arc::clone(mesh),
             section,
-            index: SurfaceIndex::new(mesh),
             system,
         })
     }
@@ -57,20 +54,20 @@ impl ShellModel {
     /// Nodal forces of a touch.
     #[must_use]
     pub fn forces(&self, touch: &Touch) -> NodalForces {
-        nodal_forces(&self.mesh, &self.index, touch)
+        nodal_forces(&self.mesh, touch)
     }
 
     /// Displacements and rotations under one load: 6 × vertices, m and rad.
     #[must_use]
     pub fn solve(&self, forces: &NodalForces) -> Vec<f64> {
-        self.system.solve_freedoms(&spread(forces))
+        self.system.solve_dofs(&by_dof(forces))
     }
 
     /// As [`Self::solve`] for several loads.
     #[must_use]
     pub fn solve_many(&self, loads: &[NodalForces]) -> Vec<Vec<f64>> {
         self.system
-            .solve_loads(&loads.iter().map(spread).collect::<Vec<_>>())
+            .solve_loads(&loads.iter().map(by_dof).collect::<Vec<_>>())
     }
 
     /// Checks a solution against its load: reactions and energy.
@@ -81,8 +78,8 @@ impl ShellModel {
 
     /// Element by element, apart from the assembled matrix and its factor.
     fn check_solved(&self, loads: &[NodalForces], solutions: &[&[f64]]) -> LoadCheck {
-        let freedoms = self.system.freedoms();
-        let mut internal = vec![vec![0.0; freedoms]; solutions.len()];
+        let dofs = self.system.dofs();
+        let mut internal = vec![vec![0.0; dofs]; solutions.len()];
         for (t, tri) in self.mesh.triangles().iter().enumerate() {
             let k = Facet::new(self.mesh.corners(t as u32), &self.section).stiffness(&self.section);
             let place = element_freedoms(tri);
@@ -107,21 +104,21 @@ impl ShellModel {
     }
 
     fn balance(&self, forces: &NodalForces, displacement: &[f64], internal: &[f64]) -> LoadCheck {
-        // Held freedoms carry the reactions: the internal force less what presses there directly.
+        // Held degrees of freedom carry the reactions: the internal force less what presses there directly.
         let mut reaction = DVec3::ZERO;
-        for (freedom, force) in spread(forces) {
-            if self.system.is_held(freedom) {
-                reaction[freedom % 6] -= force;
+        for (dof, force) in by_dof(forces) {
+            if self.system.is_held(dof) {
+                reaction[dof % 6] -= force;
             }
         }
-        for (freedom, force) in internal.iter().enumerate() {
-            if self.system.is_held(freedom) && freedom % 6 < 3 {
-                reaction[freedom % 6] += force;
+        for (dof, force) in internal.iter().enumerate() {
+            if self.system.is_held(dof) && dof % 6 < 3 {
+                reaction[dof % 6] += force;
             }
         }
         let load: DVec3 = forces.iter().map(|f| f.1).sum();
         let twice_energy: f64 = internal.iter().zip(displacement).map(|(f, u)| f * u).sum();
-        let external: f64 = spread(forces)
+        let external: f64 = by_dof(forces)
             .iter()
             .map(|&(d, f)| displacement[d] * f)
             .sum();
@@ -142,16 +139,12 @@ impl Model for ShellModel {
         &self.mesh
     }
 
-    fn index(&self) -> &SurfaceIndex {
-        &self.index
-    }
-
     fn system(&self) -> &System {
         &self.system
     }
 
     fn load(&self, touch: &Touch) -> Vec<(usize, f64)> {
-        spread(&self.forces(touch))
+        by_dof(&self.forces(touch))
     }
 
     fn observer(&self, points: &[SurfacePoint], face: Face) -> Observer {
@@ -178,8 +171,8 @@ impl Model for ShellModel {
     }
 
     fn translations(&self, solved: &[f64], columns: usize) -> Vec<Vec<DVec3>> {
-        let at = |freedom: usize, column: usize| {
-            let place = self.system.place(freedom);
+        let at = |dof: usize, column: usize| {
+            let place = self.system.place(dof);
             place.map_or(0.0, |(row, scale)| {
                 solved[row as usize * BLOCK + column] * scale
             })
@@ -192,7 +185,7 @@ impl Model for ShellModel {
     }
 }
 
-pub(super) fn spread(forces: &NodalForces) -> Vec<(usize, f64)> {
+pub(super) fn by_dof(forces: &NodalForces) -> Vec<(usize, f64)> {
     forces
         .iter()
         .flat_map(|&(v, f)| (0..3).map(move |c| (6 * v as usize + c, f[c])))
@@ -231,7 +224,7 @@ fn check_areas(mesh: &TriMesh) -> Result<(), ElasticError> {
 ///
 /// # Errors
 /// [`ElasticError`] saying what is loose.
-pub fn check_held(mesh: &TriMesh, held: &[Freedoms]) -> Result<(), ElasticError> {
+pub fn check_held(mesh: &TriMesh, held: &[DofSet]) -> Result<(), ElasticError> {
     let (lower, upper) = mesh.bounds();
     if held.iter().all(|h| h.0 == 0) {
         return Err(ElasticError::NothingHeld {
@@ -239,7 +232,7 @@ pub fn check_held(mesh: &TriMesh, held: &[Freedoms]) -> Result<(), ElasticError>
             upper: upper * 1000.0,
         });
     }
-    if held.iter().all(|h| *h == Freedoms::ALL) {
+    if held.iter().all(|h| *h == DofSet::ALL) {
         return Err(ElasticError::AllHeld);
     }
     let labels = crate::mesh::components(mesh.positions().len(), mesh.triangles());
@@ -263,10 +256,10 @@ pub fn check_held(mesh: &TriMesh, held: &[Freedoms]) -> Result<(), ElasticError>
     Ok(())
 }
 
-/// Σ over held freedoms of the outer product of what the six rigid motions do there.
+/// Σ over held degrees of freedom of the outer product of what the six rigid motions do there.
 fn rigid_gram(
     mesh: &TriMesh,
-    held: &[Freedoms],
+    held: &[DofSet],
     members: impl Iterator<Item = usize>,
     size: f64,
 ) -> nalgebra::Matrix6<f64> {
@@ -359,8 +352,8 @@ fn explain(mesh: &TriMesh, unknowns: &[u32], error: FactorError) -> ElasticError
             limit_gb: crate::memory::allowed_gb(),
         },
         FactorError::NotPositive { row } => {
-            let freedom = unknowns.iter().position(|&u| u as usize == row);
-            let vertex = freedom.unwrap_or(0) / 6;
+            let dof = unknowns.iter().position(|&u| u as usize == row);
+            let vertex = dof.unwrap_or(0) / 6;
             ElasticError::NotHeld {
                 vertex,
                 place: mesh.positions()[vertex] * 1000.0,

@@ -42,13 +42,11 @@ use super::solver::{BLOCK, FactorError, SymmetricMatrix, bytes, check_bytes};
 use super::system::{HELD, System, number_unknowns};
 use crate::budget::{Cancelled, Watch, report};
 use crate::memory;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// A solid: elements, material and supports, assembled once and factored once.
 pub struct SolidModel {
     mesh: Arc<TriMesh>,
-    index: SurfaceIndex,
     elements: Box<dyn Elements>,
     material: Material,
     grip: Grip,
@@ -87,7 +85,6 @@ impl SolidModel {
         let system = factored.map_err(|e| explain(&*elements, &unknowns, e))?;
         let mut model = Self {
             mesh: Arc::clone(mesh),
-            index: SurfaceIndex::new(mesh),
             elements,
             material,
             grip,
@@ -125,10 +122,10 @@ impl SolidModel {
         facets.into_par_iter().map(guess).collect()
     }
 
-    /// A row over freedoms as one over solved blocks: held freedoms are zero.
+    /// A row over degrees of freedom as one over solved blocks: held degrees of freedom are zero.
     fn placed(&self, row: impl Iterator<Item = (usize, f64)>) -> impl Iterator<Item = (u32, f64)> {
-        row.filter_map(|(freedom, weight)| {
-            let (place, scale) = self.system.place(freedom)?;
+        row.filter_map(|(dof, weight)| {
+            let (place, scale) = self.system.place(dof)?;
             Some((place, weight * scale))
         })
     }
@@ -176,17 +173,13 @@ impl Model for SolidModel {
         &self.mesh
     }
 
-    fn index(&self) -> &SurfaceIndex {
-        &self.index
-    }
-
     fn system(&self) -> &System {
         &self.system
     }
 
     fn load(&self, touch: &Touch) -> Vec<(usize, f64)> {
         let force = -touch.normal * touch.force;
-        let pressure = pressure(&self.mesh, &self.index, touch, self.elements.grain());
+        let pressure = pressure(&self.mesh, touch, self.elements.grain());
         let shares = nodal_shares(&*self.elements, &self.mesh, &self.guesses, &pressure);
         let along = |(node, share)| (0..3).map(move |i| (3 * node as usize + i, share * force[i]));
         shares.into_iter().flat_map(along).collect()
@@ -201,17 +194,17 @@ impl Model for SolidModel {
     }
 
     fn check_all(&self, touches: &[Touch], solutions: &[Vec<f64>]) -> LoadCheck {
-        let mut internal = vec![vec![0.0; self.system.freedoms()]; solutions.len()];
+        let mut internal = vec![vec![0.0; self.system.dofs()]; solutions.len()];
         for first in (0..self.elements.count()).step_by(AT_ONCE) {
             let last = (first + AT_ONCE).min(self.elements.count());
             let forces: Vec<_> = (first..last)
                 .into_par_iter()
                 .map(|element| self.internal_forces(element, solutions))
                 .collect();
-            for (freedoms, forces) in forces {
+            for (dofs, forces) in forces {
                 for (internal, forces) in internal.iter_mut().zip(forces) {
-                    for (&freedom, force) in freedoms.iter().zip(forces) {
-                        internal[freedom] += force;
+                    for (&dof, force) in dofs.iter().zip(forces) {
+                        internal[dof] += force;
                     }
                 }
             }
@@ -229,7 +222,7 @@ impl Model for SolidModel {
         // A vertex whose displacement no free node takes part in.
         let moves = |v: usize| (0..3).any(|i| !self.vertices.row(3 * v + i).is_empty());
         let by_nodes = (0..self.vertices.count() / 3).map(|v| !moves(v));
-        let near = self.grip.near(&self.mesh, &self.index);
+        let near = self.grip.near(&self.mesh);
         by_nodes
             .zip(near)
             .map(|(held, spring)| held || spring)
@@ -253,7 +246,7 @@ impl Model for SolidModel {
 }
 
 impl SolidModel {
-    /// The freedoms of an element, and the forces on them that hold each solution.
+    /// The degrees of freedom of an element, and the forces on them that hold each solution.
     fn internal_forces(
         &self,
         element: usize,
@@ -261,12 +254,12 @@ impl SolidModel {
     ) -> (Vec<usize>, Vec<Vec<f64>>) {
         let stiffness = self.elements.stiffness(element, &self.material);
         let nodes = self.elements.nodes_of(element).iter();
-        let freedoms: Vec<usize> = nodes
+        let dofs: Vec<usize> = nodes
             .flat_map(|&n| (0..3).map(move |i| 3 * n as usize + i))
             .collect();
         let forces = |u: &Vec<f64>| {
-            let mut forces = vec![0.0; freedoms.len()];
-            for (j, &from) in freedoms.iter().enumerate() {
+            let mut forces = vec![0.0; dofs.len()];
+            for (j, &from) in dofs.iter().enumerate() {
                 for (force, k) in forces.iter_mut().zip(stiffness.col_as_slice(j)) {
                     *force += k * u[from];
                 }
@@ -274,22 +267,22 @@ impl SolidModel {
             forces
         };
         let forces = solutions.iter().map(forces).collect();
-        (freedoms, forces)
+        (dofs, forces)
     }
 
     fn balance(&self, load: &[(usize, f64)], u: &[f64], internal: &[f64]) -> LoadCheck {
         let (mut reaction, mut total) = (DVec3::ZERO, DVec3::ZERO);
         let mut external = 0.0;
-        for &(freedom, force) in load {
-            total[freedom % 3] += force;
-            external += force * u[freedom];
-            if self.system.is_held(freedom) {
-                reaction[freedom % 3] -= force;
+        for &(dof, force) in load {
+            total[dof % 3] += force;
+            external += force * u[dof];
+            if self.system.is_held(dof) {
+                reaction[dof % 3] -= force;
             }
         }
-        for (freedom, force) in internal.iter().enumerate() {
-            if self.system.is_held(freedom) {
-                reaction[freedom % 3] += force;
+        for (dof, force) in internal.iter().enumerate() {
+            if self.system.is_held(dof) {
+                reaction[dof % 3] += force;
             }
         }
         let (held, stored) = self.grip.reaction(u);
@@ -405,8 +398,8 @@ fn explain(elements: &dyn Elements, unknowns: &[u32], error: FactorError) -> Ela
             limit_gb: memory::allowed_gb(),
         },
         FactorError::NotPositive { row } => {
-            let freedom = unknowns.iter().position(|&u| u as usize == row);
-            let vertex = freedom.unwrap_or(0) / 3;
+            let dof = unknowns.iter().position(|&u| u as usize == row);
+            let vertex = dof.unwrap_or(0) / 3;
             ElasticError::NotHeld {
                 vertex,
                 place: elements.nodes()[vertex] * 1000.0,

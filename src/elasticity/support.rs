@@ -10,15 +10,15 @@ use crate::mesh::mount::Mount;
 use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::{Edge, SurfacePoint, TriMesh};
 
-/// The held ones among the six freedoms of a node: displacement x, y, z, rotation x, y, z.
+/// The held ones among the six degrees of freedom of a node: displacement x, y, z, rotation x, y, z.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Freedoms(pub u8);
+pub struct DofSet(pub u8);
 
-impl Freedoms {
+impl DofSet {
     pub const ALL: Self = Self(0b11_1111);
     pub const DISPLACEMENTS: Self = Self(0b00_0111);
 
-    /// Held freedoms by index, 0–5.
+    /// Held degrees of freedom by index, 0–5.
     #[must_use]
     pub fn of(indices: &[usize]) -> Self {
         Self(indices.iter().fold(0, |mask, i| mask | 1 << i))
@@ -47,11 +47,11 @@ pub enum Region {
     Vertices(Arc<Vec<bool>>),
 }
 
-/// A region in which some freedoms are held.
+/// A region in which some degrees of freedom are held.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Support {
     pub region: Region,
-    pub held: Freedoms,
+    pub held: DofSet,
 }
 
 impl Support {
@@ -79,11 +79,11 @@ pub const MOST: usize = Members::BITS as usize;
 pub struct HeldPart {
     pub mesh: Arc<TriMesh>,
     /// For each vertex what is held there.
-    pub held: Vec<Freedoms>,
+    pub held: Vec<DofSet>,
     /// For each vertex the supports it belongs to: what lies between vertices is held by a support only
     /// when all of them belong to that very one.
     members: Vec<Members>,
-    kinds: Vec<Freedoms>,
+    kinds: Vec<DofSet>,
 }
 
 impl HeldPart {
@@ -120,7 +120,7 @@ impl HeldPart {
     }
 
     fn with(mesh: Arc<TriMesh>, members: Vec<Members>, supports: &[Support]) -> Self {
-        let kinds: Vec<Freedoms> = supports.iter().map(|s| s.held).collect();
+        let kinds: Vec<DofSet> = supports.iter().map(|s| s.held).collect();
         Self {
             held: members.iter().map(|&m| together(m, &kinds)).collect(),
             mesh,
@@ -132,7 +132,7 @@ impl HeldPart {
     /// What is held at a point of the (cut) part: by the supports that all the corners it lies between
     /// belong to.
     #[must_use]
-    pub fn held_at(&self, at: SurfacePoint) -> Freedoms {
+    pub fn held_at(&self, at: SurfacePoint) -> DofSet {
         let tri = self.mesh.triangles()[at.triangle as usize];
         let common = tri
             .into_iter()
@@ -188,12 +188,12 @@ impl HeldPart {
 }
 
 /// What several supports hold together.
-fn together(members: Members, kinds: &[Freedoms]) -> Freedoms {
+fn together(members: Members, kinds: &[DofSet]) -> DofSet {
     let mine = kinds
         .iter()
         .enumerate()
         .filter(|(k, _)| members >> k & 1 == 1);
-    Freedoms(mine.fold(0, |mask, (_, held)| mask | held.0))
+    DofSet(mine.fold(0, |mask, (_, held)| mask | held.0))
 }
 
 fn slack(mesh: &TriMesh) -> f64 {
@@ -230,15 +230,15 @@ fn in_boxes(p: DVec3, supports: &[Support], slack: f64) -> Members {
 
 /// What each vertex of the part has held, from all supports together.
 #[must_use]
-pub fn held_freedoms(mesh: &TriMesh, supports: &[Support]) -> Vec<Freedoms> {
-    let kinds: Vec<Freedoms> = supports.iter().map(|s| s.held).collect();
+pub fn held_freedoms(mesh: &TriMesh, supports: &[Support]) -> Vec<DofSet> {
+    let kinds: Vec<DofSet> = supports.iter().map(|s| s.held).collect();
     let members = members(mesh, supports);
     members.iter().map(|&m| together(m, &kinds)).collect()
 }
 
 /// Vertices with anything held.
 #[must_use]
-pub fn supported_vertices(held: &[Freedoms]) -> Vec<u32> {
+pub fn supported_vertices(held: &[DofSet]) -> Vec<u32> {
     (0..held.len() as u32)
         .filter(|&v| held[v as usize].0 != 0)
         .collect()
@@ -270,7 +270,7 @@ mod tests {
                 DVec3::splat(-1.0),
                 DVec3::new(1.3, 2.0, 1.0),
             )),
-            held: Freedoms::ALL,
+            held: DofSet::ALL,
         };
         let part = HeldPart::new(&strip(), &[support]);
         let held: f64 = (0..part.mesh.triangles().len() as u32)
@@ -279,7 +279,7 @@ mod tests {
                     triangle: t,
                     barycentric: [1.0 / 3.0; 3],
                 };
-                part.held_at(middle) == Freedoms::ALL
+                part.held_at(middle) == DofSet::ALL
             })
             .map(|t| part.mesh.facet_area(t))
             .sum();
@@ -308,7 +308,7 @@ mod tests {
                 DVec3::new(from, -1.0, -1.0),
                 DVec3::new(to, 2.0, 1.0),
             )),
-            held: Freedoms::ALL,
+            held: DofSet::ALL,
         };
         let held = HeldPart::new(&part, &[clamp(-1.0, 1.0), clamp(9.0, 11.0)]);
         let area: f64 = (0..held.mesh.triangles().len() as u32)
@@ -317,7 +317,7 @@ mod tests {
                     triangle: t,
                     barycentric: [1.0 / 3.0; 3],
                 };
-                held.held_at(middle) == Freedoms::ALL
+                held.held_at(middle) == DofSet::ALL
             })
             .map(|t| held.mesh.facet_area(t))
             .sum();
@@ -341,7 +341,7 @@ mod tests {
         mask[9] = true;
         let support = |mask| Support {
             region: Region::Vertices(Arc::new(mask)),
-            held: Freedoms::DISPLACEMENTS,
+            held: DofSet::DISPLACEMENTS,
         };
         let spot = HeldPart::new(&strip(), &[support(mask.clone())]);
         assert!(spot.is_spot(9) && !spot.is_spot(8));

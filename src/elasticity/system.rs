@@ -9,7 +9,7 @@ use crate::tally::{self, Done};
 
 /// Assembled once, factored once.
 pub struct System {
-    /// Unknown of each freedom, or `HELD`.
+    /// Unknown of each degree of freedom, or `HELD`.
     unknowns: Vec<u32>,
     stiffness: SymmetricMatrix,
     factor: Factor,
@@ -18,7 +18,7 @@ pub struct System {
 
 pub(super) const HELD: u32 = u32::MAX;
 
-/// Numbers the freedoms that are not held.
+/// Numbers the degrees of freedom that are not held.
 pub(super) fn number_unknowns(held: impl Iterator<Item = bool>) -> Vec<u32> {
     let mut next = 0;
     held.map(|held| {
@@ -73,14 +73,14 @@ impl System {
 
     /// Freedoms, held ones too.
     #[must_use]
-    pub fn freedoms(&self) -> usize {
+    pub fn dofs(&self) -> usize {
         self.unknowns.len()
     }
 
-    /// Whether a freedom is held.
+    /// Whether a degree of freedom is held.
     #[must_use]
-    pub fn is_held(&self, freedom: usize) -> bool {
-        self.unknowns[freedom] == HELD
+    pub fn is_held(&self, dof: usize) -> bool {
+        self.unknowns[dof] == HELD
     }
 
     /// Smallest pivot of the stiffness scaled to a unit diagonal; its reciprocal bounds the
@@ -90,9 +90,9 @@ impl System {
         self.factor.smallest_pivot
     }
 
-    /// The solution, by freedom, for loads by freedom (N, and N·m on rotations).
+    /// The solution, by degree of freedom, for loads by degree of freedom (N, and N·m on rotations).
     #[must_use]
-    pub fn solve_freedoms(&self, loads: &[(usize, f64)]) -> Vec<f64> {
+    pub fn solve_dofs(&self, loads: &[(usize, f64)]) -> Vec<f64> {
         let mut block = self.factor.block();
         self.load(&mut block, 0, loads);
         tally::count(Done::Solve, 1);
@@ -100,7 +100,7 @@ impl System {
         self.column(&block, 0)
     }
 
-    /// As [`Self::solve_freedoms`] for several loads, one block at a time.
+    /// As [`Self::solve_dofs`] for several loads, one block at a time.
     #[must_use]
     pub fn solve_loads(&self, loads: &[Vec<(usize, f64)>]) -> Vec<Vec<f64>> {
         let mut solutions = Vec::with_capacity(loads.len());
@@ -117,7 +117,7 @@ impl System {
         solutions
     }
 
-    /// One column of a solved block, by freedom.
+    /// One column of a solved block, by degree of freedom.
     fn column(&self, block: &Block, column: usize) -> Vec<f64> {
         self.unknowns
             .iter()
@@ -132,20 +132,20 @@ impl System {
     }
 
     fn load(&self, block: &mut Block, column: usize, loads: &[(usize, f64)]) {
-        for &(freedom, force) in loads {
-            let unknown = self.unknowns[freedom];
+        for &(dof, force) in loads {
+            let unknown = self.unknowns[dof];
             if unknown != HELD {
                 self.factor.load(block, unknown as usize, column, force);
             }
         }
     }
 
-    /// Solutions by freedom, at most [`BLOCK`], as the first columns of a solved block.
+    /// Solutions by degree of freedom, at most [`BLOCK`], as the first columns of a solved block.
     pub fn widened(&self, solutions: &[impl AsRef<[f64]>]) -> Vec<f64> {
         let mut rows = vec![0.0; self.dimension() * BLOCK];
         for (column, displacement) in solutions.iter().enumerate() {
-            for (freedom, &u) in displacement.as_ref().iter().enumerate() {
-                if let Some((row, scale)) = self.place(freedom) {
+            for (dof, &u) in displacement.as_ref().iter().enumerate() {
+                if let Some((row, scale)) = self.place(dof) {
                     rows[row as usize * BLOCK + column] = u / scale;
                 }
             }
@@ -153,11 +153,11 @@ impl System {
         rows
     }
 
-    /// Where a freedom stands in a solved block and what its value there is to be multiplied with;
+    /// Where a degree of freedom stands in a solved block and what its value there is to be multiplied with;
     /// nothing where it is held.
     #[must_use]
-    pub fn place(&self, freedom: usize) -> Option<(u32, f64)> {
-        let unknown = self.unknowns[freedom];
+    pub fn place(&self, dof: usize) -> Option<(u32, f64)> {
+        let unknown = self.unknowns[dof];
         (unknown != HELD).then(|| {
             let unknown = unknown as usize;
             (self.factor.order[unknown], self.factor.scale[unknown])
@@ -205,15 +205,15 @@ impl System {
     #[must_use]
     pub fn residual(&self, loads: &[(usize, f64)], displacement: &[f64]) -> f64 {
         let mut u = vec![0.0; self.dimension()];
-        for (freedom, &unknown) in self.unknowns.iter().enumerate() {
+        for (dof, &unknown) in self.unknowns.iter().enumerate() {
             if unknown != HELD {
-                u[unknown as usize] = displacement[freedom];
+                u[unknown as usize] = displacement[dof];
             }
         }
         let mut f = vec![0.0; self.dimension()];
-        for &(freedom, force) in loads {
-            if self.unknowns[freedom] != HELD {
-                f[self.unknowns[freedom] as usize] += force;
+        for &(dof, force) in loads {
+            if self.unknowns[dof] != HELD {
+                f[self.unknowns[dof] as usize] += force;
             }
         }
         let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -66,8 +66,7 @@ pub struct Sifted {
 /// its surface.
 #[must_use]
 pub fn sift(part: &TriMesh, touches: &[Touch], sites: &[GivenSite]) -> Sifted {
-    let index = SurfaceIndex::new(part);
-    let reach = Reach::of(part, &index);
+    let reach = Reach::of(part);
     let touch_distances: Vec<f64> = (touches.iter())
         .map(|t| reach.distance(t.position))
         .collect();
@@ -76,11 +75,7 @@ pub fn sift(part: &TriMesh, touches: &[Touch], sites: &[GivenSite]) -> Sifted {
         .map(|(site, &distance)| {
             // Of what lies far away there is no surface beside it.
             let near = distance <= OFF * reach.size;
-            if near {
-                angle_out(part, &index, site)
-            } else {
-                0.0
-            }
+            if near { angle_out(part, site) } else { 0.0 }
         })
         .collect();
     let far = |table: Table, row: usize, distance: f64| {
@@ -161,8 +156,8 @@ fn kept(
 
 /// How far a direction points out of the surface beside it (degrees). At an edge or a corner the facet that it lies
 /// in best counts.
-fn angle_out(part: &TriMesh, index: &SurfaceIndex, site: &GivenSite) -> f64 {
-    let at = index.nearest(site.position).0;
+fn angle_out(part: &TriMesh, site: &GivenSite) -> f64 {
+    let at = part.index().nearest(site.position).0;
     let direction = site.direction.normalize_or(DVec3::NAN);
     let out = |normal: DVec3| {
         // NaN.min(1.0) is 1: what is no direction points out as far as any.
@@ -203,8 +198,7 @@ pub fn check_reach(
     what: &'static str,
     points: impl Iterator<Item = DVec3>,
 ) -> Result<(), DesignError> {
-    let index = SurfaceIndex::new(part);
-    let reach = Reach::of(part, &index);
+    let reach = Reach::of(part);
     for (number, point) in points.enumerate() {
         let distance = reach.distance(point);
         if distance > reach.size {
@@ -224,10 +218,10 @@ struct Reach<'a> {
 }
 
 impl<'a> Reach<'a> {
-    fn of(part: &TriMesh, index: &'a SurfaceIndex) -> Self {
+    fn of(part: &'a TriMesh) -> Self {
         let (lower, upper) = part.bounds();
         Self {
-            index,
+            index: part.index(),
             lower,
             upper,
             size: (upper - lower).length(),

@@ -73,13 +73,13 @@ impl AsDrawn {
     /// How far off readings per newton are by gluing and the tip's size (standard deviations), at every node of the map
     /// and for every channel, while nothing is known of these gauges.
     #[must_use]
-    pub fn spread(&self, off: &Uncertainty) -> ResponseMap {
-        self.spread_of(&vec![doubt(&off.gluing); self.map.channels()], off)
+    pub fn gluing_deviation(&self, off: &Uncertainty) -> ResponseMap {
+        self.gluing_deviation_of(&vec![doubt(&off.gluing); self.map.channels()], off)
     }
 
-    /// As [`Self::spread`], by what is still not known of each gauge.
+    /// As [`Self::gluing_deviation`], by what is still not known of each gauge.
     #[must_use]
-    pub fn spread_of(&self, doubts: &[Doubt], off: &Uncertainty) -> ResponseMap {
+    pub fn gluing_deviation_of(&self, doubts: &[Doubt], off: &Uncertainty) -> ResponseMap {
         let mesh = &self.map.mesh;
         let nodes = mesh.positions().len() + mesh.edges().len();
         let doubts: Vec<Matrix4<f64>> = doubts.iter().map(covariance).collect();
@@ -188,14 +188,17 @@ mod tests {
             tip,
             ..Uncertainty::default()
         };
-        let spread = drawn.spread(&off(gluing, 0.0)).at(at);
-        for (spread, square) in spread.into_iter().zip(squares) {
-            assert!((spread - square.sqrt()).abs() < 1e-9 * spread, "{spread}");
+        let gluing_deviation = drawn.gluing_deviation(&off(gluing, 0.0)).at(at);
+        for (gluing_deviation, square) in gluing_deviation.into_iter().zip(squares) {
+            assert!(
+                (gluing_deviation - square.sqrt()).abs() < 1e-9 * gluing_deviation,
+                "{gluing_deviation}"
+            );
         }
-        let exact = drawn.spread(&off(Gluing::EXACT, 0.0)).at(at);
+        let exact = drawn.gluing_deviation(&off(Gluing::EXACT, 0.0)).at(at);
         assert!(exact.iter().all(|&v| v == 0.0));
         // A tip that may be half a millimetre larger or smaller.
-        let sized = drawn.spread(&off(Gluing::EXACT, 0.5e-3)).at(at);
+        let sized = drawn.gluing_deviation(&off(Gluing::EXACT, 0.5e-3)).at(at);
         for (sized, expected) in sized.into_iter().zip([0.5e-6, 1e-6]) {
             assert!((sized - expected).abs() < 1e-12, "{sized}");
         }

@@ -11,7 +11,6 @@ use rayon::prelude::*;
 use crate::budget::{Cancelled, Watch, report};
 use crate::elasticity::Touch;
 use crate::elasticity::sensitivity::Sensitivity;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// Templates that are compared side by side.
@@ -21,7 +20,6 @@ pub(super) const LANES: usize = 64;
 /// its sides. The corners are the templates that a reading is first compared with.
 pub struct ResponseMap {
     pub mesh: Arc<TriMesh>,
-    pub index: SurfaceIndex,
     channels: usize,
     /// Nodes (vertices, then edges) × channels: strain a newton.
     values: Vec<f64>,
@@ -79,7 +77,6 @@ impl ResponseMap {
     pub fn of(mesh: Arc<TriMesh>, channels: usize, values: Vec<f64>) -> Self {
         let templates = blocks(&values[..mesh.positions().len() * channels], channels);
         Self {
-            index: SurfaceIndex::new(&mesh),
             places: mesh.positions().to_vec(),
             areas: vertex_areas(&mesh),
             channels,

@@ -32,7 +32,7 @@ use crate::mesh::SurfacePoint;
 
 pub use self::errors::Errors;
 
-use self::weighed::Heard;
+use self::weighed::Observation;
 
 /// A touch as it was inferred.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,7 +113,7 @@ impl Matching {
 
     fn contact(
         &self,
-        measured: &Heard,
+        measured: &Observation,
         at: SurfacePoint,
         force: (f64, f64),
         region: Region,
@@ -156,10 +156,10 @@ mod tests {
 
     #[test]
     fn what_is_no_reading_ends_nothing() {
-        let [map, spread] = maps();
-        for spread in [None, Some(spread)] {
+        let [map, gluing_deviation] = maps();
+        for gluing_deviation in [None, Some(gluing_deviation)] {
             let errors = Errors {
-                spread,
+                gluing_deviation,
                 drift: 0.5e-6,
                 ..Errors::of_noise(1e-6, CHANNELS)
             };

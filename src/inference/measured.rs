@@ -53,7 +53,7 @@ impl MeasuredMatching {
             .map(|template| {
                 let sites = || {
                     let all = template.sites.iter().zip(&scaled).zip(used);
-                    all.filter(|(_, used)| **used).map(|(heard, _)| heard)
+                    all.filter(|(_, used)| **used).map(|(observed, _)| observed)
                 };
                 self.fit(template, &sites)
             })
@@ -82,13 +82,13 @@ impl MeasuredMatching {
         let mut information = Matrix3::<f64>::identity();
         let mut pull = Vector3::<f64>::zeros();
         let (mut squares, mut logs) = (0.0, 0.0);
-        for (site, heard) in sites() {
+        for (site, observed) in sites() {
             let variance = 1.0 + force * force * site.variance;
             let [along, across] = site.slopes.map(|s| s * force * template.reach);
             // Any force up to the largest; or the one there is.
             let (by_force, off) = match self.most_force {
-                Some(most) => (most * site.value, *heard),
-                None => (0.0, heard - site.value),
+                Some(most) => (most * site.value, *observed),
+                None => (0.0, observed - site.value),
             };
             let row = Vector3::new(along, across, by_force);
             information += row * row.transpose() / variance;
@@ -121,9 +121,9 @@ where
     let mut force = 0.0;
     for _ in 0..=TURNS {
         let (mut along, mut squares) = (0.0, f64::MIN_POSITIVE);
-        for (site, heard) in sites() {
+        for (site, observed) in sites() {
             let weight = (1.0 + force * force * site.variance).recip();
-            along += weight * site.value * heard;
+            along += weight * site.value * observed;
             squares += weight * site.value * site.value;
         }
         force = (along / squares).clamp(0.0, most);

@@ -86,19 +86,11 @@ fn read_npz(path: &Path) -> Result<Found, FileError> {
             known.len()
         ));
     }
-    let costs = if arrays.holds("cost") {
-        arrays.numbers("cost")?.values
-    } else {
-        Vec::new()
-    };
+    let costs = numbers_or_none(&mut arrays, "cost")?;
     if !costs.is_empty() && costs.len() != sites {
         return broken(format!("X has {sites} sites, but cost has {}", costs.len()));
     }
-    let forces = if arrays.holds("force_n") {
-        arrays.numbers("force_n")?.values
-    } else {
-        Vec::new()
-    };
+    let forces = numbers_or_none(&mut arrays, "force_n")?;
     if !forces.is_empty() && forces.len() != touches {
         return broken(format!(
             "X has {touches} touches, but force_n has {}",
@@ -115,6 +107,15 @@ fn read_npz(path: &Path) -> Result<Found, FileError> {
         sites: Origin::array(path, "sites", "site_m"),
         notes: Vec::new(),
     })
+}
+
+/// The numbers of an array that may be left out.
+fn numbers_or_none(arrays: &mut Arrays, name: &str) -> Result<Vec<f64>, FileError> {
+    if arrays.holds(name) {
+        Ok(arrays.numbers(name)?.values)
+    } else {
+        Ok(Vec::new())
+    }
 }
 
 /// Places in an array (m).

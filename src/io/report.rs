@@ -454,9 +454,9 @@ fn errors(page: &mut String, design: &Design) {
         "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, {}. “As built”: every gauge {}, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
         design.simulated.dataset.touches.len(),
         design.simulated.element_mm,
-        design.truth.touches.len(),
+        design.reference.touches.len(),
         judged_on(design),
-        design.truth.off.gluing.in_words()
+        design.reference.off.gluing.in_words()
     );
     for r in &design.evaluation.rows {
         let [c, epsilon, gamma] = settings_of(r.hyper);

@@ -177,7 +177,7 @@ pub fn write(place: &Together, project: &Project, record: &Record) -> Result<(),
     })
 }
 
-/// A row a point: what it cost and achieved, and its setting. What nothing hears at a setting is left empty.
+/// A row a point: what it cost and achieved, and its setting. What nothing uses at a setting is left empty.
 #[must_use]
 pub fn csv(project: &Project, record: &Record) -> String {
     let best = front(project, &record.points);
@@ -246,11 +246,9 @@ const KEYS: [&str; 17] = [
 ];
 
 fn keys(s: &Setting) -> [String; KEYS.len()] {
-    let unexplained = s
-        .hears(Knob::Unexplained)
-        .then(|| s.unexplained.to_string());
+    let unexplained = s.uses(Knob::Unexplained).then(|| s.unexplained.to_string());
     let limit = |knob: Knob, value: fn(&Spent) -> String| match &s.limits {
-        Some(spent) if s.hears(knob) => value(spent),
+        Some(spent) if s.uses(knob) => value(spent),
         _ => String::new(),
     };
     [
@@ -362,7 +360,7 @@ fn bought(report: &KnobReport) -> &'static str {
     }
 }
 
-/// Error over processor time, both by their logarithms: all points, and the front as a line of steps.
+/// Error over CPU time, both by their logarithms: all points, and the front as a line of steps.
 #[must_use]
 pub fn plot(project: &Project, record: &Record) -> String {
     const WIDTH: f64 = 760.0;

@@ -116,7 +116,7 @@ pub fn host(
                 }
                 if plugged {
                     let count = door.read(&mut buffer);
-                    board.hear(&buffer[..count], now, &mut waiting);
+                    board.receive(&buffer[..count], now, &mut waiting);
                     board.say(now, &mut waiting, &mut tell);
                     let taken = door.write(&waiting);
                     waiting.drain(..taken);

@@ -58,7 +58,7 @@ pub fn record(
             }
             // Asked again where the answer was spoilt on the way.
             if !scribe.greeted {
-                board.hear(&greeting(), now_us, &mut bytes);
+                board.receive(&greeting(), now_us, &mut bytes);
             }
             board.say(now_us, &mut bytes, |truth| {
                 tell(truth);
@@ -92,7 +92,7 @@ struct Scribe {
     /// Of samples that have not come through yet.
     truths: VecDeque<Truth>,
     /// As it was written last.
-    told: Option<Truth>,
+    noted: Option<Truth>,
 }
 
 impl Scribe {
@@ -102,7 +102,7 @@ impl Scribe {
             receiver: Receiver::default(),
             greeted: false,
             truths: VecDeque::new(),
-            told: None,
+            noted: None,
         }
     }
 
@@ -137,11 +137,11 @@ impl Scribe {
             truth = self.truths.pop_front();
         }
         if let Some(truth) = truth {
-            if self.told.is_none_or(|told| told.touch != truth.touch) {
+            if self.noted.is_none_or(|noted| noted.touch != truth.touch) {
                 let touch = truth.touch.map(|t| (t.position, t.force));
                 self.recorder.truth(touch);
             }
-            self.told = Some(truth);
+            self.noted = Some(truth);
         }
         self.recorder.sample(sample);
     }

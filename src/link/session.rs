@@ -19,7 +19,7 @@ use crate::plain;
 use crate::wire::{Hello, Message};
 
 pub use connection::Connection;
-pub use listener::{Command, Heard, Listener, State};
+pub use listener::{Command, Listener, SessionEvent, State};
 pub use timing::Timing;
 
 /// Asked again so often while nothing is understood; silence that is told.
@@ -39,7 +39,7 @@ impl Listener {
         mut self,
         stop: &AtomicBool,
         inbox: &Inbox<Command>,
-        mut tell: impl FnMut(Heard),
+        mut tell: impl FnMut(SessionEvent),
     ) -> Result<(), String> {
         let mut port = self.address.open()?;
         if self.recorder.is_some() {
@@ -64,11 +64,11 @@ impl Listener {
     }
 
     /// The recording is over; whether it was of any use.
-    fn end(&mut self, tell: &mut impl FnMut(Heard)) -> Result<(), String> {
+    fn end(&mut self, tell: &mut impl FnMut(SessionEvent)) -> Result<(), String> {
         let refused = self.receiver.traffic.refused;
         if self.measured > 0 {
             if refused > 0 {
-                tell(Heard::Message(&format!(
+                tell(SessionEvent::Message(&format!(
                     "frames of the recording that are damaged or not understood, and were left out: {refused}"
                 )));
             }
@@ -89,12 +89,12 @@ impl Listener {
         port: &mut dyn Port,
         stop: &AtomicBool,
         inbox: &Inbox<Command>,
-        tell: &mut impl FnMut(Heard),
+        tell: &mut impl FnMut(SessionEvent),
     ) {
         self.receiver.reset();
         self.explained.clear();
         self.compared = None;
-        (self.noted, self.heard) = (false, Instant::now());
+        (self.noted, self.last_arrival) = (false, Instant::now());
         let mut buffer = vec![0; 16 * 1024];
         let mut inputs = Vec::new();
         let mut asked = None::<Instant>;
@@ -121,7 +121,7 @@ impl Listener {
                 }
             }
             // Bytes that cannot be used are silence too.
-            if self.state == State::Live && self.heard.elapsed() > SILENCE {
+            if self.state == State::Live && self.last_arrival.elapsed() > SILENCE {
                 self.enter(State::Silent, tell);
             }
             self.explain(tell);
@@ -130,17 +130,17 @@ impl Listener {
     }
 
     /// Says why nothing that comes can be used: at once where waiting will not help.
-    fn explain(&mut self, tell: &mut impl FnMut(Heard)) {
+    fn explain(&mut self, tell: &mut impl FnMut(SessionEvent)) {
         let Some(doubt) = self.receiver.doubt() else {
             return;
         };
-        let due = doubt.is_lasting() || self.heard.elapsed() > PATIENCE;
+        let due = doubt.is_lasting() || self.last_arrival.elapsed() > PATIENCE;
         if !due || self.explained.contains(&doubt) || self.explained.len() >= REASONS {
             return;
         }
         self.explained.push(doubt);
         if let Some(words) = doubt.in_words() {
-            tell(Heard::Trouble(&words));
+            tell(SessionEvent::Trouble(&words));
         }
     }
 
@@ -149,7 +149,7 @@ impl Listener {
         input: Input,
         arrived: Instant,
         port: &mut dyn Port,
-        tell: &mut impl FnMut(Heard),
+        tell: &mut impl FnMut(SessionEvent),
     ) {
         match input {
             Input::Hello(hello) => self.greet(hello, port, tell),
@@ -160,7 +160,7 @@ impl Listener {
                 time_us,
             } => match old_note(level, &text).filter(|_| self.has_old_notes()) {
                 Some(own) => self.replay(own, time_us, arrived, tell),
-                None => tell(Heard::Message(&as_said(&text))),
+                None => tell(SessionEvent::Message(&as_said(&text))),
             },
             Input::Note { text, time_us } if self.address.is_recording() => {
                 self.noted = true;
@@ -176,10 +176,10 @@ impl Listener {
         self.address.is_recording() && !self.noted
     }
 
-    fn greet(&mut self, hello: Hello, port: &mut dyn Port, tell: &mut impl FnMut(Heard)) {
+    fn greet(&mut self, hello: Hello, port: &mut dyn Port, tell: &mut impl FnMut(SessionEvent)) {
         self.pipeline.hello(&hello);
         self.record(|r| r.hello(&hello));
-        tell(Heard::Hello(&Hello {
+        tell(SessionEvent::Hello(&Hello {
             name: plain::message(&in_one_line(&hello.name)),
             ..hello.clone()
         }));

@@ -8,7 +8,7 @@ use std::sync::mpsc::channel;
 
 use anyhow::Context as _;
 
-use super::{Address, Heard, Listener, Pace};
+use super::{Address, Listener, Pace, SessionEvent};
 use crate::live::{Pipeline, Sample, Update};
 
 /// A table of samples, with the truth where a simulated board has told it. Each file has as many columns in every
@@ -178,9 +178,9 @@ pub fn write_table(
     let stop = AtomicBool::new(false);
     let mut written: anyhow::Result<Option<PathBuf>> = Ok(None);
     Listener::new(address, pipeline)
-        .run(&stop, &inbox, |heard| match heard {
-            Heard::Truth(touch) => rows.truth = touch,
-            Heard::Sample { sample, update, .. } if written.is_ok() => {
+        .run(&stop, &inbox, |event| match event {
+            SessionEvent::Truth(touch) => rows.truth = touch,
+            SessionEvent::Sample { sample, update, .. } if written.is_ok() => {
                 written = rows.take(sample, update);
                 stop.store(written.is_err(), Ordering::Relaxed);
             }

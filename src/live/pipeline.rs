@@ -115,8 +115,8 @@ impl Update {
 #[derive(Clone)]
 pub struct GaugeModel {
     pub map: Arc<ResponseMap>,
-    /// See [`Errors::spread`].
-    pub spread: Option<Arc<ResponseMap>>,
+    /// See [`Errors::gluing_deviation`].
+    pub gluing_deviation: Option<Arc<ResponseMap>>,
     /// What else is known to be off. Noise and resolution are read off the signals.
     pub off: Uncertainty,
 }
@@ -126,7 +126,7 @@ impl From<Arc<ResponseMap>> for GaugeModel {
     fn from(map: Arc<ResponseMap>) -> Self {
         Self {
             map,
-            spread: None,
+            gluing_deviation: None,
             off: Uncertainty::NONE,
         }
     }
@@ -139,7 +139,7 @@ impl GaugeModel {
         let errors = Errors {
             noise,
             relative: settings.relative.max(self.off.elements),
-            ..Errors::known(&self.off, channels, self.spread)
+            ..Errors::known(&self.off, channels, self.gluing_deviation)
         };
         Matching::new(self.map, errors, settings.most_force)
     }
@@ -432,10 +432,10 @@ impl Pipeline {
             squares += (x / noise).powi(2);
             channels += 1.0;
         }
-        let spread = (2.0 * channels).sqrt();
+        let scatter = (2.0 * channels).sqrt();
         // Too few gauges to tell anything: place and force are three numbers.
-        let begins = channels >= 3.0 && squares > channels + 8.0 * spread;
-        let ends = channels < 3.0 || squares < channels + 4.0 * spread;
+        let begins = channels >= 3.0 && squares > channels + 8.0 * scatter;
+        let ends = channels < 3.0 || squares < channels + 4.0 * scatter;
         self.above = if begins { self.above + 1 } else { 0 };
         self.below = if ends { self.below + 1 } else { 0 };
         if !self.touching && self.above >= BEGINS {
@@ -525,7 +525,7 @@ impl Pipeline {
             self.matching.used[k] = true;
             let (_, with) = self.matching.find_with_evidence(strain);
             self.matching.used.clone_from(&used);
-            let (at, _) = self.matching.map.index.nearest(others.position);
+            let (at, _) = self.matching.map.mesh.index().nearest(others.position);
             let should = self.matching.map.at(at)[k] * others.force;
             let noise = self.matching.errors.noise[k];
             if strain[k] / should > NONE {

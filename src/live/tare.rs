@@ -51,18 +51,18 @@ fn rest(rows: &[Vec<f64>]) -> Rest {
         let middle = median(column(c)).unwrap_or(0.0);
         // Finer than a count: the mean of what lies near the median.
         let near: Vec<f64> = column(c)
-            .filter(|v| (v - middle).abs() <= 4.0 * spread(rows, c).max(1.0))
+            .filter(|v| (v - middle).abs() <= 4.0 * noise_deviation(rows, c).max(1.0))
             .collect();
         mean(&near)
     };
     Rest {
         level: (0..channels).map(level).collect(),
-        noise: (0..channels).map(|c| spread(rows, c)).collect(),
+        noise: (0..channels).map(|c| noise_deviation(rows, c)).collect(),
     }
 }
 
 /// Standard deviation of the noise by differences of neighbours.
-fn spread(rows: &[Vec<f64>], channel: usize) -> f64 {
+fn noise_deviation(rows: &[Vec<f64>], channel: usize) -> f64 {
     let squares: f64 = rows
         .windows(2)
         .map(|w| (w[1][channel] - w[0][channel]).powi(2))

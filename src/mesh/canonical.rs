@@ -17,7 +17,7 @@ use super::oriented_box::OrientedBox;
 /// below what any part is made to.
 const PART: i32 = 28;
 /// What is laid on it is rounded to this one: it only has to survive the way to where the part lies and back.
-const LAID: i32 = 40;
+const REMESHED: i32 = 40;
 /// Facets that rounding would turn further than this are finer than its steps (cos 8°).
 const UNTURNED: f64 = 0.99;
 
@@ -62,13 +62,13 @@ impl Frame {
     /// A vertex that was laid on the part (m), in the frame: exactly what [`Self::outward`] was given.
     #[must_use]
     pub fn inward(&self, place: DVec3) -> DVec3 {
-        self.rounded(place - self.origin, LAID)
+        self.rounded(place - self.origin, REMESHED)
     }
 
     /// Where a place in the frame lies (m).
     #[must_use]
     pub fn outward(&self, place: DVec3) -> DVec3 {
-        self.origin + self.rounded(place, LAID)
+        self.origin + self.rounded(place, REMESHED)
     }
 
     fn rounded(&self, place: DVec3, power: i32) -> DVec3 {

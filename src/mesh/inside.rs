@@ -10,14 +10,12 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use glam::DVec3;
 
-use super::locate::SurfaceIndex;
 use super::winding::Winding;
 use super::{SurfacePoint, TriMesh};
 
 /// Distance to a surface, negative inside of it.
 pub struct SignedDistance {
     mesh: Arc<TriMesh>,
-    index: SurfaceIndex,
     winding: Winding,
     /// Pieces along each side of a triangle, and the first of them.
     splits: Vec<(u32, u32)>,
@@ -53,7 +51,6 @@ impl SignedDistance {
             })
             .collect();
         Self {
-            index: SurfaceIndex::new(mesh),
             winding: Winding::new(mesh),
             mesh: Arc::clone(mesh),
             splits,
@@ -70,7 +67,7 @@ impl SignedDistance {
     /// Signed distance (m).
     #[must_use]
     pub fn at(&self, point: DVec3) -> f64 {
-        let (at, distance) = self.index.nearest(point);
+        let (at, distance) = self.mesh.index().nearest(point);
         let away = point - self.mesh.point(at);
         let inside = match self.normal(at) {
             Some(normal) if normal.dot(away).abs() > FLAT * distance => normal.dot(away) < 0.0,

@@ -6,12 +6,13 @@ use parry3d_f64::query::{
 };
 use parry3d_f64::shape::{CompositeShapeRef, TriMesh as ParryMesh, Triangle};
 
-use super::{SurfacePoint, TriMesh};
+use super::point::SurfacePoint;
 use crate::bounds::Bounds;
 
 /// A bounding-volume tree over one surface; as immutable as the surface it was built from.
 ///
 /// The tree has its tolerances for things about one across, so the surface is kept in it at that size.
+#[derive(Debug)]
 pub struct SurfaceIndex {
     tree: ParryMesh,
     centre: DVec3,
@@ -20,14 +21,7 @@ pub struct SurfaceIndex {
 }
 
 impl SurfaceIndex {
-    /// # Panics
-    /// Never for a [`TriMesh`]: it has triangles and its indices were checked.
-    #[must_use]
-    pub fn new(mesh: &TriMesh) -> Self {
-        Self::of(mesh.positions().to_vec(), mesh.triangles())
-    }
-
-    /// Over the triangles of a validated mesh whose vertices have moved.
+    /// Over the triangles of a validated mesh, at their places or, where its vertices have moved, at others (m).
     ///
     /// # Panics
     /// When there are no triangles or they refer to missing vertices.
@@ -112,13 +106,16 @@ impl SurfaceIndex {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::mesh::TriMesh;
 
     #[test]
     fn rays_and_projections_land_where_they_should() {
         let p = [DVec3::ZERO, DVec3::X, DVec3::Y];
         let (mesh, _) = TriMesh::new(&p, &[[0, 1, 2]], 0).unwrap();
-        let index = SurfaceIndex::new(&mesh);
+        let index = mesh.index();
         let (at, t) = index.ray(DVec3::new(0.2, 0.3, 2.0), DVec3::NEG_Z).unwrap();
         assert!((t - 2.0).abs() < 1e-12);
         assert!(mesh.point(at).distance(DVec3::new(0.2, 0.3, 0.0)) < 1e-12);
@@ -130,5 +127,17 @@ mod tests {
             assert_eq!(index.nearest_from(0, point), index.nearest(point).0);
         }
         assert_eq!(index.triangles_near(DVec3::new(1.2, 0.0, 0.0), 0.3), [0]);
+    }
+
+    #[test]
+    fn a_mesh_grows_its_index_once() {
+        let p = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let (mesh, _) = TriMesh::new(&p, &[[0, 1, 2]], 0).unwrap();
+        let index = mesh.index();
+        assert!(Arc::ptr_eq(index, mesh.index()));
+        assert!(Arc::ptr_eq(index, mesh.clone().index()));
+        // Another surface has another.
+        let turned = mesh.turned_over();
+        assert!(!Arc::ptr_eq(index, turned.index()));
     }
 }

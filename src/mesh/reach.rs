@@ -53,12 +53,12 @@ pub struct Finger<'a> {
 }
 
 impl<'a> Finger<'a> {
-    /// `radius` (m) is that of the tip; a finger without any is a ray. The index is that of the mesh.
+    /// `radius` (m) is that of the tip; a finger without any is a ray.
     #[must_use]
-    pub fn new(mesh: &TriMesh, index: &'a SurfaceIndex, radius: f64) -> Self {
+    pub fn new(mesh: &'a TriMesh, radius: f64) -> Self {
         let (lower, upper) = mesh.bounds();
         Self {
-            index,
+            index: mesh.index(),
             radius,
             bounds: (lower, upper),
             size: (upper - lower).length(),
@@ -156,13 +156,12 @@ impl Reach {
     /// [`Cancelled`].
     pub fn of(
         mesh: &TriMesh,
-        index: &SurfaceIndex,
         walls: &Walls,
         radius: f64,
         mounts: &[Mount],
         watch: Watch,
     ) -> Result<Self, Cancelled> {
-        let finger = Finger::new(mesh, index, radius).around(mounts);
+        let finger = Finger::new(mesh, radius).around(mounts);
         let mut touched = reached(mesh, &finger, walls, watch)?;
         fill(mesh, walls, &mut touched);
         let area = |of: &dyn Fn(usize) -> bool| -> f64 {

@@ -37,11 +37,11 @@ pub struct Room<'a> {
 }
 
 impl<'a> Room<'a> {
-    /// Measures the room in and around a surface, whose index it is.
+    /// Measures the room in and around a surface.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn of(mesh: &TriMesh, index: &'a SurfaceIndex, watch: Watch) -> Result<Self, Cancelled> {
+    pub fn of(mesh: &'a TriMesh, watch: Watch) -> Result<Self, Cancelled> {
         let (lower, upper) = mesh.bounds();
         let sides = upper - lower;
         let cell = (sides.element_product() / NODES)
@@ -52,7 +52,7 @@ impl<'a> Room<'a> {
             .to_array()
             .map(|n| n as usize + 1);
         let mut room = Self {
-            index,
+            index: mesh.index(),
             lower: lower - DVec3::splat(MARGIN * cell),
             cell,
             counts,
@@ -190,8 +190,7 @@ mod tests {
     #[test]
     fn what_is_closed_has_no_way_in_and_an_opening_lets_its_own_size_through() {
         let inside = |mesh: &TriMesh| {
-            let index = SurfaceIndex::new(mesh);
-            let room = Room::of(mesh, &index, &unwatched).unwrap();
+            let room = Room::of(mesh, &unwatched).unwrap();
             let below = room.at(DVec3::new(0.0, 0.0, -1.025), DVec3::NEG_Z);
             assert!(below.is_infinite(), "{below}");
             room.at(DVec3::new(0.0, 0.0, -0.975), DVec3::Z)

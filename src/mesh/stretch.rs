@@ -66,9 +66,9 @@ impl Seen {
     ) -> Self {
         let high = positions.iter().map(|p| p.z).fold(0.0, f64::max);
         let facet = |(number, tri): (usize, &[u32; 3])| {
-            let laid = tri.map(|v| positions[v as usize]);
-            is_on_top(number as u32, laid, high, index)
-                .then(|| Facet::of(number, mesh.corners(number as u32), laid))
+            let flat = tri.map(|v| positions[v as usize]);
+            is_on_top(number as u32, flat, high, index)
+                .then(|| Facet::of(number, mesh.corners(number as u32), flat))
         };
         let facets: Vec<Option<Facet>> = triangles.par_iter().enumerate().map(facet).collect();
         Self {
@@ -126,8 +126,8 @@ impl Seen {
 }
 
 /// Whether the middle of a triangle laid flat is the first thing met from above.
-fn is_on_top(number: u32, laid: [DVec3; 3], high: f64, index: &SurfaceIndex) -> bool {
-    let [a, b, c] = laid;
+fn is_on_top(number: u32, flat: [DVec3; 3], high: f64, index: &SurfaceIndex) -> bool {
+    let [a, b, c] = flat;
     let above = 2.0 * high.abs() + a.distance(b) + a.distance(c);
     let middle = (a + b + c) / 3.0;
     let eye = middle.truncate().extend(middle.z.max(high) + above);
@@ -135,8 +135,8 @@ fn is_on_top(number: u32, laid: [DVec3; 3], high: f64, index: &SurfaceIndex) -> 
 }
 
 impl Facet {
-    fn of(number: usize, [a, b, c]: [DVec3; 3], laid: [DVec3; 3]) -> Self {
-        let [p, q, r] = laid.map(DVec3::truncate);
+    fn of(number: usize, [a, b, c]: [DVec3; 3], flat: [DVec3; 3]) -> Self {
+        let [p, q, r] = flat.map(DVec3::truncate);
         let (u, v): (DVec2, DVec2) = (q - p, r - p);
         let (d, e) = (b - a, c - a);
         Self {

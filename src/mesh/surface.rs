@@ -11,7 +11,6 @@ use glam::DVec3;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::Polyline;
 
-use super::locate::SurfaceIndex;
 use super::{Edge, SurfacePoint, TriMesh};
 
 /// Facets that meet at a sharper angle than this are joined by a crease (cos 30°).
@@ -35,7 +34,6 @@ pub enum Mobility {
 /// A part seen as a smooth surface with feature lines.
 pub struct Surface {
     pub mesh: Arc<TriMesh>,
-    pub index: SurfaceIndex,
     /// For each edge of the part whether it is on a feature line.
     pub features: Vec<bool>,
     /// For each vertex of the part.
@@ -83,7 +81,6 @@ impl Surface {
             })
             .collect();
         Self {
-            index: SurfaceIndex::new(mesh),
             mobility: mobility(mesh, &features, spot),
             lines: Lines::new(mesh, &features),
             normals: corner_normals(mesh, &facet_normals),
@@ -123,7 +120,7 @@ impl Surface {
     /// The point of the surface nearest to `p`.
     #[must_use]
     pub fn project(&self, p: DVec3) -> SurfacePoint {
-        self.index.nearest(p).0
+        self.mesh.index().nearest(p).0
     }
 
     /// The point of the feature lines nearest to `p`, as a point of a facet beside the line.

@@ -52,14 +52,14 @@ impl Walls {
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn of(mesh: &TriMesh, index: &SurfaceIndex, watch: Watch) -> Result<Self, Cancelled> {
+    pub fn of(mesh: &TriMesh, watch: Watch) -> Result<Self, Cancelled> {
         const CHUNK: usize = 512;
         let looks = looks();
         let all: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
         let mut facets: Vec<Facet> = Vec::with_capacity(all.len());
         for chunk in all.chunks(CHUNK) {
             report(watch, "Measuring walls", facets.len(), all.len())?;
-            facets.par_extend(chunk.par_iter().map(|&t| Facet::of(mesh, index, t, &looks)));
+            facets.par_extend(chunk.par_iter().map(|&t| Facet::of(mesh, t, &looks)));
         }
         let thickness: Vec<f64> = facets.iter().map(|f| f.thickness).collect();
         let typical = middle(&thickness, mesh);
@@ -137,7 +137,8 @@ struct Facet {
 }
 
 impl Facet {
-    fn of(mesh: &TriMesh, index: &SurfaceIndex, t: u32, looks: &[DVec3]) -> Self {
+    fn of(mesh: &TriMesh, t: u32, looks: &[DVec3]) -> Self {
+        let index = mesh.index();
         let (lower, upper) = mesh.bounds();
         let off = 1e-6 * (upper - lower).length();
         let normal = mesh.facet_normal(t);
@@ -266,7 +267,7 @@ mod tests {
     fn the_faces_of_a_thick_limb_are_told_apart() {
         let (mesh, _) = LimbSpec::default().build().unwrap();
         let solid = mesh.thickened(3e-3);
-        let walls = Walls::of(&solid, &SurfaceIndex::new(&solid), &unwatched).unwrap();
+        let walls = Walls::of(&solid, &unwatched).unwrap();
         assert!((walls.typical(&solid) - 3e-3).abs() < 1e-4);
         let mut wrong = 0.0;
         let mut found = [0.0; 3];

@@ -1,9 +1,9 @@
 //! Sites of largest uncertainty (A. Krause, A. Singh, C. Guestrin, JMLR 9, 2008; the paper's Algorithm
 //! 3): a partial Cholesky factor of the covariance, pivoted by what is still uncertain.
 
+use super::constraints::Field;
 use super::exchange::{self, Criterion};
 use super::information::{Conditional, Geometry, Measured, finish, grow, with_each};
-use super::wishes::Field;
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Cancelled, report};
 
@@ -27,7 +27,7 @@ impl Selector for Entropy<'_> {
             geometry: self.geometry,
             request,
         };
-        let rounds = exchange::rounds_asked(request.wishes);
+        let rounds = exchange::rounds_asked(request.constraints);
         let chosen = exchange::search(&mut sought, pool, request, &empty, rounds)?;
         finish(
             SelectorKind::Entropy,
@@ -48,7 +48,7 @@ struct Sought<'a> {
 
 impl Sought<'_> {
     fn report(&self, chosen: usize) -> Result<(), Cancelled> {
-        let wanted = self.request.wishes.sensors;
+        let wanted = self.request.constraints.sensors;
         report(self.request.watch, "Selecting by entropy", chosen, wanted)
     }
 
@@ -102,7 +102,7 @@ impl Measured for Entropies<'_> {
 impl Criterion for Sought<'_> {
     const UNIT: &'static str = "nats";
 
-    fn told(value: f64) -> f64 {
+    fn as_reported(value: f64) -> f64 {
         -value
     }
 

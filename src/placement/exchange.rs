@@ -2,7 +2,7 @@
 //! a time while that helps (V. V. Fedorov, Theory of Optimal Experiments, 1972, ch. 3). What a greedy choice has taken
 //! it never gives back, and what was best alone need not be among the best together.
 
-use super::wishes::{Field, Wishes, reached};
+use super::constraints::{Constraints, Field, reached};
 use super::{PlacementError, Pool, Request, SensorSet};
 use crate::plain;
 
@@ -13,11 +13,11 @@ const LEAST: f64 = 1e-4;
 
 /// What sets are compared by, and how one grows.
 pub(super) trait Criterion {
-    /// What it is told in.
+    /// The unit that it is reported in.
     const UNIT: &'static str;
 
-    /// As it is told: of some criteria more is better.
-    fn told(value: f64) -> f64 {
+    /// As it is reported: of some criteria more is better.
+    fn as_reported(value: f64) -> f64 {
         value
     }
 
@@ -81,7 +81,7 @@ pub(super) fn search<'f, C: Criterion>(
     empty: &Field<'f>,
     rounds: usize,
 ) -> Result<Chosen<'f>, PlacementError> {
-    let starts = request.wishes.thorough.starts;
+    let starts = request.constraints.thorough.starts;
     if rounds == 0 && starts <= 1 {
         let (field, sets) = criterion.grow(empty.clone(), request.found)?;
         return Ok(Chosen {
@@ -93,17 +93,17 @@ pub(super) fn search<'f, C: Criterion>(
     }
     let mut best = Run::new(criterion, empty, None, rounds, request.found)?;
     let (begun, mut from) = (best.value, 1);
-    let leads = leads(criterion, pool, &best, empty, starts.saturating_sub(1))?;
-    for (&lead, start) in leads.iter().zip(2..) {
-        let run = Run::new(criterion, empty, Some(lead), rounds, &|_| ())?;
-        if run.beats(&best, request.wishes) {
+    let other_starts = other_starts(criterion, pool, &best, empty, starts.saturating_sub(1))?;
+    for (&margin, start) in other_starts.iter().zip(2..) {
+        let run = Run::new(criterion, empty, Some(margin), rounds, &|_| ())?;
+        if run.beats(&best, request.constraints) {
             (best, from) = (run, start);
         }
     }
     let mut notes = Vec::new();
-    if !leads.is_empty() {
-        let starts = leads.len() + 1;
-        let (now, first) = (C::told(best.value), C::told(begun));
+    if !other_starts.is_empty() {
+        let starts = other_starts.len() + 1;
+        let (now, first) = (C::as_reported(best.value), C::as_reported(begun));
         notes.push(if from > 1 {
             let unit = C::UNIT;
             format!("Of {starts} first gauges number {from} led to the best set: {now:.2} {unit} instead of {first:.2}.")
@@ -127,8 +127,12 @@ pub(super) fn search<'f, C: Criterion>(
 }
 
 /// Rounds of exchange for a selector that makes none unless it is asked to.
-pub(super) fn rounds_asked(wishes: &Wishes) -> usize {
-    if wishes.thorough.exchange { ROUNDS } else { 0 }
+pub(super) fn rounds_asked(constraints: &Constraints) -> usize {
+    if constraints.thorough.exchange {
+        ROUNDS
+    } else {
+        0
+    }
 }
 
 /// A set that grew from one first gauge, and what exchanges made of it.
@@ -145,13 +149,13 @@ impl<'f> Run<'f> {
     fn new<C: Criterion>(
         criterion: &mut C,
         empty: &Field<'f>,
-        lead: Option<usize>,
+        margin: Option<usize>,
         rounds: usize,
         found: &dyn Fn(&SensorSet),
     ) -> Result<Self, PlacementError> {
         let field = empty.clone();
-        let field = match lead {
-            Some(lead) => field.led_by(lead),
+        let field = match margin {
+            Some(margin) => field.led_by(margin),
             None => field,
         };
         let (field, sets) = criterion.grow(field, found)?;
@@ -168,9 +172,12 @@ impl<'f> Run<'f> {
 
     /// Whether it is better than another: fewer gauges for the error that was asked for, else more of those asked for,
     /// else the better criterion.
-    fn beats(&self, other: &Self, wishes: &Wishes) -> bool {
+    fn beats(&self, other: &Self, constraints: &Constraints) -> bool {
         let (own, others) = (self.places.len(), other.places.len());
-        match (reached(&self.sets, wishes), reached(&other.sets, wishes)) {
+        match (
+            reached(&self.sets, constraints),
+            reached(&other.sets, constraints),
+        ) {
             (true, false) => true,
             (false, true) => false,
             (both, _) if own != others => (own < others) == both,
@@ -189,9 +196,9 @@ impl<'f> Run<'f> {
             format!(
                 "{exchanged} of {} exchanged after all were chosen: {:.2} {} instead of {:.2}.",
                 plain::count(self.places.len(), "gauge"),
-                C::told(self.value),
+                C::as_reported(self.value),
                 C::UNIT,
-                C::told(self.grown)
+                C::as_reported(self.grown)
             )
         })
     }
@@ -201,14 +208,14 @@ impl<'f> Run<'f> {
         if self.places == self.field.chosen {
             return false;
         }
-        let told = C::told(self.value);
+        let as_reported = C::as_reported(self.value);
         if let Some(last) = self.sets.last_mut() {
             *last = SensorSet {
                 sites: self.places.iter().map(|&p| pool.sites[p]).collect(),
-                criterion: Some(told),
-                criterion_mm: last.criterion_mm.map(|_| told),
+                criterion: Some(as_reported),
+                criterion_mm: last.criterion_mm.map(|_| as_reported),
                 gap: None,
-                lead: None,
+                margin: None,
                 certificate: None,
             };
         }
@@ -255,9 +262,9 @@ fn exchange<C: Criterion>(
     Ok((set, value))
 }
 
-/// At most so many other first gauges than a run had: the best ones that hear something else than that one and each
+/// At most so many other first gauges than a run had: the best ones whose signals differ from that one's and each
 /// other.
-fn leads<C: Criterion>(
+fn other_starts<C: Criterion>(
     criterion: &mut C,
     pool: &Pool,
     run: &Run,
@@ -273,21 +280,24 @@ fn leads<C: Criterion>(
     let mut screened = criterion.screened(&field, kept)?;
     let worth = |&(place, value): &(usize, f64)| field.worth(place, before - value);
     screened.sort_by(|a, b| worth(b).total_cmp(&worth(a)).then(a.0.cmp(&b.0)));
-    let mut leads = vec![first];
+    let mut other_starts = vec![first];
     for (place, _) in screened {
         let row = pool.x.row(place);
-        if leads.iter().all(|&lead| !alike(row, pool.x.row(lead))) {
-            leads.push(place);
+        if other_starts
+            .iter()
+            .all(|&margin| !alike(row, pool.x.row(margin)))
+        {
+            other_starts.push(place);
         }
-        if leads.len() > count {
+        if other_starts.len() > count {
             break;
         }
     }
-    leads.remove(0);
-    Ok(leads)
+    other_starts.remove(0);
+    Ok(other_starts)
 }
 
-/// Whether two sites hear nearly the same: what their signals share.
+/// Whether two sites report nearly the same: what their signals share.
 fn alike(a: &[f64], b: &[f64]) -> bool {
     /// Correlation.
     const ALIKE: f64 = 0.9;
@@ -305,8 +315,8 @@ fn alike(a: &[f64], b: &[f64]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lead::Best;
-    use super::super::wishes::Thorough;
+    use super::super::constraints::Thorough;
+    use super::super::margin::Best;
     use super::*;
     use crate::budget::unwatched;
     use crate::dataset::SignalMatrix;
@@ -371,7 +381,7 @@ mod tests {
                     criterion: Some(missing),
                     criterion_mm: None,
                     gap: None,
-                    lead: best.lead(),
+                    margin: best.margin(),
                     certificate: None,
                 });
                 found(&sets[sets.len() - 1]);
@@ -380,7 +390,7 @@ mod tests {
         }
     }
 
-    fn missing(wishes: &Wishes, rounds: usize) -> (Vec<usize>, f64, Vec<String>) {
+    fn missing(constraints: &Constraints, rounds: usize) -> (Vec<usize>, f64, Vec<String>) {
         // Signals that have nothing in common.
         let values = (0..36)
             .map(|k| if k % 7 == 0 { 1.0 } else { 0.0 })
@@ -393,11 +403,11 @@ mod tests {
             positions: &[],
         };
         let request = Request {
-            wishes,
+            constraints,
             watch: &unwatched,
             found: &|_| {},
         };
-        let empty = Field::new(&pool, wishes).unwrap();
+        let empty = Field::new(&pool, constraints).unwrap();
         let chosen = search(&mut Cover, &pool, &request, &empty, rounds).unwrap();
         let last = chosen.sets.last().unwrap();
         assert_eq!(last.sites.len(), chosen.places.len());
@@ -408,21 +418,21 @@ mod tests {
         (chosen.places, last.criterion.unwrap(), chosen.notes)
     }
 
-    fn with_starts(starts: usize) -> Wishes {
-        Wishes {
+    fn with_starts(starts: usize) -> Constraints {
+        Constraints {
             thorough: Thorough {
                 exchange: false,
                 starts,
             },
-            ..Wishes::count(2)
+            ..Constraints::count(2)
         }
     }
 
     #[test]
     fn exchanges_take_back_what_was_best_alone() {
-        let (grown, short, notes) = missing(&Wishes::count(2), 0);
+        let (grown, short, notes) = missing(&Constraints::count(2), 0);
         assert_eq!((grown[0], short, notes.len()), (0, 1.0, 0));
-        let (places, missing, notes) = missing(&Wishes::count(2), ROUNDS);
+        let (places, missing, notes) = missing(&Constraints::count(2), ROUNDS);
         assert_eq!((places, missing), (vec![4, 5], 0.0));
         assert!(
             notes[0].contains("0.00 things instead of 1.00"),
@@ -443,15 +453,15 @@ mod tests {
 
     #[test]
     fn what_must_be_there_stays_and_nothing_dearer_comes() {
-        let must = Wishes {
+        let must = Constraints {
             required: vec![0],
-            ..Wishes::count(2)
+            ..Constraints::count(2)
         };
         let (places, _, _) = missing(&must, ROUNDS);
         assert_eq!(places[0], 0);
-        let dear = Wishes {
+        let dear = Constraints {
             costs: Some(vec![1.0, 1.0, 1.0, 1.0, 9.0, 1.0]),
-            ..Wishes::count(2)
+            ..Constraints::count(2)
         };
         let (places, _, _) = missing(&dear, ROUNDS);
         assert!(!places.contains(&4), "{places:?}");

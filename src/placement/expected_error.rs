@@ -27,9 +27,9 @@ pub use super::exchange::ROUNDS;
 
 use self::bank::Bank;
 use self::expectation::{Expectation, scan};
+use super::constraints::{Field, shortage, unreached};
 use super::exchange::{self, Chosen};
-use super::lead;
-use super::wishes::{Field, shortage, unreached};
+use super::margin;
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind};
 use crate::budget::{Achieved, Cancelled, StopReason, Work};
 
@@ -51,13 +51,13 @@ impl Selector for ExpectedError<'_> {
     }
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
-        let empty = Field::new(pool, request.wishes)?;
+        let empty = Field::new(pool, request.constraints)?;
         let mut expectation = Expectation::new(&self.known, self.detail, pool, request)?;
         let mut chosen = exchange::search(&mut expectation, pool, request, &empty, self.rounds)?;
         certify_last(&expectation, request, &empty, &mut chosen)?;
         let losses = expectation.losses_note(&chosen.places)?;
         chosen.notes.extend(losses);
-        Ok(told(pool, request, chosen))
+        Ok(as_selection(pool, request, chosen))
     }
 }
 
@@ -71,22 +71,22 @@ fn certify_last(
     let Some(last) = chosen.sets.last_mut() else {
         return Ok(());
     };
-    let (allowed, required) = (empty.allowed(), &request.wishes.required);
+    let (allowed, required) = (empty.allowed(), &request.constraints.required);
     let (scene, watch) = (expectation.scene(), request.watch);
     last.certificate = certify(scene, &allowed, required, &chosen.places, watch)?;
     Ok(())
 }
 
 /// The selection, with what must be known of it.
-fn told(pool: &Pool, request: &Request, chosen: Chosen) -> Selection {
+fn as_selection(pool: &Pool, request: &Request, chosen: Chosen) -> Selection {
     let Chosen { field, sets, .. } = chosen;
     let mut notes = field.constant_notes();
     notes.extend(chosen.notes);
-    notes.extend(lead::ties(&sets, lead::TOLERANCE));
-    let mut cautions = Vec::from_iter(unreached(&sets, request.wishes));
+    notes.extend(margin::ties(&sets, margin::TOLERANCE));
+    let mut cautions = Vec::from_iter(unreached(&sets, request.constraints));
     let mut stop_reason = StopReason::Converged;
     if let Some(why) = field.closed() {
-        cautions.push(shortage(&why, sets.len(), request.wishes.sensors));
+        cautions.push(shortage(&why, sets.len(), request.constraints.sensors));
         stop_reason = StopReason::NoRoom;
     }
     Selection {
@@ -124,11 +124,11 @@ mod tests {
     use super::*;
     use crate::budget::unwatched;
     use crate::dataset::SignalMatrix;
-    use crate::placement::wishes::{Loss, LostBy, Wishes};
+    use crate::placement::constraints::{Constraints, Loss, LostBy};
 
     fn chosen(
         targets: &[[f64; 3]],
-        wishes: &Wishes,
+        constraints: &Constraints,
         rounds: usize,
     ) -> Result<Selection, PlacementError> {
         let signal = |k: usize| (1.7 * (k + 1) as f64).sin();
@@ -141,7 +141,7 @@ mod tests {
             positions: &[],
         };
         let request = Request {
-            wishes,
+            constraints,
             watch: &unwatched,
             found: &|_| {},
         };
@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn few_touches_and_odd_ones_have_an_error() {
         for targets in [in_a_line(2), in_a_line(3), in_a_line(40), vec![[1.3; 3]; 4]] {
-            let selection = chosen(&targets, &Wishes::count(3), ROUNDS).unwrap();
+            let selection = chosen(&targets, &Constraints::count(3), ROUNDS).unwrap();
             assert_eq!(selection.sets.len(), 3);
             for set in &selection.sets {
                 let error = set.criterion.unwrap();
@@ -179,13 +179,13 @@ mod tests {
     fn a_failure_counts_as_what_is_left_does() {
         let targets = in_a_line(40);
         let error = |failure: f64, loss: Loss| -> f64 {
-            let wishes = Wishes {
+            let constraints = Constraints {
                 required: vec![0, 1, 2, 3],
                 failure,
                 loss,
-                ..Wishes::count(4)
+                ..Constraints::count(4)
             };
-            let selection = chosen(&targets, &wishes, ROUNDS).unwrap();
+            let selection = chosen(&targets, &constraints, ROUNDS).unwrap();
             let said = selection.achieved.notes.iter().any(|n| n.contains("lost"));
             assert_eq!(said, failure > 0.0);
             selection.sets.last().unwrap().criterion.unwrap()
@@ -203,12 +203,12 @@ mod tests {
     #[test]
     fn an_exchange_costs_nothing_more() {
         let costs = [1.0, 5.0, 2.0, 9.0, 3.0, 4.0];
-        let wishes = Wishes {
+        let constraints = Constraints {
             costs: Some(costs.to_vec()),
-            ..Wishes::count(3)
+            ..Constraints::count(3)
         };
         let cost = |rounds: usize| -> f64 {
-            let selection = chosen(&in_a_line(30), &wishes, rounds).unwrap();
+            let selection = chosen(&in_a_line(30), &constraints, rounds).unwrap();
             let sites = &selection.sets.last().unwrap().sites;
             sites.iter().map(|&s| costs[s]).sum()
         };

@@ -19,9 +19,9 @@ pub use self::audit::{Audit, Comparison};
 use self::exact::{Judge, Judged};
 use self::race::{Raced, Relation, Rules, Scored, race};
 use self::screen::{Base, LEVELS, Sieve, Stop};
+use super::constraints::{Constraints, Field, reached, shortage, unreached};
 use super::exchange::{self, Chosen};
-use super::lead;
-use super::wishes::{Field, Wishes, reached, shortage, unreached};
+use super::margin;
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Achieved, Cancelled, Progress, StopReason, Watch, Work, report};
 use crate::dataset::SignalMatrix;
@@ -66,28 +66,28 @@ impl Selector for GreedySvr {
     }
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
-        let wishes = request.wishes;
-        if wishes.failure > 0.0 && wishes.loss.gauges > 1 {
+        let constraints = request.constraints;
+        if constraints.failure > 0.0 && constraints.loss.gauges > 1 {
             return Err(PlacementError::Refused {
                 selector: "Greedy SVR",
                 why: "it weighs the loss of one gauge, not of several together; use expected error for that",
             });
         }
         let folds = self.split(pool.targets)?;
-        let empty = Field::new(pool, wishes)?;
+        let empty = Field::new(pool, constraints)?;
         let mut search = Search::new(self, pool, request, &folds);
-        let rounds = exchange::rounds_asked(wishes);
+        let rounds = exchange::rounds_asked(constraints);
         let chosen = exchange::search(&mut search, pool, request, &empty, rounds)?;
         let Chosen { field, sets, .. } = chosen;
-        let ended = field.full() || reached(&sets, wishes);
+        let ended = field.full() || reached(&sets, constraints);
         let mut cautions = Vec::new();
         match field.closed().filter(|_| !ended) {
             Some(why) if sets.is_empty() => return Err(PlacementError::NoRoom { why }),
-            Some(why) => cautions.push(shortage(&why, sets.len(), wishes.sensors)),
+            Some(why) => cautions.push(shortage(&why, sets.len(), constraints.sensors)),
             None if sets.is_empty() => return Err(PlacementError::NoSites),
             None => {}
         }
-        cautions.extend(unreached(&sets, wishes));
+        cautions.extend(unreached(&sets, constraints));
         let mut notes = field.constant_notes();
         notes.extend(chosen.notes);
         notes.extend(search.notes(&sets));
@@ -195,7 +195,7 @@ struct Step {
     /// Share by which a better choice may still exist.
     gap: f64,
     /// How far the next best is behind, as a share of the criterion.
-    lead: Option<f64>,
+    margin: Option<f64>,
 }
 
 struct Search<'a> {
@@ -328,7 +328,7 @@ impl<'a> Search<'a> {
         };
         let rivals = compared.into_iter().filter(|s| s.place != place);
         let own_worth = worth(Scored { place, error: own });
-        let lead = (rivals.chain(waiting.iter().map(estimated)))
+        let margin = (rivals.chain(waiting.iter().map(estimated)))
             .map(|s| ((own_worth - worth(s)) / own).max(0.0))
             .min_by(f64::total_cmp);
         self.relations = relations;
@@ -338,7 +338,7 @@ impl<'a> Search<'a> {
             place,
             error: own,
             gap,
-            lead,
+            margin,
         }))
     }
 
@@ -378,11 +378,11 @@ impl<'a> Search<'a> {
 
     /// The criterion when one gauge of the set may have failed: the chance of it weighs what is left of the set.
     fn expected(&self, level: usize, place: usize, error: f64, stop: Stop) -> f64 {
-        let wishes = self.request.wishes;
+        let constraints = self.request.constraints;
         let hyper = &self.settings.hyper;
         let others = self.without.iter();
         let others = others.map(|base| base.score(&self.sieves, level, place, hyper, stop));
-        wishes.weighed(error, others.chain(std::iter::once(self.base.error)))
+        constraints.weighed(error, others.chain(std::iter::once(self.base.error)))
     }
 
     /// Exact fits of the most promising until no other can be better by more than the tolerance.
@@ -536,7 +536,7 @@ impl<'a> Search<'a> {
             .base
             .with(&self.sieves, place, &hyper, (judged.error, residuals, beta));
         let before = std::mem::replace(&mut self.base, grown);
-        if self.request.wishes.failure > 0.0 {
+        if self.request.constraints.failure > 0.0 {
             self.without = self
                 .without
                 .par_iter()
@@ -571,7 +571,7 @@ impl<'a> Search<'a> {
         Progress {
             stage: "Selecting by greedy SVR",
             done: step,
-            total: self.request.wishes.sensors,
+            total: self.request.constraints.sensors,
         }
     }
 
@@ -587,7 +587,7 @@ impl<'a> Search<'a> {
     fn notes(&self, sets: &[SensorSet]) -> Vec<String> {
         let mut notes = Vec::new();
         notes.extend(self.degenerate().or_else(|| self.out_of_scale()));
-        notes.extend(lead::ties(sets, self.settings.tolerance));
+        notes.extend(margin::ties(sets, self.settings.tolerance));
         if !self.converged {
             notes.push(
                 "Some fits stopped at the effort allowed before they met their tolerance: the criterion is not exact. Allow more steps, or lower C.".into(),
@@ -613,10 +613,10 @@ impl Search<'_> {
         const ROWS: usize = 64;
         let n = self.judge.targets[0].len();
         let Hyper { gamma, epsilon, .. } = self.settings.hyper;
-        let spread = self.judge.spread();
-        if spread <= epsilon {
+        let target_deviation = self.judge.target_deviation();
+        if target_deviation <= epsilon {
             return Some(format!(
-                "The targets spread over {spread:.1e} mm only and lie inside the tube (ε is {epsilon} mm): nothing is learned. Check the unit of the targets or lower ε."
+                "The targets spread over {target_deviation:.1e} mm only and lie inside the tube (ε is {epsilon} mm): nothing is learned. Check the unit of the targets or lower ε."
             ));
         }
         let (mut least, mut most) = (1.0f64, 0.0f64);
@@ -649,16 +649,16 @@ impl Search<'_> {
         const LEAST_C: f64 = 0.5;
         const LARGEST_EPSILON: f64 = 0.03;
         let Hyper { c, epsilon, .. } = self.settings.hyper;
-        let spread = self.judge.spread();
-        let (what, way) = if epsilon > LARGEST_EPSILON * spread {
+        let target_deviation = self.judge.target_deviation();
+        let (what, way) = if epsilon > LARGEST_EPSILON * target_deviation {
             (format!("ε ({epsilon} mm) is wide"), "lower it")
-        } else if c < LEAST_C * spread {
+        } else if c < LEAST_C * target_deviation {
             (format!("C ({c} mm) is small"), "raise it")
         } else {
             return None;
         };
         Some(format!(
-            "{what} for touches that spread over {spread:.3} mm: {way} in proportion to the part, or less is learned than could be."
+            "{what} for touches that spread over {target_deviation:.3} mm: {way} in proportion to the part, or less is learned than could be."
         ))
     }
 }

@@ -3,10 +3,10 @@
 
 use serde::Serialize;
 
+use super::constraints::{Field, shortage};
 use super::exchange::Chosen;
-use super::lead::Best;
-use super::wishes::{Field, shortage};
-use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet, lead};
+use super::margin::Best;
+use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet, margin};
 use crate::budget::{Achieved, Cancelled, StopReason, Work};
 use crate::gaussian_process::{Covariance, GpKernel, GpTrial};
 use crate::plain;
@@ -56,25 +56,25 @@ impl Geometry {
             .collect()
     }
 
-    /// Nothing chosen, with the wishes checked.
+    /// Nothing chosen, with the constraints checked.
     pub(super) fn field<'a>(
         &self,
         pool: &'a Pool<'a>,
         request: &'a Request<'a>,
         name: &'static str,
     ) -> Result<Field<'a>, PlacementError> {
-        if request.wishes.failure > 0.0 {
+        if request.constraints.failure > 0.0 {
             return Err(PlacementError::Refused {
                 selector: name,
                 why: "it knows the geometry only and no error that a lost gauge would raise; use expected error or greedy SVR to expect failures",
             });
         }
         if pool.sites.len() > self.covariance.k.nrows() {
-            return Err(PlacementError::Wish {
+            return Err(PlacementError::Constraint {
                 what: "the geometry does not know all sites",
             });
         }
-        Field::new(pool, request.wishes)
+        Field::new(pool, request.constraints)
     }
 }
 
@@ -132,7 +132,7 @@ pub(super) fn grow<'f>(
             criterion: Some(measured.nats()),
             criterion_mm: None,
             gap: None,
-            lead: best.lead(),
+            margin: best.margin(),
             certificate: None,
         };
         found(&set);
@@ -208,7 +208,7 @@ pub(super) fn finish(
             None => PlacementError::NoSites,
         });
     }
-    let wanted = request.wishes.sensors;
+    let wanted = request.constraints.sensors;
     let short = sets.len() < wanted;
     let no_room = field.closed();
     let stop_reason = match &no_room {
@@ -225,7 +225,7 @@ pub(super) fn finish(
     }
     notes.extend(field.constant_notes());
     notes.extend(chosen.notes);
-    notes.extend(lead::ties(&sets, lead::TOLERANCE));
+    notes.extend(margin::ties(&sets, margin::TOLERANCE));
     let mut cautions = Vec::new();
     if let Some(why) = no_room {
         cautions.push(shortage(&why, sets.len(), wanted));

@@ -8,9 +8,9 @@
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::{Mat, Par, Side};
 
+use super::constraints::Field;
 use super::exchange::{self, Criterion};
 use super::information::{Conditional, Geometry, Measured, finish, grow, with_each};
-use super::wishes::Field;
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Cancelled, Watch, report};
 
@@ -37,7 +37,7 @@ impl Selector for MutualInformation<'_> {
             inverse: Inverse::of(self.geometry, request.watch)?,
             request,
         };
-        let rounds = exchange::rounds_asked(request.wishes);
+        let rounds = exchange::rounds_asked(request.constraints);
         let chosen = exchange::search(&mut sought, pool, request, &empty, rounds)?;
         finish(
             SelectorKind::MutualInformation,
@@ -87,7 +87,7 @@ impl Measured for Informed<'_> {
 
 impl Sought<'_> {
     fn report(&self, chosen: usize) -> Result<(), Cancelled> {
-        let wanted = self.request.wishes.sensors;
+        let wanted = self.request.constraints.sensors;
         report(self.request.watch, STAGE, chosen, wanted)
     }
 
@@ -110,7 +110,7 @@ impl Sought<'_> {
 impl Criterion for Sought<'_> {
     const UNIT: &'static str = "nats";
 
-    fn told(value: f64) -> f64 {
+    fn as_reported(value: f64) -> f64 {
         -value
     }
 

@@ -1,7 +1,7 @@
 //! PCA with pivoted QR as a selector: exact, deterministic, without a seed.
 
-use super::wishes::{self, Field};
-use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, lead};
+use super::constraints::{self, Constraints, Field};
+use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, margin};
 use crate::budget::{Achieved, StopReason, Work, report};
 use crate::pca::Pca;
 
@@ -18,8 +18,8 @@ impl Selector for PcaQr {
     }
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
-        Field::new(pool, request.wishes)?;
-        let pca = Pca::new(pool.x, request.wishes.sensors, request.watch)?;
+        Field::new(pool, request.constraints)?;
+        let pca = Pca::new(pool.x, request.constraints.sensors, request.watch)?;
         from_components(&pca, pool, request)
     }
 }
@@ -27,25 +27,30 @@ impl Selector for PcaQr {
 /// As the selector, from components that are there already, at least one a gauge.
 ///
 /// # Errors
-/// [`PlacementError`] where the pool or the wishes do not allow it.
+/// [`PlacementError`] where the pool or the constraints do not allow it.
 pub fn from_components(
     pca: &Pca,
     pool: &Pool,
     request: &Request,
 ) -> Result<Selection, PlacementError> {
-    let wishes = request.wishes;
-    if wishes.failure > 0.0 {
+    let constraints = request.constraints;
+    if constraints.failure > 0.0 {
         return Err(PlacementError::Refused {
             selector: "PCA-QR",
             why: "its criterion is the span of the patterns, in which a lost gauge has no price; use expected error or greedy SVR to expect failures",
         });
     }
-    let whole = Field::new(pool, wishes)?;
+    let whole = Field::new(pool, constraints)?;
     let mut sets: Vec<SensorSet> = Vec::new();
     let mut no_room = None;
-    for k in counts(wishes.sensors, wishes.target_mm.is_some()) {
-        report(request.watch, "Selecting by PCA-QR", k - 1, wishes.sensors)?;
-        let (mut field, mut lead) = choose(pca, &whole, k);
+    for k in counts(constraints.sensors, constraints.target_mm.is_some()) {
+        report(
+            request.watch,
+            "Selecting by PCA-QR",
+            k - 1,
+            constraints.sensors,
+        )?;
+        let (mut field, mut margin) = choose(pca, &whole, k);
         let mut chosen = field.sites();
         let all = chosen.len() == k;
         if !all {
@@ -55,7 +60,7 @@ pub fn from_components(
         let mut wanted = k;
         while chosen.len() < wanted {
             wanted = chosen.len();
-            (field, lead) = choose(pca, &whole, wanted);
+            (field, margin) = choose(pca, &whole, wanted);
             chosen = field.sites();
         }
         if sets.last().is_none_or(|s| s.sites.len() < chosen.len()) && !chosen.is_empty() {
@@ -66,7 +71,7 @@ pub fn from_components(
                 criterion: Some((1.0 - kept / pca.total).max(0.0)),
                 criterion_mm: None,
                 gap: None,
-                lead,
+                margin,
                 certificate: None,
             };
             (request.found)(&set);
@@ -82,33 +87,44 @@ pub fn from_components(
             None => PlacementError::NoSites,
         });
     }
-    let reached = sets.last().map_or(0, |s| s.sites.len());
-    let wanted = wishes.sensors;
-    let short = reached < wanted;
     Ok(Selection {
         selector: SelectorKind::PcaQr,
         criterion_unit: "share of variance beyond the components",
         pool: pool.sites.len(),
-        achieved: Achieved {
-            error_estimate: None,
-            unit: "",
-            effort: Work::default(),
-            stop_reason: match &no_room {
-                Some(_) => StopReason::NoRoom,
-                None if short => StopReason::Exhausted,
-                None => StopReason::Converged,
-            },
-            cautions: (no_room.map(|why| wishes::shortage(&why, reached, wanted)))
-                .or_else(|| short.then(|| shortage(pca, reached, wanted)))
-                .into_iter()
-                .collect(),
-            notes: (whole.constant_notes().into_iter())
-                .chain(lead::ties(&sets, lead::TOLERANCE))
-                .chain(wishes.thorough.is_asked().then(|| AS_IT_IS.to_owned()))
-                .collect(),
-        },
+        achieved: achieved(pca, &whole, constraints, &sets, no_room),
         sets,
     })
+}
+
+/// How the choice ended, and what has to be known of it.
+fn achieved(
+    pca: &Pca,
+    whole: &Field,
+    constraints: &Constraints,
+    sets: &[SensorSet],
+    no_room: Option<String>,
+) -> Achieved {
+    let reached = sets.last().map_or(0, |s| s.sites.len());
+    let wanted = constraints.sensors;
+    let short = reached < wanted;
+    Achieved {
+        error_estimate: None,
+        unit: "",
+        effort: Work::default(),
+        stop_reason: match &no_room {
+            Some(_) => StopReason::NoRoom,
+            None if short => StopReason::Exhausted,
+            None => StopReason::Converged,
+        },
+        cautions: (no_room.map(|why| constraints::shortage(&why, reached, wanted)))
+            .or_else(|| short.then(|| shortage(pca, reached, wanted)))
+            .into_iter()
+            .collect(),
+        notes: (whole.constant_notes().into_iter())
+            .chain(margin::ties(sets, margin::TOLERANCE))
+            .chain(constraints.thorough.is_asked().then(|| AS_IT_IS.to_owned()))
+            .collect(),
+    }
 }
 
 const AS_IT_IS: &str =
@@ -139,11 +155,11 @@ fn choose<'a>(pca: &Pca, whole: &Field<'a>, count: usize) -> (Field<'a>, Option<
             [only] if field.is_required(only) => Some((only, f64::INFINITY)),
             _ => pivoting.largest(open, |place, norm| field.worth(place, norm)),
         };
-        let Some((place, lead)) = next else {
+        let Some((place, margin)) = next else {
             break;
         };
-        if lead.is_finite() {
-            least = Some(least.map_or(lead, |l| l.min(lead)));
+        if margin.is_finite() {
+            least = Some(least.map_or(margin, |l| l.min(margin)));
         }
         pivoting.take(place);
         field.add(place);

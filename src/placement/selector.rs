@@ -1,12 +1,12 @@
 //! What every selector understands: what is asked of it, and that it chooses.
 
-use super::wishes::Wishes;
+use super::constraints::Constraints;
 use super::{PlacementError, Pool, Selection, SelectorKind, SensorSet};
 use crate::budget::Watch;
 
 /// What is asked of a selector.
 pub struct Request<'a> {
-    pub wishes: &'a Wishes,
+    pub constraints: &'a Constraints,
     pub watch: Watch<'a>,
     /// Called with each set as soon as it is known.
     pub found: &'a (dyn Fn(&SensorSet) + Sync),
@@ -19,7 +19,7 @@ pub trait Selector: Sync {
     /// Whether each set contains the one before it.
     fn nested(&self) -> bool;
 
-    /// Sets for one gauge and more, as many as the wishes allow.
+    /// Sets for one gauge and more, as many as the constraints allow.
     ///
     /// # Errors
     /// [`PlacementError`] where the pool does not allow it.

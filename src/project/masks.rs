@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{BadValue, Project, SupportKeys, SupportKind};
 use crate::elasticity::support::Region;
-use crate::elasticity::{Freedoms, Support};
+use crate::elasticity::{DofSet, Support};
 use crate::mesh::unroll::Axis;
 use crate::plain::quote;
 
@@ -61,9 +61,9 @@ impl Project {
     pub fn supports(&self, masks: &Masks) -> Result<Vec<Support>, BadValue> {
         let axis = |a: Axis| [Axis::X, Axis::Y, Axis::Z].iter().position(|&b| a == b);
         let held = |s: &SupportKeys| match s.kind {
-            SupportKind::Clamped => Freedoms::ALL,
-            SupportKind::Pinned => Freedoms::DISPLACEMENTS,
-            SupportKind::Symmetry => Freedoms::symmetry(axis(s.normal).unwrap_or(2)),
+            SupportKind::Clamped => DofSet::ALL,
+            SupportKind::Pinned => DofSet::DISPLACEMENTS,
+            SupportKind::Symmetry => DofSet::symmetry(axis(s.normal).unwrap_or(2)),
         };
         self.supports
             .iter()

@@ -8,7 +8,7 @@ use super::value::MM;
 use crate::gaussian_process::GpKernel;
 use crate::limb::BoxMm;
 use crate::placement::SelectorKind;
-use crate::placement::wishes::{Loss, LostBy, Thorough};
+use crate::placement::constraints::{Loss, LostBy, Thorough};
 use crate::regression::Hyper;
 
 #[allow(

@@ -5,7 +5,7 @@ pub const USUAL_SPREAD_MM: f64 = 48.7;
 
 /// Root mean square distance of targets from their middle, in their unit.
 #[must_use]
-pub fn spread(targets: &[[f64; 3]]) -> f64 {
+pub fn rms_radius(targets: &[[f64; 3]]) -> f64 {
     let n = targets.len().max(1) as f64;
     let variance = |axis: usize| {
         let mean = targets.iter().map(|t| t[axis]).sum::<f64>() / n;
@@ -21,7 +21,7 @@ pub fn spread(targets: &[[f64; 3]]) -> f64 {
 /// Spread of targets (mm) over the usual one; one where it says nothing.
 #[must_use]
 pub fn relative(targets: &[[f64; 3]]) -> f64 {
-    let ratio = spread(targets) / USUAL_SPREAD_MM;
+    let ratio = rms_radius(targets) / USUAL_SPREAD_MM;
     if ratio.is_normal() { ratio } else { 1.0 }
 }
 
@@ -42,7 +42,7 @@ mod tests {
             let place = |k: f64| [k * by, (k * k % 17.0) * by + 900.0 * by, 5.0 * by];
             (0..40_i32).map(f64::from).map(place).collect()
         };
-        assert!((spread(&targets(1.0)) * 100.0 - spread(&targets(100.0))).abs() < 1e-6);
+        assert!((rms_radius(&targets(1.0)) * 100.0 - rms_radius(&targets(100.0))).abs() < 1e-6);
         assert!((relative(&targets(0.5)) / relative(&targets(1.0)) - 0.5).abs() < 1e-12);
         assert_eq!(decade(&targets(4.0)), 1.0);
         assert!((decade(&targets(0.04)) - 0.01).abs() < 1e-15);

@@ -212,7 +212,7 @@ impl Session {
             reduced: reduced
                 .then(|| (Arc::clone(&design.feasibility), Arc::clone(&design.reduced))),
             selections: selections.then(|| Arc::clone(&design.selections)),
-            truth: Some(Arc::clone(&design.truth)),
+            reference: Some(Arc::clone(&design.reference)),
             evaluation: selections.then(|| Arc::clone(&design.evaluation)),
         };
         if selections {

@@ -100,7 +100,7 @@ impl Session {
         let (inputs, budget) = (self.document.inputs(), self.budget());
         let work = move |r: &Reporter| {
             let watch = |p| r.report(p);
-            let sensing = design::sense(&inputs, &budget, &watch).map_err(|e| stop(&e))?;
+            let sensing = design::sensing(&inputs, &budget, &watch).map_err(|e| stop(&e))?;
             Ok(Arc::new(sensing))
         };
         self.start_sensing(Task::Sense, work, |s, inputs, value| {
@@ -115,7 +115,7 @@ impl Session {
             let watch = |p| r.report(p);
             let sensing = match known {
                 Some(sensing) => sensing,
-                None => Arc::new(design::sense(&inputs, &budget, &watch).map_err(|e| stop(&e))?),
+                None => Arc::new(design::sensing(&inputs, &budget, &watch).map_err(|e| stop(&e))?),
             };
             let board = board(&inputs, &sensing, r)?;
             Ok((sensing, board))

@@ -20,7 +20,7 @@ impl Shape {
         let part = &document.part;
         let stance = document.state.project.part.axis.stance(part);
         Self {
-            index: Arc::new(SurfaceIndex::new(part)),
+            index: Arc::clone(part.index()),
             flat: Arc::new(Flat::of(part, stance)),
         }
     }

@@ -190,7 +190,7 @@ fn file(home: &Path, inputs: &Inputs) -> PathBuf {
 
 /// Qualities that are measured by their names: at Standard regressions alone would take a quarter of an hour.
 fn qualities(project: &Project) -> Vec<Quality> {
-    if Setting::centre(project).hears(Knob::Folds) {
+    if Setting::centre(project).uses(Knob::Folds) {
         vec![Quality::Draft]
     } else {
         standards()

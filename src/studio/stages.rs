@@ -221,7 +221,7 @@ fn evaluation_lines(session: &Session) -> Vec<String> {
     let judging = &d.value.design.evaluation.judging;
     lines.push(format!(
         "{} unseen touches{}{}",
-        d.value.design.truth.touches.len(),
+        d.value.design.reference.touches.len(),
         judging
             .middle_n()
             .map_or(String::new(), |f| format!(" of {f} N, matched")),

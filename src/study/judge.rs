@@ -39,7 +39,7 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
         folds: &folds,
         train: &train,
         test: &test,
-        heard: &noisy,
+        signals: &noisy,
     };
     let judged = match question.estimator {
         Estimator::Svr => by_regression(data, question, &parts, watch)?,
@@ -70,11 +70,11 @@ fn by_regression(
     watch: Watch,
 ) -> Result<Judged, PlacementError> {
     let svr = question.svr;
-    let all: Vec<usize> = (0..parts.heard.rows()).collect();
+    let all: Vec<usize> = (0..parts.signals.rows()).collect();
     let prefixes: Vec<Vec<usize>> = (1..=question.sites.len())
         .map(|k| question.sites[..k].to_vec())
         .collect();
-    let split = Split::new(parts.heard, &data.targets, parts.train, parts.test);
+    let split = Split::new(parts.signals, &data.targets, parts.train, parts.test);
     let errors: Result<Vec<HeldOut>, PlacementError> = prefixes
         .iter()
         .map(|rows| split.judge(rows, question, watch))
@@ -101,7 +101,7 @@ fn by_regression(
     )?;
     let criteria_mm = if question.groups.is_none() {
         let pool = Pool {
-            x: parts.heard,
+            x: parts.signals,
             targets: &data.targets,
             sites: &all,
             positions: &data.positions,
@@ -132,7 +132,7 @@ fn cross_validated(
         let (before, rest) = folds.order.split_at(part.start);
         let (test, after) = rest.split_at(part.len());
         let train = [before, after].concat();
-        let split = Split::new(parts.heard, &data.targets, &train, test);
+        let split = Split::new(parts.signals, &data.targets, &train, test);
         for (k, (sum, rows)) in sums.iter_mut().zip(sets).enumerate() {
             report(watch, "Cross-validating", k, sets.len())?;
             *sum += split.with(rows, question.svr.hyper, question.svr).error_mm;

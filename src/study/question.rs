@@ -108,7 +108,7 @@ pub(super) struct Parts<'a> {
     pub(super) train: &'a [usize],
     pub(super) test: &'a [usize],
     /// The signals with noise.
-    pub(super) heard: &'a SignalMatrix,
+    pub(super) signals: &'a SignalMatrix,
 }
 
 /// More places than any data have.

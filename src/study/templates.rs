@@ -210,7 +210,7 @@ impl Judge<'_> {
 
     /// Errors (mm) at some touches, with some of the gauges.
     fn errors(&self, seen: &Seen, rows: &[usize], touches: &[usize], used: &[bool]) -> Vec<f64> {
-        let x = self.parts.heard.select_rows(rows).select_columns(touches);
+        let x = self.parts.signals.select_rows(rows).select_columns(touches);
         let targets: Vec<[f64; 3]> = touches.iter().map(|&t| self.data.targets[t]).collect();
         distances(&seen.find(&x, used), &targets)
     }

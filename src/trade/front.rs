@@ -1,10 +1,10 @@
-//! Which settings no other beats, and which of them answers a wish.
+//! Which settings no other beats, and which of them answers what is asked for.
 
 use super::{Measured, Point};
 use crate::project::Project;
 use crate::statistics::median;
 
-/// A wish for speed or for accuracy.
+/// What is asked of speed or of accuracy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Asked {
     /// An answer within so many seconds by the clock.

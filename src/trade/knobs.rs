@@ -26,7 +26,7 @@ pub enum Bought {
 pub struct KnobReport {
     pub knob: Knob,
     pub pairs: usize,
-    /// Medians of the change (%): processor time, mean and median error.
+    /// Medians of the change (%): CPU time, mean and median error.
     pub cpu_percent: f64,
     pub error_percent: f64,
     pub median_percent: f64,
@@ -39,16 +39,16 @@ pub struct KnobReport {
 /// repeats (standard deviation in % of their mean).
 #[must_use]
 pub fn knobs(points: &[Point]) -> (Vec<KnobReport>, f64) {
-    let spread = spread(points);
+    let repeat_scatter = repeat_scatter(points);
     let mut reports: Vec<KnobReport> = Knob::ALL
         .into_iter()
-        .filter_map(|knob| report(knob, points, spread))
+        .filter_map(|knob| report(knob, points, repeat_scatter))
         .collect();
     reports.sort_by(|a, b| a.error_percent.total_cmp(&b.error_percent));
-    (reports, spread)
+    (reports, repeat_scatter)
 }
 
-fn report(knob: Knob, points: &[Point], spread: f64) -> Option<KnobReport> {
+fn report(knob: Knob, points: &[Point], repeat_scatter: f64) -> Option<KnobReport> {
     /// A step that moves the time by less is free, and one that moves the error by less does not (%).
     const FREE: f64 = 5.0;
     const STILL: f64 = 3.0;
@@ -61,7 +61,7 @@ fn report(knob: Knob, points: &[Point], spread: f64) -> Option<KnobReport> {
         pairs.iter().map(change).collect()
     };
     let errors = changes(|m| m.error_mm);
-    let scatter = scatter(&errors, spread);
+    let scatter = scatter(&errors, repeat_scatter);
     let [cpu, error, middle] = [
         midpoint_median(changes(|m| m.cpu_seconds)),
         midpoint_median(errors),
@@ -90,13 +90,13 @@ fn report(knob: Knob, points: &[Point], spread: f64) -> Option<KnobReport> {
 
 /// Standard error of the median of some changes (%): from their own scatter, for most of what moves an error moves
 /// both of a pair; of a single pair from that of repeats.
-fn scatter(changes: &[f64], spread: f64) -> f64 {
+fn scatter(changes: &[f64], repeat_scatter: f64) -> f64 {
     /// Of a median over that of a mean, for normal values.
     const MEDIAN: f64 = 1.253;
     const FEW: usize = 2;
     let n = changes.len() as f64;
     let one = if changes.len() < FEW {
-        spread * std::f64::consts::SQRT_2
+        repeat_scatter * std::f64::consts::SQRT_2
     } else {
         let mean = changes.iter().sum::<f64>() / n;
         let squares: f64 = changes.iter().map(|c| (c - mean).powi(2)).sum();
@@ -124,7 +124,7 @@ fn pairs(knob: Knob, points: &[Point]) -> Vec<(&Measured, &Measured)> {
 }
 
 /// How far the errors of repeats lie apart (% of their mean); zero where there are none.
-fn spread(points: &[Point]) -> f64 {
+fn repeat_scatter(points: &[Point]) -> f64 {
     let Some(first) = points.iter().find(|p| p.setting.repeat > 0) else {
         return 0.0;
     };
@@ -182,8 +182,11 @@ mod tests {
         for knob in [Knob::Vertices, Knob::Folds, Knob::PointTip] {
             points.extend(centre.neighbours(knob).into_iter().map(point));
         }
-        let (reports, spread) = knobs(&points);
-        assert!(spread > 0.1 && spread < 1.0, "{spread}");
+        let (reports, repeat_scatter) = knobs(&points);
+        assert!(
+            repeat_scatter > 0.1 && repeat_scatter < 1.0,
+            "{repeat_scatter}"
+        );
         let of = |knob| reports.iter().find(|r| r.knob == knob).unwrap();
         assert_eq!(reports[0].knob, Knob::Vertices);
         assert_eq!(of(Knob::Vertices).bought, Bought::Accuracy);

@@ -48,7 +48,7 @@ pub struct Spent {
     pub tuning_touches: usize,
 }
 
-/// Where the ladders begin, and where a knob stands that nothing hears.
+/// Where the ladders begin, and where a knob stands that nothing uses.
 const USUAL: Spent = Spent {
     vertices: 2400,
     touches: 400,
@@ -218,7 +218,7 @@ impl Setting {
         if project.judging().estimator() != self.estimator {
             project.evaluation.estimator = self.estimator;
         }
-        if self.hears(Knob::Unexplained) {
+        if self.uses(Knob::Unexplained) {
             project.candidates.unexplained = self.unexplained;
         }
         project.budget.limits = self.budget_limits();
@@ -241,17 +241,17 @@ impl Setting {
         let Some(spent) = self.limits else {
             return Limits::default();
         };
-        let heard = |knob: Knob, count: usize| self.hears(knob).then_some(count);
+        let used = |knob: Knob, count: usize| self.uses(knob).then_some(count);
         Limits {
             elements_percent: Some(ELEMENTS_PERCENT),
             vertices: Some(spent.vertices),
             touches: Some(spent.touches),
-            candidates: heard(Knob::Unexplained, MOST_CANDIDATES),
-            expected_places: heard(Knob::ExpectedPlaces, spent.expected_places),
-            expected_presses: heard(Knob::ExpectedPresses, spent.expected_presses),
-            selection_touches: heard(Knob::SelectionTouches, spent.selection_touches),
-            selection_candidates: heard(Knob::SelectionCandidates, spent.selection_candidates),
-            tuning_touches: heard(Knob::TuningTouches, spent.tuning_touches),
+            candidates: used(Knob::Unexplained, MOST_CANDIDATES),
+            expected_places: used(Knob::ExpectedPlaces, spent.expected_places),
+            expected_presses: used(Knob::ExpectedPresses, spent.expected_presses),
+            selection_touches: used(Knob::SelectionTouches, spent.selection_touches),
+            selection_candidates: used(Knob::SelectionCandidates, spent.selection_candidates),
+            tuning_touches: used(Knob::TuningTouches, spent.tuning_touches),
         }
     }
 
@@ -298,8 +298,7 @@ impl Setting {
         self.answers(project)
             && (quality, *limits) == (self.quality, self.budget_limits())
             && self.selector == project.selection.selector
-            && (self.unexplained == project.candidates.unexplained
-                || !self.hears(Knob::Unexplained))
+            && (self.unexplained == project.candidates.unexplained || !self.uses(Knob::Unexplained))
     }
 
     /// Whether a project can be computed so, and it answers the project's own question: with its signal and the
@@ -312,10 +311,10 @@ impl Setting {
             && self.limits.is_none_or(|spent| spent.is_offered())
     }
 
-    /// Whether anything at this setting hears a knob. What greedy SVR scores and regressions are tuned on is nothing to
+    /// Whether anything at this setting uses a knob. What greedy SVR scores and regressions are tuned on is nothing to
     /// expected error and matching; candidates are greedy SVR's, and the baseline of a regression.
     #[must_use]
-    pub fn hears(&self, knob: Knob) -> bool {
+    pub fn uses(&self, knob: Knob) -> bool {
         let greedy = self.selector == SelectorKind::GreedySvr;
         let trained = self.estimator == EstimatorKind::Svr;
         match knob {
@@ -330,7 +329,7 @@ impl Setting {
         }
     }
 
-    /// The same with knobs that nothing hears at their usual places, so that equal work is one setting.
+    /// The same with knobs that nothing uses at their usual places, so that equal work is one setting.
     #[must_use]
     pub fn canonical(mut self) -> Self {
         if self.signal != Signal::Strain {
@@ -339,24 +338,24 @@ impl Setting {
         let Some(mut spent) = self.limits else {
             return self;
         };
-        let heard = |knob| self.hears(knob);
-        if !heard(Knob::ExpectedPlaces) {
+        let used = |knob| self.uses(knob);
+        if !used(Knob::ExpectedPlaces) {
             spent.expected_places = USUAL.expected_places;
             spent.expected_presses = USUAL.expected_presses;
         }
-        if !heard(Knob::SelectionTouches) {
+        if !used(Knob::SelectionTouches) {
             spent.selection_touches = USUAL.selection_touches;
             spent.selection_candidates = USUAL.selection_candidates;
         }
-        if !heard(Knob::Folds) {
+        if !used(Knob::Folds) {
             spent.folds = USUAL.folds;
             spent.svr_tolerance_mm = USUAL.svr_tolerance_mm;
         }
-        if !heard(Knob::TuningTouches) {
+        if !used(Knob::TuningTouches) {
             spent.tuning_touches = USUAL.tuning_touches;
             spent.point_tip = USUAL.point_tip;
         }
-        if !heard(Knob::Unexplained) {
+        if !used(Knob::Unexplained) {
             self.unexplained = USUAL_UNEXPLAINED;
         }
         spent.selection_touches = spent.selection_touches.min(spent.touches);
@@ -374,11 +373,11 @@ impl Setting {
         self
     }
 
-    /// The settings one step away along a knob: none where nothing hears it.
+    /// The settings one step away along a knob: none where nothing uses it.
     #[must_use]
     pub fn neighbours(&self, knob: Knob) -> Vec<Self> {
         let mut found: Vec<Self> = match self.limits {
-            Some(spent) if self.hears(knob) => self.turned(knob, spent),
+            Some(spent) if self.uses(knob) => self.turned(knob, spent),
             _ => Vec::new(),
         };
         for setting in &mut found {
@@ -506,26 +505,26 @@ impl Setting {
             return format!("the quality “{}”", self.quality.name());
         };
         let mut words = format!("{} vertices, {} touches", spent.vertices, spent.touches);
-        if self.hears(Knob::Unexplained) {
+        if self.uses(Knob::Unexplained) {
             let percent = (self.unexplained * 1000.0).round() / 10.0;
             let _ = write!(words, ", {percent} % unexplained");
         }
         let _ = write!(words, ", {}", self.selector.title());
-        if self.hears(Knob::ExpectedPlaces) {
+        if self.uses(Knob::ExpectedPlaces) {
             let (places, presses) = (spent.expected_places, spent.expected_presses);
             let _ = write!(words, " on {places} places × {presses} presses");
         }
-        if self.hears(Knob::SelectionTouches) {
+        if self.uses(Knob::SelectionTouches) {
             let (touches, candidates) = (spent.selection_touches, spent.selection_candidates);
             let _ = write!(words, " on {touches} touches × {candidates} candidates");
         }
-        if self.hears(Knob::Folds) {
+        if self.uses(Knob::Folds) {
             let _ = write!(words, ", {} folds", spent.folds);
         }
-        if self.hears(Knob::TuningTouches) {
+        if self.uses(Knob::TuningTouches) {
             let _ = write!(words, ", tuned on {}", spent.tuning_touches);
         }
-        if self.hears(Knob::SvrTolerance) {
+        if self.uses(Knob::SvrTolerance) {
             let _ = write!(words, ", to {} mm", spent.svr_tolerance_mm);
         }
         if spent.as_solid {
@@ -660,7 +659,7 @@ mod tests {
             setting.apply(&mut applied);
             assert_eq!(applied.judging().estimator(), setting.estimator);
         }
-        // What nobody hears is left as the project has it.
+        // What nobody uses is left as the project has it.
         let mut applied = project.clone();
         centre.apply(&mut applied);
         assert_eq!(applied.candidates, project.candidates);

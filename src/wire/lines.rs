@@ -166,8 +166,8 @@ mod tests {
         let mut reader = LineReader::default();
         reader.push(&vec![b'1'; 1_000_000], |r| panic!("{r:?}"));
         assert!(reader.line.capacity() <= 2 * LONGEST);
-        let mut told = Vec::new();
-        reader.push(b"\n1,2\n", |r| told.push(r));
-        assert_eq!(told, [Reading::Other, Reading::Values(vec![1.0, 2.0])]);
+        let mut met = Vec::new();
+        reader.push(b"\n1,2\n", |r| met.push(r));
+        assert_eq!(met, [Reading::Other, Reading::Values(vec![1.0, 2.0])]);
     }
 }

@@ -67,7 +67,7 @@ impl Trial {
         let sensing = (sets.iter())
             .map(|set| {
                 let glued = with_gauges(&inputs, &simulated, &set.sites);
-                design::sense(&glued, &budget(), &unwatched).unwrap()
+                design::sensing(&glued, &budget(), &unwatched).unwrap()
             })
             .collect();
         Self {
@@ -115,7 +115,7 @@ impl Trial {
                 let dataset = &self.simulated.dataset;
                 let all = dataset.slopes.as_ref().unwrap().touches();
                 (evenly(all.len(), count).into_iter())
-                    .map(|k| map.index.nearest(dataset.touches[all[k]].position).0)
+                    .map(|k| map.mesh.index().nearest(dataset.touches[all[k]].position).0)
                     .collect()
             }
         }
@@ -129,7 +129,7 @@ impl Trial {
         let drawn = &sensing.drawn;
         let errors = Errors {
             relative: share,
-            spread: Some(Arc::clone(&sensing.spread)),
+            gluing_deviation: Some(Arc::clone(&sensing.gluing_deviation)),
             ..Errors::of_noise(noise, sensing.gauges.len())
         };
         let mut matching = Matching::new(Arc::clone(&drawn.map), errors, 60.0);

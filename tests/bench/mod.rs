@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use hapdef::budget::unwatched;
-use hapdef::elasticity::{Freedoms, Material, Section, ShellModel};
+use hapdef::elasticity::{DofSet, Material, Section, ShellModel};
 use hapdef::mesh::TriMesh;
 
 /// The diagonal that cells are cut along: benchmark figures depend on it.
@@ -58,11 +58,7 @@ fn solve(
     held: impl Fn(DVec3) -> u8,
     forces: &[(u32, DVec3)],
 ) -> Vec<f64> {
-    let held: Vec<Freedoms> = mesh
-        .positions()
-        .iter()
-        .map(|&p| Freedoms(held(p)))
-        .collect();
+    let held: Vec<DofSet> = mesh.positions().iter().map(|&p| DofSet(held(p))).collect();
     let model = ShellModel::new(&Arc::new(mesh.clone()), section, &held, &unwatched).unwrap();
     model.solve(&forces.to_vec())
 }
@@ -81,7 +77,7 @@ fn on(x: f64, y: f64) -> bool {
 }
 
 fn symmetry(axis: usize) -> u8 {
-    Freedoms::symmetry(axis).0
+    DofSet::symmetry(axis).0
 }
 
 /// Scordelis–Lo roof, one quarter: vertical displacement at the middle of the free edge, of 0.3024.
@@ -115,7 +111,7 @@ pub fn ratio_roof(n: usize) -> f64 {
                 mask |= symmetry(0);
             }
             if on(p.y, half) {
-                mask |= Freedoms::of(&[0, 2]).0;
+                mask |= DofSet::of(&[0, 2]).0;
             }
             mask
         },
@@ -148,7 +144,7 @@ pub fn ratio_cylinder(n: usize) -> f64 {
                 mask |= symmetry(2);
             }
             if on(p.y, half) {
-                mask |= Freedoms::of(&[0, 2]).0;
+                mask |= DofSet::of(&[0, 2]).0;
             }
             mask
         },
@@ -285,7 +281,7 @@ pub fn ratio_cook(n: usize) -> f64 {
             if on(p.x, 0.0) {
                 63
             } else {
-                Freedoms::of(&[2, 3, 4]).0
+                DofSet::of(&[2, 3, 4]).0
             }
         },
         &forces,

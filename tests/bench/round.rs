@@ -9,7 +9,7 @@ use hapdef::elasticity::estimate::under_load;
 use hapdef::elasticity::grade::{Graded, Ground};
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::support::Region;
-use hapdef::elasticity::{Freedoms, Model as _, Section, ShellModel, Support, Touch};
+use hapdef::elasticity::{DofSet, Model as _, Section, ShellModel, Support, Touch};
 use hapdef::mesh::{SurfacePoint, TriMesh};
 
 use super::section;
@@ -21,7 +21,10 @@ pub fn strain_error(
     places: &[DVec3],
     exact: impl Fn(DVec3) -> [f64; 3],
 ) -> f64 {
-    let points: Vec<SurfacePoint> = places.iter().map(|&p| model.index.nearest(p).0).collect();
+    let points: Vec<SurfacePoint> = places
+        .iter()
+        .map(|&p| model.mesh.index().nearest(p).0)
+        .collect();
     let observer = model.observer(&points, Face::Inside);
     let (mut sum, mut largest) = (0.0, 0.0f64);
     for ((&p, strain), frame) in places
@@ -102,7 +105,7 @@ impl Disc {
         let mask = self.part.positions().iter().map(|p| p.length() > edge);
         Support {
             region: Region::Vertices(Arc::new(mask.collect())),
-            held: Freedoms::ALL,
+            held: DofSet::ALL,
         }
     }
 

@@ -1,5 +1,5 @@
 //! The shell against a three-dimensional solid model of a slotted limb that shares nothing with it but
-//! its geometry: 747 000 freedoms, quadratic wedges (`tests/fixtures/slotted/solid.py`; its own two
+//! its geometry: 747 000 degrees of freedom, quadratic wedges (`tests/fixtures/slotted/solid.py`; its own two
 //! finest meshes differ by 0.04 % under the load and by 0.2 % in strain).
 //!
 //! Wall 3 mm on a radius of 30 mm: the thick end of what a shell is for.

@@ -11,7 +11,7 @@ use hapdef::elasticity::solid::SolidModel;
 use hapdef::elasticity::solid::ground::SolidGround;
 use hapdef::elasticity::solid::immersed::{Fineness, Immersed};
 use hapdef::elasticity::support::Region;
-use hapdef::elasticity::{Freedoms, Material, Model as _, Support, Touch};
+use hapdef::elasticity::{DofSet, Material, Model as _, Support, Touch};
 use hapdef::given::GivenSite;
 use hapdef::io::points::{read_sites, read_touches};
 use hapdef::mesh::TriMesh;
@@ -74,7 +74,7 @@ pub fn tube(inner: f64, outer: f64, length: f64, n: u32) -> Arc<TriMesh> {
 pub fn clamp(lower: DVec3, upper: DVec3) -> Support {
     Support {
         region: Region::Box(OrientedBox::of_file(lower, upper)),
-        held: Freedoms::ALL,
+        held: DofSet::ALL,
     }
 }
 
@@ -91,13 +91,13 @@ pub fn model(
 /// Displacement under a touch, along it, a newton (m/N).
 pub fn under(m: &SolidModel, touch: &Touch) -> f64 {
     let load = m.load(touch);
-    let u = m.system().solve_freedoms(&load);
+    let u = m.system().solve_dofs(&load);
     load.iter().map(|&(i, f)| f * u[i]).sum::<f64>() / (touch.force * touch.force)
 }
 
 /// Strain at a place on the surface along a direction under a touch.
 pub fn strain_along(m: &SolidModel, touch: &Touch, place: DVec3, direction: DVec3) -> f64 {
-    let u = m.system().solve_freedoms(&m.load(touch));
+    let u = m.system().solve_dofs(&m.load(touch));
     let observer = m.observer(&[m.index().nearest(place).0], Face::Inside);
     let frame = observer.frames()[0];
     let [xx, yy, xy] = observer.strain_of(m, &u)[0];
@@ -179,12 +179,12 @@ pub fn bent_tube(cells: f64, order: usize) -> Found {
             tip_radius: 0.003,
         };
         moment += position.x * touch.force;
-        for (freedom, force) in m.load(&touch) {
-            *load.entry(freedom).or_insert(0.0) += force;
+        for (dof, force) in m.load(&touch) {
+            *load.entry(dof).or_insert(0.0) += force;
         }
     }
     let load: Vec<(usize, f64)> = load.into_iter().collect();
-    let u = m.system().solve_freedoms(&load);
+    let u = m.system().solve_dofs(&load);
     // The second moment of the polygon's ring, which is a little less than the circle's.
     let n = f64::from(sides);
     let polygon = (std::f64::consts::TAU / n).sin() * n / std::f64::consts::TAU;
@@ -341,7 +341,7 @@ fn departure(found: &Readings, right: &Readings) -> Found {
 }
 
 /// The slotted tube of the shell's test, thick, against a solid model that shares nothing with this one (747 000
-/// freedoms, quadratic wedges), as [`departure`].
+/// degrees of freedom, quadratic wedges), as [`departure`].
 pub fn slotted(cells_mm: f64, order: usize) -> Found {
     let found = slotted_solid(3e-3, cells_mm * 1e-3, order);
     departure(&found, &slotted_reference(&found))

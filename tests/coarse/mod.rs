@@ -1,4 +1,4 @@
-//! The bundled limb so coarse that a whole road on it ends soon.
+//! The bundled limb so coarse that a whole pipeline on it ends soon.
 
 use std::sync::Arc;
 

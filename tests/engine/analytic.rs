@@ -15,7 +15,7 @@ use glam::DVec3;
 use hapdef::budget::unwatched;
 use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::Face;
-use hapdef::elasticity::{Freedoms, Material, Model, Section, ShellModel};
+use hapdef::elasticity::{DofSet, Material, Model, Section, ShellModel};
 use hapdef::mesh::{SurfacePoint, TriMesh};
 
 fn near(name: &str, computed: f64, known: f64) {
@@ -58,7 +58,7 @@ fn patch(field: impl Fn(DVec3) -> [f64; 6]) -> (TriMesh, Section, f64, f64) {
         },
         thickness: 1e-3,
     };
-    // Rim freedoms are given, so the inner ones balance K_ii u_i = -K_ir u_r: solve it densely.
+    // Rim degrees of freedom are given, so the inner ones balance K_ii u_i = -K_ir u_r: solve it densely.
     let n = 48;
     let mut k = nalgebra::DMatrix::<f64>::zeros(n, n);
     for (t, tri) in mesh.triangles().iter().enumerate() {
@@ -182,14 +182,14 @@ fn strain_on_the_faces_of_a_clamped_beam() {
         },
         thickness: t,
     };
-    let held: Vec<Freedoms> = mesh
+    let held: Vec<DofSet> = mesh
         .positions()
         .iter()
         .map(|p| {
             if p.x < 1e-9 {
-                Freedoms::ALL
+                DofSet::ALL
             } else {
-                Freedoms::default()
+                DofSet::default()
             }
         })
         .collect();
@@ -206,7 +206,7 @@ fn strain_on_the_faces_of_a_clamped_beam() {
     };
     let forces = end.iter().map(|&v| (v, DVec3::NEG_Z * share(v))).collect();
     let u = model.solve(&forces);
-    let middle = model.index.nearest(DVec3::new(0.051, 0.0052, 0.0)).0;
+    let middle = model.mesh.index().nearest(DVec3::new(0.051, 0.0052, 0.0)).0;
     let at: [SurfacePoint; 1] = [middle];
     let expected = 6.0 * (length - mesh.point(middle).x) / (e * width * t * t);
     for (face, sign) in [(Face::Outside, 1.0), (Face::Inside, -1.0)] {

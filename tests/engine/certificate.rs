@@ -10,7 +10,7 @@ use hapdef::design;
 use hapdef::placement::expected_error::{
     Certificate, Detail, ExpectedError, Forces, Knowledge, ROUNDS, Scene, certify, local,
 };
-use hapdef::placement::{Pool, Request, Selector, SelectorKind, SensorSet, Wishes};
+use hapdef::placement::{Constraints, Pool, Request, Selector, SelectorKind, SensorSet};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -70,7 +70,7 @@ impl Patch {
         Scene::new(&self.x, &self.targets, &known, detail(), &unwatched).unwrap()
     }
 
-    fn chosen(&self, wishes: &Wishes) -> SensorSet {
+    fn chosen(&self, constraints: &Constraints) -> SensorSet {
         let sites: Vec<usize> = (0..self.x.rows()).collect();
         let pool = Pool {
             x: &self.x,
@@ -79,7 +79,7 @@ impl Patch {
             positions: &[],
         };
         let request = Request {
-            wishes,
+            constraints,
             watch: &unwatched,
             found: &|_| {},
         };
@@ -168,7 +168,7 @@ fn a_choice_says_how_far_from_the_best_it_can_be() {
     for loose in [false, true] {
         let patch = Patch::new(11, 40, loose);
         for gauges in [3, 6] {
-            let set = patch.chosen(&Wishes::count(gauges));
+            let set = patch.chosen(&Constraints::count(gauges));
             let certificate = set.certificate.unwrap();
             assert!(certificate.bound_mm > 0.0);
             assert!(certificate.bound_mm <= certificate.local_mm, "{set:?}");
@@ -188,11 +188,11 @@ fn a_choice_says_how_far_from_the_best_it_can_be() {
 fn gauges_that_must_be_there_are_in_the_bound() {
     let patch = Patch::new(11, 40, true);
     let bound = |required: &[usize]| {
-        let wishes = Wishes {
+        let constraints = Constraints {
             required: required.to_vec(),
-            ..Wishes::count(4)
+            ..Constraints::count(4)
         };
-        patch.chosen(&wishes).certificate.unwrap()
+        patch.chosen(&constraints).certificate.unwrap()
     };
     let (free, bound_to) = (bound(&[]), bound(&[0, 1, 2]));
     assert!(bound_to.bound_mm > free.bound_mm, "{free:?} {bound_to:?}");
@@ -227,7 +227,7 @@ fn one_thread_or_two_bound_the_same_to_the_byte() {
             .num_threads(threads)
             .build()
             .unwrap()
-            .install(|| patch.chosen(&Wishes::count(5)))
+            .install(|| patch.chosen(&Constraints::count(5)))
     };
     assert_eq!(run(1), run(2));
 }

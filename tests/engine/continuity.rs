@@ -7,7 +7,7 @@ use glam::DVec3;
 use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::design::{self, Inputs, Simulated};
 use hapdef::mesh::TriMesh;
-use hapdef::placement::{Selection, SelectorKind, greedy_svr, lead};
+use hapdef::placement::{Selection, SelectorKind, greedy_svr, margin};
 use hapdef::project::Elements;
 
 const CHANGE: f64 = 1e-6;
@@ -62,7 +62,7 @@ fn selected(inputs: &Inputs) -> (Simulated, Vec<Selection>) {
 fn tolerance(kind: SelectorKind) -> f64 {
     match kind {
         SelectorKind::GreedySvr => greedy_svr::TOLERANCE,
-        _ => lead::TOLERANCE,
+        _ => margin::TOLERANCE,
     }
 }
 
@@ -86,7 +86,7 @@ fn agree(what: &str, open: f64, before: &[Selection], after: &[Selection]) -> us
         let own = tolerance(a.selector);
         let says = |start: &str| a.achieved.notes.iter().any(|n| n.starts_with(start));
         for (x, y) in a.sets.iter().zip(&b.sets) {
-            let within = |tolerance: f64| x.lead.is_some_and(|lead| lead <= 2.0 * tolerance);
+            let within = |tolerance: f64| x.margin.is_some_and(|margin| margin <= 2.0 * tolerance);
             if within(own) || (open > 0.0 && within(open)) {
                 assert!(
                     !within(own) || says("Ties with"),
@@ -102,7 +102,7 @@ fn agree(what: &str, open: f64, before: &[Selection], after: &[Selection]) -> us
                 }
                 break;
             }
-            assert_eq!(x.sites, y.sites, "{what}: {name}, lead {:?}", x.lead);
+            assert_eq!(x.sites, y.sites, "{what}: {name}, lead {:?}", x.margin);
             compared += 1;
         }
     }
@@ -153,7 +153,7 @@ fn a_millionth_changes_no_pick_that_leads() {
         .iter()
         .find(|s| s.selector == SelectorKind::Entropy)
         .unwrap();
-    assert!(by_shape.sets.iter().any(|s| s.lead == Some(0.0)));
+    assert!(by_shape.sets.iter().any(|s| s.margin == Some(0.0)));
     assert!(
         by_shape
             .achieved

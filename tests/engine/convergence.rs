@@ -10,7 +10,7 @@ use bench::{Cut, grid, section};
 use glam::DVec3;
 use hapdef::budget::{Quality, unwatched};
 use hapdef::elasticity::linearity::linearity;
-use hapdef::elasticity::{Freedoms, ShellModel, Touch};
+use hapdef::elasticity::{DofSet, ShellModel, Touch};
 use hapdef::mesh::TriMesh;
 
 /// Observed order from three meshes of which each halves the last: log₂ of successive changes.
@@ -54,12 +54,12 @@ fn pressure(mesh: &TriMesh) -> Vec<(u32, DVec3)> {
         .collect()
 }
 
-fn clamped_where(mesh: &TriMesh, test: impl Fn(DVec3) -> bool) -> Vec<Freedoms> {
+fn clamped_where(mesh: &TriMesh, test: impl Fn(DVec3) -> bool) -> Vec<DofSet> {
     let all = |p: &DVec3| {
         if test(*p) {
-            Freedoms::ALL
+            DofSet::ALL
         } else {
-            Freedoms::default()
+            DofSet::default()
         }
     };
     mesh.positions().iter().map(all).collect()
@@ -108,21 +108,21 @@ fn inner_strain_of_a_clamped_disc_converges_to_the_closed_form() {
     let (r, s) = (5.0, section(1.7472e7, 0.3, 0.02));
     let error = |n: usize| {
         let mesh = Arc::new(bench::disc(n, r));
-        let held: Vec<Freedoms> = mesh
+        let held: Vec<DofSet> = mesh
             .positions()
             .iter()
             .map(|p| {
                 let mut mask = 0;
                 if p.x.abs() < 1e-9 {
-                    mask |= Freedoms::symmetry(0).0;
+                    mask |= DofSet::symmetry(0).0;
                 }
                 if p.y.abs() < 1e-9 {
-                    mask |= Freedoms::symmetry(1).0;
+                    mask |= DofSet::symmetry(1).0;
                 }
                 if p.length() > r * (1.0 - 1e-9) {
-                    mask |= Freedoms::ALL.0;
+                    mask |= DofSet::ALL.0;
                 }
-                Freedoms(mask)
+                DofSet(mask)
             })
             .collect();
         let model = ShellModel::new(&mesh, s, &held, &unwatched).unwrap();

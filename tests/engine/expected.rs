@@ -9,13 +9,13 @@ use agreement::{FORCES_N, Touched, Trial};
 use hapdef::budget::{Progress, unwatched};
 use hapdef::dataset::SignalMatrix;
 use hapdef::gaussian_process::{Covariance, Distances, GpKernel};
+use hapdef::placement::constraints::{Loss, LostBy, Thorough};
 use hapdef::placement::entropy::Entropy;
 use hapdef::placement::expected_error::{Detail, ExpectedError, Knowledge, ROUNDS};
 use hapdef::placement::greedy_svr::{GreedySvr, TOLERANCE};
 use hapdef::placement::information::Geometry;
 use hapdef::placement::mutual_information::MutualInformation;
-use hapdef::placement::wishes::{Loss, LostBy, Thorough};
-use hapdef::placement::{PlacementError, Pool, Request, Selection, Selector, Wishes};
+use hapdef::placement::{Constraints, PlacementError, Pool, Request, Selection, Selector};
 use hapdef::regression::tune::Effort;
 use hapdef::regression::{Grouping, Hyper};
 
@@ -109,7 +109,7 @@ impl Square {
     fn chosen_by(
         &self,
         selector: &dyn Selector,
-        wishes: &Wishes,
+        constraints: &Constraints,
     ) -> Result<Selection, PlacementError> {
         let pool = Pool {
             x: &self.x,
@@ -118,15 +118,16 @@ impl Square {
             positions: &self.positions,
         };
         let request = Request {
-            wishes,
+            constraints,
             watch: &unwatched,
             found: &|_| (),
         };
         selector.select(&pool, &request)
     }
 
-    fn chosen(&self, wishes: &Wishes, rounds: usize) -> Selection {
-        self.chosen_by(&expected_error(rounds), wishes).unwrap()
+    fn chosen(&self, constraints: &Constraints, rounds: usize) -> Selection {
+        self.chosen_by(&expected_error(rounds), constraints)
+            .unwrap()
     }
 }
 
@@ -154,18 +155,18 @@ fn last(selection: &Selection) -> (Vec<usize>, f64) {
     (sites, set.criterion.unwrap())
 }
 
-fn failing(failure: f64, gauges: usize, by: LostBy) -> Wishes {
-    Wishes {
+fn failing(failure: f64, gauges: usize, by: LostBy) -> Constraints {
+    Constraints {
         failure,
         loss: Loss { gauges, by },
-        ..Wishes::count(3)
+        ..Constraints::count(3)
     }
 }
 
 #[test]
 fn a_gauge_that_may_be_lost_is_not_relied_upon() {
     let square = Square::of_four();
-    let (without, error) = last(&square.chosen(&Wishes::count(3), ROUNDS));
+    let (without, error) = last(&square.chosen(&Constraints::count(3), ROUNDS));
     assert_eq!(without, [0, 1, 2]);
     for by in LostBy::ALL {
         // Only one site tells y for itself; the one that tells both can stand in for any of the others.
@@ -184,7 +185,7 @@ fn a_gauge_that_may_be_lost_is_not_relied_upon() {
 #[test]
 fn losses_and_starts_give_the_same_bytes_on_any_number_of_threads() {
     let square = Square::of_twelve();
-    let wishes = Wishes {
+    let constraints = Constraints {
         failure: 0.2,
         loss: Loss {
             gauges: 2,
@@ -194,11 +195,12 @@ fn losses_and_starts_give_the_same_bytes_on_any_number_of_threads() {
             exchange: true,
             starts: 3,
         },
-        ..Wishes::count(4)
+        ..Constraints::count(4)
     };
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.unwrap().install(|| square.chosen(&wishes, ROUNDS))
+        pool.unwrap()
+            .install(|| square.chosen(&constraints, ROUNDS))
     };
     assert_eq!(on(1), on(2));
 }
@@ -221,7 +223,7 @@ fn a_choice_with_losses_can_be_stopped() {
         }
     };
     let request = Request {
-        wishes: &failing(0.3, 1, LostBy::Worst),
+        constraints: &failing(0.3, 1, LostBy::Worst),
         watch: &watch,
         found: &|_| (),
     };
@@ -273,13 +275,13 @@ fn exchange_and_starts_make_no_criterion_worse() {
     for (selector, sign) in selectors {
         let name = selector.kind().name();
         let with = |exchange: bool, starts: usize| {
-            let wishes = Wishes {
+            let constraints = Constraints {
                 required: vec![7],
                 spacing: 0.003,
                 thorough: Thorough { exchange, starts },
-                ..Wishes::count(4)
+                ..Constraints::count(4)
             };
-            let selection = square.chosen_by(selector, &wishes).unwrap();
+            let selection = square.chosen_by(selector, &constraints).unwrap();
             let set = selection.sets.last().unwrap();
             assert_eq!((set.sites.len(), set.sites[0]), (4, 7), "{name}");
             sign * set.criterion.unwrap()

@@ -158,7 +158,7 @@ fn noise_above_every_signal_leaves_no_site() {
 fn one_feasible_site_is_taken_and_a_second_is_refused() {
     let open = sound("all sites", &limb());
     let part = limb().part;
-    let index = hapdef::mesh::locate::SurfaceIndex::new(&part);
+    let index = part.index();
     let one = open.reduced.feasible.iter().find_map(|&s| {
         let at = index.nearest(open.simulated.dataset.sites[s].position).0;
         let mut mask = vec![false; part.positions().len()];

@@ -1,4 +1,4 @@
-//! What is foreseen of a part with tetrahedra of its own, against what the road then does with them.
+//! What is foreseen of a part with tetrahedra of its own, against what the pipeline then does with them.
 
 use crate::bench;
 

@@ -27,7 +27,7 @@ struct Lab {
 fn lab() -> &'static Lab {
     static LAB: LazyLock<Lab> = LazyLock::new(|| {
         let inputs = hapdef::cli::bundled().unwrap().inputs;
-        let sensing = design::sense(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
+        let sensing = design::sensing(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
         Lab { inputs, sensing }
     });
     &LAB
@@ -90,7 +90,7 @@ fn matching_is_as_good_as_can_be() {
                     );
                 }
             }
-            let at = sensing.drawn.map.index.nearest(touch.position).0;
+            let at = sensing.drawn.map.mesh.index().nearest(touch.position).0;
             let (bound, _) = cramer_rao(&sensing.drawn.map, at, force, &vec![NOISE; gauges]);
             ratios.push(squares.sqrt() / bound);
         }
@@ -158,7 +158,7 @@ fn known_touches_show_how_gauges_are_glued() {
     let known: Vec<Known> = touches(24, 8, 10.0)
         .iter()
         .map(|t| {
-            let at = real.index.nearest(t.position).0;
+            let at = real.mesh.index().nearest(t.position).0;
             let clean: Vec<f64> = real.at(at).iter().map(|g| 10.0 * g).collect();
             Known {
                 at,
@@ -181,7 +181,7 @@ fn known_touches_show_how_gauges_are_glued() {
     let mut before = 0.0;
     let mut after = 0.0;
     for t in touches(50, 9, 1.0) {
-        let at = real.index.nearest(t.position).0;
+        let at = real.mesh.index().nearest(t.position).0;
         let off = |map: &hapdef::inference::ResponseMap| {
             let pairs = map.at(at).into_iter().zip(real.at(at));
             pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
@@ -236,7 +236,7 @@ impl Bench {
         for _ in 0..milliseconds {
             let (mut bytes, mut truths) = (Vec::new(), Vec::new());
             self.board
-                .hear(&std::mem::take(&mut to_board), self.now_us, &mut bytes);
+                .receive(&std::mem::take(&mut to_board), self.now_us, &mut bytes);
             self.board.say(self.now_us, &mut bytes, |t| truths.push(t));
             let pipeline = &mut self.pipeline;
             self.receiver
@@ -347,7 +347,8 @@ fn the_same_on_any_number_of_threads() {
             .build()
             .unwrap();
         pool.install(|| {
-            let sensing = design::sense(&lab.inputs, &Quality::Draft.budget(), &unwatched).unwrap();
+            let sensing =
+                design::sensing(&lab.inputs, &Quality::Draft.budget(), &unwatched).unwrap();
             let mut matching = Matching::new(
                 Arc::clone(&sensing.drawn.map),
                 Errors::of_noise(NOISE, 10),

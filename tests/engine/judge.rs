@@ -133,7 +133,7 @@ fn the_same_on_one_thread_and_on_two() {
     assert_eq!(one.evaluation.matched, two.evaluation.matched);
     assert_eq!(one.evaluation.found, two.evaluation.found);
     assert_eq!(one.evaluation.failures, two.evaluation.failures);
-    assert_eq!(one.truth.pressed, two.truth.pressed);
+    assert_eq!(one.reference.pressed, two.reference.pressed);
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn another_region_is_quoted_from_what_was_found() {
         let known = design::Known {
             reduced: Some((Arc::clone(&first.feasibility), Arc::clone(&first.reduced))),
             selections: Some(Arc::clone(&first.selections)),
-            truth: Some(Arc::clone(&first.truth)),
+            reference: Some(Arc::clone(&first.reference)),
             evaluation: Some(Arc::clone(&first.evaluation)),
         };
         let simulated = Arc::clone(&first.simulated);

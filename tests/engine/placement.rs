@@ -1,4 +1,4 @@
-//! The selectors against the slow way, what users may wish of them, and data at the edge.
+//! The selectors against the slow way, the constraints that users may set, and data at the edge.
 
 use glam::DVec3;
 use hapdef::budget::{StopReason, unwatched};
@@ -9,7 +9,7 @@ use hapdef::placement::greedy_svr::{Audit, GreedySvr, TOLERANCE};
 use hapdef::placement::information::Geometry;
 use hapdef::placement::mutual_information::MutualInformation;
 use hapdef::placement::pca_qr::PcaQr;
-use hapdef::placement::{PlacementError, Pool, Request, Selection, Selector, Wishes};
+use hapdef::placement::{Constraints, PlacementError, Pool, Request, Selection, Selector};
 use hapdef::regression::tune::Effort;
 use hapdef::regression::{Grouping, Hyper};
 
@@ -115,12 +115,12 @@ const PAPER: Hyper = Hyper {
 fn choose(
     selector: &dyn Selector,
     strip: &Strip,
-    wishes: &Wishes,
+    constraints: &Constraints,
 ) -> Result<Selection, PlacementError> {
     selector.select(
         &strip.pool(),
         &Request {
-            wishes,
+            constraints,
             watch: &unwatched,
             found: &|_| (),
         },
@@ -132,7 +132,7 @@ fn greedy_svr_chooses_as_the_plain_algorithm() {
     let strip = Strip::new(40, 240);
     for hyper in [TUNED, PAPER] {
         let selector = svr(hyper);
-        let selection = choose(&selector, &strip, &Wishes::count(4)).unwrap();
+        let selection = choose(&selector, &strip, &Constraints::count(4)).unwrap();
         let mut chosen: Vec<usize> = Vec::new();
         for set in &selection.sets {
             let others: Vec<usize> = (0..40).filter(|s| !chosen.contains(s)).collect();
@@ -166,7 +166,7 @@ fn poor_screens_cost_time_and_not_the_choice() {
             landmarks,
             ..svr(TUNED)
         };
-        let selection = choose(&selector, &strip, &Wishes::count(5)).unwrap();
+        let selection = choose(&selector, &strip, &Constraints::count(5)).unwrap();
         let set = selection.sets.last().unwrap();
         let steps = selector
             .audit(&strip.pool(), &set.sites, all, &unwatched)
@@ -191,7 +191,7 @@ fn each_step_is_told_as_soon_as_it_is_made() {
         .select(
             &strip.pool(),
             &Request {
-                wishes: &Wishes::count(3),
+                constraints: &Constraints::count(3),
                 watch: &unwatched,
                 found: &|set| told.lock().unwrap().push(set.sites.clone()),
             },
@@ -227,13 +227,13 @@ fn entropy_and_mutual_information_are_what_their_formulas_say() {
         noise: 0.01,
     };
     let geometry = strip.geometry(kernel);
-    let wishes = Wishes::count(8);
+    let constraints = Constraints::count(8);
     let entropy = choose(
         &Entropy {
             geometry: &geometry,
         },
         &strip,
-        &wishes,
+        &constraints,
     )
     .unwrap();
     let information = choose(
@@ -241,7 +241,7 @@ fn entropy_and_mutual_information_are_what_their_formulas_say() {
             geometry: &geometry,
         },
         &strip,
-        &wishes,
+        &constraints,
     )
     .unwrap();
     for (selection, with_rest) in [(&entropy, false), (&information, true)] {
@@ -291,16 +291,16 @@ fn wishes_are_met_by_every_selector_or_refused_with_the_reason() {
     ];
     for selector in selectors {
         let name = selector.kind().name();
-        let required = Wishes {
+        let required = Constraints {
             required: vec![17, 3],
-            ..Wishes::count(5)
+            ..Constraints::count(5)
         };
         let chosen = choose(selector, &strip, &required).unwrap();
         assert!(chosen.sets[4].sites.starts_with(&[17, 3]), "{name}");
 
-        let apart = Wishes {
+        let apart = Constraints {
             spacing: 0.04,
-            ..Wishes::count(6)
+            ..Constraints::count(6)
         };
         let chosen = choose(selector, &strip, &apart).unwrap();
         for set in &chosen.sets {
@@ -316,10 +316,10 @@ fn wishes_are_met_by_every_selector_or_refused_with_the_reason() {
         let cost: Vec<f64> = (0..40)
             .map(|s| if s % 4 == 0 { 1.0 } else { 3.0 })
             .collect();
-        let bought = Wishes {
+        let bought = Constraints {
             costs: Some(cost.clone()),
             budget: Some(6.0),
-            ..Wishes::count(8)
+            ..Constraints::count(8)
         };
         let chosen = choose(selector, &strip, &bought).unwrap();
         for set in &chosen.sets {
@@ -327,14 +327,14 @@ fn wishes_are_met_by_every_selector_or_refused_with_the_reason() {
             assert!(spent <= 6.0 + 1e-9, "{name} spends {spent}");
         }
 
-        let robust = Wishes {
+        let robust = Constraints {
             failure: 0.5,
-            ..Wishes::count(3)
+            ..Constraints::count(3)
         };
         match choose(selector, &strip, &robust) {
             Ok(chosen) => {
                 assert_eq!(name, "greedy-svr");
-                let plain = choose(selector, &strip, &Wishes::count(3)).unwrap();
+                let plain = choose(selector, &strip, &Constraints::count(3)).unwrap();
                 assert!(
                     chosen.sets[2].criterion > plain.sets[2].criterion,
                     "an expected failure costs something"
@@ -346,30 +346,32 @@ fn wishes_are_met_by_every_selector_or_refused_with_the_reason() {
             }
         }
 
-        for (wishes, said) in [
+        for (constraints, said) in [
             (
-                Wishes {
+                Constraints {
                     required: vec![3, 3],
-                    ..Wishes::count(4)
+                    ..Constraints::count(4)
                 },
                 "the same",
             ),
             (
-                Wishes {
+                Constraints {
                     required: vec![1, 2, 3],
-                    ..Wishes::count(2)
+                    ..Constraints::count(2)
                 },
                 "raise their number",
             ),
-            (Wishes::count(41), "41 gauges"),
+            (Constraints::count(41), "41 gauges"),
         ] {
-            let error = choose(selector, &strip, &wishes).unwrap_err().to_string();
+            let error = choose(selector, &strip, &constraints)
+                .unwrap_err()
+                .to_string();
             assert!(error.contains(said), "{name}: {error}");
         }
     }
-    let enough = Wishes {
+    let enough = Constraints {
         target_mm: Some(30.0),
-        ..Wishes::count(10)
+        ..Constraints::count(10)
     };
     let chosen = choose(&greedy, &strip, &enough).unwrap();
     let last = chosen.sets.last().unwrap();
@@ -385,10 +387,10 @@ fn a_share_of_noise_or_a_dead_site_is_never_chosen_for_its_rounding() {
         *v = 1.0 + if t % 2 == 0 { 1e-16 } else { 0.0 };
     }
     strip.x = SignalMatrix::new(120, values);
-    let chosen = choose(&svr(TUNED), &strip, &Wishes::count(19)).unwrap();
+    let chosen = choose(&svr(TUNED), &strip, &Constraints::count(19)).unwrap();
     assert!(chosen.sets.iter().all(|s| !s.sites.contains(&5)));
     assert!(chosen.achieved.notes[0].contains("1 site with the same report"));
-    let pca = choose(&PcaQr, &strip, &Wishes::count(6)).unwrap();
+    let pca = choose(&PcaQr, &strip, &Constraints::count(6)).unwrap();
     assert!(pca.sets.iter().all(|s| !s.sites.contains(&5)));
 }
 
@@ -396,7 +398,7 @@ fn a_share_of_noise_or_a_dead_site_is_never_chosen_for_its_rounding() {
 fn kernels_and_targets_at_the_edge_are_answered_in_words() {
     let strip = Strip::new(12, 100);
     let said = |hyper: Hyper, strip: &Strip| {
-        let selection = choose(&svr(hyper), strip, &Wishes::count(2)).unwrap();
+        let selection = choose(&svr(hyper), strip, &Constraints::count(2)).unwrap();
         assert!(
             selection
                 .sets
@@ -423,7 +425,7 @@ fn kernels_and_targets_at_the_edge_are_answered_in_words() {
         gamma: 0.5,
     });
     hard.effort.max_steps = 2000;
-    let selection = choose(&hard, &strip, &Wishes::count(2)).unwrap();
+    let selection = choose(&hard, &strip, &Constraints::count(2)).unwrap();
     assert!(
         selection.achieved.stop_reason == StopReason::Converged
             || selection
@@ -450,7 +452,7 @@ fn sites_at_one_place_are_told_apart_by_their_signal_only() {
             geometry: &geometry,
         },
         &strip,
-        &Wishes::count(12),
+        &Constraints::count(12),
     )
     .unwrap();
     let last = &chosen.sets.last().unwrap().sites;
@@ -464,10 +466,10 @@ fn sites_at_one_place_are_told_apart_by_their_signal_only() {
     );
     // Greedy SVR knows no geometry but the spacing; gauges at the very same place are one rosette.
     strip.positions[4] = strip.positions[3];
-    let apart = Wishes {
+    let apart = Constraints {
         required: vec![3, 4],
         spacing: 0.01,
-        ..Wishes::count(3)
+        ..Constraints::count(3)
     };
     assert!(choose(&svr(TUNED), &strip, &apart).is_ok());
 }
@@ -475,7 +477,7 @@ fn sites_at_one_place_are_told_apart_by_their_signal_only() {
 #[test]
 fn fewer_touches_than_sensors_end_at_the_numerical_rank() {
     let strip = Strip::new(40, 12);
-    let chosen = choose(&PcaQr, &strip, &Wishes::count(20)).unwrap();
+    let chosen = choose(&PcaQr, &strip, &Constraints::count(20)).unwrap();
     assert!(chosen.sets.len() < 12);
     assert_eq!(chosen.achieved.stop_reason, StopReason::Exhausted);
     assert!(chosen.achieved.cautions[0].contains("independent patterns"));
@@ -489,7 +491,7 @@ fn one_thread_or_two_choose_the_same_to_the_byte() {
             .num_threads(threads)
             .build()
             .unwrap()
-            .install(|| choose(&svr(TUNED), &strip, &Wishes::count(5)).unwrap())
+            .install(|| choose(&svr(TUNED), &strip, &Constraints::count(5)).unwrap())
     };
     assert_eq!(run(1), run(2));
 }

@@ -13,9 +13,8 @@ use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::respond::{Reading, Responses, Side, respond, respond_from};
 use hapdef::elasticity::support::held_freedoms;
-use hapdef::elasticity::{Freedoms, Model as _, ShellModel, Touch};
+use hapdef::elasticity::{DofSet, Model as _, ShellModel, Touch};
 use hapdef::mesh::TriMesh;
-use hapdef::mesh::locate::SurfaceIndex;
 use hapdef::placement::SelectorKind;
 use hapdef::regression::tune::Effort;
 use hapdef::regression::{Hyper, PositionModel};
@@ -24,7 +23,7 @@ fn bundled() -> Inputs {
     hapdef::cli::bundled().unwrap().inputs
 }
 
-fn held(inputs: &Inputs) -> Vec<Freedoms> {
+fn held(inputs: &Inputs) -> Vec<DofSet> {
     let supports = inputs.project.supports(&inputs.masks).unwrap();
     held_freedoms(&inputs.part, &supports)
 }
@@ -35,7 +34,7 @@ fn model(inputs: &Inputs) -> ShellModel {
 }
 
 fn touch(inputs: &Inputs, toward: DVec3) -> Touch {
-    let index = SurfaceIndex::new(&inputs.part);
+    let index = inputs.part.index();
     let (at, _) = index.nearest(toward);
     Touch {
         position: inputs.part.point(at),
@@ -268,7 +267,7 @@ fn the_inside_face_is_the_outside_face_of_the_shell_turned_over() {
     let u = m.solve(&m.forces(&touch(&inputs, DVec3::new(0.03, 0.01, 0.07))));
     let place = DVec3::new(0.028, 0.012, 0.06);
     let size = |m: &ShellModel, face| {
-        let at = m.index.nearest(place).0;
+        let at = m.mesh.index().nearest(place).0;
         let [xx, yy, xy] = m.observer(&[at], face).strain_of(m, &u)[0];
         (f64::midpoint(xx, yy), ((xx - yy) / 2.0).hypot(xy / 2.0))
     };
@@ -426,8 +425,8 @@ fn the_work_is_counted_and_nothing_is_done_twice() {
     )
     .unwrap();
     let total = design.work();
-    // The truth is the only other model, and on it the fewer of sites and test touches are solved for.
-    let truth = design.truth.work;
+    // The reference is the only other model, and on it the fewer of sites and test touches are solved for.
+    let truth = design.reference.work;
     assert_eq!((truth.assemblies, truth.factorizations), (1, 1));
     assert!(truth.solves <= 60, "{truth:?}");
     assert_eq!(total.assemblies, work.assemblies + 1);

@@ -11,7 +11,6 @@ use hapdef::design;
 use hapdef::elasticity::Material;
 use hapdef::elasticity::solid::ground::SolidGround;
 use hapdef::feasible::Surroundings;
-use hapdef::mesh::locate::SurfaceIndex;
 use hapdef::mesh::mount::Mount;
 use hapdef::mesh::reach::{FINGERTIP, Finger};
 use hapdef::mesh::room::Room;
@@ -63,8 +62,7 @@ fn voxels(counts: [i32; 3], filled: impl Fn([i32; 3]) -> bool) -> Arc<TriMesh> {
 }
 
 fn reaches(mesh: &TriMesh, radius: f64, at_mm: [f64; 3], normal: DVec3) -> bool {
-    let index = SurfaceIndex::new(mesh);
-    Finger::new(mesh, &index, radius).reaches(DVec3::from_array(at_mm) * 1e-3, normal)
+    Finger::new(mesh, radius).reaches(DVec3::from_array(at_mm) * 1e-3, normal)
 }
 
 /// A closed box, 40 mm and walls of 2 mm, with a window of 12 mm in its roof, and a block on a post below it.
@@ -107,16 +105,14 @@ fn a_narrow_gap_keeps_fingers_off_its_bottom() {
 #[test]
 fn a_pad_gets_round_corners_and_not_into_what_is_closed() {
     let house = house();
-    let index = SurfaceIndex::new(&house);
-    let room = Room::of(&house, &index, &unwatched).unwrap();
+    let room = Room::of(&house, &unwatched).unwrap();
     let at = |mm: [f64; 3], normal| room.at(DVec3::from_array(mm) * 1e-3, normal);
     // Through the window, round the block, to the wall behind it.
     let wall = at([2.0, 20.0, 16.0], DVec3::X);
     assert!((2e-3..7e-3).contains(&wall), "{wall}");
     assert!(at([0.0, 20.0, 20.0], DVec3::NEG_X).is_infinite());
     let closed = voxels([20, 20, 20], |p| p.iter().any(|c| !(3..17).contains(c)));
-    let index = SurfaceIndex::new(&closed);
-    let room = Room::of(&closed, &index, &unwatched).unwrap();
+    let room = Room::of(&closed, &unwatched).unwrap();
     let inside = room.at(DVec3::new(6e-3, 20e-3, 20e-3), DVec3::X);
     assert!(inside <= 0.0, "{inside}");
 }
@@ -220,9 +216,8 @@ fn nothing_comes_through_what_a_part_is_fastened_to() {
         .collect();
     let mount = Mount::behind(&cup, &rim).unwrap();
     assert!(mount.normal.distance(DVec3::NEG_Z) < 1e-12);
-    let index = SurfaceIndex::new(&cup);
     let reaches = |mounts: &[Mount], at_mm: [f64; 3], normal: DVec3| {
-        let finger = Finger::new(&cup, &index, 1e-3).around(mounts);
+        let finger = Finger::new(&cup, 1e-3).around(mounts);
         finger.reaches(DVec3::from_array(at_mm) * 1e-3, normal)
     };
     let floor = ([21.0, 17.0, 4.0], DVec3::NEG_Z);

@@ -11,7 +11,6 @@ use hapdef::budget::{Budget, Progress, Quality, unwatched};
 use hapdef::dataset::Signal;
 use hapdef::design::{self, Design, Hooks, Inputs, Known, Simulated};
 use hapdef::io::artifacts;
-use hapdef::mesh::locate::SurfaceIndex;
 use hapdef::placement::{Selection, SelectorKind};
 
 const KINDS: [SelectorKind; 1] = [SelectorKind::ExpectedError];
@@ -113,7 +112,7 @@ fn gauges_that_moved_keep_every_rule() {
     let (count, plain, design) = refined();
     let simulated = &design.simulated;
     let (sites, lattice) = (&simulated.dataset.sites, simulated.lattice);
-    let index = SurfaceIndex::new(&simulated.mesh);
+    let index = simulated.mesh.index();
     let project = &inputs(count, true).project;
     let (rules, spacing) = (project.feasible_rules(), project.sites.spacing_mm * 1e-3);
     for site in &sites[lattice..] {
@@ -165,7 +164,7 @@ fn what_is_kept_out_and_what_must_be_there_stays() {
         .collect();
     assert_eq!(places[0], must);
     assert!(set[0] < simulated.lattice);
-    let index = SurfaceIndex::new(&asked.part);
+    let index = asked.part.index();
     for (k, place) in places.iter().enumerate() {
         let on = index.nearest(*place).0;
         assert!(asked.part.mostly_in(&mask, on), "{k}");
@@ -238,7 +237,7 @@ fn what_is_known_of_a_refined_design_is_taken_over() {
     let known = Known {
         reduced: Some((Arc::clone(&design.feasibility), Arc::clone(&design.reduced))),
         selections: Some(Arc::clone(&design.selections)),
-        truth: Some(Arc::clone(&design.truth)),
+        reference: Some(Arc::clone(&design.reference)),
         evaluation: Some(Arc::clone(&design.evaluation)),
     };
     let hooks = Hooks {
@@ -253,11 +252,11 @@ fn what_is_known_of_a_refined_design_is_taken_over() {
     assert_eq!(again.chosen(), design.chosen());
     assert_eq!(again.chosen_row(), design.chosen_row());
     // What was measured there is of gauges there, and of no others that come to have their numbers.
-    let (truth, off) = (&design.truth, &design.truth.off);
+    let (reference, off) = (&design.reference, &design.reference.off);
     let mut sites = again.simulated.dataset.sites.clone();
-    assert!(truth.measures(&truth.sites, &sites, off, &asked.project));
+    assert!(reference.measures(&reference.sites, &sites, off, &asked.project));
     sites[design.simulated.lattice].position.x += 1e-4;
-    assert!(!truth.measures(&truth.sites, &sites, off, &asked.project));
+    assert!(!reference.measures(&reference.sites, &sites, off, &asked.project));
 }
 
 #[test]

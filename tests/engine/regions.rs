@@ -44,7 +44,7 @@ fn touches_come_only_where_they_are_painted_and_gauges_only_where_they_are_not_k
     let kept_out = taken.iter().find(|(f, _)| *f == Filter::KeptOut).unwrap().1;
     assert!(kept_out > 500, "{kept_out}");
     // The judge touches the same region.
-    let truth = design::truth(
+    let reference = design::reference(
         &inputs,
         &simulated,
         &feasible.sites()[..4],
@@ -52,8 +52,8 @@ fn touches_come_only_where_they_are_painted_and_gauges_only_where_they_are_not_k
         &unwatched,
     )
     .unwrap();
-    assert!(truth.touches.iter().all(|t| t.position.z > 0.057));
-    assert!(truth.touches.len() > 200);
+    assert!(reference.touches.iter().all(|t| t.position.z > 0.057));
+    assert!(reference.touches.len() > 200);
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn other_regions_are_quoted_from_the_same_errors() {
     let known = Known {
         reduced: Some((Arc::clone(&first.feasibility), Arc::clone(&first.reduced))),
         selections: Some(Arc::clone(&first.selections)),
-        truth: Some(Arc::clone(&first.truth)),
+        reference: Some(Arc::clone(&first.reference)),
         evaluation: Some(Arc::clone(&first.evaluation)),
     };
     let (quoted, anew) = (run(&inputs, known), run(&inputs, Known::default()));

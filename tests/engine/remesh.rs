@@ -7,7 +7,6 @@ use glam::DVec3;
 use hapdef::budget::{Quality, unwatched};
 use hapdef::design::Inputs;
 use hapdef::io::mesh_file::read_mesh;
-use hapdef::mesh::locate::SurfaceIndex;
 use hapdef::mesh::remesh::{as_given, quarter, remesh};
 use hapdef::mesh::repair::Repair;
 use hapdef::mesh::surface::Surface;
@@ -57,7 +56,7 @@ fn rim(mesh: &TriMesh) -> f64 {
 
 /// The largest distance of the vertices of one mesh from the surface of the other.
 fn away(mesh: &TriMesh, from: &TriMesh) -> f64 {
-    let index = SurfaceIndex::new(from);
+    let index = from.index();
     let distances = mesh.positions().iter().map(|&p| index.nearest(p).1);
     distances.fold(0.0, f64::max)
 }
@@ -162,7 +161,7 @@ fn halving_gives_back_the_corners_of_openings() {
     let surface = plain(&part);
     let coarse = remesh(&surface, &|_: DVec3| 6.5e-3);
     let fine = quarter(&surface, &coarse);
-    let excess = [&coarse, &fine].map(|laid| laid.mesh.area() - part.area());
+    let excess = [&coarse, &fine].map(|remeshed| remeshed.mesh.area() - part.area());
     println!(
         "area too much: {:.0} and {:.0} mm²",
         excess[0] * 1e6,

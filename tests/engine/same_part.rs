@@ -9,7 +9,7 @@ use hapdef::budget::{Budget, Limits, Quality, unwatched};
 use hapdef::design::{self, Inputs};
 use hapdef::elasticity::grade::Ground;
 use hapdef::elasticity::support::Region;
-use hapdef::elasticity::{ElasticError, Freedoms, Material, Section, Support, Touch};
+use hapdef::elasticity::{DofSet, ElasticError, Material, Section, Support, Touch};
 use hapdef::given::{self, GivenSite};
 use hapdef::io::mesh_file::read_mesh;
 use hapdef::limb::{BoxMm, LimbSpec, LimbSupport};
@@ -247,7 +247,7 @@ fn lower_hoop(positions: &[DVec3]) -> Support {
     let mask = positions.iter().map(|p| p.z < 8.001e-3).collect();
     Support {
         region: Region::Vertices(Arc::new(mask)),
-        held: Freedoms::ALL,
+        held: DofSet::ALL,
     }
 }
 
@@ -259,11 +259,11 @@ fn a_mask_holds_the_same_places_in_any_order() {
         let support = lower_hoop(part.positions());
         let ground = Ground::new(&Arc::new(part), SECTION, &[support], false);
         assert!(ground.check_held().is_ok());
-        let laid = ground.even(500);
-        for laid in [ground.halved(&laid), laid] {
-            let held = ground.held(&laid);
-            for (p, held) in laid.mesh.positions().iter().zip(held) {
-                assert_eq!(held == Freedoms::ALL, p.z < 8.001e-3, "{seed}: {p}");
+        let remeshed = ground.even(500);
+        for remeshed in [ground.halved(&remeshed), remeshed] {
+            let held = ground.held(&remeshed);
+            for (p, held) in remeshed.mesh.positions().iter().zip(held) {
+                assert_eq!(held == DofSet::ALL, p.z < 8.001e-3, "{seed}: {p}");
             }
         }
     }
@@ -278,7 +278,7 @@ fn what_is_not_held_is_told_where_the_part_lies() {
     let part = Arc::new(part);
     let beside = Support {
         region: Region::Box(OrientedBox::of_file(DVec3::ZERO, DVec3::ONE)),
-        held: Freedoms::ALL,
+        held: DofSet::ALL,
     };
     let ground = Ground::new(&part, SECTION, &[beside], false);
     let Err(ElasticError::NothingHeld { lower, upper }) = ground.check_held() else {

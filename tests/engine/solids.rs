@@ -9,7 +9,7 @@ use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::solid::SolidModel;
 use hapdef::elasticity::solid::immersed::Fineness;
 use hapdef::elasticity::support::Region;
-use hapdef::elasticity::{Freedoms, Material, Model as _, Support, Touch};
+use hapdef::elasticity::{DofSet, Material, Model as _, Support, Touch};
 use hapdef::mesh::oriented_box::OrientedBox;
 use hapdef::mesh::stance::Stance;
 
@@ -100,7 +100,7 @@ fn strain_inside_converges() {
         })
         .collect();
     let read = |m: &SolidModel| -> Vec<[f64; 3]> {
-        let u = m.system().solve_freedoms(&m.load(&touch));
+        let u = m.system().solve_dofs(&m.load(&touch));
         let points: Vec<_> = places.iter().map(|&p| m.index().nearest(p).0).collect();
         m.observer(&points, Face::Inside).strain_of(m, &u)
     };
@@ -152,7 +152,7 @@ fn mirror(axis: usize) -> Support {
     lower[axis] = -1e-9;
     Support {
         region: Region::Box(OrientedBox::of_file(lower, upper)),
-        held: Freedoms::symmetry(axis),
+        held: DofSet::symmetry(axis),
     }
 }
 
@@ -172,7 +172,7 @@ fn a_block_under_uniform_load_shortens_as_hooke_says() {
     let strain = stress / RESIN.youngs_modulus;
     for size in [12e-3, 5e-3] {
         let m = model(&part, RESIN, &supports, &Fineness::of(size, 0.015));
-        let u = m.system().solve_freedoms(&m.load(&touch));
+        let u = m.system().solve_dofs(&m.load(&touch));
         let corner = [m.index().nearest(sides).0];
         let moved = m.observer(&corner, Face::Outside).displacement_of(&m, &u)[0];
         let exact = DVec3::new(
@@ -202,7 +202,7 @@ fn far_from_a_small_tip_a_thick_block_gives_way_as_a_half_space() {
         force: 10.0,
         tip_radius: 2e-3,
     };
-    let u = m.system().solve_freedoms(&m.load(&touch));
+    let u = m.system().solve_dofs(&m.load(&touch));
     let sunk = |r: f64| {
         let sum: f64 = (0..8)
             .map(|k| {
@@ -244,7 +244,7 @@ fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
                 lower: DVec3::NEG_ONE,
                 upper: DVec3::new(1.0, 1.0, 0.01),
             }),
-            held: Freedoms::ALL,
+            held: DofSet::ALL,
         };
         let touch = Touch {
             position: turn * DVec3::new(0.01, 0.005, 0.045),

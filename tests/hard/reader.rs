@@ -13,7 +13,7 @@ use hapdef::inference::ResponseMap;
 use hapdef::io::mesh_file::parse_mesh;
 use hapdef::io::{dataset_file, npz, points, project_file, trade_file};
 use hapdef::limb::LimbSpec;
-use hapdef::link::{Address, Heard, Listener, Pace};
+use hapdef::link::{Address, Listener, Pace, SessionEvent};
 use hapdef::live::{Pipeline, Receiver, Settings};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::repair::Repair;
@@ -444,12 +444,16 @@ fn recording(path: &Path) -> Result<Outcome, String> {
             return;
         }
         held = match heard {
-            Heard::Sample { sample, update, .. } => property::finite(sample.counts.iter().copied())
-                .and_then(|()| property::update(update)),
-            Heard::Truth(Some((place, force))) => {
+            SessionEvent::Sample { sample, update, .. } => {
+                property::finite(sample.counts.iter().copied())
+                    .and_then(|()| property::update(update))
+            }
+            SessionEvent::Truth(Some((place, force))) => {
                 property::finite(place.to_array().into_iter().chain([force]))
             }
-            Heard::Turn { .. } if begun.elapsed() > REPLAY => Err("the replay does not end".into()),
+            SessionEvent::Turn { .. } if begun.elapsed() > REPLAY => {
+                Err("the replay does not end".into())
+            }
             _ => Ok(()),
         };
         if held.is_err() {

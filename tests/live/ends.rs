@@ -1,4 +1,4 @@
-//! The whole road at its ends, through the program: a right answer or a plain refusal.
+//! The whole pipeline at its ends, through the program: a right answer or a plain refusal.
 
 use std::path::Path;
 use std::process::{Command, Output};

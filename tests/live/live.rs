@@ -12,7 +12,7 @@ use std::time::Instant;
 use glam::DVec3;
 use hapdef::budget::unwatched;
 use hapdef::design;
-use hapdef::link::{Address, BAUD, Heard, Listener, Pace, State};
+use hapdef::link::{Address, BAUD, Listener, Pace, SessionEvent, State};
 use hapdef::live::{Pipeline, Update};
 use hapdef::studio::Studio;
 
@@ -180,7 +180,7 @@ fn record(w: &mut Window, path: &Path) -> BTreeMap<u64, Update> {
 fn replay(w: &mut Window, path: &Path, seen: &BTreeMap<u64, Update>) {
     let inputs = w.session().document.inputs();
     let budget = inputs.project.budget.budget();
-    let sensing = design::sense(&inputs, &budget, &unwatched).unwrap();
+    let sensing = design::sensing(&inputs, &budget, &unwatched).unwrap();
     let live = &inputs.project.live;
     let pipeline = Pipeline::new(sensing.map_for(live), live.settings(sensing.gauges.len()));
     let address = Address::parse(&path.display().to_string(), BAUD, Pace::Fast);
@@ -189,10 +189,10 @@ fn replay(w: &mut Window, path: &Path, seen: &BTreeMap<u64, Update>) {
     let (_commands, inbox) = channel();
     Listener::new(address, pipeline)
         .run(&AtomicBool::new(false), &inbox, |heard| match heard {
-            Heard::Sample { update, .. } => {
+            SessionEvent::Sample { update, .. } => {
                 again.insert(update.time_us, update.clone());
             }
-            Heard::Truth(Some(_)) => truths += 1,
+            SessionEvent::Truth(Some(_)) => truths += 1,
             _ => {}
         })
         .unwrap();

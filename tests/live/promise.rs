@@ -100,7 +100,7 @@ impl Designed {
         let inputs = hapdef::cli::open(&report.join("design.hapdef.toml"), None)
             .unwrap()
             .inputs;
-        let sensing = design::sense(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
+        let sensing = design::sensing(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
         Self {
             folder,
             rows: summary["evaluation"].as_array().unwrap().clone(),
@@ -206,12 +206,12 @@ impl Designed {
     /// The project after known presses, made by hand, on the gauges of a workshop.
     fn calibrated(&self, seed: u64) -> PathBuf {
         let (drawn, gluing) = (&self.sensing.drawn, self.inputs.project.gluing());
-        let (truth, gains) = self.sensing.truth(&gluing, seed, &unwatched).unwrap();
+        let (truth, gains) = self.sensing.reference(&gluing, seed, &unwatched).unwrap();
         let known: Vec<Known> = (self.sensing.proposed.iter().enumerate())
             .map(|(k, asked)| {
                 let read = truth.read(&self.by_hand(asked, k));
                 Known {
-                    at: drawn.map.index.nearest(asked.position).0,
+                    at: drawn.map.mesh.index().nearest(asked.position).0,
                     force: asked.force,
                     reading: read.iter().zip(&gains).map(|(x, gain)| x * gain).collect(),
                 }
@@ -235,7 +235,7 @@ impl Designed {
         let along = asked.normal.any_orthonormal_vector();
         let across = asked.normal.cross(along);
         let beside = asked.position + (along * cos + across * sin) * hand.place;
-        let at = map.index.nearest(beside).0;
+        let at = map.mesh.index().nearest(beside).0;
         let off = if k.is_multiple_of(2) {
             hand.force
         } else {

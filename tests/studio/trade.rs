@@ -104,7 +104,7 @@ fn a_sweep_goes_on_from_what_is_there_and_its_points_can_be_had_again() {
     let kinds = again.project.selectors();
     let design = design::run(&again, &kinds, &budget, &|| 0.0, &unwatched).unwrap();
     assert!(record.judge.element_mm < 0.7 * design.simulated.element_mm);
-    assert!(record.judge.element_mm < design.truth.element_mm);
+    assert!(record.judge.element_mm < design.reference.element_mm);
     // The setting reproduces the point.
     let sites = &design.simulated.dataset.sites;
     let places: Vec<[f64; 3]> = (design.chosen().iter())

@@ -47,8 +47,8 @@ impl<'a> Places<'a> {
 
     /// A line for each row that was left out, and for each gauge whose direction was laid into the surface.
     pub fn say_all(&self, rows: &Sifted) {
-        let laid = (rows.sites.iter()).filter(|&&row| rows.site_angles[row] >= WORTH_A_LINE);
-        let laid = laid.map(|&row| {
+        let projected = (rows.sites.iter()).filter(|&&row| rows.site_angles[row] >= WORTH_A_LINE);
+        let projected = projected.map(|&row| {
             format!(
                 "{}: site {row}: its direction points {:.0}° out of the surface and is laid into it",
                 self.words(Table::Sites, row),
@@ -56,12 +56,12 @@ impl<'a> Places<'a> {
             )
         });
         let left_out = rows.left_out.iter().map(|l| self.left_out(l));
-        say(&left_out.chain(laid).collect::<Vec<_>>());
+        say(&left_out.chain(projected).collect::<Vec<_>>());
     }
 
     /// A line for each row that was left out only now, after those that were told already.
-    pub fn say_later(&self, rows: &Sifted, told: usize) {
-        let later = rows.left_out.iter().skip(told);
+    pub fn say_later(&self, rows: &Sifted, said_before: usize) {
+        let later = rows.left_out.iter().skip(said_before);
         say(&later.map(|l| self.left_out(l)).collect::<Vec<_>>());
     }
 

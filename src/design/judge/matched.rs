@@ -1,6 +1,6 @@
 //! Sets of gauges judged by what runs live: the design's elastic model, matched to what a finer one reads.
 //!
-//! The estimator knows what the truth was made with (`Truth::off`), as live touch does: as drawn, that gauges are glued
+//! The estimator knows what the reference was made with (`Reference::off`), as live touch does: as drawn, that gauges are glued
 //! just so; as built, how far off a workshop usually glues them; after known presses, how these gauges were really
 //! glued, as far as the presses tell.
 
@@ -16,8 +16,8 @@ use crate::budget::{Budget, Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::design::drawn::{MOVES, POINT, drawn_on, gauge_at, map_size};
 use crate::design::known;
-use crate::design::truth::{Truth, noisy};
-use crate::design::{DesignError, Inputs, Simulated};
+use crate::design::reference::{Reference, noisy};
+use crate::design::{DesignError, Ground, Inputs, Simulated};
 use crate::draw::normal;
 use crate::elasticity::sensitivity::Gauge;
 use crate::elasticity::{Model, Touch};
@@ -47,15 +47,15 @@ const DRIFT_SEED: u64 = 0xd21f7;
 pub(in crate::design) struct ByMatching<'a> {
     pub inputs: &'a Inputs,
     pub simulated: &'a Simulated,
-    pub truth: &'a Truth,
-    /// Numbers of the streams of noise, one for each site of the truth.
+    pub reference: &'a Reference,
+    /// Numbers of the streams of noise, one for each site of the reference.
     pub streams: &'a [u64],
     pub forces: &'a Forces,
     pub budget: &'a Budget,
 }
 
-/// Readings of all sites of the truth under touches of one force, with noise.
-struct Heard {
+/// Readings of all sites of the reference under touches of one force, with noise.
+struct Readings {
     force_n: f64,
     drawn: SignalMatrix,
     built: SignalMatrix,
@@ -63,11 +63,11 @@ struct Heard {
 
 /// What the gauges at some sites read of touches anywhere, by the design's model.
 struct Everywhere {
-    /// Of the truth, rising: a channel each.
+    /// Of the reference, rising: a channel each.
     rows: Vec<usize>,
     drawn: AsDrawn,
     /// What gluing and the tip's size put on the readings.
-    spread: ResponseMap,
+    gluing_deviation: ResponseMap,
     /// What the tip's size puts on them, where it may be off: gauges that are glued just so have that too.
     sized: Option<ResponseMap>,
 }
@@ -79,10 +79,10 @@ impl ByMatching<'_> {
     /// # Errors
     /// [`DesignError`] as for the design's simulation.
     pub fn judge(&self, sets: &[Candidate], watch: Watch) -> Result<Evaluation, DesignError> {
-        let heard = self.heard();
-        let middle = &heard[self.forces.middle()];
+        let readings = self.readings();
+        let middle = &readings[self.forces.middle()];
         let model = self.simulated.model()?;
-        let ground = self.simulated.meshed.ground();
+        let ground = Ground::of(&self.simulated.meshed);
         let mesh = ground.of_size(map_size(&ground, self.tip_radius()));
         let mut work = model.system().work();
         let (mut found, mut failures) = (Vec::new(), Vec::new());
@@ -97,8 +97,8 @@ impl ByMatching<'_> {
                     continue;
                 }
                 let calibrated = set.calibrated(&everywhere);
-                let all: Vec<Matched> = (heard.iter())
-                    .map(|heard| set.found(heard, &calibrated))
+                let all: Vec<Matched> = (readings.iter())
+                    .map(|readings| set.found(readings, &calibrated))
                     .collect();
                 let whole = &all[self.forces.middle()].errors;
                 failures.extend(set.failures(middle, whole, watch)?);
@@ -109,7 +109,7 @@ impl ByMatching<'_> {
         Ok(Evaluation {
             failures,
             work,
-            ..Evaluation::of_matched(judging, found, &self.truth.regions)
+            ..Evaluation::of_matched(judging, found, &self.reference.regions)
         })
     }
 
@@ -122,25 +122,25 @@ impl ByMatching<'_> {
         known::off(&self.inputs.project, self.simulated)
     }
 
-    /// Signals of the truth for a force (N) in place of that of its touches: the model is linear.
+    /// Signals of the reference for a force (N) in place of that of its touches: the model is linear.
     fn at_force(&self, x: &SignalMatrix, force_n: f64) -> SignalMatrix {
         x.scaled(force_n / self.inputs.project.tip().0)
     }
 
-    fn heard(&self) -> Vec<Heard> {
-        let heard = |(k, &force_n): (u64, &f64)| {
+    fn readings(&self) -> Vec<Readings> {
+        let readings = |(k, &force_n): (u64, &f64)| {
             let with_noise = |x: &SignalMatrix, draw: u64| {
                 let x = self.at_force(x, force_n);
                 let x = noisy(self.inputs, &x, draw, self.streams).into_owned();
                 self.drifted(x, draw)
             };
-            Heard {
+            Readings {
                 force_n,
-                drawn: with_noise(&self.truth.x, FIRST_DRAW + 2 * k),
-                built: with_noise(&self.truth.workshop, FIRST_DRAW + 2 * k + 1),
+                drawn: with_noise(&self.reference.x, FIRST_DRAW + 2 * k),
+                built: with_noise(&self.reference.workshop, FIRST_DRAW + 2 * k + 1),
             }
         };
-        (0..).zip(&self.forces.judged_n).map(heard).collect()
+        (0..).zip(&self.forces.judged_n).map(readings).collect()
     }
 
     /// With what all channels have drifted by together, another amount for every touch.
@@ -171,8 +171,8 @@ impl ByMatching<'_> {
         let gauges: Vec<Gauge> = (rows.iter())
             .map(|&row| {
                 gauge_at(
-                    &sites[self.truth.sites[row]],
-                    self.truth.grid.unwrap_or(POINT),
+                    &sites[self.reference.sites[row]],
+                    self.reference.grid.unwrap_or(POINT),
                 )
             })
             .collect();
@@ -184,8 +184,8 @@ impl ByMatching<'_> {
             ..off
         };
         Ok(Everywhere {
-            spread: drawn.spread(&off),
-            sized: drawn.tip.is_some().then(|| drawn.spread(&exact)),
+            gluing_deviation: drawn.gluing_deviation(&off),
+            sized: drawn.tip.is_some().then(|| drawn.gluing_deviation(&exact)),
             rows,
             drawn,
         })
@@ -194,7 +194,7 @@ impl ByMatching<'_> {
     /// Which touches of a force (N) move no gauge of a set far enough to be told from noise.
     fn blind(&self, rows: &[usize], force_n: f64) -> Vec<bool> {
         let least = BLIND * self.off().of_channel();
-        let x = self.at_force(&self.truth.x.select_rows(rows), force_n);
+        let x = self.at_force(&self.reference.x.select_rows(rows), force_n);
         (0..x.columns())
             .map(|touch| (0..x.rows()).all(|row| x.row(row)[touch].abs() <= least))
             .collect()
@@ -241,12 +241,12 @@ impl<'a> Set<'a> {
         let channel = |row: &usize| Some(vec![(everywhere.rows.binary_search(row).ok()?, 1.0)]);
         let channels: Vec<Vec<(usize, f64)>> = candidate.rows.iter().filter_map(channel).collect();
         let map = Arc::new(everywhere.drawn.map.mixed(&channels));
-        let errors = |spread: Option<&ResponseMap>| {
-            let spread = spread.map(|s| Arc::new(s.mixed(&channels)));
-            Errors::known(&trial.off(), channels.len(), spread)
+        let errors = |gluing_deviation: Option<&ResponseMap>| {
+            let gluing_deviation = gluing_deviation.map(|s| Arc::new(s.mixed(&channels)));
+            Errors::known(&trial.off(), channels.len(), gluing_deviation)
         };
         let exact = errors(everywhere.sized.as_ref());
-        let glued = errors(Some(&everywhere.spread));
+        let glued = errors(Some(&everywhere.gluing_deviation));
         let most_n = trial.forces.most_n;
         Self {
             drawn: Matching::new(Arc::clone(&map), exact, most_n),
@@ -258,26 +258,30 @@ impl<'a> Set<'a> {
     }
 
     /// What is found of the set at one force.
-    fn found(&self, heard: &Heard, calibrated: &[Matching]) -> Matched {
+    fn found(&self, readings: &Readings, calibrated: &[Matching]) -> Matched {
         let rows = &self.candidate.rows;
         let errors = |matching: &Matching, x: &SignalMatrix| {
-            errors_mm(matching, &x.select_rows(rows), &self.trial.truth.touches)
+            errors_mm(
+                matching,
+                &x.select_rows(rows),
+                &self.trial.reference.touches,
+            )
         };
         Matched {
             selector: self.candidate.selector.clone(),
             sensors: rows.len(),
-            force_n: heard.force_n,
-            errors: errors(&self.drawn, &heard.drawn),
-            built: errors(&self.built, &heard.built),
-            calibrated: mean_of(calibrated.iter().map(|m| errors(m, &heard.built))),
-            blind: self.trial.blind(rows, heard.force_n),
+            force_n: readings.force_n,
+            errors: errors(&self.drawn, &readings.drawn),
+            built: errors(&self.built, &readings.built),
+            calibrated: mean_of(calibrated.iter().map(|m| errors(m, &readings.built))),
+            blind: self.trial.blind(rows, readings.force_n),
         }
     }
 
     /// The estimator after the known presses of each round, where there are any.
     fn calibrated(&self, everywhere: &Everywhere) -> Vec<Matching> {
         let trial = self.trial;
-        let Some(pressed) = &trial.truth.pressed else {
+        let Some(pressed) = &trial.reference.pressed else {
             return Vec::new();
         };
         let drawn = everywhere.drawn.mixed(&self.channels);
@@ -287,7 +291,7 @@ impl<'a> Set<'a> {
         let known = |k: usize| {
             let press = &pressed.presses[k];
             Known {
-                at: drawn.map.index.nearest(press.asked.position).0,
+                at: drawn.map.mesh.index().nearest(press.asked.position).0,
                 force: press.asked.force,
                 reading: reading(&x, k),
             }
@@ -302,7 +306,9 @@ impl<'a> Set<'a> {
         let calibration = calibrate(drawn, known, &before.noise, &off);
         let errors = Errors {
             relative: calibration.relative,
-            spread: Some(Arc::new(drawn.spread_of(&calibration.doubts, &off))),
+            gluing_deviation: Some(Arc::new(
+                drawn.gluing_deviation_of(&calibration.doubts, &off),
+            )),
             ..before.clone()
         };
         let map = Arc::new(drawn.calibrated(&calibration));
@@ -313,18 +319,18 @@ impl<'a> Set<'a> {
     /// sample of the touches says what a loss adds to the errors of all touches, `whole` (mm).
     fn failures(
         &self,
-        heard: &Heard,
+        readings: &Readings,
         whole: &[f64],
         watch: Watch,
     ) -> Result<Option<Failures>, Cancelled> {
-        let (truth, most) = (self.trial.truth, self.trial.budget.failure_subsets);
+        let (reference, most) = (self.trial.reference, self.trial.budget.failure_subsets);
         let gauges = self.channels.len();
         if most == 0 || gauges < 2 {
             return Ok(None);
         }
-        let sample = evenly(truth.touches.len(), FAILURE_TOUCHES);
-        let touches: Vec<Touch> = sample.iter().map(|&t| truth.touches[t]).collect();
-        let x = heard.drawn.select_rows(&self.candidate.rows);
+        let sample = evenly(reference.touches.len(), FAILURE_TOUCHES);
+        let touches: Vec<Touch> = sample.iter().map(|&t| reference.touches[t]).collect();
+        let x = readings.drawn.select_rows(&self.candidate.rows);
         let x = x.select_columns(&sample);
         let sampled: Vec<f64> = sample.iter().map(|&t| whole[t]).collect();
         let apart = mean(whole) - mean(&sampled);

@@ -10,7 +10,6 @@ use rand_chacha::ChaCha8Rng;
 use crate::dataset::SignalMatrix;
 use crate::elasticity::Touch;
 use crate::mesh::TriMesh;
-use crate::mesh::locate::SurfaceIndex;
 use crate::uncertainty::Pressing;
 
 /// A press, as it was asked for and as it was made.
@@ -34,7 +33,7 @@ pub struct Pressed {
 
 /// Presses on a surface as a hand makes them: each as far off as is usual for it, in any direction and either way.
 pub(super) fn by_hand(mesh: &TriMesh, asked: Vec<Touch>, hand: &Pressing, seed: u64) -> Vec<Press> {
-    let index = SurfaceIndex::new(mesh);
+    let index = mesh.index();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let make = |asked: Touch| {
         let (sin, cos) = (TAU * rng.random::<f64>()).sin_cos();

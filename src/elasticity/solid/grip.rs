@@ -12,15 +12,14 @@ use crate::bounds::Bounds;
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::solver::SymmetricMatrix;
 use crate::elasticity::system::HELD;
-use crate::elasticity::{Freedoms, Material};
-use crate::mesh::locate::SurfaceIndex;
+use crate::elasticity::{DofSet, Material};
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// What is held.
 #[derive(Clone, Debug, Default)]
 pub struct Grip {
     /// Held displacements of every node.
-    pub nodes: Vec<Freedoms>,
+    pub nodes: Vec<DofSet>,
     springs: Vec<Spring>,
 }
 
@@ -29,7 +28,7 @@ pub struct Grip {
 struct Spring {
     point: DVec3,
     shape: Shape,
-    held: Freedoms,
+    held: DofSet,
     /// N/m.
     stiffness: f64,
 }
@@ -44,13 +43,13 @@ impl Grip {
     #[must_use]
     pub fn new(elements: &dyn Elements) -> Self {
         Self {
-            nodes: vec![Freedoms::default(); elements.nodes().len()],
+            nodes: vec![DofSet::default(); elements.nodes().len()],
             springs: Vec::new(),
         }
     }
 
     /// Holds all nodes of the elements whose middle `inside` says is held.
-    pub fn hold_elements(&mut self, elements: &dyn Elements, inside: impl Fn(DVec3) -> Freedoms) {
+    pub fn hold_elements(&mut self, elements: &dyn Elements, inside: impl Fn(DVec3) -> DofSet) {
         for element in 0..elements.count() {
             let held = inside(elements.centre(element));
             if held.0 != 0 {
@@ -65,7 +64,7 @@ impl Grip {
     pub fn hold_nodes(
         &mut self,
         elements: &dyn Elements,
-        held: Freedoms,
+        held: DofSet,
         inside: impl Fn(DVec3) -> bool,
     ) -> bool {
         let mut any = false;
@@ -84,7 +83,7 @@ impl Grip {
         elements: &dyn Elements,
         mesh: &TriMesh,
         facet: u32,
-        held: Freedoms,
+        held: DofSet,
         material: &Material,
         size: f64,
     ) {
@@ -150,10 +149,10 @@ impl Grip {
     }
 
     /// The vertices of a surface that have springs on a facet around them.
-    pub(super) fn near(&self, mesh: &TriMesh, index: &SurfaceIndex) -> Vec<bool> {
+    pub(super) fn near(&self, mesh: &TriMesh) -> Vec<bool> {
         let mut near = vec![false; mesh.positions().len()];
         for spring in &self.springs {
-            let at = index.nearest(spring.point).0;
+            let at = mesh.index().nearest(spring.point).0;
             for v in mesh.triangles()[at.triangle as usize] {
                 near[v as usize] = true;
             }
@@ -187,7 +186,7 @@ pub fn check(elements: &dyn Elements, grip: &Grip) -> Result<usize, ElasticError
     let labels = labels(elements);
     let size = (upper - lower).length().max(f64::MIN_POSITIVE);
     let mut grams: BTreeMap<u32, nalgebra::Matrix6<f64>> = BTreeMap::new();
-    let mut hold = |label: u32, point: DVec3, held: Freedoms| {
+    let mut hold = |label: u32, point: DVec3, held: DofSet| {
         let gram = grams.entry(label).or_insert_with(nalgebra::Matrix6::zeros);
         let r = (point - nodes[0]) / size;
         for i in (0..3).filter(|&i| held.holds(i)) {

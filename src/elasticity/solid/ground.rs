@@ -23,8 +23,7 @@ use crate::budget::{Cancelled, Watch, report};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::grade::even_size;
 use crate::elasticity::load::Touch;
-use crate::elasticity::{Freedoms, Material, Support};
-use crate::mesh::locate::SurfaceIndex;
+use crate::elasticity::{DofSet, Material, Support};
 use crate::mesh::reach::{FINGERTIP, Reach};
 use crate::mesh::remesh::remesh;
 use crate::mesh::room::Room;
@@ -46,7 +45,7 @@ pub struct SolidGround {
     pub inside: Arc<TriMesh>,
     pub outside: Arc<TriMesh>,
     /// What is held at the vertices of the inside.
-    pub inside_held: Vec<Freedoms>,
+    pub inside_held: Vec<DofSet>,
     /// Whether its facets are the back of a wall that touches come to.
     inside_backs: Vec<bool>,
     /// Places of the surface that are held (m).
@@ -58,7 +57,7 @@ const VERTICES: usize = 9000;
 /// Of the distances between touches and what is held, this share may be left unresolved.
 const NEAREST: f64 = 0.1;
 impl SolidGround {
-    /// Tells the faces of a part apart that fingertips touch; `told` says what the user has said of a place.
+    /// Tells the faces of a part apart that fingertips touch; `declared` says what the user has said of a place.
     ///
     /// # Errors
     /// [`ElasticError::Open`] for a surface that encloses nothing, [`ElasticError::Cancelled`].
@@ -66,10 +65,10 @@ impl SolidGround {
         part: &Arc<TriMesh>,
         material: Material,
         supports: &[Support],
-        told: &dyn Fn(DVec3) -> Option<Side>,
+        declared: &dyn Fn(DVec3) -> Option<Side>,
         watch: Watch,
     ) -> Result<Self, ElasticError> {
-        Self::touched_by(FINGERTIP, part, material, supports, told, watch)
+        Self::touched_by(FINGERTIP, part, material, supports, declared, watch)
     }
 
     /// As [`Self::new`], for tips of another radius (m).
@@ -81,7 +80,7 @@ impl SolidGround {
         part: &Arc<TriMesh>,
         material: Material,
         supports: &[Support],
-        told: &dyn Fn(DVec3) -> Option<Side>,
+        declared: &dyn Fn(DVec3) -> Option<Side>,
         watch: Watch,
     ) -> Result<Self, ElasticError> {
         report(watch, "Measuring walls", 0, 1)?;
@@ -90,15 +89,14 @@ impl SolidGround {
         let held = &immersed.held;
         let surface = Surface::new(&held.mesh, |e| held.is_border(e), |v| held.is_spot(v));
         let size = even_size(held.mesh.area(), 0.0, VERTICES);
-        let laid = remesh(&surface, &|_| size);
-        let whole = laid.mesh;
-        let index = SurfaceIndex::new(&whole);
-        let mut walls = Walls::of(&whole, &index, watch)?;
+        let remeshed = remesh(&surface, &|_| size);
+        let whole = remeshed.mesh;
+        let mut walls = Walls::of(&whole, watch)?;
         let mounts = held.mounts(supports.len());
-        let mut reach = Reach::of(&whole, &index, &walls, fingertip, &mounts, watch)?;
+        let mut reach = Reach::of(&whole, &walls, fingertip, &mounts, watch)?;
         for t in 0..whole.triangles().len() as u32 {
             let middle = whole.corners(t).iter().sum::<DVec3>() / 3.0;
-            if let Some(side) = told(middle) {
+            if let Some(side) = declared(middle) {
                 walls.sides[t as usize] = side;
                 reach.tell(t, side);
             }
@@ -113,7 +111,7 @@ impl SolidGround {
         let facets = inward.iter().zip(&reach.backs);
         let inside_backs = facets.filter(|(i, _)| **i).map(|(_, &back)| back).collect();
         walls.sides = reach.sides(&walls.sides);
-        let at = |&v: &u32| held.held_at(laid.places[v as usize]);
+        let at = |&v: &u32| held.held_at(remeshed.places[v as usize]);
         let is_held = |v: &u32| at(v).0 != 0;
         let all = 0..whole.positions().len() as u32;
         Ok(Self {
@@ -145,8 +143,7 @@ impl SolidGround {
     /// # Errors
     /// [`Cancelled`].
     pub fn room(&self, points: &[SurfacePoint], watch: Watch) -> Result<Vec<f64>, Cancelled> {
-        let index = SurfaceIndex::new(&self.whole);
-        let room = Room::of(&self.whole, &index, watch)?;
+        let room = Room::of(&self.whole, watch)?;
         let at = |&at: &SurfacePoint| {
             room.at(self.inside.point(at), self.inside.facet_normal(at.triangle))
         };
@@ -168,10 +165,10 @@ impl SolidGround {
     /// A mesh of about one edge length (m) on the outside.
     #[must_use]
     pub fn outside_of_size(&self, size: f64) -> Arc<TriMesh> {
-        let laid = remesh(&self.surface, &|_| size).mesh;
-        let index = SurfaceIndex::new(&self.whole);
-        let outside = laid.part_of(|t| {
-            let middle = laid.corners(t).iter().sum::<DVec3>() / 3.0;
+        let remeshed = remesh(&self.surface, &|_| size).mesh;
+        let index = self.whole.index();
+        let outside = remeshed.part_of(|t| {
+            let middle = remeshed.corners(t).iter().sum::<DVec3>() / 3.0;
             self.walls.sides[index.nearest(middle).0.triangle as usize] == Side::Outside
         });
         outside.map_or_else(|| Arc::clone(&self.outside), |(mesh, _)| Arc::new(mesh))

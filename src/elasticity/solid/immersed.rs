@@ -15,7 +15,7 @@ use crate::bounds::Bounds;
 use crate::budget::Watch;
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::support::{HeldPart, Region};
-use crate::elasticity::{Freedoms, Material, Support};
+use crate::elasticity::{DofSet, Material, Support};
 use crate::mesh::TriMesh;
 use crate::mesh::inside::SignedDistance;
 use crate::mesh::volume::VolumeMesh;
@@ -187,7 +187,7 @@ impl Immersed {
         let elements = Tetrahedra::new(&piece.mesh, fineness.order);
         let mut grip = Grip::new(&elements);
         for node in elements.nodes_on(&piece.cut) {
-            grip.nodes[node as usize].0 |= Freedoms::DISPLACEMENTS.0;
+            grip.nodes[node as usize].0 |= DofSet::DISPLACEMENTS.0;
         }
         for support in &self.supports {
             hold_box(&mut grip, &elements, support, fineness);
@@ -196,7 +196,7 @@ impl Immersed {
     }
 
     /// Holds the facets of a support with springs.
-    fn spring(&self, grip: &mut Grip, on: &dyn Elements, number: usize, held: Freedoms, size: f64) {
+    fn spring(&self, grip: &mut Grip, on: &dyn Elements, number: usize, held: DofSet, size: f64) {
         let mesh = &self.held.mesh;
         for facet in 0..mesh.triangles().len() as u32 {
             if self.held.facet_belongs(facet, number) {
@@ -209,11 +209,11 @@ impl Immersed {
         let mut grip = Grip::new(cells);
         for (number, support) in self.supports.iter().enumerate() {
             let held = displacements(support);
-            let is_volume = held == Freedoms::DISPLACEMENTS && {
+            let is_volume = held == DofSet::DISPLACEMENTS && {
                 let planes = along_planes(support);
                 let inside = |p: DVec3| match planes {
                     Some((lower, upper)) if (Bounds { lower, upper }).contains(p) => held,
-                    _ => Freedoms::default(),
+                    _ => DofSet::default(),
                 };
                 let any = (0..cells.count()).any(|c| inside(cells.centre(c)).0 != 0);
                 if any {
@@ -231,8 +231,8 @@ impl Immersed {
 }
 
 /// What a support holds of displacements.
-fn displacements(support: &Support) -> Freedoms {
-    Freedoms(support.held.0 & Freedoms::DISPLACEMENTS.0)
+fn displacements(support: &Support) -> DofSet {
+    DofSet(support.held.0 & DofSet::DISPLACEMENTS.0)
 }
 
 /// The box (m) of a support where planes of a grid can lie along its faces. One that is turned holds the surface in it

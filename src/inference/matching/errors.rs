@@ -18,7 +18,7 @@ pub struct Errors {
     pub relative: f64,
     /// Standard deviation a newton that gluing puts on each channel's reading, on the mesh of the readings; absent
     /// where gauges are known to be glued as the readings say.
-    pub spread: Option<Arc<ResponseMap>>,
+    pub gluing_deviation: Option<Arc<ResponseMap>>,
     /// Standard deviation of what all channels have drifted by together (strain).
     pub drift: f64,
     /// Standard deviation of the factor by which the part is stiffer or softer than its model: of every force.
@@ -37,18 +37,22 @@ impl Errors {
         Self {
             noise: noise.to_vec(),
             relative: 0.0,
-            spread: None,
+            gluing_deviation: None,
             drift: 0.0,
             stiffness: 0.0,
         }
     }
 
-    /// As the project describes what is off, for so many channels whose gauges may be glued as `spread` says.
+    /// As the project describes what is off, for so many channels whose gauges may be glued as `gluing_deviation` says.
     #[must_use]
-    pub fn known(off: &Uncertainty, channels: usize, spread: Option<Arc<ResponseMap>>) -> Self {
+    pub fn known(
+        off: &Uncertainty,
+        channels: usize,
+        gluing_deviation: Option<Arc<ResponseMap>>,
+    ) -> Self {
         Self {
             relative: off.elements,
-            spread,
+            gluing_deviation,
             drift: off.drift,
             stiffness: off.stiffness,
             ..Self::of_noise(off.of_channel().max(LEAST_NOISE), channels)

@@ -1,7 +1,7 @@
 //! From a reading to the touch: the likeliest places, or the mean over all where that is what is known.
 
 use super::modes::{Mode, widest};
-use super::weighed::Heard;
+use super::weighed::Observation;
 use super::{Contact, Matching};
 
 impl Matching {
@@ -13,7 +13,7 @@ impl Matching {
     /// As [`Self::find`], and the logarithm of the reading's density over all touches there may be, but for a constant
     /// that depends neither on the reading nor on the channels that are trusted.
     pub fn find_with_evidence(&mut self, reading: &[f64]) -> (Contact, f64) {
-        let measured = Heard::new(reading, &self.errors, &self.used);
+        let measured = Observation::new(reading, &self.errors, &self.used);
         self.score(&measured);
         let mut modes = self.modes(&measured);
         modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
@@ -35,11 +35,11 @@ impl Matching {
     /// Nothing where that does not explain the reading any more, or no longer clearly.
     #[must_use]
     pub fn track(&self, reading: &[f64], last: &Contact) -> Option<Contact> {
-        let measured = Heard::new(reading, &self.errors, &self.used);
+        let measured = Observation::new(reading, &self.errors, &self.used);
         // Noise alone makes them differ by a few deviations of χ².
         let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
         let explained = |cost: f64| 2.0 * cost <= last.unexplained + differs;
-        let start = self.map.index.nearest(last.position).0;
+        let start = self.map.mesh.index().nearest(last.position).0;
         let mode = self.follow(&measured, start, Some(last.force));
         let broad = BROAD * self.map.spacing();
         (explained(mode.cost) && widest(mode.covariance) <= broad * broad)
@@ -50,7 +50,7 @@ impl Matching {
 impl Matching {
     /// The best templates, apart from each other, each followed to the best place near it. There is one at least: the
     /// first template where none says anything.
-    fn modes(&self, measured: &Heard) -> Vec<Mode> {
+    fn modes(&self, measured: &Observation) -> Vec<Mode> {
         let reach = APART * self.map.spacing();
         let mut starts: Vec<usize> = Vec::with_capacity(STARTS);
         for _ in 0..STARTS {
@@ -65,7 +65,7 @@ impl Matching {
         }
         let mut modes: Vec<Mode> = Vec::with_capacity(STARTS);
         for start in starts {
-            let at = self.map.index.nearest(self.map.places[start]).0;
+            let at = self.map.mesh.index().nearest(self.map.places[start]).0;
             let mode = self.follow(measured, at, None);
             // Two starts may end at the same place.
             let same = |m: &Mode| m.position.distance(mode.position) < 0.5 * self.map.spacing();

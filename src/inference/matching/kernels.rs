@@ -79,7 +79,7 @@ wide! {
         }
         let block = LANES * channels;
         let blocks = templates.chunks_exact(block).zip(spreads.chunks_exact(block));
-        for (((block, spread), out), highest) in
+        for (((block, gluing_deviation), out), highest) in
             blocks.zip(scores.chunks_exact_mut(LANES)).zip(highest)
         {
             let (mut s, mut d) = ([0.0_f32; LANES], [f32::MIN_POSITIVE; LANES]);
@@ -99,11 +99,11 @@ wide! {
                 (s, d) = ([0.0_f32; LANES], [f32::MIN_POSITIVE; LANES]);
                 let (mut x_sum, mut g_sum) = ([0.0_f32; LANES], [0.0_f32; LANES]);
                 let mut w_sum = [0.0_f32; LANES];
-                let rows = block.chunks_exact(LANES).zip(spread.chunks_exact(LANES));
-                for ((row, spread), (&x, &w)) in rows.zip(reading.iter().zip(weights)) {
+                let rows = block.chunks_exact(LANES).zip(gluing_deviation.chunks_exact(LANES));
+                for ((row, gluing_deviation), (&x, &w)) in rows.zip(reading.iter().zip(weights)) {
                     let mut own = [0.0_f32; LANES];
                     for k in 0..LANES {
-                        let off = force[k] * spread[k];
+                        let off = force[k] * gluing_deviation[k];
                         let wider = 1.0 + w * off * off;
                         let w = w / wider;
                         own[k] = w;

@@ -3,7 +3,7 @@
 use glam::{DMat2, DVec3};
 use nalgebra::Matrix3;
 
-use super::weighed::{Heard, Measured, Weighed};
+use super::weighed::{Measured, Observation, Weighed};
 use super::{Contact, Matching};
 use crate::inference::map::Slope;
 use crate::inference::region::{DEVIATIONS, Region};
@@ -30,34 +30,44 @@ pub(super) struct Mode {
 
 impl Matching {
     /// The weights for a touch at a place: of the force that is given, or else of the one that fits best.
-    fn weighed_at(&self, heard: &Heard, at: SurfacePoint, force: Option<f64>) -> Weighed {
-        let spread = self.errors.spread.as_ref().map(|s| s.at(at));
-        let spread = spread.as_deref();
-        let fitting = || self.fitting_force(heard, &self.map.at(at), spread);
-        heard.weighed(spread, force.unwrap_or_else(fitting))
+    fn weighed_at(&self, observed: &Observation, at: SurfacePoint, force: Option<f64>) -> Weighed {
+        let gluing_deviation = self.errors.gluing_deviation.as_ref().map(|s| s.at(at));
+        let gluing_deviation = gluing_deviation.as_deref();
+        let fitting = || self.fitting_force(observed, &self.map.at(at), gluing_deviation);
+        observed.weighed(gluing_deviation, force.unwrap_or_else(fitting))
     }
 
     /// The force that fits best at a place with these readings a newton: its weights depend on it, and two turns
     /// settle them.
-    pub(super) fn fitting_force(&self, heard: &Heard, g: &[f64], spread: Option<&[f64]>) -> f64 {
-        let mut force = heard.first_force(g).clamp(0.0, self.most_force);
+    pub(super) fn fitting_force(
+        &self,
+        observed: &Observation,
+        g: &[f64],
+        gluing_deviation: Option<&[f64]>,
+    ) -> f64 {
+        let mut force = observed.first_force(g).clamp(0.0, self.most_force);
         for _ in 0..TURNS {
-            let weighed = heard.weighed(spread, force);
-            force = heard.measured(&weighed).fit(g, self.most_force).0;
+            let weighed = observed.weighed(gluing_deviation, force);
+            force = observed.measured(&weighed).fit(g, self.most_force).0;
         }
         force
     }
 
     /// The most likely place near a start. Weights that depend on where and how hard the touch was are taken there
     /// once more.
-    pub(super) fn follow(&self, heard: &Heard, start: SurfacePoint, force: Option<f64>) -> Mode {
-        let weighed = self.weighed_at(heard, start, force);
-        let mode = self.descend(&heard.measured(&weighed), weighed.log, start);
-        if self.errors.spread.is_none() {
+    pub(super) fn follow(
+        &self,
+        observed: &Observation,
+        start: SurfacePoint,
+        force: Option<f64>,
+    ) -> Mode {
+        let weighed = self.weighed_at(observed, start, force);
+        let mode = self.descend(&observed.measured(&weighed), weighed.log, start);
+        if self.errors.gluing_deviation.is_none() {
             return mode;
         }
-        let weighed = self.weighed_at(heard, mode.at, Some(mode.force));
-        self.descend(&heard.measured(&weighed), weighed.log, mode.at)
+        let weighed = self.weighed_at(observed, mode.at, Some(mode.force));
+        self.descend(&observed.measured(&weighed), weighed.log, mode.at)
     }
 
     /// Gauss–Newton on place and force, with Levenberg's damping.
@@ -83,7 +93,7 @@ impl Matching {
             // No farther than the quadratic pieces can be trusted.
             let within = (3.0 * map.spacing() / length.max(f64::MIN_POSITIVE)).min(1.0);
             let moved = slope.plane[0] * (step[0] * within) + slope.plane[1] * (step[1] * within);
-            let there = map.index.nearest(map.mesh.point(at) + moved).0;
+            let there = map.mesh.index().nearest(map.mesh.point(at) + moved).0;
             let next = map.slope(there);
             let (next_force, next_cost) = measured.fit(&next.reading, self.most_force);
             if next_cost < cost {
@@ -138,14 +148,14 @@ impl Matching {
     }
 
     /// A mode alone, with its normal distribution.
-    pub(super) fn contact_at(&self, measured: &Heard, mode: &Mode, narrow: bool) -> Contact {
+    pub(super) fn contact_at(&self, measured: &Observation, mode: &Mode, narrow: bool) -> Contact {
         let region = Region::of_normal(mode.covariance, mode.plane);
         let force = (mode.force, mode.force_variance);
         self.contact(measured, mode.at, force, region, mode.cost, narrow)
     }
 
     /// Where one narrow place is far likelier than all others, that one; otherwise their mean.
-    pub(super) fn mean_of_modes(&self, measured: &Heard, modes: &[Mode]) -> Contact {
+    pub(super) fn mean_of_modes(&self, measured: &Observation, modes: &[Mode]) -> Contact {
         let best = modes[0];
         let weight = |m: &Mode| (m.log_evidence - best.log_evidence).exp();
         let total: f64 = modes.iter().map(weight).sum();
@@ -156,17 +166,18 @@ impl Matching {
             modes.iter().map(|m| weight(m) * value(m)).sum::<f64>() / total
         };
         let centre: DVec3 = modes.iter().map(|m| m.position * (weight(m) / total)).sum();
-        let at = self.map.index.nearest(centre).0;
+        let at = self.map.mesh.index().nearest(centre).0;
         let force = mean(&|m| m.force);
         let variance = mean(&|m| m.force_variance + (m.force - force).powi(2));
-        let places: Vec<(DVec3, f64)> = modes.iter().flat_map(|m| spread(m, weight(m))).collect();
+        let places: Vec<(DVec3, f64)> =
+            modes.iter().flat_map(|m| stand_ins(m, weight(m))).collect();
         let region = Region::of_places(&places, self.map.mesh.point(at), self.map.mesh.normal(at));
         self.contact(measured, at, (force, variance), region, best.cost, false)
     }
 }
 
 /// Four places that stand for a mode: one deviation of √2 along each principal direction, either way.
-fn spread(mode: &Mode, weight: f64) -> impl Iterator<Item = (DVec3, f64)> {
+fn stand_ins(mode: &Mode, weight: f64) -> impl Iterator<Item = (DVec3, f64)> {
     let region = Region::of_normal(mode.covariance, mode.plane);
     let scale = std::f64::consts::SQRT_2 / DEVIATIONS;
     let position = mode.position;

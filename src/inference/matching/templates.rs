@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::kernels::{score_templates, score_with_gluing};
 use super::modes::Mode;
-use super::weighed::Heard;
+use super::weighed::Observation;
 use super::{Contact, Matching};
 use crate::inference::map::LANES;
 use crate::inference::region::Region;
@@ -14,26 +14,30 @@ const NOTHING: f64 = 14.0;
 
 impl Matching {
     /// How much better than nothing a touch at each template explains the reading.
-    pub(super) fn score(&mut self, heard: &Heard) {
-        let weights: Vec<f32> = heard.w.iter().map(|w| (w * 1e-12) as f32).collect();
+    pub(super) fn score(&mut self, observed: &Observation) {
+        let weights: Vec<f32> = observed.w.iter().map(|w| (w * 1e-12) as f32).collect();
         let most = self.most_force as f32;
-        if let Some(spread) = &self.errors.spread {
-            let reading: Vec<f32> = heard.reading().iter().map(|x| (x * 1e6) as f32).collect();
+        if let Some(gluing_deviation) = &self.errors.gluing_deviation {
+            let reading: Vec<f32> = observed
+                .reading()
+                .iter()
+                .map(|x| (x * 1e6) as f32)
+                .collect();
             score_with_gluing(
-                [&self.map.templates, &spread.templates],
+                [&self.map.templates, &gluing_deviation.templates],
                 &reading,
                 &weights,
-                (heard.drift * 1e12) as f32,
+                (observed.drift * 1e12) as f32,
                 most,
                 &mut self.scores,
                 &mut self.highest,
             );
             return;
         }
-        let scaled: Vec<f32> = (heard.reading().iter().zip(&heard.w))
+        let scaled: Vec<f32> = (observed.reading().iter().zip(&observed.w))
             .map(|(x, w)| (w * x * 1e-6) as f32)
             .collect();
-        let unglued = heard.unglued();
+        let unglued = observed.unglued();
         score_templates(
             &self.map.templates,
             &scaled,
@@ -63,10 +67,10 @@ impl Matching {
     }
 
     /// Mean, spread and region over all templates, each with the area it stands for.
-    pub(super) fn mean_of_templates(&self, heard: &Heard, best: &Mode) -> Contact {
+    pub(super) fn mean_of_templates(&self, observed: &Observation, best: &Mode) -> Contact {
         let map = &self.map;
         let highest = self.highest.iter().fold(0.0_f32, |m, s| m.max(*s));
-        let highest = f64::from(highest).max(0.5 * heard.squares - best.cost);
+        let highest = f64::from(highest).max(0.5 * observed.squares - best.cost);
         let floor = (highest - NOTHING - 1e-5 * highest) as f32;
         let mut places = Vec::new();
         let (mut total, mut centre, mut force, mut squares) = (0.0, DVec3::ZERO, 0.0, 0.0);
@@ -75,7 +79,7 @@ impl Matching {
             .enumerate()
             .filter(|(_, s)| **s >= floor)
         {
-            let (mean, variance, log_likelihood) = self.force_at(heard, node);
+            let (mean, variance, log_likelihood) = self.force_at(observed, node);
             let weight = map.areas[node] * (log_likelihood - highest).exp();
             places.push((map.places[node], weight));
             total += weight;
@@ -84,22 +88,23 @@ impl Matching {
             squares += weight * (mean * mean + variance);
         }
         if total <= 0.0 || !total.is_finite() {
-            return self.contact_at(heard, best, false);
+            return self.contact_at(observed, best, false);
         }
-        let at = map.index.nearest(centre / total).0;
+        let at = map.mesh.index().nearest(centre / total).0;
         let force = force / total;
         let variance = (squares / total - force * force).max(0.0);
         let region = Region::of_places(&places, map.mesh.point(at), map.mesh.normal(at));
-        self.contact(heard, at, (force, variance), region, best.cost, false)
+        self.contact(observed, at, (force, variance), region, best.cost, false)
     }
 
     /// Mean and variance of the force at a place, and the log-likelihood with the force integrated out.
-    fn force_at(&self, heard: &Heard, node: usize) -> (f64, f64, f64) {
+    fn force_at(&self, observed: &Observation, node: usize) -> (f64, f64, f64) {
         let g = self.map.node(node);
-        let spread = self.errors.spread.as_ref().map(|s| s.node(node));
-        let force = spread.map_or(0.0, |_| self.fitting_force(heard, g, spread));
-        let weighed = heard.weighed(spread, force);
-        let measured = heard.measured(&weighed);
+        let gluing_deviation = self.errors.gluing_deviation.as_ref().map(|s| s.node(node));
+        let force =
+            gluing_deviation.map_or(0.0, |_| self.fitting_force(observed, g, gluing_deviation));
+        let weighed = observed.weighed(gluing_deviation, force);
+        let measured = observed.measured(&weighed);
         let (_, d) = measured.products(g);
         let (force, cost) = measured.fit(g, self.most_force);
         // A force is never known worse than that it lies between nothing and the most.
@@ -107,7 +112,7 @@ impl Matching {
         (
             force,
             variance,
-            0.5 * heard.squares - cost - weighed.log + 0.5 * variance.ln(),
+            0.5 * observed.squares - cost - weighed.log + 0.5 * variance.ln(),
         )
     }
 }
@@ -121,36 +126,40 @@ mod tests {
     use super::*;
 
     /// What a touch at a template explains, in double precision and one by one.
-    fn explained(matching: &Matching, heard: &Heard, node: usize) -> f64 {
+    fn explained(matching: &Matching, observed: &Observation, node: usize) -> f64 {
         let g = matching.map.node(node);
-        let spread = matching.errors.spread.as_ref().map(|s| s.node(node));
-        let force = matching.fitting_force(heard, g, spread);
-        let weighed = heard.weighed(spread, force);
-        let measured = heard.measured(&weighed);
+        let gluing_deviation = matching
+            .errors
+            .gluing_deviation
+            .as_ref()
+            .map(|s| s.node(node));
+        let force = matching.fitting_force(observed, g, gluing_deviation);
+        let weighed = observed.weighed(gluing_deviation, force);
+        let measured = observed.measured(&weighed);
         let (s, d) = measured.products(g);
         let left = measured.squares - force * (2.0 * s - force * d);
-        0.5 * (heard.squares - left) - weighed.log
+        0.5 * (observed.squares - left) - weighed.log
     }
 
     #[test]
     fn all_at_once_are_scored_as_one_by_one() {
-        let [map, spread] = maps();
+        let [map, gluing_deviation] = maps();
         let reading = [9e-6, 4e-6, 7e-6, 2e-6];
         for drift in [0.0, 1e-6, 20e-6] {
-            for spread in [None, Some(Arc::clone(&spread))] {
+            for gluing_deviation in [None, Some(Arc::clone(&gluing_deviation))] {
                 let errors = Errors {
-                    spread,
+                    gluing_deviation,
                     drift,
                     ..Errors::of_noise(1e-6, CHANNELS)
                 };
                 let mut matching = Matching::new(Arc::clone(&map), errors, 50.0);
-                let heard = Heard::new(&reading, &matching.errors, &matching.used);
-                matching.score(&heard);
+                let observed = Observation::new(&reading, &matching.errors, &matching.used);
+                matching.score(&observed);
                 for node in 0..matching.map.places.len() {
-                    let expected = explained(&matching, &heard, node);
+                    let expected = explained(&matching, &observed, node);
                     let score = f64::from(matching.scores[node]);
                     assert!(
-                        (score - expected).abs() < 1e-3 * (1.0 + heard.squares),
+                        (score - expected).abs() < 1e-3 * (1.0 + observed.squares),
                         "{score} {expected} {drift}"
                     );
                 }

@@ -110,7 +110,7 @@ impl<'a> Measured<'a> {
 }
 
 /// A reading, and what is known of its errors wherever the touch was.
-pub(super) struct Heard<'a> {
+pub(super) struct Observation<'a> {
     /// A channel that reads no strain is left out, and stands here as zero.
     x: Cow<'a, [f64]>,
     /// One over the variance of every channel, without gluing.
@@ -123,7 +123,7 @@ pub(super) struct Heard<'a> {
     log: f64,
 }
 
-impl<'a> Heard<'a> {
+impl<'a> Observation<'a> {
     /// A reading with the weights that it has where gluing does not count.
     pub fn new(reading: &'a [f64], errors: &Errors, used: &[bool]) -> Self {
         if reading.iter().all(|&x| is_a_strain(x)) {
@@ -165,8 +165,8 @@ impl<'a> Heard<'a> {
     }
 
     /// The weights for a touch of a force, where gauges glued otherwise would read so much else (a newton).
-    pub fn weighed(&self, spread: Option<&[f64]>, force: f64) -> Weighed {
-        let Some(spread) = spread else {
+    pub fn weighed(&self, gluing_deviation: Option<&[f64]>, force: f64) -> Weighed {
+        let Some(gluing_deviation) = gluing_deviation else {
             return Weighed {
                 w: self.w.clone(),
                 log: 0.0,
@@ -178,7 +178,7 @@ impl<'a> Heard<'a> {
             log += 0.5 * wider.ln();
             w / wider
         };
-        let w: Vec<f64> = self.w.iter().zip(spread).map(weight).collect();
+        let w: Vec<f64> = self.w.iter().zip(gluing_deviation).map(weight).collect();
         Weighed {
             log: log + Shared::of(self.drift, &w).log - self.log,
             w,
@@ -238,10 +238,10 @@ mod tests {
     #[test]
     fn a_common_drift_is_a_covariance_of_rank_one() {
         let errors = errors(3.0);
-        let heard = Heard::new(&X, &errors, &[true; 4]);
-        let spread = [0.3, 0.1, 0.0, 0.7];
+        let observed = Observation::new(&X, &errors, &[true; 4]);
+        let gluing_deviation = [0.3, 0.1, 0.0, 0.7];
         let force = 2.0;
-        let variances: Vec<f64> = (errors.noise.iter().zip(spread))
+        let variances: Vec<f64> = (errors.noise.iter().zip(gluing_deviation))
             .map(|(n, s)| n * n + f64::powi(force * s, 2))
             .collect();
         let (inverse, determinant) = dense(&variances, 3.0);
@@ -251,13 +251,13 @@ mod tests {
             DVector::from_column_slice(&X),
             DVector::from_column_slice(&G),
         );
-        let weighed = heard.weighed(Some(&spread), force);
-        let measured = heard.measured(&weighed);
+        let weighed = observed.weighed(Some(&gluing_deviation), force);
+        let measured = observed.measured(&weighed);
         let (s, d) = measured.products(&G);
         assert!((s - x.dot(&(&inverse * &g))).abs() < 1e-12);
         assert!((d - g.dot(&(&inverse * &g))).abs() < 1e-12);
         assert!((measured.squares - x.dot(&(&inverse * &x))).abs() < 1e-12);
-        assert!((heard.squares - x.dot(&(&plain * &x))).abs() < 1e-12);
+        assert!((observed.squares - x.dot(&(&plain * &x))).abs() < 1e-12);
         assert!((weighed.log - 0.5 * (determinant / without).ln()).abs() < 1e-12);
     }
 
@@ -266,8 +266,8 @@ mod tests {
         let (still, drifting) = (errors(0.0), errors(1e6));
         let shifted = X.map(|x| x + 5.0);
         let force = |errors: &Errors, x: &[f64]| {
-            let heard = Heard::new(x, errors, &[true; 4]);
-            heard.unglued().fit(&G, 100.0).0
+            let observed = Observation::new(x, errors, &[true; 4]);
+            observed.unglued().fit(&G, 100.0).0
         };
         assert!((force(&drifting, &shifted) - force(&drifting, &X)).abs() < 1e-6);
         assert!((force(&still, &shifted) - force(&still, &X)).abs() > 0.1);
@@ -278,9 +278,9 @@ mod tests {
         let errors = errors(0.3);
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e200] {
             let reading = [X[0], bad, X[2], X[3]];
-            let heard = Heard::new(&reading, &errors, &[true; 4]);
-            let without = Heard::new(&X, &errors, &[true, false, true, true]);
-            let fits = [&heard, &without].map(|h| h.unglued().fit(&G, 100.0).0);
+            let observed = Observation::new(&reading, &errors, &[true; 4]);
+            let without = Observation::new(&X, &errors, &[true, false, true, true]);
+            let fits = [&observed, &without].map(|h| h.unglued().fit(&G, 100.0).0);
             assert_eq!(fits[0], fits[1]);
         }
     }

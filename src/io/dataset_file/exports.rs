@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 use glam::DVec3;
 
 use super::found::{Found, Touches};
-use super::plausible::{Origin, spread};
+use super::plausible::{Origin, longest_side};
 use crate::io::{FileError, source};
 use crate::memory;
 use crate::plain::{self, mm, quote};
@@ -350,7 +350,7 @@ impl Export {
                 ));
             }
         }
-        let moved = MOVED * spread(&first.positions);
+        let moved = MOVED * longest_side(&first.positions);
         for (node, place) in first.nodes.iter().zip(&first.positions) {
             let Some(&row) = rows.get(node) else { continue };
             let apart = (self.positions[row] - *place).abs().max_element();

@@ -102,8 +102,8 @@ impl<'a> Places<'a> {
     }
 
     /// mm.
-    fn spread(&self) -> f64 {
-        spread(&self.points)
+    fn longest_side(&self) -> f64 {
+        longest_side(&self.points)
     }
 
     /// The median of each coordinate (mm): one place far away does not move it.
@@ -114,8 +114,8 @@ impl<'a> Places<'a> {
 
     /// Refuses what is wider than any part: one place by its name, or all for their unit.
     fn within_reach(&self) -> Result<(), FileError> {
-        let spread = self.spread();
-        if spread <= WIDEST {
+        let longest_side = self.longest_side();
+        if longest_side <= WIDEST {
             return Ok(());
         }
         let origin = self.origin;
@@ -138,14 +138,14 @@ impl<'a> Places<'a> {
             _ => origin.wrong(format!(
                 "the {} are spread over {}, wider than any part. {}",
                 origin.what,
-                mm(spread),
+                mm(longest_side),
                 origin.unit()
             )),
         })
     }
 
     fn check_touches(&self) -> Result<(), FileError> {
-        if self.spread() > ONE {
+        if self.longest_side() > ONE {
             return Ok(());
         }
         Err(self.origin.wrong(match self.points.len() {
@@ -165,7 +165,7 @@ pub fn check(touches: &Places, sites: &Places) -> Result<Vec<String>, FileError>
     touches.within_reach()?;
     sites.within_reach()?;
     touches.check_touches()?;
-    let (pressed, read) = (touches.spread(), sites.spread());
+    let (pressed, read) = (touches.longest_side(), sites.longest_side());
     let (narrow, wide) = (pressed.min(read), pressed.max(read));
     if sites.points.len() < 2 || wide <= UNLIKE * narrow {
         let doubt = || in_doubt(wide, touches, sites);
@@ -199,7 +199,7 @@ fn in_doubt(size: f64, touches: &Places, sites: &Places) -> String {
 
 /// The longest side of the box around some points, in their unit; zero of none. No square is taken: it may leave
 /// the range of numbers.
-pub fn spread(points: &[DVec3]) -> f64 {
+pub fn longest_side(points: &[DVec3]) -> f64 {
     if points.is_empty() {
         return 0.0;
     }

@@ -18,7 +18,7 @@ use super::place::Origin;
 use super::sets::Numbered;
 use super::soup::Soup;
 use super::words::at;
-use crate::elasticity::Freedoms;
+use crate::elasticity::DofSet;
 use crate::plain::quote;
 use command::{Command, Lines, Statement, statements};
 use elements::{Element, Routine};
@@ -423,11 +423,11 @@ impl Reader {
     /// D,NODE,Lab,VALUE,VALUE2,NEND,NINC,Lab2,…,Lab6.
     fn hold(&mut self, command: &Command) -> Result<(), String> {
         let labels: Vec<String> = [1, 6, 7, 8, 9, 10].map(|k| command.label(k)).into();
-        let freedoms = labels.iter().fold(0, |all, label| all | freedom(label).0);
+        let dofs = labels.iter().fold(0, |all, label| all | dof(label).0);
         // A table, or what is no plain number, moves what it holds.
         let value = self.known.number(command, 2);
         let moved = value.map_or(1.0, |value| value.unwrap_or(0.0));
-        if freedoms == 0 || moved != 0.0 {
+        if dofs == 0 || moved != 0.0 {
             self.not_read(command);
             return Ok(());
         }
@@ -435,16 +435,15 @@ impl Reader {
             self.not_read(command);
             return Ok(());
         };
-        let full = Freedoms::DISPLACEMENTS.0;
-        let turned =
-            freedoms & full != full && places.iter().any(|place| self.turned.contains(place));
+        let full = DofSet::DISPLACEMENTS.0;
+        let turned = dofs & full != full && places.iter().any(|place| self.turned.contains(place));
         if turned {
             // Directions of its own: no mirror plane of ours.
             self.not_read(command);
             return Ok(());
         }
         for place in places {
-            self.held.hold(place, Freedoms(freedoms));
+            self.held.hold(place, DofSet(dofs));
         }
         Ok(())
     }
@@ -480,12 +479,12 @@ fn changing(command: &Command) -> String {
     )
 }
 
-/// The freedoms of a label of D.
-fn freedom(label: &str) -> Freedoms {
+/// The degrees of freedom of a label of D.
+fn dof(label: &str) -> DofSet {
     let one = ["UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ"];
     match (label, one.iter().position(|known| *known == label)) {
-        (_, Some(index)) => Freedoms::of(&[index]),
-        ("ALL", _) => Freedoms::ALL,
-        _ => Freedoms::default(),
+        (_, Some(index)) => DofSet::of(&[index]),
+        ("ALL", _) => DofSet::ALL,
+        _ => DofSet::default(),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::elasticity::Freedoms;
+use crate::elasticity::DofSet;
 use crate::mesh::unroll::Axis;
 use crate::plain;
 use crate::project::{SupportKeys, SupportKind};
@@ -29,11 +29,11 @@ struct Way {
 /// A solid has no rotations.
 fn ways(solid: bool) -> Vec<Way> {
     let full = if solid {
-        Freedoms::DISPLACEMENTS
+        DofSet::DISPLACEMENTS
     } else {
-        Freedoms::ALL
+        DofSet::ALL
     };
-    let all = |kind, need: Freedoms, name| Way {
+    let all = |kind, need: DofSet, name| Way {
         kind,
         normal: Axis::Z,
         need: need.0,
@@ -41,7 +41,7 @@ fn ways(solid: bool) -> Vec<Way> {
     };
     let mut ways = vec![all(SupportKind::Clamped, full, "held")];
     if !solid {
-        ways.push(all(SupportKind::Pinned, Freedoms::DISPLACEMENTS, "pinned"));
+        ways.push(all(SupportKind::Pinned, DofSet::DISPLACEMENTS, "pinned"));
     }
     let axes = [
         (Axis::X, "held along x"),
@@ -52,7 +52,7 @@ fn ways(solid: bool) -> Vec<Way> {
         ways.push(Way {
             kind: SupportKind::Symmetry,
             normal,
-            need: Freedoms::symmetry(axis).0 & full.0,
+            need: DofSet::symmetry(axis).0 & full.0,
             name,
         });
     }
@@ -65,8 +65,8 @@ fn fits(held: u8, need: u8) -> bool {
 
 impl Held {
     /// Holds a node, beside what is held of it already.
-    pub fn hold(&mut self, node: u32, freedoms: Freedoms) {
-        *self.nodes.entry(node).or_default() |= freedoms.0;
+    pub fn hold(&mut self, node: u32, dofs: DofSet) {
+        *self.nodes.entry(node).or_default() |= dofs.0;
     }
 
     /// The supports that this is, on sets of nodes: those of the file that hold the same nodes, and new ones. What no
@@ -94,9 +94,9 @@ impl Held {
         });
         let supports = supports.collect();
         let meant = if solid {
-            Freedoms::DISPLACEMENTS
+            DofSet::DISPLACEMENTS
         } else {
-            Freedoms::ALL
+            DofSet::ALL
         };
         let said = |held: u8| {
             let fitting = ways.iter().filter(|way| fits(held, way.need));
@@ -142,10 +142,10 @@ mod tests {
     fn what_is_held_is_said_by_the_sets_of_the_file() {
         let mut held = Held::default();
         for node in [1, 2, 5] {
-            held.hold(node, Freedoms::of(&[0, 1]));
-            held.hold(node, Freedoms::of(&[2]));
+            held.hold(node, DofSet::of(&[0, 1]));
+            held.hold(node, DofSet::of(&[2]));
         }
-        held.hold(7, Freedoms::of(&[1]));
+        held.hold(7, DofSet::of(&[1]));
         let mut sets = vec![("rim".to_owned(), vec![1, 2, 5])];
         let mut notes = Vec::new();
         let supports = held.supports(true, &mut sets, &mut notes);
@@ -167,9 +167,9 @@ mod tests {
     #[test]
     fn a_shell_has_rotations() {
         let mut held = Held::default();
-        held.hold(1, Freedoms::DISPLACEMENTS);
-        held.hold(2, Freedoms::ALL);
-        held.hold(3, Freedoms::of(&[0]));
+        held.hold(1, DofSet::DISPLACEMENTS);
+        held.hold(2, DofSet::ALL);
+        held.hold(3, DofSet::of(&[0]));
         let (mut sets, mut notes) = (Vec::new(), Vec::new());
         let supports = held.supports(false, &mut sets, &mut notes);
         let kinds: Vec<SupportKind> = supports.iter().map(|s| s.kind).collect();

@@ -68,7 +68,7 @@ fn part(t: &mut Text, project: &Project) {
         "\"shell\": the mesh is the mid-surface; \"solid\": it encloses a part with walls",
     );
     t.key("thickness_mm", float(part.thickness_mm), "of the shell");
-    let told = [
+    let entries = [
         (
             "inside",
             &part.inside,
@@ -80,7 +80,7 @@ fn part(t: &mut Text, project: &Project) {
             "mask of vertices where touches land, likewise",
         ),
     ];
-    for (key, name, comment) in told {
+    for (key, name, comment) in entries {
         if let Some(name) = name {
             t.key(key, quoted(name), comment);
         }

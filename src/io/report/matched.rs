@@ -43,16 +43,16 @@ fn figures(r: &MatchedRow) -> String {
 
 /// How sets were judged, and every figure.
 pub(super) fn errors(page: &mut String, design: &Design) {
-    let truth = &design.truth;
-    let presses = truth.pressed.as_ref().map_or(0, |p| p.presses.len());
+    let reference = &design.reference;
+    let presses = reference.pressed.as_ref().map_or(0, |p| p.presses.len());
     let _ = write!(
         page,
         "<p>Each reading is matched with the model ({:.2} mm elements), which needs no training; judged on {} touches that no selection has seen, {}. “As built”: every gauge {}, of which the model knows no more than that. “Calibrated”: the same gauges after {presses} known presses, each made by hand {}. “Blind”: touches that move no gauge by more than {BLIND} times its noise.</p>",
         design.simulated.element_mm,
-        truth.touches.len(),
+        reference.touches.len(),
         judged_on(design),
-        truth.off.gluing.in_words(),
-        truth.off.pressing.in_words()
+        reference.off.gluing.in_words(),
+        reference.off.pressing.in_words()
     );
     page.push_str("<details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Force (N)</th><th>Region</th><th>Touches</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Calibrated (mm)</th><th>Blind</th><th>Mean without blind (mm)</th></tr>");
     for r in &design.evaluation.matched {

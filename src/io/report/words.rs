@@ -6,10 +6,10 @@ use crate::design::Design;
 pub(super) fn judged_on(design: &Design) -> String {
     /// Sizes that differ by less are the same.
     const SAME: f64 = 0.99;
-    let (own, truth) = (design.simulated.element_mm, design.truth.element_mm);
-    if truth < SAME * own {
-        format!("drawn off the nodes of a finer model ({truth:.2} mm)")
+    let (own, reference) = (design.simulated.element_mm, design.reference.element_mm);
+    if reference < SAME * own {
+        format!("drawn off the nodes of a finer model ({reference:.2} mm)")
     } else {
-        format!("drawn off the nodes of a model with elements of the same size ({truth:.2} mm)")
+        format!("drawn off the nodes of a model with elements of the same size ({reference:.2} mm)")
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
-use super::{Command, Heard, Listener};
+use super::{Command, Listener, SessionEvent};
 
 /// A listener on a thread of its own; it ends when this is dropped.
 pub struct Connection {
@@ -19,7 +19,7 @@ impl Connection {
     /// When no thread can be had.
     pub fn start(
         listener: Listener,
-        tell: impl FnMut(Heard) + Send + 'static,
+        tell: impl FnMut(SessionEvent) + Send + 'static,
         ended: impl FnOnce(Result<(), String>) + Send + 'static,
     ) -> Result<Self, String> {
         let (commands, inbox) = channel();

@@ -1,4 +1,4 @@
-//! Who listens, what it is told, and what it tells.
+//! Who listens: the commands that it takes, and the events that it reports.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -24,8 +24,8 @@ pub enum State {
     Ended,
 }
 
-/// What is told while listening.
-pub enum Heard<'a> {
+/// What is reported while listening.
+pub enum SessionEvent<'a> {
     State(&'a State),
     Hello(&'a Hello),
     Sample {
@@ -73,7 +73,7 @@ pub struct Listener {
     pub(super) rate: Option<u16>,
     pub(super) state: State,
     /// When the last sample came, or the port was opened.
-    pub(super) heard: Instant,
+    pub(super) last_arrival: Instant,
     /// Why nothing can be used, as far as it was told.
     pub(super) explained: Vec<Doubt>,
     /// How many channels were compared with those of the gauges.
@@ -100,7 +100,7 @@ impl Listener {
             hello: None,
             rate: None,
             state: State::Waiting,
-            heard: Instant::now(),
+            last_arrival: Instant::now(),
             explained: Vec::new(),
             compared: None,
             rest: Rest::default(),
@@ -126,9 +126,9 @@ impl Listener {
         self
     }
 
-    pub(super) fn enter(&mut self, state: State, tell: &mut impl FnMut(Heard)) {
+    pub(super) fn enter(&mut self, state: State, tell: &mut impl FnMut(SessionEvent)) {
         self.state = state;
-        tell(Heard::State(&self.state));
+        tell(SessionEvent::State(&self.state));
     }
 
     pub(super) fn say(&mut self, port: &mut dyn Port, message: &Message) {

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::listener::{Heard, Listener};
+use super::listener::{Listener, SessionEvent};
 use crate::live::Sample;
 use crate::wire::MOST_CHANNELS;
 
@@ -15,7 +15,7 @@ impl Listener {
         own: &str,
         time_us: u64,
         arrived: Instant,
-        tell: &mut impl FnMut(Heard),
+        tell: &mut impl FnMut(SessionEvent),
     ) {
         let words: Vec<&str> = own.split_whitespace().collect();
         match words[..] {
@@ -37,10 +37,13 @@ impl Listener {
                     self.pipeline.mark_dead(&[k]);
                 }
             }
-            ["truth", "none"] => tell(Heard::Truth(None)),
+            ["truth", "none"] => tell(SessionEvent::Truth(None)),
             ["truth", x, y, z, force] => {
                 if let [Some(x), Some(y), Some(z), Some(force)] = [x, y, z, force].map(number) {
-                    tell(Heard::Truth(Some((DVec3::new(x, y, z) * 1e-3, force))));
+                    tell(SessionEvent::Truth(Some((
+                        DVec3::new(x, y, z) * 1e-3,
+                        force,
+                    ))));
                 }
             }
             ["part", from, values] => {
@@ -59,7 +62,7 @@ impl Listener {
         values: &str,
         time_us: u64,
         arrived: Instant,
-        tell: &mut impl FnMut(Heard),
+        tell: &mut impl FnMut(SessionEvent),
     ) {
         if self.gather(from, values) {
             let counts = std::mem::take(&mut self.line);

@@ -1,13 +1,13 @@
 //! What a listener is asked to do while it listens.
 
-use super::listener::{Command, Heard, Listener};
+use super::listener::{Command, Listener, SessionEvent};
 use crate::link::{Port, Recorder};
 use crate::wire::Message;
 
 impl Listener {
-    pub(super) fn turn(&mut self, tell: &mut impl FnMut(Heard)) {
+    pub(super) fn turn(&mut self, tell: &mut impl FnMut(SessionEvent)) {
         self.check_recording(tell);
-        tell(Heard::Turn {
+        tell(SessionEvent::Turn {
             traffic: self.receiver.traffic,
             timing: &self.timing,
             pipeline: &self.pipeline,
@@ -19,7 +19,7 @@ impl Listener {
         &mut self,
         command: Command,
         port: &mut dyn Port,
-        tell: &mut impl FnMut(Heard),
+        tell: &mut impl FnMut(SessionEvent),
     ) {
         match command {
             Command::Tare => {
@@ -35,7 +35,7 @@ impl Listener {
                     self.recorder = Some(recorder);
                     self.begin_recording();
                 }
-                Err(why) => tell(Heard::Unrecorded(&why)),
+                Err(why) => tell(SessionEvent::Unrecorded(&why)),
             },
             Command::StopRecording => {
                 self.flush_recording(tell);

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver as Inbox;
 use std::time::{Duration, Instant};
 
-use super::listener::{Command, Heard, Listener};
+use super::listener::{Command, Listener, SessionEvent};
 use crate::link::{Address, Got, Port, ports};
 use crate::live::{Input, Receiver};
 use crate::wire::Message;
@@ -20,7 +20,7 @@ impl Listener {
         &mut self,
         stop: &AtomicBool,
         inbox: &Inbox<Command>,
-        tell: &mut impl FnMut(Heard),
+        tell: &mut impl FnMut(SessionEvent),
     ) -> Option<Box<dyn Port>> {
         while !stop.load(Ordering::Relaxed) {
             if let Ok(port) = self.address.open() {

@@ -1,6 +1,6 @@
-//! What is heard, written down while it is heard.
+//! What arrives, written down while it arrives.
 
-use super::listener::{Heard, Listener};
+use super::listener::{Listener, SessionEvent};
 use crate::link::Recorder;
 
 impl Listener {
@@ -35,14 +35,14 @@ impl Listener {
     }
 
     /// A recording that can be written no more has ended, and that is said.
-    pub(super) fn check_recording(&mut self, tell: &mut impl FnMut(Heard)) {
+    pub(super) fn check_recording(&mut self, tell: &mut impl FnMut(SessionEvent)) {
         if let Some(why) = self.recorder.as_mut().and_then(|r| r.failed.take()) {
             self.recorder = None;
-            tell(Heard::Unrecorded(&why));
+            tell(SessionEvent::Unrecorded(&why));
         }
     }
 
-    pub(super) fn flush_recording(&mut self, tell: &mut impl FnMut(Heard)) {
+    pub(super) fn flush_recording(&mut self, tell: &mut impl FnMut(SessionEvent)) {
         if let Some(recorder) = &mut self.recorder {
             recorder.flush();
         }

@@ -2,20 +2,24 @@
 
 use std::time::Instant;
 
-use super::listener::{Heard, Listener, State};
+use super::listener::{Listener, SessionEvent, State};
 use crate::live::Sample;
 
 impl Listener {
     /// Says where a gauge is on a channel that does not come, whether a board has told how many there are or its
     /// lines show it; each number of channels once.
-    pub(super) fn compare_channels(&mut self, channels: usize, tell: &mut impl FnMut(Heard)) {
+    pub(super) fn compare_channels(
+        &mut self,
+        channels: usize,
+        tell: &mut impl FnMut(SessionEvent),
+    ) {
         if self.compared.replace(channels) == Some(channels) {
             return;
         }
         let mut gauges = self.pipeline.settings.channels.iter().enumerate();
         if let Some((gauge, channel)) = gauges.find(|(_, c)| **c >= channels) {
             let many = if channels == 1 { "" } else { "s" };
-            tell(Heard::Message(&format!(
+            tell(SessionEvent::Message(&format!(
                 "gauge {} is on channel {channel}, but this board has only {channels} channel{many} (from 0): nothing can be told of a touch. Correct “Channels of the gauges”, or channels in the project's table [live]",
                 gauge + 1
             )));
@@ -26,7 +30,7 @@ impl Listener {
         &mut self,
         sample: &Sample,
         arrived: Instant,
-        tell: &mut impl FnMut(Heard),
+        tell: &mut impl FnMut(SessionEvent),
     ) {
         self.measured += 1;
         if self.state != State::Live {
@@ -43,12 +47,12 @@ impl Listener {
             self.timing.push(arrived.elapsed().as_secs_f32() * 1e6);
         }
         self.record(|r| r.sample(sample));
-        tell(Heard::Sample {
+        tell(SessionEvent::Sample {
             sample,
             update: &update,
             pipeline: &self.pipeline,
         });
         // Not when it arrived: one that is slow to compute is not silent.
-        self.heard = Instant::now();
+        self.last_arrival = Instant::now();
     }
 }

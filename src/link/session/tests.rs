@@ -58,12 +58,12 @@ fn heard(address: Address) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
     let (mut said, mut counts) = (Vec::new(), Vec::new());
     let (stop, (_commands, inbox)) = (AtomicBool::new(false), channel());
     let ended = Listener::new(address, pipeline()).run(&stop, &inbox, |heard| match heard {
-        Heard::State(State::Gone) => stop.store(true, Ordering::Relaxed),
-        Heard::Hello(hello) => said.push(format!("hello {}", hello.name)),
-        Heard::Message(text) => said.push(format!("message {text}")),
-        Heard::Trouble(text) => said.push(format!("trouble {text}")),
-        Heard::Truth(touch) => said.push(format!("truth {touch:?}")),
-        Heard::Sample { sample, .. } => counts.push(sample.counts.clone()),
+        SessionEvent::State(State::Gone) => stop.store(true, Ordering::Relaxed),
+        SessionEvent::Hello(hello) => said.push(format!("hello {}", hello.name)),
+        SessionEvent::Message(text) => said.push(format!("message {text}")),
+        SessionEvent::Trouble(text) => said.push(format!("trouble {text}")),
+        SessionEvent::Truth(touch) => said.push(format!("truth {touch:?}")),
+        SessionEvent::Sample { sample, .. } => counts.push(sample.counts.clone()),
         _ => {}
     });
     (said, counts, ended)

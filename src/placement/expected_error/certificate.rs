@@ -128,7 +128,7 @@ pub fn certify(
     let relaxed = Relaxed::new(scene, &free, &held);
     let as_chosen = |site: &usize| if own.contains(site) { 1.0 } else { 0.0 };
     let weights: Vec<f64> = free.iter().map(as_chosen).collect();
-    let Some(local) = relaxed.sensed(&weights) else {
+    let Some(local) = relaxed.expected(&weights) else {
         return Ok(None);
     };
     let bound = relaxed.bound(own.len(), watch)?;
@@ -155,7 +155,7 @@ struct Relaxed {
 }
 
 /// What weights come to.
-struct Sensed {
+struct Expected {
     /// The error (mm).
     mm: f64,
     /// For each press the matrix H with which a row r, as its weight grows, takes rᵀHr from the error.
@@ -201,26 +201,26 @@ impl Relaxed {
             report(watch, BOUNDING, round, MOST)?;
             let felt = |w: &f64| if *w < FELT * even { 0.0 } else { *w };
             let felt: Vec<f64> = weights.iter().map(felt).collect();
-            let Some(sensed) = self.sensed(&felt) else {
+            let Some(expected) = self.expected(&felt) else {
                 return Ok(None);
             };
-            let worths = self.worths(&sensed);
-            best = best.max(sensed.mm - lead(&worths, &felt, count));
-            if sensed.mm - best <= TOLERANCE * sensed.mm {
+            let worths = self.worths(&expected);
+            best = best.max(expected.mm - duality_gap(&worths, &felt, count));
+            if expected.mm - best <= TOLERANCE * expected.mm {
                 break;
             }
-            let wished: Vec<f64> = (weights.iter().zip(&worths))
+            let wanted: Vec<f64> = (weights.iter().zip(&worths))
                 .map(|(weight, worth)| weight.max(LEAST * even) * worth)
                 .collect();
-            weights = shared_out(&wished, count);
+            weights = shared_out(&wanted, count);
         }
         Ok(Some(best))
     }
 
     /// What weights come to; nothing where numbers fail.
-    fn sensed(&self, weights: &[f64]) -> Option<Sensed> {
+    fn expected(&self, weights: &[f64]) -> Option<Expected> {
         let informed = self.informed(weights);
-        let mut sensed = Sensed {
+        let mut expected = Expected {
             mm: 0.0,
             slopes: Vec::with_capacity(self.presses),
         };
@@ -231,12 +231,12 @@ impl Relaxed {
             let place = upper.fixed_columns::<2>(0) * scale;
             let (length, slope) =
                 mean_length_and_slope(place[(0, 0)], place[(0, 1)], place[(1, 1)]);
-            sensed.mm += mass * length;
-            sensed
+            expected.mm += mass * length;
+            expected
                 .slopes
                 .push(upper.transpose() * slope * upper * *mass);
         }
-        Some(sensed)
+        Some(expected)
     }
 
     /// Information about each press.
@@ -253,9 +253,9 @@ impl Relaxed {
     }
 
     /// By how much the error falls (mm) as the weight of each site grows, over what it grows by.
-    fn worths(&self, sensed: &Sensed) -> Vec<f64> {
+    fn worths(&self, expected: &Expected) -> Vec<f64> {
         let worth = |rows: &[[f32; 3]]| -> f64 {
-            let pairs = rows.iter().zip(&sensed.slopes);
+            let pairs = rows.iter().zip(&expected.slopes);
             pairs
                 .map(|(row, slope)| {
                     let r = wide(row);
@@ -279,31 +279,32 @@ fn add(informed: &mut [Matrix3<f64>], rows: &[[f32; 3]], weight: f64) {
     }
 }
 
-/// By how much the best `count` sites are worth more than the weighted ones, as if worths stayed as they are.
-fn lead(worths: &[f64], weights: &[f64], count: usize) -> f64 {
+/// By how much the best `count` sites are worth more than the weighted ones, as if worths stayed as they are: the gap of
+/// the convex problem's dual.
+fn duality_gap(worths: &[f64], weights: &[f64], count: usize) -> f64 {
     let mut sorted = worths.to_vec();
     sorted.sort_by(|a, b| b.total_cmp(a));
     let weighted = worths.iter().zip(weights).map(|(d, w)| d * w);
     sorted.iter().take(count).sum::<f64>() - weighted.sum::<f64>()
 }
 
-/// Weights in proportion to what is wished, none above one, `count` in all.
-fn shared_out(wished: &[f64], count: usize) -> Vec<f64> {
-    let mut full = vec![false; wished.len()];
+/// Weights in proportion to what is wanted, none above one, `count` in all.
+fn shared_out(wanted: &[f64], count: usize) -> Vec<f64> {
+    let mut full = vec![false; wanted.len()];
     loop {
         let left = count.saturating_sub(full.iter().filter(|f| **f).count());
-        let open = wished.iter().zip(&full).filter(|(_, full)| !**full);
+        let open = wanted.iter().zip(&full).filter(|(_, full)| !**full);
         let sum: f64 = open.map(|(w, _)| w).sum();
         let share = if sum > 0.0 { left as f64 / sum } else { 0.0 };
         let mut more = false;
-        for (full, w) in full.iter_mut().zip(wished) {
+        for (full, w) in full.iter_mut().zip(wanted) {
             if !*full && w * share > 1.0 {
                 (*full, more) = (true, true);
             }
         }
         if !more {
             let weight = |(w, full): (&f64, &bool)| if *full { 1.0 } else { w * share };
-            return wished.iter().zip(&full).map(weight).collect();
+            return wanted.iter().zip(&full).map(weight).collect();
         }
     }
 }
@@ -355,7 +356,7 @@ mod tests {
             for set in [vec![], vec![3], vec![1, 4], vec![0, 2, 5, 7]] {
                 let (held, free) = set.split_at(set.len() / 2);
                 let relaxed = Relaxed::new(&scene, free, held);
-                let mm = relaxed.sensed(&vec![1.0; free.len()]).unwrap().mm;
+                let mm = relaxed.expected(&vec![1.0; free.len()]).unwrap().mm;
                 let bank = local(&scene, &set);
                 assert!((mm - bank).abs() < 1e-4 * bank, "{set:?}: {mm} {bank}");
             }
@@ -368,12 +369,12 @@ mod tests {
         for with_forces in [false, true] {
             let relaxed = Relaxed::new(&scene(7, with_forces), &[0, 1, 3, 4, 6], &[2]);
             let weights = [0.2, 0.7, 0.05, 0.4, 0.65];
-            let worths = relaxed.worths(&relaxed.sensed(&weights).unwrap());
+            let worths = relaxed.worths(&relaxed.expected(&weights).unwrap());
             for (k, worth) in worths.iter().enumerate() {
                 let at = |step: f64| {
                     let mut moved = weights;
                     moved[k] += step;
-                    relaxed.sensed(&moved).unwrap().mm
+                    relaxed.expected(&moved).unwrap().mm
                 };
                 let fall = (at(-STEP) - at(STEP)) / (2.0 * STEP);
                 assert!((worth / fall - 1.0).abs() < 1e-4, "{k}: {worth} {fall}");
@@ -384,7 +385,7 @@ mod tests {
     #[test]
     fn the_error_is_convex_in_the_weights() {
         let relaxed = Relaxed::new(&scene(5, true), &[0, 1, 2, 3, 4], &[]);
-        let at = |w: &[f64]| relaxed.sensed(w).unwrap().mm;
+        let at = |w: &[f64]| relaxed.expected(w).unwrap().mm;
         let (a, b) = ([1.0, 0.0, 0.3, 0.6, 0.0], [0.0, 1.0, 0.1, 0.0, 0.9]);
         let middle: Vec<f64> = (a.iter().zip(&b))
             .map(|(a, b)| f64::midpoint(*a, *b))

@@ -7,9 +7,9 @@ use super::bank::{Bank, Rows};
 use super::scene::{Detail, Knowledge, Scene};
 use crate::budget::{Cancelled, Watch, report};
 use crate::draw::subsets;
+use crate::placement::constraints::{Constraints, Field, LostBy, reached};
 use crate::placement::exchange::Criterion;
-use crate::placement::lead::Best;
-use crate::placement::wishes::{Field, LostBy, Wishes, reached};
+use crate::placement::margin::Best;
 use crate::placement::{PlacementError, Pool, Request, SensorSet};
 
 const SELECTING: &str = "Selecting by expected error";
@@ -41,16 +41,16 @@ pub(super) struct Losses {
 
 impl Losses {
     /// Nothing where no gauge may be lost.
-    pub fn of(wishes: &Wishes, seed: u64) -> Option<Self> {
+    pub fn of(constraints: &Constraints, seed: u64) -> Option<Self> {
         /// From so many on they are many.
         const MANY: usize = 12;
         let losses = Self {
-            gauges: wishes.loss.gauges,
+            gauges: constraints.loss.gauges,
             seed,
             many: false,
         };
-        (wishes.failure > 0.0).then(|| Self {
-            many: losses.all(wishes.sensors).len() > MANY,
+        (constraints.failure > 0.0).then(|| Self {
+            many: losses.all(constraints.sensors).len() > MANY,
             ..losses
         })
     }
@@ -98,8 +98,8 @@ impl Expected {
     }
 
     /// As it counts (mm).
-    pub fn weighed(self, wishes: &Wishes) -> f64 {
-        wishes.weighed(self.whole, self.lost.into_iter())
+    pub fn weighed(self, constraints: &Constraints) -> f64 {
+        constraints.weighed(self.whole, self.lost.into_iter())
     }
 }
 
@@ -120,7 +120,7 @@ impl<'a> Expectation<'a> {
             },
             pool,
             request,
-            losses: Losses::of(request.wishes, known.seed),
+            losses: Losses::of(request.constraints, known.seed),
         })
     }
 
@@ -131,7 +131,7 @@ impl<'a> Expectation<'a> {
 
     /// The criterion (mm) of a set.
     fn error(&self, set: &[usize]) -> Result<f64, Cancelled> {
-        Ok(self.expected(set)?.weighed(self.request.wishes))
+        Ok(self.expected(set)?.weighed(self.request.constraints))
     }
 
     fn expected(&self, set: &[usize]) -> Result<Expected, Cancelled> {
@@ -199,7 +199,7 @@ impl<'a> Expectation<'a> {
         places: &[usize],
         chosen: usize,
     ) -> Result<Vec<(usize, f64)>, Cancelled> {
-        let step = (chosen, self.request.wishes.sensors);
+        let step = (chosen, self.request.constraints.sensors);
         let errors = scan(bank, places, self.request.watch, step)?;
         Ok(places.iter().copied().zip(errors).collect())
     }
@@ -227,13 +227,13 @@ impl<'a> Expectation<'a> {
         let errors = errors?;
         let weighed = whole.iter().enumerate().map(|(k, &(place, whole))| {
             let lost = errors.iter().map(|after| after[k]);
-            (place, self.request.wishes.weighed(whole, lost))
+            (place, self.request.constraints.weighed(whole, lost))
         });
         Ok(weighed.collect())
     }
 
     fn report(&self, chosen: usize) -> Result<(), Cancelled> {
-        let wanted = self.request.wishes.sensors;
+        let wanted = self.request.constraints.sensors;
         report(self.request.watch, SELECTING, chosen.min(wanted), wanted)
     }
 
@@ -242,14 +242,14 @@ impl<'a> Expectation<'a> {
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
     pub fn losses_note(&self, set: &[usize]) -> Result<Option<String>, Cancelled> {
-        let wishes = self.request.wishes;
+        let constraints = self.request.constraints;
         let Some(losses) = self.losses.as_ref().filter(|_| !set.is_empty()) else {
             return Ok(None);
         };
         let Expected { whole, lost } = self.expected(set)?;
         let mean = lost.iter().sum::<f64>() / lost.len().max(1) as f64;
         let worst = lost.iter().copied().fold(0.0, f64::max);
-        let counts = match wishes.loss.by {
+        let counts = match constraints.loss.by {
             LostBy::Expected => "the mean",
             LostBy::Worst => "the worst",
         };
@@ -257,7 +257,7 @@ impl<'a> Expectation<'a> {
             "With all gauges {whole:.2} mm; with any {} lost {mean:.2} mm in the mean of {} cases and {worst:.2} mm in the worst. Counted: {counts}, with {:.0} %.",
             losses.gauges.min(set.len()),
             lost.len(),
-            100.0 * wishes.failure
+            100.0 * constraints.failure
         )))
     }
 }
@@ -295,7 +295,7 @@ impl Criterion for Expectation<'_> {
         let mut banks = self.banks(&[], 0);
         let mut sets: Vec<SensorSet> = Vec::new();
         let mut before = self.error(&[])?;
-        while !field.full() && !reached(&sets, self.request.wishes) {
+        while !field.full() && !reached(&sets, self.request.constraints) {
             let others = (&field.chosen[..], field.chosen.len());
             let worth = |place: usize, gain: f64| field.worth(place, gain);
             let errors = self.scan(&banks, others, &field.open(), &worth)?;
@@ -310,7 +310,7 @@ impl Criterion for Expectation<'_> {
                 Some(_) => self.error(&field.chosen)?,
                 None => banks.fine.error(),
             };
-            let set = set_of(self.pool, &field.chosen, before, best.lead());
+            let set = set_of(self.pool, &field.chosen, before, best.margin());
             found(&set);
             sets.push(set);
         }
@@ -318,13 +318,13 @@ impl Criterion for Expectation<'_> {
     }
 }
 
-fn set_of(pool: &Pool, chosen: &[usize], error: f64, lead: Option<f64>) -> SensorSet {
+fn set_of(pool: &Pool, chosen: &[usize], error: f64, margin: Option<f64>) -> SensorSet {
     SensorSet {
         sites: chosen.iter().map(|&p| pool.sites[p]).collect(),
         criterion: Some(error),
         criterion_mm: Some(error),
         gap: None,
-        lead,
+        margin,
         certificate: None,
     }
 }

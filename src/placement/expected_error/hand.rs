@@ -222,9 +222,9 @@ pub(super) mod tests {
         let places = scene.presses_mm();
         for (place, blind) in places.iter().zip(of(0.2)) {
             let away = place.distance(DVec3::new(5.0, 5.0, 0.0));
-            let heard = 0.2 * 40.0 * (-away / 25.0).exp();
-            if (heard - BLIND).abs() > 0.01 {
-                assert_eq!(blind, heard < BLIND, "{place}");
+            let reading = 0.2 * 40.0 * (-away / 25.0).exp();
+            if (reading - BLIND).abs() > 0.01 {
+                assert_eq!(blind, reading < BLIND, "{place}");
             }
         }
         let count = |force: f64| of(force).into_iter().filter(|b| *b).count();

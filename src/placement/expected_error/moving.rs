@@ -9,7 +9,7 @@ use super::scene::{Outlook, Scene, Variance};
 use super::{Detail, Knowledge};
 use crate::budget::{Cancelled, Watch};
 use crate::dataset::SignalMatrix;
-use crate::placement::Wishes;
+use crate::placement::Constraints;
 
 /// Seats for gauges, numbered from zero, under the touches that a choice looked at; who sits there may change.
 pub struct Moving<'a> {
@@ -17,7 +17,7 @@ pub struct Moving<'a> {
     /// Where so many gauges may be lost that this is looked at in less detail.
     coarse: Option<Seated<'a>>,
     losses: Option<Losses>,
-    wishes: &'a Wishes,
+    constraints: &'a Constraints,
 }
 
 /// The seats, in some detail.
@@ -37,7 +37,7 @@ impl<'a> Moving<'a> {
         targets: &[[f64; 3]],
         known: &Knowledge<'a>,
         (detail, seats): (Detail, usize),
-        wishes: &'a Wishes,
+        constraints: &'a Constraints,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
         let nobody = SignalMatrix::new(x.columns(), vec![0.0; seats * x.columns()]);
@@ -46,14 +46,14 @@ impl<'a> Moving<'a> {
             let scene = outlook.scene(&nobody, None, watch)?;
             Ok(Seated { outlook, scene })
         };
-        let losses = Losses::of(wishes, known.seed);
+        let losses = Losses::of(constraints, known.seed);
         let many = losses.as_ref().is_some_and(|l| l.many);
         let coarse = many.then(|| seated(detail.coarse())).transpose()?;
         Ok(Self {
             fine: seated(detail)?,
             coarse,
             losses,
-            wishes,
+            constraints,
         })
     }
 
@@ -78,7 +78,7 @@ impl<'a> Moving<'a> {
         let lossy = self.coarse.as_ref().unwrap_or(&self.fine);
         let losses = self.losses.as_ref().map(|l| (l, &lossy.scene));
         let expected = Expected::of(&self.fine.scene, losses, set, report)?;
-        Ok(expected.weighed(self.wishes))
+        Ok(expected.weighed(self.constraints))
     }
 
     /// The part of the error (mm) that is left where one place is meant.

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::screen::LEVELS;
-use super::{GreedySvr, PlacementError, Pool, Request, Scored, Search, Wishes};
+use super::{Constraints, GreedySvr, PlacementError, Pool, Request, Scored, Search};
 use crate::budget::Watch;
 
 /// How many others are compared at each step.
@@ -57,9 +57,9 @@ impl GreedySvr {
         audit: Audit,
         watch: Watch,
     ) -> Result<Vec<Comparison>, PlacementError> {
-        let wishes = Wishes::count(chosen.len());
+        let constraints = Constraints::count(chosen.len());
         let request = Request {
-            wishes: &wishes,
+            constraints: &constraints,
             watch,
             found: &|_| (),
         };

@@ -58,7 +58,7 @@ impl<'a> Judge<'a> {
 
     /// Largest standard deviation of a coordinate of the targets (mm).
     #[must_use]
-    pub fn spread(&self) -> f64 {
+    pub fn target_deviation(&self) -> f64 {
         let deviation = |y: &Vec<f64>| {
             let n = y.len().max(1) as f64;
             let mean = y.iter().sum::<f64>() / n;
@@ -89,7 +89,7 @@ impl<'a> Judge<'a> {
         };
         // A tolerance larger than what there is to learn would be met by learning nothing.
         let mut params = self.hyper.params(self.effort);
-        params.tolerance = params.tolerance.min(RELATIVE * self.spread());
+        params.tolerance = params.tolerance.min(RELATIVE * self.target_deviation());
         let fits: Vec<Fit> = (0..3 * self.folds.parts.len())
             .into_par_iter()
             .map(|j| {

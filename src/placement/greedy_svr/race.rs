@@ -86,20 +86,12 @@ pub fn race(
     let mut pairs = Vec::new();
     let mut relation = Relation::default();
     while !rest.is_empty() {
-        let mut batch: Vec<Scored> = Vec::new();
         let size = if scored.is_empty() {
             rules.least
         } else {
             rules.batch
         };
-        for k in 0..size.min(rest.len()) {
-            let at = if k < rules.audits {
-                (k + 1) * rest.len() / (rules.audits + 1)
-            } else {
-                0
-            };
-            batch.push(rest.remove(at));
-        }
+        let batch = taken(&mut rest, size, rules.audits);
         let places: Vec<usize> = batch.iter().map(|b| b.place).collect();
         for (before, error) in batch.iter().zip(score(&places)?) {
             pairs.push((before.error, error));
@@ -134,6 +126,20 @@ pub fn race(
         rest,
         relation,
     })
+}
+
+/// Takes the next ones out of the rest: so many audits from all over it, and then its first ones.
+fn taken(rest: &mut Vec<Scored>, size: usize, audits: usize) -> Vec<Scored> {
+    let mut batch = Vec::new();
+    for k in 0..size.min(rest.len()) {
+        let at = if k < audits {
+            (k + 1) * rest.len() / (audits + 1)
+        } else {
+            0
+        };
+        batch.push(rest.remove(at));
+    }
+    batch
 }
 
 #[cfg(test)]

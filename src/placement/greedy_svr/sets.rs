@@ -4,8 +4,8 @@ use super::exact::Judged;
 use super::screen::Base;
 use super::{PlacementError, Search, SensorSet};
 use crate::budget::Cancelled;
+use crate::placement::constraints::{Field, reached};
 use crate::placement::exchange::Criterion;
-use crate::placement::wishes::{Field, reached};
 use crate::regression::kernel;
 
 impl Criterion for Search<'_> {
@@ -15,12 +15,12 @@ impl Criterion for Search<'_> {
     fn of(&mut self, set: &[usize]) -> Result<f64, PlacementError> {
         let whole = self.error(set)?;
         let mut lost = Vec::new();
-        if self.request.wishes.failure > 0.0 {
+        if self.request.constraints.failure > 0.0 {
             for number in 0..set.len() {
                 lost.push(self.error(&without(set, number))?);
             }
         }
-        Ok(self.request.wishes.weighed(whole, lost.into_iter()))
+        Ok(self.request.constraints.weighed(whole, lost.into_iter()))
     }
 
     fn screened(&mut self, others: &Field, _: usize) -> Result<Vec<(usize, f64)>, PlacementError> {
@@ -41,7 +41,7 @@ impl Criterion for Search<'_> {
     ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
         self.stand_on(&[])?;
         let mut sets: Vec<SensorSet> = Vec::new();
-        while !field.full() && !reached(&sets, self.request.wishes) {
+        while !field.full() && !reached(&sets, self.request.constraints) {
             let Some(step) = self.best_addition(&field)? else {
                 break;
             };
@@ -51,7 +51,7 @@ impl Criterion for Search<'_> {
                 criterion: Some(step.error),
                 criterion_mm: Some(step.error),
                 gap: Some(step.gap),
-                lead: step.lead,
+                margin: step.margin,
                 certificate: None,
             };
             found(&set);
@@ -76,7 +76,7 @@ impl Search<'_> {
         self.kernel = self.kernel_over(set);
         self.base = self.base_of(set)?;
         self.without.clear();
-        if self.request.wishes.failure > 0.0 {
+        if self.request.constraints.failure > 0.0 {
             for number in 0..set.len() {
                 let base = self.base_of(&without(set, number))?;
                 self.without.push(base);
@@ -104,7 +104,7 @@ impl Search<'_> {
         from_last: bool,
     ) -> Result<Judged, Cancelled> {
         let start = from_last.then_some(&self.base.beta);
-        let progress = self.progress(step.min(self.request.wishes.sensors));
+        let progress = self.progress(step.min(self.request.constraints.sensors));
         let judged = self
             .judge
             .judge(kernel, start, progress, self.request.watch)?;

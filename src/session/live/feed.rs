@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use crate::board::Truth;
-use crate::link::{Heard, State};
+use crate::link::{SessionEvent, State};
 use crate::live::{Estimator, Health, Traffic, Update};
 use crate::wire::Hello;
 
@@ -74,13 +74,13 @@ pub struct Feed {
 pub type Shared = Arc<Mutex<Feed>>;
 
 /// Takes in what was heard, and wakes the window when there is something to see.
-pub fn hear(feed: &Shared, heard: &Heard, wake: &dyn Fn()) {
+pub fn hear(feed: &Shared, heard: &SessionEvent, wake: &dyn Fn()) {
     let Ok(mut feed) = feed.lock() else {
         return;
     };
     let at_once = feed.take(heard);
     let due = feed.drawn.is_none_or(|t| t.elapsed() >= FRAME);
-    let seen = matches!(heard, Heard::Sample { .. });
+    let seen = matches!(heard, SessionEvent::Sample { .. });
     if at_once || (seen && due) {
         feed.drawn = Some(Instant::now());
         wake();
@@ -89,9 +89,9 @@ pub fn hear(feed: &Shared, heard: &Heard, wake: &dyn Fn()) {
 
 impl Feed {
     /// Whether the window must show it at once.
-    fn take(&mut self, heard: &Heard) -> bool {
+    fn take(&mut self, heard: &SessionEvent) -> bool {
         match heard {
-            Heard::State(state) => {
+            SessionEvent::State(state) => {
                 self.state = Some((*state).clone());
                 if **state == State::Waiting {
                     self.trouble = None;
@@ -102,11 +102,11 @@ impl Feed {
                 }
                 true
             }
-            Heard::Hello(hello) => {
+            SessionEvent::Hello(hello) => {
                 self.hello = Some((*hello).clone());
                 true
             }
-            Heard::Sample {
+            SessionEvent::Sample {
                 update, pipeline, ..
             } => {
                 self.sample(update);
@@ -118,20 +118,20 @@ impl Feed {
                 }
                 false
             }
-            Heard::Truth(touch) => {
+            SessionEvent::Truth(touch) => {
                 self.truth = *touch;
                 false
             }
-            Heard::Message(text) | Heard::Unrecorded(text) => {
+            SessionEvent::Message(text) | SessionEvent::Unrecorded(text) => {
                 self.say(text);
                 true
             }
-            Heard::Trouble(text) => {
+            SessionEvent::Trouble(text) => {
                 self.trouble = Some((*text).to_owned());
                 self.say(text);
                 true
             }
-            Heard::Turn {
+            SessionEvent::Turn {
                 traffic,
                 timing,
                 pipeline,
@@ -230,10 +230,10 @@ mod tests {
     #[test]
     fn why_a_board_is_not_understood_stays_until_it_is_asked_anew() {
         let mut feed = Feed::default();
-        assert!(feed.take(&Heard::Trouble("version 2")));
-        feed.take(&Heard::State(&State::Silent));
+        assert!(feed.take(&SessionEvent::Trouble("version 2")));
+        feed.take(&SessionEvent::State(&State::Silent));
         assert_eq!(feed.trouble.as_deref(), Some("version 2"));
-        feed.take(&Heard::State(&State::Waiting));
+        feed.take(&SessionEvent::State(&State::Waiting));
         assert_eq!(feed.trouble, None);
     }
 
@@ -241,7 +241,7 @@ mod tests {
     fn a_board_that_talks_without_a_pause_fills_no_memory() {
         let mut feed = Feed::default();
         for _ in 0..1000 {
-            feed.take(&Heard::Message("again"));
+            feed.take(&SessionEvent::Message("again"));
         }
         assert_eq!(feed.messages.len(), MESSAGES);
     }

@@ -112,7 +112,7 @@ impl Session {
         let mean =
             |c: usize| rows.iter().skip(1).map(|r| r[c]).sum::<f64>() / (rows.len() - 1) as f64;
         let reading = (0..sensing.gauges.len()).map(mean).collect();
-        let at = sensing.drawn.map.index.nearest(place).0;
+        let at = sensing.drawn.map.mesh.index().nearest(place).0;
         self.live.known.push(Known { at, force, reading });
     }
 

@@ -187,7 +187,7 @@ mod tests {
         for sequence in [65_531, 65_535, 0, 0, 65_531, 1] {
             encode(&data, sequence, 0, 12, &mut bytes);
         }
-        let told: Vec<String> = (events(&bytes).iter())
+        let met: Vec<String> = (events(&bytes).iter())
             .map(|event| match event {
                 Event::Message { sequence, .. } => sequence.to_string(),
                 Event::Lost(n) => format!("lost {n}"),
@@ -197,7 +197,7 @@ mod tests {
         let expected = [
             "65530", "65531", "lost 3", "65535", "0", "Repeated", "Repeated", "1",
         ];
-        assert_eq!(told, expected);
+        assert_eq!(met, expected);
         // A board that begins anew and whose hello was lost is heard again soon.
         for sequence in 0..40 {
             encode(&data, 40_000 + sequence, 0, 12, &mut bytes);
@@ -216,9 +216,9 @@ mod tests {
         let mut decoder = Decoder::default();
         decoder.push(&vec![0x41; 1_000_000], |e| panic!("{e:?}"));
         assert!(decoder.frame.capacity() < 1024);
-        let mut told = Vec::new();
-        decoder.push(&[0], |e| told.push(e));
-        assert_eq!(told, [Event::Refused(Refusal::Framing)]);
+        let mut met = Vec::new();
+        decoder.push(&[0], |e| met.push(e));
+        assert_eq!(met, [Event::Refused(Refusal::Framing)]);
     }
 
     /// A HELLO as its bytes on the wire, after something was done to its payload.

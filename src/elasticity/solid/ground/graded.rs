@@ -7,7 +7,7 @@ use super::solved::{SAFETY, SolidGraded, Solved};
 use crate::budget::{Elements, Watch};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::estimate::{self, Discretization, Sample};
-use crate::elasticity::grade::{PLACES, sample, spread};
+use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::solid::series::Series;
 use crate::elasticity::solid::sizing::{self, LEAST_GRIDS, Shape};
@@ -77,7 +77,7 @@ impl SolidGround {
         let shape = self.shape();
         let least = shape.least(aim, touches.len());
         let touches = sample(touches);
-        let places: Vec<DVec3> = spread(places, PLACES);
+        let places: Vec<DVec3> = subsample(places, PLACES);
         let (tip, away) = self.nearest(&touches);
         let mut grids = Grids::default();
         let mut size = shape.first(tip, away, least);
@@ -173,7 +173,7 @@ mod tests {
     use super::*;
     use crate::budget::unwatched;
     use crate::elasticity::support::Region;
-    use crate::elasticity::{Freedoms, Material, Support};
+    use crate::elasticity::{DofSet, Material, Support};
     use crate::mesh::TriMesh;
     use crate::mesh::oriented_box::OrientedBox;
 
@@ -196,7 +196,7 @@ mod tests {
                 DVec3::NEG_ONE,
                 DVec3::new(1.0, 1.0, 1e-6),
             )),
-            held: Freedoms::ALL,
+            held: DofSet::ALL,
         };
         let material = Material {
             youngs_modulus: 2e9,

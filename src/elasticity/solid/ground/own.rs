@@ -8,7 +8,7 @@ use super::solved::{SAFETY, SolidGraded, Solved};
 use crate::budget::{Elements, Watch};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::estimate::{self, Discretization};
-use crate::elasticity::grade::{PLACES, sample, spread};
+use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::solid::immersed::Fineness;
 use crate::elasticity::solid::orders::{self, FIRST};
@@ -18,7 +18,7 @@ use crate::memory;
 use crate::mesh::volume::VolumeMesh;
 
 /// Entries of the factor × touches, and multiplications of the factorization, for each vertex × touch of an effort: at
-/// standard quality about two minutes of processor time, and a quarter of one.
+/// standard quality about two minutes of CPU time, and a quarter of one.
 const ENTRIES: f64 = 70_000.0;
 const MULTIPLICATIONS: f64 = 25_000.0;
 /// Pieces that are judged where the whole, one order higher, does not fit into memory.
@@ -52,7 +52,7 @@ impl Climb {
     fn new(touches: &[Touch], places: &[DVec3]) -> Self {
         Self {
             touches: sample(touches),
-            places: spread(places, PLACES),
+            places: subsample(places, PLACES),
             changes: Vec::new(),
         }
     }
@@ -279,7 +279,7 @@ impl SolidGround {
             return Ok(estimate::unknown(0, 0));
         };
         let mut found = Vec::new();
-        for touch in spread(&climb.touches, PIECES) {
+        for touch in subsample(&climb.touches, PIECES) {
             let piece = Piece::around(own, touch.position);
             let near: Vec<DVec3> = piece.within(&climb.places);
             let solved = |order| -> Result<Solved, ElasticError> {

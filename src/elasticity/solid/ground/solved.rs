@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::elasticity::estimate::{Discretization, Sample};
-use crate::elasticity::grade::{CHECKED, spread};
+use crate::elasticity::grade::{CHECKED, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::model::{LoadCheck, Model as _};
 use crate::elasticity::solid::SolidModel;
@@ -57,8 +57,10 @@ impl Solved {
         models: u64,
     ) -> SolidGraded {
         SolidGraded {
-            balance: (self.model)
-                .check_all(&spread(touches, CHECKED), &spread(&self.solutions, CHECKED)),
+            balance: (self.model).check_all(
+                &subsample(touches, CHECKED),
+                &subsample(&self.solutions, CHECKED),
+            ),
             fineness: self.fineness,
             model: self.model,
             estimate,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::keyword::{Keyword, values};
-use crate::elasticity::Freedoms;
+use crate::elasticity::DofSet;
 use crate::io::mesh_file::held::{Held, NodeSet};
 use crate::io::mesh_file::words::{fortran, listed, whole};
 use crate::plain;
@@ -68,8 +68,8 @@ impl Elastic {
 /// What is held, of nodes and sets by their names in the file, in capitals.
 #[derive(Default)]
 pub struct Boundaries {
-    held: BTreeMap<String, Freedoms>,
-    /// Lines that move what they hold, or do not say freedoms of displacement.
+    held: BTreeMap<String, DofSet>,
+    /// Lines that move what they hold, or do not say degrees of freedom of displacement.
     others: usize,
     steps: usize,
 }
@@ -86,7 +86,7 @@ impl Boundaries {
         self.steps += 1;
     }
 
-    /// Takes a line: a node or a set, and its first and last freedom, or a name for several.
+    /// Takes a line: a node or a set, and its first and last degree of freedom, or a name for several.
     ///
     /// # Errors
     /// A message naming the line.
@@ -96,7 +96,7 @@ impl Boundaries {
         let held = named(word(1)).map_or_else(|| numbered(word(1), word(2), line), Ok)?;
         let value = word(3);
         let moved = !value.is_empty() && fortran(value, line)? != 0.0;
-        if moved || held == Freedoms::default() {
+        if moved || held == DofSet::default() {
             self.others += 1;
         } else {
             let name = word(0).trim_matches('"').to_uppercase();
@@ -114,13 +114,13 @@ impl Boundaries {
     ) -> Vec<SupportKeys> {
         let mut all = Held::default();
         let mut unknown: Vec<&str> = Vec::new();
-        for (name, freedoms) in &self.held {
+        for (name, dofs) in &self.held {
             let nodes = nodes_of(name, places, sets);
             if nodes.is_empty() {
                 unknown.push(name);
             }
             for node in nodes {
-                all.hold(node, *freedoms);
+                all.hold(node, *dofs);
             }
         }
         if !unknown.is_empty() {
@@ -140,21 +140,21 @@ impl Boundaries {
 }
 
 /// Freedoms by their common name.
-fn named(word: &str) -> Option<Freedoms> {
+fn named(word: &str) -> Option<DofSet> {
     Some(match word.to_uppercase().as_str() {
-        "ENCASTRE" => Freedoms::ALL,
-        "PINNED" => Freedoms::DISPLACEMENTS,
-        "XSYMM" => Freedoms::symmetry(0),
-        "YSYMM" => Freedoms::symmetry(1),
-        "ZSYMM" => Freedoms::symmetry(2),
+        "ENCASTRE" => DofSet::ALL,
+        "PINNED" => DofSet::DISPLACEMENTS,
+        "XSYMM" => DofSet::symmetry(0),
+        "YSYMM" => DofSet::symmetry(1),
+        "ZSYMM" => DofSet::symmetry(2),
         _ => return None,
     })
 }
 
 /// Freedoms from one number to another, those beyond the six left out; a name that is not known is none.
-fn numbered(first: &str, last: &str, line: usize) -> Result<Freedoms, String> {
+fn numbered(first: &str, last: &str, line: usize) -> Result<DofSet, String> {
     if first.starts_with(char::is_alphabetic) {
-        return Ok(Freedoms::default());
+        return Ok(DofSet::default());
     }
     let first = whole(first, line)?;
     let last = match last {
@@ -165,7 +165,7 @@ fn numbered(first: &str, last: &str, line: usize) -> Result<Freedoms, String> {
         .zip(0..)
         .filter(|(k, _)| (first..=last).contains(k));
     let held: Vec<usize> = among.map(|(_, index)| index).collect();
-    Ok(Freedoms::of(&held))
+    Ok(DofSet::of(&held))
 }
 
 /// The nodes of a set, whichever instance it is said to be of, or the one of a number.

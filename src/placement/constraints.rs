@@ -7,9 +7,9 @@ use crate::pca::PcaError;
 use crate::plain;
 use crate::regression::Standardizer;
 
-/// Wishes; the default asks for nothing but the count.
+/// What is asked of a choice; the default asks for nothing but the count.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Wishes {
+pub struct Constraints {
     /// Most gauges.
     pub sensors: usize,
     /// Places in the pool that must be chosen, before all others: what is glued already.
@@ -108,7 +108,7 @@ impl Thorough {
     }
 }
 
-impl Wishes {
+impl Constraints {
     #[must_use]
     pub fn count(sensors: usize) -> Self {
         Self {
@@ -138,10 +138,10 @@ impl Wishes {
 
 /// Whether sets have come to the error (mm) that was asked for, with all gauges that must be there.
 #[must_use]
-pub fn reached(sets: &[SensorSet], wishes: &Wishes) -> bool {
+pub fn reached(sets: &[SensorSet], constraints: &Constraints) -> bool {
     let error = sets.last().and_then(|s| s.criterion_mm);
-    matches!((error, wishes.target_mm), (Some(error), Some(target)) if error <= target)
-        && sets.len() >= wishes.required.len()
+    matches!((error, constraints.target_mm), (Some(error), Some(target)) if error <= target)
+        && sets.len() >= constraints.required.len()
 }
 
 /// A note on a choice that ended short of what was wanted, with what [`Field::closed`] says.
@@ -155,9 +155,9 @@ pub fn shortage(why: &str, reached: usize, wanted: usize) -> String {
 
 /// What is to be said where the error that was asked for is not reached.
 #[must_use]
-pub fn unreached(sets: &[SensorSet], wishes: &Wishes) -> Option<String> {
+pub fn unreached(sets: &[SensorSet], constraints: &Constraints) -> Option<String> {
     let error = sets.last().and_then(|s| s.criterion)?;
-    let target = wishes.target_mm.filter(|t| error > *t)?;
+    let target = constraints.target_mm.filter(|t| error > *t)?;
     Some(format!(
         "The error asked for, {target} mm, was not reached: {error:.2} mm with {}.",
         plain::count(sets.len(), "gauge")
@@ -168,7 +168,7 @@ pub fn unreached(sets: &[SensorSet], wishes: &Wishes) -> Option<String> {
 #[derive(Clone)]
 pub struct Field<'a> {
     pool: &'a Pool<'a>,
-    wishes: &'a Wishes,
+    constraints: &'a Constraints,
     /// In the order they were chosen.
     pub chosen: Vec<usize>,
     open: Vec<bool>,
@@ -185,13 +185,13 @@ impl<'a> Field<'a> {
     /// Nothing chosen yet.
     ///
     /// # Errors
-    /// [`PlacementError`] for wishes that cannot be met.
-    pub fn new(pool: &'a Pool<'a>, wishes: &'a Wishes) -> Result<Self, PlacementError> {
+    /// [`PlacementError`] for constraints that cannot be met.
+    pub fn new(pool: &'a Pool<'a>, constraints: &'a Constraints) -> Result<Self, PlacementError> {
         let available = pool.sites.len();
         if available == 0 {
             return Err(PlacementError::NoSites);
         }
-        let wanted = wishes.sensors.max(wishes.required.len());
+        let wanted = constraints.sensors.max(constraints.required.len());
         if wanted > available {
             return Err(PlacementError::TooFewSites { wanted, available });
         }
@@ -206,7 +206,7 @@ impl<'a> Field<'a> {
         }
         let mut field = Self {
             pool,
-            wishes,
+            constraints,
             chosen: Vec::new(),
             open: vec![true; available],
             constant,
@@ -222,28 +222,28 @@ impl<'a> Field<'a> {
     }
 
     fn check(&mut self) -> Result<(), PlacementError> {
-        let wishes = self.wishes;
-        let bad = |what: &'static str| Err(PlacementError::Wish { what });
-        if wishes.sensors < wishes.required.len() {
+        let constraints = self.constraints;
+        let bad = |what: &'static str| Err(PlacementError::Constraint { what });
+        if constraints.sensors < constraints.required.len() {
             return bad(
                 "more gauges must be there than are to be placed in all: raise their number",
             );
         }
-        if wishes.costs.as_ref().is_some_and(|c| {
+        if constraints.costs.as_ref().is_some_and(|c| {
             c.len() != self.open.len() || c.iter().any(|c| !c.is_finite() || *c <= 0.0)
         }) {
             return bad("every site's cost must be a number above zero");
         }
-        if !(0.0..=1.0).contains(&wishes.failure) {
+        if !(0.0..=1.0).contains(&constraints.failure) {
             return bad("the probability of a failure must lie between 0 and 1");
         }
-        if wishes.failure > 0.0 && wishes.loss.gauges == 0 {
+        if constraints.failure > 0.0 && constraints.loss.gauges == 0 {
             return bad("a failure must take one gauge at least");
         }
-        if self.pool.positions.is_empty() && wishes.spacing > 0.0 {
+        if self.pool.positions.is_empty() && constraints.spacing > 0.0 {
             return bad("a spacing needs the positions of the sites (site_m)");
         }
-        for &place in &wishes.required {
+        for &place in &constraints.required {
             if place >= self.open.len() {
                 return bad("a gauge that must be there is not among the sites");
             }
@@ -263,18 +263,18 @@ impl<'a> Field<'a> {
     /// Whether enough was chosen.
     #[must_use]
     pub fn full(&self) -> bool {
-        self.chosen.len() >= self.wishes.sensors
+        self.chosen.len() >= self.constraints.sensors
     }
 
     /// What may be chosen; the next that must be, alone, while there is one.
     #[must_use]
     pub fn open(&self) -> Vec<usize> {
-        if let Some(&next) = self.wishes.required.get(self.chosen.len()) {
+        if let Some(&next) = self.constraints.required.get(self.chosen.len()) {
             return vec![next];
         }
         let mut allowed = self.allowed();
         if let Some(first) = self.first
-            && self.chosen.len() == self.wishes.required.len()
+            && self.chosen.len() == self.constraints.required.len()
         {
             allowed.retain(|&place| place == first);
         }
@@ -293,14 +293,14 @@ impl<'a> Field<'a> {
     /// How many gauges must be there.
     #[must_use]
     pub(super) fn required(&self) -> usize {
-        self.wishes.required.len()
+        self.constraints.required.len()
     }
 
     /// Of a field with nothing chosen: with the gauges that must be there.
     #[must_use]
     pub(super) fn with_required(&self) -> Self {
         let mut field = self.clone();
-        for &place in &self.wishes.required {
+        for &place in &self.constraints.required {
             field.add(place);
         }
         field
@@ -329,20 +329,20 @@ impl<'a> Field<'a> {
     /// Whether this place is the next that must be chosen.
     #[must_use]
     pub fn is_required(&self, place: usize) -> bool {
-        self.wishes.required.get(self.chosen.len()) == Some(&place)
+        self.constraints.required.get(self.chosen.len()) == Some(&place)
     }
 
     fn affordable(&self, place: usize) -> bool {
         /// Sums of costs round.
         const ROUNDING: f64 = 1e-12;
-        let budget = self.wishes.budget.unwrap_or(f64::INFINITY);
+        let budget = self.constraints.budget.unwrap_or(f64::INFINITY);
         let cost = self.cost(place);
         cost <= self.dearest && self.spent + cost <= budget * (1.0 + ROUNDING)
     }
 
     #[must_use]
     pub fn cost(&self, place: usize) -> f64 {
-        self.wishes.costs.as_ref().map_or(1.0, |c| c[place])
+        self.constraints.costs.as_ref().map_or(1.0, |c| c[place])
     }
 
     /// A gain as it counts: by what it costs.
@@ -361,11 +361,11 @@ impl<'a> Field<'a> {
         self.spent += self.cost(place);
         self.chosen.push(place);
         self.open[place] = false;
-        if self.wishes.spacing > 0.0 {
+        if self.constraints.spacing > 0.0 {
             let here = self.pool.positions[place];
             for (open, p) in self.open.iter_mut().zip(self.pool.positions) {
                 let apart = p.distance(here);
-                *open &= apart >= self.wishes.spacing || apart == 0.0;
+                *open &= apart >= self.constraints.spacing || apart == 0.0;
             }
         }
     }
@@ -387,7 +387,7 @@ impl<'a> Field<'a> {
             }
         }
         // Without what rounds in metres.
-        let spacing = (self.wishes.spacing * 1e6).round() / 1e3;
+        let spacing = (self.constraints.spacing * 1e6).round() / 1e3;
         let reasons = [
             (near, format!("nearer than {spacing} mm to a gauge")),
             (costly, "dearer than what is left of the budget".to_owned()),
@@ -414,7 +414,7 @@ impl<'a> Field<'a> {
     /// What is to be said of sites whose signal never changes.
     #[must_use]
     pub fn constant_notes(&self) -> Vec<String> {
-        let required = |place: &usize| self.wishes.required.contains(place);
+        let required = |place: &usize| self.constraints.required.contains(place);
         let (kept, left_out): (Vec<usize>, Vec<usize>) = (0..self.constant.len())
             .filter(|&place| self.constant[place])
             .partition(required);

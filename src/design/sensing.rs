@@ -30,7 +30,7 @@ pub struct Sensing {
     pub off: Uncertainty,
     /// What the project's tolerance of gluing, and of the tip, puts on the readings, while nothing is known of these
     /// gauges.
-    pub spread: Arc<ResponseMap>,
+    pub gluing_deviation: Arc<ResponseMap>,
     /// Where known touches are best pressed: evenly over the part.
     pub proposed: Vec<Touch>,
     /// Mean edge of the elements (mm).
@@ -77,7 +77,7 @@ impl Workshop {
 ///
 /// # Errors
 /// [`DesignError`] as for a simulation, and where no gauges are chosen.
-pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, DesignError> {
+pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, DesignError> {
     let project = &inputs.project;
     project.check()?;
     if project.selection.sites.is_empty() {
@@ -101,7 +101,7 @@ pub fn sense(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing, 
     Ok(Sensing {
         gauges,
         sensitivity: Arc::new(sensitivity),
-        spread: Arc::new(drawn.spread(&off)),
+        gluing_deviation: Arc::new(drawn.gluing_deviation(&off)),
         off,
         drawn: Arc::new(drawn),
         proposed,
@@ -138,13 +138,13 @@ impl Sensing {
     ///
     /// # Errors
     /// [`DesignError`] as for a simulation.
-    pub fn truth(
+    pub fn reference(
         &self,
         gluing: &Gluing,
         seed: u64,
         watch: Watch,
     ) -> Result<(Sensitivity, Vec<f64>), DesignError> {
-        let (_, model) = self.meshed.truth(watch)?;
+        let (_, model) = self.meshed.reference_model(watch)?;
         let gauges: Vec<Gauge> = (self.gauges.iter().enumerate())
             .map(|(k, gauge)| glued(gauge, gluing, seed, k))
             .collect();
@@ -206,15 +206,16 @@ impl Sensing {
         let Some(glued) = live.glued(gauges) else {
             return GaugeModel {
                 map: Arc::clone(&self.drawn.map),
-                spread: Some(Arc::clone(&self.spread)),
+                gluing_deviation: Some(Arc::clone(&self.gluing_deviation)),
                 off,
             };
         };
         let doubts = live.doubts(gauges);
-        let spread = doubts.map(|doubts| Arc::new(self.drawn.spread_of(&doubts, &off)));
+        let gluing_deviation =
+            doubts.map(|doubts| Arc::new(self.drawn.gluing_deviation_of(&doubts, &off)));
         GaugeModel {
             map: Arc::new(self.drawn.glued(&glued)),
-            spread,
+            gluing_deviation,
             // What known touches have shown says more than what the elements were estimated to leave.
             off: Uncertainty {
                 elements: 0.0,

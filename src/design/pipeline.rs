@@ -1,4 +1,4 @@
-//! The whole road in one go, and what comes out of it.
+//! The whole pipeline in one go, and what comes out of it.
 
 use std::sync::Arc;
 
@@ -6,8 +6,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    DesignError, Found, Inputs, Reduced, Simulated, Truth, evaluate, filter, reduce_sites, refine,
-    select_step_by_step, simulate, sites_to_judge, truth,
+    DesignError, Found, Inputs, Reduced, Reference, Simulated, evaluate, filter, reduce_sites,
+    reference, refine, select_step_by_step, simulate, sites_to_judge,
 };
 use crate::budget::{Budget, Watch, Work};
 use crate::evaluation::{Evaluation, EvaluationRow};
@@ -30,7 +30,7 @@ pub struct Design {
     pub lead: SelectorKind,
     /// Whether gauges of the chosen set were moved by hand.
     pub by_hand: bool,
-    pub truth: Arc<Truth>,
+    pub reference: Arc<Reference>,
     pub evaluation: Arc<Evaluation>,
     pub seconds: Vec<StageTime>,
 }
@@ -43,8 +43,8 @@ pub struct Known {
     /// moved off its lattice.
     pub selections: Option<Arc<Vec<Selection>>>,
     /// Of the same simulation.
-    pub truth: Option<Arc<Truth>>,
-    /// Of these selections on this truth, in whatever regions.
+    pub reference: Option<Arc<Reference>>,
+    /// Of these selections on this reference model, in whatever regions.
     pub evaluation: Option<Arc<Evaluation>>,
 }
 
@@ -107,7 +107,7 @@ impl Design {
         rows.find(|r| r.selector == name && r.sensors == count)
     }
 
-    /// Errors touch by touch (mm) of a selector's set of so many gauges, beside the truth's touches.
+    /// Errors touch by touch (mm) of a selector's set of so many gauges, beside the held-out touches of the reference model.
     #[must_use]
     pub fn touch_errors(&self, kind: SelectorKind, sensors: usize) -> Option<&[f64]> {
         let mut sets = (self.selections.iter())
@@ -120,7 +120,7 @@ impl Design {
     #[must_use]
     pub fn error_map(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
         let errors = self.touch_errors(self.lead, self.chosen().len())?;
-        let places: Vec<(DVec3, DVec3)> = (self.truth.touches.iter())
+        let places: Vec<(DVec3, DVec3)> = (self.reference.touches.iter())
             .map(|t| (t.position, t.normal))
             .collect();
         Some(scatter::to_vertices(mesh, &places, errors))
@@ -145,7 +145,7 @@ impl Design {
         for selection in self.selections.iter() {
             work += selection.achieved.effort;
         }
-        work += self.truth.work;
+        work += self.reference.work;
         work += self.evaluation.work;
         work
     }
@@ -157,7 +157,7 @@ impl Design {
         cautions.extend(self.led().map(|s| named(s, &s.achieved.cautions)));
         cautions.push(self.evaluation.notes.clone());
         cautions.push(self.simulated.achieved.cautions.clone());
-        if self.truth.element_mm >= self.simulated.element_mm {
+        if self.reference.element_mm >= self.simulated.element_mm {
             cautions.push(vec![
                 "Judged on elements as large as the model's own: finer ones would not have fitted into memory, so the errors leave out what elements of this size cost.".into(),
             ]);
@@ -210,7 +210,7 @@ fn named(selection: &Selection, words: &[String]) -> Vec<String> {
     words.iter().map(|w| format!("{title}: {w}")).collect()
 }
 
-/// Runs the whole road. `clock` gives seconds since any fixed moment: the core has no clock of its own.
+/// Runs the whole pipeline. `clock` gives seconds since any fixed moment: the core has no clock of its own.
 ///
 /// # Errors
 /// [`DesignError`] from the stage that could not end.
@@ -229,7 +229,7 @@ pub fn run(
     Ok(design)
 }
 
-/// Runs the road from a simulation that is there already.
+/// Runs the pipeline from a simulation that is there already.
 ///
 /// # Errors
 /// [`DesignError`] from the stage that could not end.
@@ -298,25 +298,25 @@ pub fn run_step_by_step(
     let by = judging.estimator();
     let judged = sites_to_judge(by, &reduced, &selections);
     let off = super::known::off(&inputs.project, &simulated);
-    let measured = (known.truth).filter(|t| {
+    let measured = (known.reference).filter(|t| {
         let all = &simulated.dataset.sites;
         t.measures(&judged, all, &off, &inputs.project)
     });
     let same = |e: &Arc<Evaluation>| measured.is_some() && e.judging == judging;
     let known = known.evaluation.filter(same);
-    let truth = match measured {
+    let reference = match measured {
         Some(known) => Arc::new(known.in_regions_of(&inputs.project)),
-        None => Arc::new(truth(inputs, &simulated, &judged, budget, watch)?),
+        None => Arc::new(reference(inputs, &simulated, &judged, budget, watch)?),
     };
     times.lap("truth");
     let evaluation = match known {
-        Some(known) => known.in_regions(&truth.regions),
+        Some(known) => known.in_regions(&reference.regions),
         None => evaluate(
             inputs,
             &simulated,
             &reduced,
             &selections,
-            &truth,
+            &reference,
             budget,
             watch,
         )?,
@@ -331,7 +331,7 @@ pub fn run_step_by_step(
         lead,
         by_hand: false,
         selections,
-        truth,
+        reference,
         evaluation: Arc::new(evaluation),
         seconds: times.stages,
     })

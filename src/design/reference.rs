@@ -11,10 +11,10 @@ use crate::uncertainty::Uncertainty;
 
 /// The judge: a model of finer elements, with touches of its own.
 #[derive(Clone)]
-pub struct Truth {
+pub struct Reference {
     pub touches: Vec<Touch>,
     pub regions: Vec<Region>,
-    /// Element size of the truth (mm).
+    /// Element size of the reference model (mm).
     pub element_mm: f64,
     pub work: Work,
     /// Dataset sites that were measured, rising, and their signals.
@@ -69,7 +69,7 @@ pub(super) fn noisy<'a>(
     evaluation::add_noise_by(x, noise, seed.wrapping_add(draw), &|row| streams[row])
 }
 
-impl Truth {
+impl Reference {
     /// Whether it measures exactly these of all sites, in any order, built and pressed as far off as that, and what this
     /// estimator asks for beside.
     #[must_use]
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn what_another_workshop_built_was_not_measured() {
-        let truth = Truth {
+        let reference = Reference {
             touches: Vec::new(),
             regions: Vec::new(),
             element_mm: 1.0,
@@ -140,19 +140,19 @@ mod tests {
         let mut project = Project::around("limb.stl", None);
         project.evaluation.estimator = EstimatorKind::Svr;
         let mut all = vec![site(); 6];
-        assert!(truth.measures(&[5, 2, 5], &all, &usual, &project));
-        assert!(!truth.measures(&[5, 3], &all, &usual, &project));
-        assert!(!truth.measures(&[5, 2], &all, &other, &project));
+        assert!(reference.measures(&[5, 2, 5], &all, &usual, &project));
+        assert!(!reference.measures(&[5, 3], &all, &usual, &project));
+        assert!(!reference.measures(&[5, 2], &all, &other, &project));
         project.evaluation.estimator = EstimatorKind::Matching;
-        let matched = Truth {
+        let matched = Reference {
             grid: grid(&project),
             pressed: Some(Pressed {
                 presses: Vec::new(),
                 x: SignalMatrix::default(),
             }),
-            ..truth.clone()
+            ..reference.clone()
         };
-        assert!(!truth.measures(&[5, 2], &all, &usual, &project));
+        assert!(!reference.measures(&[5, 2], &all, &usual, &project));
         assert!(matched.measures(&[5, 2], &all, &usual, &project));
         // A gauge off the lattice may lie elsewhere now.
         all[5].position.x += 1e-4;

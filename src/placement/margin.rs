@@ -3,7 +3,7 @@
 
 use super::SensorSet;
 
-/// Relative tolerance of picks by criteria without an effort of their own: a lead of less than twice this is a tie.
+/// Relative tolerance of picks by criteria without an effort of their own: a margin of less than twice this is a tie.
 /// It is what a relative change of 1e-6 in the input may grow to on its way through a model.
 pub const TOLERANCE: f64 = 1e-4;
 
@@ -43,18 +43,18 @@ impl Best {
 
     /// How far the best is ahead of the next, over its own worth; nothing where there was no choice.
     #[must_use]
-    pub fn lead(&self) -> Option<f64> {
+    pub fn margin(&self) -> Option<f64> {
         let ((_, best), second) = (self.best?, self.second?);
         Some(((best - second) / best.abs().max(f64::MIN_POSITIVE)).max(0.0))
     }
 }
 
-/// A word on the picks whose lead is less than twice the tolerance, where there are any.
+/// A word on the picks whose margin is less than twice the tolerance, where there are any.
 #[must_use]
 pub fn ties(sets: &[SensorSet], tolerance: f64) -> Option<String> {
     let tied: Vec<String> = sets
         .iter()
-        .filter(|s| s.lead.is_some_and(|lead| lead <= 2.0 * tolerance))
+        .filter(|s| s.margin.is_some_and(|margin| margin <= 2.0 * tolerance))
         .map(|s| s.sites.len().to_string())
         .collect();
     (!tied.is_empty()).then(|| {
@@ -73,7 +73,7 @@ pub fn within_model(sets: &[SensorSet], tolerance: f64) -> Option<String> {
     if tolerance.is_nan() || tolerance <= 0.0 {
         return None;
     }
-    let firm = |s: &&SensorSet| s.lead.is_none_or(|lead| lead > 2.0 * tolerance);
+    let firm = |s: &&SensorSet| s.margin.is_none_or(|margin| margin > 2.0 * tolerance);
     let number = |s: &SensorSet| s.sites.len().to_string();
     let open = sets.len() - sets.iter().filter(firm).count();
     if open == 0 {
@@ -99,12 +99,12 @@ mod tests {
     #[test]
     fn the_first_of_equal_ones_is_best_and_has_no_lead() {
         let mut best = Best::default();
-        assert_eq!(best.lead(), None);
+        assert_eq!(best.margin(), None);
         for (place, worth) in [(3, 1.0), (5, 2.0), (7, 2.0), (9, 1.5)] {
             best.offer(place, worth);
         }
-        assert_eq!((best.place(), best.lead()), (Some(5), Some(0.0)));
+        assert_eq!((best.place(), best.margin()), (Some(5), Some(0.0)));
         best.offer(11, 4.0);
-        assert_eq!((best.place(), best.lead()), (Some(11), Some(0.5)));
+        assert_eq!((best.place(), best.margin()), (Some(11), Some(0.5)));
     }
 }
