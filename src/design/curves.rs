@@ -1,6 +1,6 @@
 //! What a design found as curves with their names, for pages and windows alike.
 
-use super::road::Design;
+use super::pipeline::Design;
 use crate::evaluation::{BASELINE, EstimatorKind, Failures};
 use crate::placement::SelectorKind;
 

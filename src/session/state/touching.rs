@@ -92,7 +92,7 @@ pub(in crate::session) fn serve(
             return desk.wait();
         }
     };
-    let vertices = design::carry(model.index(), &first.inputs.part);
+    let vertices = design::carry(model.mesh(), &first.inputs.part);
     let observer = model.observer(&vertices, Face::Inside);
     let model_inputs = first.model.clone();
     let mut request = first;
