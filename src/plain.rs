@@ -183,6 +183,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn single_peaks_do_not_wash_a_map_out() {
+        let mut values: Vec<f64> = (0..1000).map(|k| f64::from(k) * -1e-3).collect();
+        values.extend([1e6, f64::NAN, f64::INFINITY]);
+        assert!((robust_top(&values) - 1.0).abs() < 1e-12);
+        assert_eq!(
+            (robust_top(&[]), round_up(0.0), round_up(4.1)),
+            (1.0, 1.0, 5.0)
+        );
+    }
+
+    #[test]
     fn nothing_that_a_terminal_obeys_is_left() {
         assert_eq!(quote("\u{1b}[31mred\u{7}"), "“\u{fffd}[31mred\u{fffd}”");
         assert_eq!(quote("two\n”lines"), "“two\u{fffd}\"lines”");

@@ -17,7 +17,7 @@ use super::news::Event;
 use super::slot::{Slot, current};
 use super::state::Session;
 use super::state::live::{Gathering, Target};
-use crate::board::{Faults, Script, SimulatedBoard, Truth, script_seed};
+use crate::board::{ChannelFault, Faults, Illness, Script, SimulatedBoard, Truth, script_seed};
 use crate::design::simulated_board::{options, places, simulated};
 use crate::design::{self, Inputs, Sensing, Workshop};
 use crate::document::SensingInputs;
@@ -27,6 +27,17 @@ use crate::link::{
 };
 use crate::live::{Estimator, Pipeline};
 use feed::Shared;
+
+/// What may happen to a simulated board.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mishap {
+    /// For two seconds.
+    Unplugged,
+    /// To a gauge of its own for each illness.
+    Ill(Illness),
+    /// All gauges are well again.
+    Recovery,
+}
 
 /// Smallest and largest force of the touches of a simulated board (N).
 const FORCES_N: [f64; 2] = [2.0, 15.0];
@@ -66,6 +77,29 @@ impl Session {
         self.disconnect();
         self.live.target = Some(Target::Simulated);
         self.go_on_connecting();
+    }
+
+    /// Has something go wrong at the simulated board from now on, where there is one.
+    pub fn let_happen(&mut self, mishap: Mishap) {
+        const UNPLUGGED_S: f64 = 2.0;
+        let Some(hosted) = self.live.simulated_board() else {
+            return;
+        };
+        let now = hosted.seconds();
+        let Ok(mut board) = hosted.board.lock() else {
+            return;
+        };
+        let faults = board.faults_mut();
+        match mishap {
+            Mishap::Unplugged => faults.unplugged.push((now, now + UNPLUGGED_S)),
+            Mishap::Ill(illness) => faults.channels.push(ChannelFault {
+                channel: illness as usize,
+                illness,
+                from_s: now,
+                until_s: f64::INFINITY,
+            }),
+            Mishap::Recovery => faults.channels.clear(),
+        }
     }
 
     /// Hangs up.

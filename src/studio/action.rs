@@ -9,7 +9,7 @@ use crate::document::{Brush, Layer};
 use crate::io::examples::Example;
 use crate::mesh::SurfacePoint;
 use crate::project::{ChosenSite, Project, Unit};
-use crate::session::{Desk, Ends, Session, Task};
+use crate::session::{Desk, Ends, Mishap, Session, Task};
 use crate::trade::{Asked, Setting};
 
 /// Something to be done.
@@ -119,6 +119,8 @@ pub enum FileAction {
 pub enum BoardAction {
     Connect(String),
     Simulated,
+    /// Of the simulated board.
+    Mishap(Mishap),
     Tare,
     ToggleRecording(String),
     Disconnect,
@@ -282,6 +284,7 @@ impl BoardAction {
         match self {
             Self::Connect(address) => session.connect(&address),
             Self::Simulated => session.start_simulated_board(),
+            Self::Mishap(mishap) => session.let_happen(mishap),
             Self::Tare => session.tare(),
             Self::ToggleRecording(name) => session.toggle_recording(&name),
             Self::Disconnect => session.disconnect(),

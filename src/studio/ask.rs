@@ -119,3 +119,40 @@ impl<'a> Ask<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::document::Document;
+    use crate::io::opening::bundled;
+    use crate::session::Wake;
+
+    #[test]
+    fn forms_of_one_frame_add_up_and_one_that_changes_nothing_asks_for_nothing() {
+        let document = Document::new(bundled().unwrap(), None);
+        let mut session = Session::new(document, Wake::default());
+        let mut view = View::of(&session.document);
+        let mut ask = Ask::new(&session, &mut view);
+        ask.edit(|_| ());
+        ask.edit_desk(|desk| desk.baud += 0);
+        assert!(ask.into_actions().is_empty());
+
+        let (force, baud) = (
+            session.document.state.project.touch.force_n,
+            session.desk.baud,
+        );
+        let mut ask = Ask::new(&session, &mut view);
+        ask.edit(|project| project.touch.force_n += 1.0);
+        ask.edit_desk(|desk| desk.compare = !desk.compare);
+        ask.edit(|project| project.selection.sensors += 1);
+        ask.edit_desk(|desk| desk.baud += 1);
+        let sensors = ask.project().selection.sensors;
+        for action in ask.into_actions() {
+            assert!(action.apply(&mut session).is_none());
+        }
+        let project = &session.document.state.project;
+        assert!((project.touch.force_n - force - 1.0).abs() < 1e-12);
+        assert_eq!(project.selection.sensors, sensors + 1);
+        assert!(session.desk.compare && session.desk.baud == baud + 1);
+    }
+}

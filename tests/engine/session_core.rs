@@ -4,10 +4,11 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::coarse;
+use hapdef::board::Illness;
 use hapdef::budget::Quality;
 use hapdef::document::Document;
 use hapdef::io::opening::bundled;
-use hapdef::session::{Attention, Event, Opened, Session, Task, Wake};
+use hapdef::session::{Attention, Event, Mishap, Opened, Session, Task, Wake};
 
 /// A session on a limb so coarse that a simulation ends soon.
 fn session() -> Session {
@@ -173,4 +174,28 @@ fn a_board_is_listened_to_by_the_model_of_the_gauges() {
     // What was to be listened to is not there: that is said, and nothing is connected.
     advance_until(&mut s, "the end", |s| said(s, "nowhere.hapdrec"));
     assert!(!s.live.is_connected() && !s.live.is_preparing());
+}
+
+#[test]
+fn what_happens_to_a_simulated_board_is_its_own() {
+    let mut s = session();
+    // Without a board nothing happens.
+    s.let_happen(Mishap::Unplugged);
+    s.start_simulated_board();
+    advance_until(&mut s, "the board", |s| s.live.is_connected());
+    let faults = |s: &Session| {
+        let hosted = s.live.simulated_board().unwrap();
+        let mut board = hosted.board.lock().unwrap();
+        let faults = board.faults_mut();
+        (faults.unplugged.len(), faults.channels.len())
+    };
+    assert_eq!(faults(&s), (0, 0));
+    s.let_happen(Mishap::Ill(Illness::Dead));
+    s.let_happen(Mishap::Ill(Illness::Stuck));
+    s.let_happen(Mishap::Unplugged);
+    assert_eq!(faults(&s), (1, 2));
+    s.let_happen(Mishap::Recovery);
+    assert_eq!(faults(&s), (1, 0));
+    s.disconnect();
+    assert!(s.live.simulated_board().is_none() && !s.live.is_connected());
 }

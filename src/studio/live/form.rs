@@ -8,11 +8,11 @@ use super::super::commands::Command;
 use super::super::form::{choice, number, percentage, rows};
 use super::super::theme;
 use super::super::words::live_in_words;
-use crate::board::{ChannelFault, Illness};
+use crate::board::Illness;
 use crate::link::{PortInfo, ports};
 use crate::live::Estimator;
 use crate::project::{FORCE_OFF, LiveKeys, PLACE_OFF};
-use crate::session::{LEAST_KNOWN, WANTED_KNOWN};
+use crate::session::{LEAST_KNOWN, Mishap, WANTED_KNOWN};
 
 /// What is typed at the live stage.
 #[derive(Default)]
@@ -153,40 +153,20 @@ fn connected_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
     recording_form(ask, form, ui);
 }
 
-fn faults(ask: &Ask<'_>, ui: &mut Ui) {
-    let Some(hosted) = ask.session.live.simulated_board() else {
-        return;
-    };
-    let now = hosted.seconds();
+fn faults(ask: &mut Ask<'_>, ui: &mut Ui) {
     ui.menu_button("Faults", |ui| {
-        let Ok(mut board) = hosted.board.lock() else {
-            return;
-        };
-        let faults = board.faults_mut();
-        if ui.button("Unplug for 2 s").clicked() {
-            faults.unplugged.push((now, now + 2.0));
-            ui.close();
-        }
-        for (name, illness) in [
-            ("Gauge 1 dies", Illness::Dead),
-            ("Gauge 2 sticks", Illness::Stuck),
-            ("Gauge 3 saturates", Illness::Saturated),
-            ("Gauge 4 gets noisy", Illness::Noisy),
+        for (name, mishap) in [
+            ("Unplug for 2 s", Mishap::Unplugged),
+            ("Gauge 1 dies", Mishap::Ill(Illness::Dead)),
+            ("Gauge 2 sticks", Mishap::Ill(Illness::Stuck)),
+            ("Gauge 3 saturates", Mishap::Ill(Illness::Saturated)),
+            ("Gauge 4 gets noisy", Mishap::Ill(Illness::Noisy)),
+            ("All gauges recover", Mishap::Recovery),
         ] {
             if ui.button(name).clicked() {
-                let channel = illness as usize;
-                faults.channels.push(ChannelFault {
-                    channel,
-                    illness,
-                    from_s: now,
-                    until_s: f64::INFINITY,
-                });
+                ask.act(BoardAction::Mishap(mishap));
                 ui.close();
             }
-        }
-        if ui.button("All gauges recover").clicked() {
-            faults.channels.clear();
-            ui.close();
         }
     })
     .response
