@@ -75,6 +75,8 @@ struct Frame {
     title: String,
     /// What had the keyboard.
     focused: Option<egui::Id>,
+    /// What hands and eyes were at when the session was last told.
+    attention: Attention,
     /// Whoever closes it has said that nothing need be saved.
     closes: bool,
 }
@@ -209,7 +211,15 @@ impl Studio {
     fn advance(&mut self, ctx: &Context) {
         let attention = self.attention(ctx);
         self.session.advance(&attention);
+        self.frame.attention = attention;
         self.follow();
+    }
+
+    /// Has the next frame come at once where the session must hear of something that is looked at only now.
+    fn look_again(&self, ctx: &Context) {
+        if self.attention(ctx) != self.frame.attention {
+            ctx.request_repaint();
+        }
     }
 
     fn follow(&mut self) {
@@ -459,6 +469,7 @@ impl eframe::App for Studio {
         self.panels(ui);
         self.over(&ctx);
         self.settle(&ctx);
+        self.look_again(&ctx);
         self.update_title(&ctx);
         self.keep_unsaved(&ctx);
         self.guard_close(&ctx);

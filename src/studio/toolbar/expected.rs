@@ -8,15 +8,7 @@ use super::super::ask::Ask;
 fn nothing_expected(ask: &Ask<'_>) -> &'static str {
     if ask.session.simulation_holds() != Some(true) {
         "Expected error: press “Simulate”"
-    } else if ask
-        .session
-        .document
-        .state
-        .project
-        .selection
-        .sites
-        .is_empty()
-    {
+    } else if ask.project().selection.sites.is_empty() {
         "Expected error: no gauges yet"
     } else if ask.session.simulated_sites().is_none() {
         "A gauge lies at none of the sites that were simulated"
