@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::attention::Attention;
 use super::jobs::Task;
 use super::latest::Latest;
-use super::slot::{Slot, current};
+use super::slot::{Slot, current, take_in};
 use super::state::Session;
 use super::state::confusions::{BROKEN, ConfusionInputs, Question, Taken, serve};
 use crate::design::InHand;
@@ -50,7 +50,9 @@ impl Session {
         };
         self.jobs
             .start(Task::Confuse, inputs, work, |s, inputs, value| {
-                s.caches.confusions.pairs = Some(Slot { inputs, value });
+                let now = s.confusion_inputs();
+                let pairs = &mut s.caches.confusions.pairs;
+                take_in(pairs, Slot { inputs, value }, now.as_ref());
             });
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::attention::Attention;
 use super::jobs::Task;
 use super::latest::Latest;
-use super::slot::{Slot, current};
+use super::slot::{Slot, current, take_in};
 use super::state::Session;
 use super::state::expected::{BROKEN, ExpectedOf, Question, serve};
 use crate::design::InHand;
@@ -87,11 +87,13 @@ impl Session {
 
     /// What sets are asked of from now on.
     pub(super) fn take_in_hand(&mut self, inputs: ExpectedInputs, value: Arc<InHand>) {
+        let now = self.expected_inputs();
         let expecting = &mut self.caches.expected;
-        if !(expecting.ready.as_ref()).is_some_and(|ready| ready.holds_for(&inputs)) {
+        let known = (expecting.ready.as_ref()).map(|ready| ready.inputs.clone());
+        take_in(&mut expecting.ready, Slot { inputs, value }, now.as_ref());
+        if expecting.ready.as_ref().map(|ready| &ready.inputs) != known.as_ref() {
             expecting.number += 1;
         }
-        expecting.ready = Some(Slot { inputs, value });
     }
 
     fn ask_expected(&mut self, attention: &Attention, in_hand: &Arc<InHand>) {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::attention::Attention;
 use super::jobs::Task;
-use super::slot::{Slot, current};
+use super::slot::{Slot, current, take_in};
 use super::state::Session;
 use super::state::fields::{FieldInputs, FieldKind, FieldValues};
 use crate::design::Simulated;
@@ -65,7 +65,8 @@ impl Session {
         };
         self.jobs
             .start(Task::Field, inputs, work, |s, inputs, value| {
-                s.caches.field = Some(Slot { inputs, value });
+                let now = s.field_inputs(inputs.kind);
+                take_in(&mut s.caches.field, Slot { inputs, value }, now.as_ref());
             });
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::attention::{Attention, Colours};
 use super::jobs::{Task, stop};
-use super::slot::{Slot, current};
+use super::slot::{Slot, current, take_in};
 use super::state::Session;
 use crate::design::{self, Advice};
 use crate::job::Reporter;
@@ -39,7 +39,8 @@ impl Session {
         };
         self.jobs
             .start(Task::Advise, inputs, work, |s, inputs, value| {
-                s.caches.walls = Some(Slot { inputs, value });
+                let now = s.document.wall_inputs();
+                take_in(&mut s.caches.walls, Slot { inputs, value }, Some(&now));
             });
     }
 }
