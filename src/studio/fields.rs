@@ -75,9 +75,24 @@ pub struct Legend {
     pub map: ColorMap,
 }
 
+/// What is shown of the unrolled part, and what it was made from.
 pub struct FlatShown {
     of: Arc<Vec<Shown>>,
     pub shown: Arc<Vec<Shown>>,
+}
+
+fn legend(title: &str, [low, high]: [f64; 2], map: ColorMap) -> Legend {
+    Legend {
+        title: title.to_owned(),
+        low,
+        high,
+        map,
+    }
+}
+
+/// Of what begins at nothing.
+fn rising(title: &str, top: f64) -> Legend {
+    legend(title, [0.0, top], ColorMap::Viridis)
 }
 
 impl Built {
@@ -214,12 +229,6 @@ impl<'a> Source<'a> {
 
     /// The chosen field a vertex of the part, in the units of its legend.
     fn field_values(&self) -> Option<(Vec<f64>, Legend)> {
-        let legend = |title: &str, low, high, map| Legend {
-            title: title.to_owned(),
-            low,
-            high,
-            map,
-        };
         match self.view.field {
             Field::Region => None,
             Field::Strain => {
@@ -227,65 +236,57 @@ impl<'a> Source<'a> {
                 let micro: Vec<f64> = touched.strain.iter().map(|e| e * 1e6).collect();
                 let top = robust_top(&micro);
                 let map = ColorMap::BlueOrange;
-                Some((micro, legend("strain (microstrain)", -top, top, map)))
+                Some((micro, legend("strain (microstrain)", [-top, top], map)))
             }
             Field::Displacement => {
                 let touched = self.session.caches.touching.result()?;
                 let top = round_up(touched.largest * 1000.0);
                 let mm = touched.displacement.iter().map(|d| d.length() * 1000.0);
-                let map = ColorMap::Viridis;
-                Some((mm.collect(), legend("displacement (mm)", 0.0, top, map)))
+                Some((mm.collect(), rising("displacement (mm)", top)))
             }
             Field::SignalToNoise => {
-                let noise = self.project().gauge.noise_microstrain * 1e-6;
-                let simulation = self
-                    .session
-                    .results
-                    .simulation
-                    .as_ref()
-                    .filter(|_| noise > 0.0)?;
-                let sites = simulation.value.simulated.dataset.sites.iter();
-                let rms: Vec<f64> = sites.map(|s| s.rms_strain / noise).collect();
-                let ratio = self.session.carried_from_sites(&rms);
+                let ratio = self.signal_to_noise()?;
                 let top = robust_top(&ratio);
-                let map = ColorMap::Viridis;
-                Some((ratio, legend("signal to noise (rms)", 0.0, top, map)))
+                Some((ratio, rising("signal to noise (rms)", top)))
             }
             Field::Faces => {
                 let sides = self.wall_values(true)?;
-                let map = ColorMap::BlueOrange;
-                Some((sides, legend("faces", -FACE_RANGE, FACE_RANGE, map)))
+                let ends = [-FACE_RANGE, FACE_RANGE];
+                Some((sides, legend("faces", ends, ColorMap::BlueOrange)))
             }
             Field::Thickness => {
                 let mm = self.wall_values(false)?;
                 let top = robust_top(&mm);
-                Some((
-                    mm,
-                    legend("wall thickness (mm)", 0.0, top, ColorMap::Viridis),
-                ))
+                Some((mm, rising("wall thickness (mm)", top)))
             }
             Field::Error => {
                 let errors = &*self.session.field(FieldKind::Error)?.value;
-                let top = robust_top(errors);
-                let map = ColorMap::Viridis;
-                Some((errors.clone(), legend("error (mm)", 0.0, top, map)))
+                Some((errors.clone(), rising("error (mm)", robust_top(errors))))
             }
-            Field::Expected => {
-                let vertices = self.session.document.part.positions().len();
-                let answer = self.view.expected(self.session)?;
-                let values = answer.expected.map_mm.clone();
-                let [lightest, hardest] = self.session.in_hand()?.forces_n;
-                let title = format!("expected error (mm), {lightest}–{hardest} N");
-                let found = legend(&title, 0.0, answer.top_mm, ColorMap::Viridis);
-                (values.len() == vertices).then_some((values, found))
-            }
+            Field::Expected => self.expected_values(),
             Field::Uncertainty => {
                 let variances = &*self.session.field(FieldKind::Uncertainty)?.value;
-                let map = ColorMap::Viridis;
-                let title = "variance left";
-                Some((variances.clone(), legend(title, 0.0, 1.0, map)))
+                Some((variances.clone(), rising("variance left", 1.0)))
             }
         }
+    }
+
+    fn signal_to_noise(&self) -> Option<Vec<f64>> {
+        let noise = self.project().gauge.noise_microstrain * 1e-6;
+        let simulation = self.session.results.simulation.as_ref();
+        let simulation = simulation.filter(|_| noise > 0.0)?;
+        let sites = simulation.value.simulated.dataset.sites.iter();
+        let rms: Vec<f64> = sites.map(|s| s.rms_strain / noise).collect();
+        Some(self.session.carried_from_sites(&rms))
+    }
+
+    fn expected_values(&self) -> Option<(Vec<f64>, Legend)> {
+        let vertices = self.session.document.part.positions().len();
+        let answer = self.view.expected(self.session)?;
+        let values = answer.expected.map_mm.clone();
+        let [lightest, hardest] = self.session.in_hand()?.forces_n;
+        let title = format!("expected error (mm), {lightest}–{hardest} N");
+        (values.len() == vertices).then(|| (values, rising(&title, answer.top_mm)))
     }
 
     /// What the gauges are blind to, a vertex of the part, where that is marked.

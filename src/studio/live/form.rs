@@ -11,8 +11,8 @@ use super::super::words::live_in_words;
 use crate::board::Illness;
 use crate::link::{PortInfo, ports};
 use crate::live::Estimator;
-use crate::project::{FORCE_OFF, LiveKeys, PLACE_OFF};
-use crate::session::{LEAST_KNOWN, Mishap, WANTED_KNOWN};
+use crate::project::{CalibrationKeys, FORCE_OFF, LiveKeys, PLACE_OFF};
+use crate::session::{Desk, LEAST_KNOWN, Mishap, WANTED_KNOWN};
 
 /// What is typed at the live stage.
 #[derive(Default)]
@@ -135,22 +135,23 @@ fn connected_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
             faults(ask, ui);
         }
     });
-    ask.edit_desk(|desk| rows(ui, "Touch", |ui| {
-        let help = "Model matching needs no training and says how sure it is; the others learn from the model first";
-        choice(
-            ui,
-            "Estimator",
-            &mut desk.estimator,
-            &Estimator::ALL,
-            Estimator::label,
-            help,
-        );
-        ui.label("");
-        ui.checkbox(&mut desk.compare, "Compare all")
-            .on_hover_text("Show what the others say too");
-        ui.end_row();
-    }));
+    ask.edit_desk(|desk| rows(ui, "Touch", |ui| estimators(ui, desk)));
     recording_form(ask, form, ui);
+}
+
+fn estimators(ui: &mut Ui, desk: &mut Desk) {
+    choice(
+        ui,
+        "Estimator",
+        &mut desk.estimator,
+        &Estimator::ALL,
+        Estimator::label,
+        "Model matching needs no training and says how sure it is; the others learn from the model first",
+    );
+    ui.label("");
+    ui.checkbox(&mut desk.compare, "Compare all")
+        .on_hover_text("Show what the others say too");
+    ui.end_row();
 }
 
 fn faults(ask: &mut Ask<'_>, ui: &mut Ui) {
@@ -210,6 +211,16 @@ fn recording_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
 
 fn known_form(ask: &mut Ask<'_>, ui: &mut Ui) {
     ui.add(egui::Label::new("Press where the limb shows a cross, as hard as it says here, and take it. The gauges then show how they are really glued.").wrap());
+    next_touch(ask, ui);
+    known_buttons(ask, ui);
+    if ask.session.live.simulated_board().is_some() {
+        calibrate_from_board(ask, ui);
+    }
+    what_was_calibrated(ask, ui);
+}
+
+/// How the next known touch is pressed, and how well.
+fn next_touch(ask: &mut Ask<'_>, ui: &mut Ui) {
     rows(ui, "Next touch", |ui| {
         ask.edit_desk(|desk| {
             number(
@@ -222,28 +233,33 @@ fn known_form(ask: &mut Ask<'_>, ui: &mut Ui) {
                 "That the next known touch is pressed with",
             );
         });
-        ask.edit(|project| {
-        let hand = &mut project.calibration;
-        number(
-            ui,
-            "Place off",
-            &mut hand.place_mm,
-            PLACE_OFF,
-            0.01,
-            " mm",
-            "How far beside its place a known touch is pressed, in any direction (standard deviation)",
-        );
-        number(
-            ui,
-            "Force off",
-            &mut hand.force_percent,
-            FORCE_OFF,
-            0.05,
-            " %",
-            "How much too hard or too soft a known touch is pressed (standard deviation)",
-        );
-        });
+        ask.edit(|project| pressing(ui, &mut project.calibration));
     });
+}
+
+fn pressing(ui: &mut Ui, hand: &mut CalibrationKeys) {
+    number(
+        ui,
+        "Place off",
+        &mut hand.place_mm,
+        PLACE_OFF,
+        0.01,
+        " mm",
+        "How far beside its place a known touch is pressed, in any direction (standard deviation)",
+    );
+    number(
+        ui,
+        "Force off",
+        &mut hand.force_percent,
+        FORCE_OFF,
+        0.05,
+        " %",
+        "How much too hard or too soft a known touch is pressed (standard deviation)",
+    );
+}
+
+/// To take a known touch, and to make use of all of them.
+fn known_buttons(ask: &mut Ask<'_>, ui: &mut Ui) {
     let (count, connected) = (
         ask.session.live.known_touches(),
         ask.session.live.is_connected(),
@@ -267,20 +283,24 @@ fn known_form(ask: &mut Ask<'_>, ui: &mut Ui) {
             ask.act(BoardAction::Calibrate);
         }
     });
-    if ask.session.live.simulated_board().is_some() {
-        let help = "The next touches of the simulated board, whose places and forces are known";
-        let (_, waiting) = ask.session.live.is_gathering();
-        if ui
-            .add_enabled(
-                !waiting,
-                egui::Button::new("Calibrate from the simulated board"),
-            )
-            .on_hover_text(help)
-            .clicked()
-        {
-            ask.act(BoardAction::CalibrateFromBoard);
-        }
+}
+
+fn calibrate_from_board(ask: &mut Ask<'_>, ui: &mut Ui) {
+    let help = "The next touches of the simulated board, whose places and forces are known";
+    let (_, waiting) = ask.session.live.is_gathering();
+    if ui
+        .add_enabled(
+            !waiting,
+            egui::Button::new("Calibrate from the simulated board"),
+        )
+        .on_hover_text(help)
+        .clicked()
+    {
+        ask.act(BoardAction::CalibrateFromBoard);
     }
+}
+
+fn what_was_calibrated(ask: &mut Ask<'_>, ui: &mut Ui) {
     ask.edit(|project| {
         let live = &mut project.live;
         if live.glued.is_empty() {
