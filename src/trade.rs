@@ -8,6 +8,7 @@
 mod front;
 mod knobs;
 mod setting;
+mod spent;
 mod sweep;
 
 use serde::{Deserialize, Serialize};
@@ -18,7 +19,8 @@ use crate::project::BadValue;
 
 pub use self::front::{Asked, answer, clock, front};
 pub use self::knobs::{Bought, KnobReport, knobs};
-pub use self::setting::{Knob, Setting, Spent};
+pub use self::setting::Setting;
+pub use self::spent::{Knob, Spent};
 pub use self::sweep::{Sweep, standards};
 
 /// What a setting costs and achieves.
