@@ -5,9 +5,12 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
+use super::race::Scored;
 use super::screen::LEVELS;
-use super::{Constraints, GreedySvr, PlacementError, Pool, Request, Scored, Search};
+use super::search::Search;
+use super::settings::GreedySvr;
 use crate::budget::Watch;
+use crate::placement::{Constraints, PlacementError, Pool, Request};
 
 /// How many others are compared at each step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
