@@ -9,6 +9,7 @@
 
 mod audit;
 mod exact;
+mod notes;
 mod race;
 mod screen;
 mod search;
@@ -59,7 +60,7 @@ impl Selector for GreedySvr {
         cautions.extend(unreached(&sets, constraints));
         let mut notes = field.constant_notes();
         notes.extend(chosen.notes);
-        notes.extend(search.notes(&sets));
+        notes.extend(self::notes::notes(&search, &sets));
         Ok(Selection {
             selector: SelectorKind::GreedySvr,
             criterion_unit: "mm, cross-validated",

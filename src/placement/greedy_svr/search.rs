@@ -9,10 +9,10 @@ use super::settings::GreedySvr;
 use crate::budget::{Cancelled, Progress, Work, report};
 use crate::dataset::SignalMatrix;
 use crate::placement::constraints::Field;
-use crate::placement::{PlacementError, Pool, Request, SensorSet, margin};
+use crate::placement::{PlacementError, Pool, Request};
 use crate::regression::features::Standardizer;
-use crate::regression::folds::{Folds, evenly};
-use crate::regression::{Hyper, kernel};
+use crate::regression::folds::Folds;
+use crate::regression::kernel;
 
 /// Two candidates whose criteria differ by less than this share are tied; the lower place wins.
 pub const TIE: f64 = 1e-9;
@@ -416,84 +416,6 @@ impl<'a> Search<'a> {
 
     pub(super) fn stopped(&self, step: usize) -> bool {
         self.report(step).is_err()
-    }
-
-    pub(super) fn notes(&self, sets: &[SensorSet]) -> Vec<String> {
-        let mut notes = Vec::new();
-        notes.extend(self.degenerate().or_else(|| self.out_of_scale()));
-        notes.extend(margin::ties(sets, self.settings.tolerance));
-        if !self.converged {
-            notes.push(
-                "Some fits stopped at the effort allowed before they met their tolerance: the criterion is not exact. Allow more steps, or lower C.".into(),
-            );
-        }
-        let gap = sets.iter().filter_map(|s| s.gap).fold(0.0, f64::max);
-        notes.push(format!(
-            "{} sets were fitted exactly; the screens departed from them by at most {:.2} %, so that a better choice of a step could be better by at most {:.2} %.",
-            self.exactly,
-            100.0 * self.widest,
-            100.0 * gap
-        ));
-        notes
-    }
-}
-
-impl Search<'_> {
-    /// What makes the regression unable to learn anything.
-    pub(super) fn degenerate(&self) -> Option<String> {
-        /// Off the diagonal all kernel values within this of one, or of zero.
-        const SAME: f64 = 1e-9;
-        /// Rows looked at.
-        const ROWS: usize = 64;
-        let n = self.judge.targets[0].len();
-        let Hyper { gamma, epsilon, .. } = self.settings.hyper;
-        let target_deviation = self.judge.target_deviation();
-        if target_deviation <= epsilon {
-            return Some(format!(
-                "The targets spread over {target_deviation:.1e} mm only and lie inside the tube (ε is {epsilon} mm): nothing is learned. Check the unit of the targets or lower ε."
-            ));
-        }
-        let (mut least, mut most) = (1.0f64, 0.0f64);
-        for &i in &evenly(n, ROWS) {
-            for (j, &k) in self.kernel[i * n..][..n].iter().enumerate() {
-                if i != j {
-                    (least, most) = (least.min(k), most.max(k));
-                }
-            }
-        }
-        if least > 1.0 - SAME {
-            Some(format!(
-                "The kernel is degenerate: at γ = {gamma:.1e} every touch looks like every other, and all predictions are one constant. Raise γ."
-            ))
-        } else if most < SAME {
-            Some(format!(
-                "The kernel is degenerate: at γ = {gamma:.1e} no touch looks like any other, and unseen touches are all predicted at one point. Lower γ."
-            ))
-        } else {
-            None
-        }
-    }
-}
-
-impl Search<'_> {
-    /// That C or ε, which are in millimetres, were meant for parts of another size.
-    pub(super) fn out_of_scale(&self) -> Option<String> {
-        /// The least C and the largest ε over the spread of the targets at which most of it can be learned: a
-        /// tenth and ten times of what suits the bundled limb.
-        const LEAST_C: f64 = 0.5;
-        const LARGEST_EPSILON: f64 = 0.03;
-        let Hyper { c, epsilon, .. } = self.settings.hyper;
-        let target_deviation = self.judge.target_deviation();
-        let (what, way) = if epsilon > LARGEST_EPSILON * target_deviation {
-            (format!("ε ({epsilon} mm) is wide"), "lower it")
-        } else if c < LEAST_C * target_deviation {
-            (format!("C ({c} mm) is small"), "raise it")
-        } else {
-            return None;
-        };
-        Some(format!(
-            "{what} for touches that spread over {target_deviation:.3} mm: {way} in proportion to the part, or less is learned than could be."
-        ))
     }
 }
 
