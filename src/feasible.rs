@@ -23,6 +23,7 @@ pub struct FeasibleRules {
     pub edge_radius: f64,
     /// The measuring grid of the gauge, along and across its direction.
     pub grid_length: f64,
+    /// Width of the measuring grid, across its direction.
     pub grid_width: f64,
     /// Largest height of the surface over the gauge's plane, under the gauge.
     pub flatness: f64,
@@ -38,15 +39,25 @@ pub struct FeasibleRules {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {
+    /// Of a solid: not the back of a wall that is touched.
     NotBehind,
+    /// Of a solid: no pad gets there.
     OutOfReach,
+    /// Nearer to a support than is allowed.
     SupportClearance,
+    /// At an edge, by the paper's centre of mass.
     Edge,
+    /// The gauge would overhang an edge.
     Footprint,
+    /// The surface is too curved for the gauge.
     Flatness,
+    /// The signal is too small beside the noise.
     Noise,
+    /// The strain is beyond what gauge or amplifier can take.
     Range,
+    /// Outside the painted region.
     Painted,
+    /// Where no gauge may go.
     KeptOut,
 }
 
@@ -65,6 +76,7 @@ impl Filter {
         Self::KeptOut,
     ];
 
+    /// What is wrong with a site that it takes out, for people.
     #[must_use]
     pub fn label(self) -> &'static str {
         match self {
@@ -143,10 +155,13 @@ impl Surroundings {
 
 /// Everything the filters look at.
 pub struct FeasibleInput<'a> {
+    /// The surface that gauges are glued to (m).
     pub mesh: &'a TriMesh,
     /// Vertices with anything held.
     pub supported: &'a [u32],
+    /// Where the sites lie on it.
     pub points: &'a [SurfacePoint],
+    /// What the sites report.
     pub sites: &'a [Site],
     /// What lies before and behind the sites of a solid; absent for a shell, which is all wall.
     pub surroundings: Option<&'a Surroundings>,
@@ -192,6 +207,7 @@ pub fn feasible_beside(
 /// The filter that keeps most sites out, and what would let some of them in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blame {
+    /// That filter.
     pub filter: Filter,
     /// How many sites pass all other filters.
     pub alone: usize,

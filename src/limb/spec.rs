@@ -7,15 +7,18 @@ pub struct LimbSpec {
     pub circumference: f64,
     /// Angle the limb covers (degrees); 360 closes the tube.
     pub arc_degrees: f64,
+    /// From rim to rim.
     pub height: f64,
     /// Radius at the top over radius at the bottom.
     pub taper: f64,
     /// Centres of the columns along s.
     pub columns: Vec<f64>,
+    /// Width of the columns.
     pub column_width: f64,
     /// Lower and upper end of each hoop, from the bottom up, touching neither each other nor beyond
     /// the height; the first and last form the rims.
     pub hoops: Vec<(f64, f64)>,
+    /// How it is held.
     pub support: LimbSupport,
     /// Radius of the windows' corners; 0 leaves them sharp.
     pub corner_radius: f64,
@@ -28,27 +31,39 @@ pub struct LimbSpec {
 pub enum LimbSupport {
     /// Bosses of this half-width about each of these s, this tall, at both ends.
     Bosses {
+        /// Places of the bosses along s.
         centres: Vec<f64>,
+        /// Half the width of each.
         half_width: f64,
+        /// Height of each, from the rim.
         depth: f64,
     },
     /// Both rims all round, this deep.
-    Rims { depth: f64 },
+    Rims {
+        /// How deep the rims are held.
+        depth: f64,
+    },
 }
 
 /// Why a limb cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LimbError {
+    /// A parameter is out of its range.
     #[error("{what} must be {rule}, but is {value}")]
     Range {
+        /// Which one.
         what: &'static str,
+        /// What it must be.
         rule: &'static str,
+        /// What it is.
         value: f64,
     },
+    /// Hoops overlap, or leave no window.
     #[error(
         "hoops must lie one above the other between 0 and the height, with windows between them"
     )]
     Hoops,
+    /// Columns overlap, or leave no window.
     #[error("columns must lie apart from each other around the limb, with windows between them")]
     Columns,
 }
@@ -99,6 +114,7 @@ impl LimbSpec {
         }
     }
 
+    /// Whether it goes all the way round.
     #[must_use]
     pub fn closed(&self) -> bool {
         self.arc_degrees >= 360.0

@@ -26,12 +26,14 @@ const RATE: f64 = 1000.0;
 
 /// The state between samples.
 pub struct Pipeline {
+    /// Thresholds and constants.
     pub settings: Settings,
     matching: Matching,
     trained: [Option<Arc<Trained>>; 2],
     /// What the trained ones were trained with: with other channels they say nothing.
     trained_for: Vec<bool>,
     taring: Option<Taring>,
+    /// Rest of every channel; absent before the first tare.
     pub rest: Option<Rest>,
     watchers: Vec<Watcher>,
     health: Vec<Health>,
@@ -50,6 +52,7 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
+    /// Not tared, by a model of the gauges.
     #[must_use]
     pub fn new(model: impl Into<GaugeModel>, settings: Settings) -> Self {
         let model: GaugeModel = model.into();
@@ -155,16 +158,19 @@ impl Pipeline {
         self.end_touch();
     }
 
+    /// Whether rest is being taken just now.
     #[must_use]
     pub fn is_taring(&self) -> bool {
         self.taring.is_some()
     }
 
+    /// Of each gauge.
     #[must_use]
     pub fn health(&self) -> &[Health] {
         &self.health
     }
 
+    /// Whether each gauge is trusted.
     #[must_use]
     pub fn used(&self) -> Vec<bool> {
         self.health.iter().map(|h| h.is_good()).collect()

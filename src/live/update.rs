@@ -20,6 +20,7 @@ pub enum Estimator {
 }
 
 impl Estimator {
+    /// All, the default first.
     pub const ALL: [Self; 3] = [Self::Matching, Self::Normalized, Self::Raw];
 
     /// For people.
@@ -74,12 +75,14 @@ impl Settings {
 pub struct Guess {
     /// m.
     pub position: DVec3,
+    /// How hard (N).
     pub force: f64,
 }
 
 /// What one sample said.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Update {
+    /// The board's clock (µs).
     pub time_us: u64,
     /// Strain of each gauge since the tare; nothing before it.
     pub strain: Option<Vec<f64>>,
@@ -109,6 +112,7 @@ impl Update {
 /// What gauges read of a newton anywhere, and how far off that may be.
 #[derive(Clone)]
 pub struct GaugeModel {
+    /// Readings as the gauges are thought to be glued.
     pub map: Arc<ResponseMap>,
     /// See [`Errors::gluing_deviation`].
     pub gluing_deviation: Option<Arc<ResponseMap>>,

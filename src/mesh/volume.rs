@@ -32,6 +32,7 @@ pub struct VolumeMesh {
 /// A tetrahedron as a file has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tetrahedron {
+    /// Its four corner nodes.
     pub corners: [u32; 4],
     /// The nodes on [`EDGES`], where it has some.
     pub middles: [Option<u32>; 6],
@@ -43,34 +44,59 @@ pub type FacePlace = (u32, [DVec3; 3]);
 /// Why tetrahedra were refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VolumeError {
+    /// It has no volume.
     #[error(
         "the tetrahedron has no volume (near {place:.2} mm): repair the mesh in the program that wrote it"
     )]
-    Flat { element: usize, place: DVec3 },
+    Flat {
+        /// Which tetrahedron.
+        element: usize,
+        /// Where it lies (mm).
+        place: DVec3,
+    },
+    /// A bent edge turns it inside out.
     #[error(
         "an edge of the tetrahedron is bent so far that it is turned inside out there (near {place:.2} mm), and straightening that edge would move its node by {}, more than the {} that are allowed: raise part.straighten_mm, or straighten it in the mesher",
         plain::mm(.shift * 1e3),
         plain::mm(.most * 1e3)
     )]
     Folded {
+        /// Which tetrahedron.
         element: usize,
+        /// Where it lies (mm).
         place: DVec3,
         /// How far the node in the middle of the edge would move, and how far it may (m).
         shift: f64,
+        /// How far a node may be moved (m).
         most: f64,
     },
+    /// One of its middle nodes belongs elsewhere.
     #[error(
         "one of its nodes lies in the middle of two edges, or is a corner elsewhere: write the mesh anew"
     )]
-    Astray { element: usize },
+    Astray {
+        /// Which tetrahedron.
+        element: usize,
+    },
+    /// It lies on the wrong side of a face that it shares.
     #[error(
         "the tetrahedron overlaps another one that it shares a face with (near {place:.2} mm): mesh the part anew"
     )]
-    Overlapping { element: usize, place: DVec3 },
+    Overlapping {
+        /// Which tetrahedron.
+        element: usize,
+        /// Where it lies (mm).
+        place: DVec3,
+    },
+    /// Its neighbour has another middle node on a shared edge.
     #[error(
         "on one of its edges the tetrahedron has another middle node than its neighbour: join equal nodes in the program that wrote the mesh"
     )]
-    Torn { element: usize },
+    Torn {
+        /// Which tetrahedron.
+        element: usize,
+    },
+    /// Its surface is no mesh.
     #[error(transparent)]
     Surface(#[from] MeshError),
 }

@@ -23,12 +23,15 @@ pub struct Setting {
     pub quality: Quality,
     /// Added to the project's seed: how much an error moves when nothing else does.
     pub repeat: u64,
+    /// Who chooses.
     pub selector: SelectorKind,
+    /// What the sites report.
     pub signal: Signal,
     /// Share of the variance that candidates may leave unexplained.
     pub unexplained: f64,
     /// What finds the touches that the setting is judged by.
     pub estimator: EstimatorKind,
+    /// Values of its own; absent where it is the quality as it is.
     pub limits: Option<Spent>,
 }
 

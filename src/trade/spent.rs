@@ -9,19 +9,25 @@ use crate::dataset::Signal;
 pub struct Spent {
     /// Most vertices of the elastic model.
     pub vertices: usize,
+    /// Most touches that the model is asked for.
     pub touches: usize,
+    /// Whether the tip is taken as a point where the model learns.
     pub point_tip: bool,
     /// The wall of a shell as the solid that it is.
     pub as_solid: bool,
     /// What a choice by expected error looks at.
     pub expected_places: usize,
+    /// Presses that a choice by expected error is tried on.
     pub expected_presses: usize,
     /// What greedy SVR scores.
     pub selection_touches: usize,
+    /// Most candidates that greedy SVR scores.
     pub selection_candidates: usize,
     /// Of regressions, where any are trained.
     pub svr_tolerance_mm: f64,
+    /// Folds of cross-validations.
     pub folds: usize,
+    /// Most touches that settings are searched on.
     pub tuning_touches: usize,
 }
 
@@ -61,20 +67,35 @@ impl Spent {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Knob {
+    /// Vertices of the elastic model.
     Vertices,
+    /// Touches that the model is asked for.
     Touches,
+    /// The tip as a point, or as it is.
     PointTip,
+    /// A shell's wall taken as a solid.
     AsSolid,
+    /// Variance that candidates may leave unexplained.
     Unexplained,
+    /// Who chooses.
     Selector,
+    /// Places that expected error compares.
     ExpectedPlaces,
+    /// Presses that expected error is tried on.
     ExpectedPresses,
+    /// Touches that greedy SVR scores on.
     SelectionTouches,
+    /// Candidates that greedy SVR scores.
     SelectionCandidates,
+    /// Tolerance of regressions.
     SvrTolerance,
+    /// Folds of cross-validations.
     Folds,
+    /// Touches that settings are searched on.
     TuningTouches,
+    /// What the sites report.
     Signal,
+    /// What locates the touches.
     Estimator,
 }
 
@@ -99,6 +120,7 @@ pub(super) const ELEMENTS_PERCENT: f64 = 0.5;
 pub(super) const MOST_CANDIDATES: usize = 100_000;
 
 impl Knob {
+    /// All, in the order of reports.
     pub const ALL: [Self; 15] = [
         Self::Vertices,
         Self::Touches,
@@ -117,6 +139,7 @@ impl Knob {
         Self::Estimator,
     ];
 
+    /// For people.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

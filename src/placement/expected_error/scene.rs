@@ -78,6 +78,7 @@ pub struct Knowledge<'a> {
     pub among: Option<&'a [usize]>,
     /// Absent where the signals are what they are.
     pub forces: Option<Forces<'a>>,
+    /// Of places, presses and noise.
     pub seed: u64,
 }
 
@@ -152,6 +153,7 @@ impl Scene {
         self.draws[turn % TURNS * self.presses.len() + press]
     }
 
+    /// How many sites there are.
     #[must_use]
     pub fn sites(&self) -> usize {
         self.sites
@@ -352,6 +354,7 @@ pub struct Template {
 /// What one site reports of a template.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
+    /// How much.
     pub value: f64,
     /// A millimetre.
     pub slopes: [f64; 2],

@@ -11,11 +11,15 @@ use crate::regression::{Grouping, Hyper, kernel};
 /// Settings of the selector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GreedySvr {
+    /// Settings of the regression.
     pub hyper: Hyper,
+    /// Folds of the criterion.
     pub folds: usize,
+    /// Of the folds and landmarks.
     pub seed: u64,
     /// What is never divided between folds.
     pub grouping: Grouping,
+    /// Of each fit.
     pub effort: Effort,
     /// A choice may be worse than the best by this share of the criterion.
     pub tolerance: f64,
