@@ -20,17 +20,21 @@ pub use script::{GivenPress, PRESSES, Press, Script};
 /// How the board measures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
+    /// Of noise, drift, gluing and random touches.
     pub seed: u64,
     /// Of the data at first (Hz).
     pub rate_hz: u16,
+    /// From strain to counts.
     pub chain: Chain,
     /// Channels that the board has; those beyond the gauges read noise.
     pub channels: usize,
     /// Standard deviation of a reading (strain), and of what it drifts by in a second's walk.
     pub noise: f64,
+    /// Standard deviation of the drift in a second (strain).
     pub drift: f64,
     /// Standard deviation of what bridges are off balance by (strain).
     pub offset: f64,
+    /// What the board calls itself in its HELLO.
     pub name: String,
 }
 
@@ -39,6 +43,7 @@ pub struct Options {
 pub struct Truth {
     /// On the board's clock (µs).
     pub time_us: u64,
+    /// The touch at that moment; absent where nothing touches.
     pub touch: Option<Touch>,
 }
 
@@ -136,6 +141,7 @@ impl SimulatedBoard {
         self.ears.reset();
     }
 
+    /// What goes wrong, to be changed while the board runs.
     pub fn faults_mut(&mut self) -> &mut Faults {
         &mut self.faults
     }

@@ -10,8 +10,11 @@ use serde::{Serialize, Serializer};
 /// How far one stage has come: `done` of `total` units of its own choosing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
+    /// Name of the stage, for people.
     pub stage: &'static str,
+    /// Units that are finished.
     pub done: usize,
+    /// Units in all.
     pub total: usize,
 }
 
@@ -88,8 +91,11 @@ pub enum StopReason {
 pub struct Achieved {
     /// In `unit`; absent where no estimate exists.
     pub error_estimate: Option<f64>,
+    /// Unit of the estimate.
     pub unit: &'static str,
+    /// What was counted on the way.
     pub effort: Work,
+    /// Why it ended.
     pub stop_reason: StopReason,
     /// What may change a decision, in plain words: the weightiest first.
     pub cautions: Vec<String>,
@@ -110,15 +116,20 @@ impl Achieved {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Quality {
+    /// Seconds: while something is still being tried out.
     Draft,
+    /// The default: errors small beside those of the estimator.
     #[default]
     Standard,
+    /// Minutes: to see whether Standard was enough.
     Reference,
 }
 
 impl Quality {
+    /// All, the cheapest first.
     pub const ALL: [Self; 3] = [Self::Draft, Self::Standard, Self::Reference];
 
+    /// As in files and options.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -229,6 +240,7 @@ impl Quality {
 pub struct Elements {
     /// Vertices to begin with, and the most whatever the number of loads.
     pub vertices: usize,
+    /// Most vertices, however few the loads are.
     pub most_vertices: usize,
     /// The most vertices × loads.
     #[serde(serialize_with = "or_null")]
@@ -236,6 +248,7 @@ pub struct Elements {
     /// Estimated errors at which no more are added (%): rms over the loads of the displacement under the
     /// load, and of the strain beyond two tip radii over the load's largest.
     pub displacement_percent: f64,
+    /// Estimated error of the strain (%) at which no more elements are added.
     pub strain_percent: f64,
     /// How often elements are laid anew by the error of the last ones.
     pub passes: usize,
@@ -262,6 +275,7 @@ fn or_null<S: Serializer>(limit: &usize, serializer: S) -> Result<S::Ok, S::Erro
 /// An explicit budget: the largest effort each stage may spend, and the tolerances it works to.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Budget {
+    /// The quality that it is of.
     pub quality: Quality,
     /// Size of the elastic model. The reference model that accuracy is quoted against always has elements of half
     /// their size; of a solid two thirds.
@@ -284,6 +298,7 @@ pub struct Budget {
     pub selection_candidates: usize,
     /// Places that a choice by expected error compares readings with, and presses that it is tried on.
     pub expected_places: usize,
+    /// Presses that a choice by expected error is tried on.
     pub expected_presses: usize,
     /// Folds of every cross-validation.
     pub folds: usize,
@@ -291,6 +306,7 @@ pub struct Budget {
     pub tuning_touches: usize,
     /// Most subsets of failed gauges that the regression is trained anew for, and on how many touches.
     pub failure_subsets: usize,
+    /// Touches that such a regression is retrained on.
     pub failure_touches: usize,
     /// Most SMO steps of one fit.
     pub svr_steps: usize,
@@ -312,16 +328,19 @@ pub struct Limits {
     /// Most touches the model is asked for, and most candidates that the reduction keeps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub touches: Option<usize>,
+    /// Most candidates that the reduction keeps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub candidates: Option<usize>,
     /// Most places and presses that a choice by expected error looks at.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_places: Option<usize>,
+    /// Most presses that a choice by expected error is tried on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_presses: Option<usize>,
     /// Most touches and candidates that greedy SVR scores.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub selection_touches: Option<usize>,
+    /// Most candidates that greedy SVR scores.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub selection_candidates: Option<usize>,
     /// Most touches that hyper-parameters are searched on.

@@ -35,8 +35,10 @@ pub enum Signal {
 }
 
 impl Signal {
+    /// All, in the order of the enumeration.
     pub const ALL: [Self; 3] = [Self::Displacement, Self::NormalDisplacement, Self::Strain];
 
+    /// As in files and options.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -61,18 +63,22 @@ impl SignalMatrix {
         debug_assert!(columns == 0 || values.len().is_multiple_of(columns));
         Self { columns, values }
     }
+    /// Number of rows: sites.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.values.len().checked_div(self.columns).unwrap_or(0)
     }
+    /// Number of columns: touches.
     #[must_use]
     pub fn columns(&self) -> usize {
         self.columns
     }
+    /// One site's signal under every touch.
     #[must_use]
     pub fn row(&self, row: usize) -> &[f64] {
         &self.values[row * self.columns..][..self.columns]
     }
+    /// All values, row by row.
     #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values
@@ -119,13 +125,17 @@ impl SignalMatrix {
 /// Signals of sites under touches.
 #[derive(Clone, Debug)]
 pub struct Dataset {
+    /// What the sites report.
     pub signal: Signal,
+    /// A row of the signals each.
     pub sites: Vec<Site>,
+    /// A column of the signals each.
     pub touches: Vec<Touch>,
     /// Sites × touches; m or strain.
     pub x: SignalMatrix,
     /// What readings change by as gauges are glued a little off, where that was asked for.
     pub slopes: Option<GluingSlopes>,
+    /// What it took.
     pub work: Work,
 }
 

@@ -62,85 +62,143 @@ pub use self::walled::*;
 /// Why a stage ended without a result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DesignError {
+    /// A key of the project has a value out of its range.
     #[error(transparent)]
     Value(#[from] BadValue),
+    /// The elastic model cannot be built or solved.
     #[error(transparent)]
     Elastic(#[from] ElasticError),
+    /// The selector found no set.
     #[error(transparent)]
     Placement(#[from] PlacementError),
+    /// Fewer sites are feasible than gauges were asked for.
     #[error(transparent)]
     Shortage(#[from] Shortage),
+    /// Too few touches to train on.
     #[error("{touches} touches are too few to learn from, which takes at least {least}: {remedy}")]
     TooFewTouches {
+        /// How many there are.
         touches: usize,
+        /// How many are needed.
         least: usize,
+        /// What to do.
         remedy: String,
     },
+    /// No touch lands on the part.
     #[error("no touch lands on the part: {remedy}")]
-    NoTouches { remedy: String },
+    NoTouches {
+        /// What to do.
+        remedy: String,
+    },
+    /// The lattice has more sites than can be handled.
     #[error(
         "{count} sites at a spacing of {spacing_mm} mm are more than the {limit} this version handles: widen sites.spacing_mm or check the unit of the mesh (the part is {size_mm:.0} mm across)"
     )]
     TooManySites {
+        /// How many it would have.
         count: usize,
+        /// The most there may be.
         limit: usize,
+        /// The spacing asked for (mm).
         spacing_mm: f64,
+        /// Diagonal of the part's box (mm).
         size_mm: f64,
     },
+    /// A point that was given lies far from the part.
     #[error(
         "{what} {number} lies {} from the part, which is {} across: check the unit of the mesh and of the points (mm)",
         plain::mm(*distance_mm),
         plain::mm(*size_mm)
     )]
     OffThePart {
+        /// A touch or a site.
         what: &'static str,
+        /// Which one.
         number: usize,
+        /// How far off it is (mm).
         distance_mm: f64,
+        /// Diagonal of the part's box (mm).
         size_mm: f64,
     },
+    /// A gauge's direction points out of the surface.
     #[error(
         "the direction of site {number} points {angle_deg:.0}° out of the surface: a gauge lies in it, give dx, dy, dz along it"
     )]
-    AcrossTheWall { number: usize, angle_deg: f64 },
+    AcrossTheWall {
+        /// Which gauge.
+        number: usize,
+        /// Angle between direction and surface (degrees).
+        angle_deg: f64,
+    },
+    /// No row of a table can be answered.
     #[error(
         "none of the {count} {what} can be answered: each is off the part or points out of its surface. Check the unit of the mesh and of the points (mm), and the directions"
     )]
-    NothingLeft { what: &'static str, count: usize },
+    NothingLeft {
+        /// Touches or sites.
+        what: &'static str,
+        /// How many there were.
+        count: usize,
+    },
+    /// The wall of a shell is thicker than the part is wide.
     #[error(
         "the part is {size_mm:.3} mm across and its wall {thickness_mm:.3} mm thick: this is no shell. Check the unit of the mesh and part.thickness_mm"
     )]
-    ThickerThanWide { size_mm: f64, thickness_mm: f64 },
+    ThickerThanWide {
+        /// Diagonal of the part's box (mm).
+        size_mm: f64,
+        /// Thickness of the wall (mm).
+        thickness_mm: f64,
+    },
+    /// One vertex lies far from all others.
     #[error(
         "one vertex of the part, at {place_mm:.3} mm, lies {distance_mm:.3} mm from all the others, which are {size_mm:.3} mm across: remove or move it in the program that wrote the mesh"
     )]
     FarVertex {
+        /// Where it is (mm).
         place_mm: DVec3,
+        /// How far from the others (mm).
         distance_mm: f64,
+        /// Diagonal of the others' box (mm).
         size_mm: f64,
     },
+    /// The part is all long thin triangles.
     #[error(
         "the part is too slender for elements: its longest edge has {longest_mm:.3} mm, and all of its surface {area_mm2:.3} mm². Remove the long thin triangles in the program that wrote the mesh, or check for vertices in a wrong place"
     )]
-    Slender { longest_mm: f64, area_mm2: f64 },
+    Slender {
+        /// Its longest edge (mm).
+        longest_mm: f64,
+        /// Its area (mm²).
+        area_mm2: f64,
+    },
+    /// The unrolled part is too large for a lattice of this spacing.
     #[error(
         "unrolled about its axis the part is {round_mm:.0} mm round and {high_mm:.0} mm high, too much for sites every {spacing_mm} mm: choose sites.lattice = \"even\", another part.axis, or a wider sites.spacing_mm"
     )]
     WideLattice {
+        /// Length around the axis (mm).
         round_mm: f64,
+        /// Length along it (mm).
         high_mm: f64,
+        /// The spacing asked for (mm).
         spacing_mm: f64,
     },
+    /// The spacing is too wide for even one site.
     #[error(
         "no site fits on the part: {spacing_mm} mm (sites.spacing_mm) is too wide for a part of {size_mm:.3} mm across and {area_mm2:.3} mm². Lower it to less than {fits_mm:.3}, or check the unit of the mesh"
     )]
     NoRoom {
+        /// The spacing asked for (mm).
         spacing_mm: f64,
+        /// Diagonal of the part's box (mm).
         size_mm: f64,
         /// Of the surface that gauges are glued to.
         area_mm2: f64,
         /// Where one site fits.
         fits_mm: f64,
     },
+    /// More memory would be needed than may be taken.
     #[error(
         "{} would be needed for {sites} sites × {touches} touches, more than the {} that may be taken: {}, or allow more with --memory-gb",
         plain::needed_gb(*needed_gb),
@@ -148,16 +206,23 @@ pub enum DesignError {
         said_by.remedy()
     )]
     TooLarge {
+        /// How much is needed (GB).
         needed_gb: f64,
+        /// How much may be taken (GB).
         limit_gb: f64,
+        /// Sites asked for.
         sites: usize,
+        /// Touches asked for.
         touches: usize,
+        /// Where these numbers come from, and so what to change.
         said_by: SaidBy,
     },
+    /// The project has no chosen gauges.
     #[error(
         "the project has no gauges yet: place them in the studio, or with `hapdef design`, whose design.hapdef.toml has them"
     )]
     NoGauges,
+    /// The caller asked for a stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

@@ -28,20 +28,26 @@ use crate::regression::{Grouping, Hyper, PositionModel, scale};
 
 /// Training on one model, judging on another: nothing here has seen the test touches.
 pub struct Trial<'a> {
+    /// What the sites report.
     pub signal: Signal,
     /// Signals of the sites of interest under the training touches (sites × touches).
     pub train: &'a SignalMatrix,
+    /// Where the training touches were (mm).
     pub train_targets: &'a [[f64; 3]],
     /// The same sites under the test touches, from the finer model.
     pub test: &'a SignalMatrix,
     /// The same as a workshop would build them: a little off their places, directions and gains.
     pub workshop: &'a SignalMatrix,
+    /// Where the test touches were (mm).
     pub test_targets: &'a [[f64; 3]],
+    /// Regions of the test touches that errors are quoted for.
     pub regions: &'a [Region],
     /// Standard deviation of the noise added to training and test strain, and the numbers of the streams it
     /// is drawn from, one a site: the same stream gives the same noise in every trial.
     pub noise: f64,
+    /// Number of the stream of noise of each site.
     pub streams: &'a [u64],
+    /// Of noise and folds.
     pub seed: u64,
 }
 
@@ -54,7 +60,9 @@ pub const BASELINE: &str = "all-candidates";
 
 /// A set to judge: whose it is and which rows of the trial's matrices it has.
 pub struct Candidate {
+    /// Name of the selector.
     pub selector: String,
+    /// Rows of the set's gauges.
     pub rows: Vec<usize>,
     /// Settings of its regression; searched where there are none.
     pub hyper: Option<Hyper>,
@@ -64,29 +72,37 @@ pub struct Candidate {
 /// workshop would build it.
 #[derive(Clone, Default)]
 pub struct Evaluation {
+    /// What judged.
     pub judging: Judging,
     /// By matching: at the force in the middle.
     pub rows: Vec<EvaluationRow>,
+    /// As drawn: for each set the error at each test touch (mm).
     pub errors: Vec<Vec<f64>>,
+    /// The same as built (mm).
     pub built: Vec<Vec<f64>>,
     /// What is left of each selector's largest set when gauges fail.
     pub failures: Vec<Failures>,
     /// By matching: what was found of each set at each force, and what is quoted of that. The largest set of each
     /// selector has all forces, those before it the one in the middle.
     pub found: Vec<Matched>,
+    /// By matching: rows by set, force and region.
     pub matched: Vec<MatchedRow>,
     /// What a reader must know of how sets were judged.
     pub notes: Vec<String>,
+    /// What it took.
     pub work: Work,
 }
 
 /// Errors of one set with failed gauges.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Failures {
+    /// Name of the selector.
     pub selector: String,
+    /// Gauges of the whole set.
     pub sensors: usize,
     /// Touches that were learned from; by matching, which learns from none, those that were judged.
     pub touches: usize,
+    /// Rising in failed gauges.
     pub rows: Vec<FailureRow>,
 }
 

@@ -72,11 +72,13 @@ impl Distances {
         }
     }
 
+    /// How many locations there are.
     #[must_use]
     pub fn count(&self) -> usize {
         self.count
     }
 
+    /// Between locations i and j (m).
     #[must_use]
     pub fn at(&self, i: usize, j: usize) -> f64 {
         self.values[i * self.count + j]
@@ -96,6 +98,7 @@ impl Distances {
 pub struct Covariance {
     /// Without β⁻¹.
     pub k: Mat<f64>,
+    /// β⁻¹: variance of a measurement's noise over the field's.
     pub noise: f64,
     /// Share of the spectrum that was negative and set to zero.
     pub clipped: f64,
@@ -181,12 +184,15 @@ const STAGE: &str = "Covariance of the sites";
 /// signals' own rms about their mean over the sites.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GpTrial {
+    /// The kernel.
     pub kernel: GpKernel,
+    /// Its error, as a share.
     pub error: f64,
 }
 
 /// Parameters that the search looks at.
 pub const LENGTHS_M: [f64; 9] = [0.004, 0.007, 0.012, 0.018, 0.025, 0.033, 0.045, 0.065, 0.1];
+/// Powers that the search tries.
 pub const POWERS: [f64; 6] = [0.8, 1.0, 1.3, 1.6, 1.9, 2.0];
 /// Most sites that the search uses.
 const SEARCHED: usize = 500;

@@ -19,13 +19,16 @@ pub use sift::{GivenSite, LeftOut, Sifted, Table, check_reach, sift};
 
 /// What the model answers.
 pub struct Answer {
+    /// The factored model.
     pub model: Box<dyn Model>,
     responses: Responses,
     /// The rows that were answered and those that were not, and how far each was off.
     pub rows: Sifted,
+    /// How far it is from converged.
     pub discretization: Discretization,
     /// Of a shell.
     pub linearity: Option<Linearity>,
+    /// What the solution was checked for.
     pub checks: Checks,
     /// What a reader must know.
     pub notes: Vec<String>,
@@ -36,9 +39,11 @@ pub struct Answer {
 pub struct Pair {
     /// Rows of what was given.
     pub touch: usize,
+    /// Row of the site in what was given.
     pub site: usize,
     /// m.
     pub displacement: DVec3,
+    /// Along the gauge's direction, as a ratio.
     pub strain: f64,
 }
 

@@ -4,8 +4,10 @@ pub mod health;
 pub mod pipeline;
 pub mod receiver;
 pub mod tare;
+mod update;
 
 pub use health::Health;
-pub use pipeline::{Estimator, GaugeModel, Guess, Pipeline, Settings, Update};
+pub use pipeline::Pipeline;
 pub use receiver::{Doubt, Input, Receiver, Sample, Traffic};
 pub use tare::Rest;
+pub use update::{Estimator, GaugeModel, Guess, Settings, Update};

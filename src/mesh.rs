@@ -151,22 +151,27 @@ impl TriMesh {
         self.index.get_or_init(|| Arc::new(grown()))
     }
 
+    /// Places of the vertices (m).
     #[must_use]
     pub fn positions(&self) -> &[DVec3] {
         &self.positions
     }
+    /// Vertices of each triangle, counter-clockwise seen from outside.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
+    /// Every edge once.
     #[must_use]
     pub fn edges(&self) -> &[Edge] {
         &self.edges
     }
+    /// Edges of each triangle, by their numbers.
     #[must_use]
     pub fn triangle_edges(&self) -> &[[u32; 3]] {
         &self.triangle_edges
     }
+    /// Triangles around each vertex.
     #[must_use]
     pub fn vertex_triangles(&self) -> &[Vec<u32>] {
         &self.vertex_triangles

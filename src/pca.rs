@@ -17,12 +17,15 @@ use crate::regression::Standardizer;
 /// Why there are no components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PcaError {
+    /// No signal varies.
     #[error("no site's signal varies over the touches: nothing can be told apart")]
     Constant,
+    /// The iteration for eigenvalues did not converge.
     #[error(
         "the eigenvalues of the signals did not converge: check the dataset for values that are not finite"
     )]
     NoConvergence,
+    /// The caller asked for a stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

@@ -29,15 +29,21 @@ pub use selector::{Request, Selector};
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum SelectorKind {
+    /// Least error that model matching is expected to make; the default.
     #[default]
     ExpectedError,
+    /// The paper's Algorithm 1.
     GreedySvr,
+    /// Pivots of a QR factorization of the principal components.
     PcaQr,
+    /// Entropy of a Gaussian process.
     Entropy,
+    /// Mutual information of a Gaussian process.
     MutualInformation,
 }
 
 impl SelectorKind {
+    /// All, the default first.
     pub const ALL: [Self; 5] = [
         Self::ExpectedError,
         Self::GreedySvr,
@@ -157,11 +163,15 @@ impl SensorSet {
 /// What a selector chose: one set for each number of gauges from one up.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Selection {
+    /// Who chose.
     pub selector: SelectorKind,
+    /// Rising in gauges; a choice that is not nested exchanges some from set to set.
     pub sets: Vec<SensorSet>,
+    /// Unit of the criterion.
     pub criterion_unit: &'static str,
     /// How many sites there were to choose from.
     pub pool: usize,
+    /// What was reached, and at what effort.
     pub achieved: Achieved,
 }
 
@@ -176,48 +186,84 @@ impl Selection {
 /// Why nothing could be chosen.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlacementError {
+    /// There is nothing to choose from.
     #[error("there is no site to choose from: all are left out, or there are none")]
     NoSites,
+    /// Fewer sites than gauges asked for.
     #[error(
         "{} asked for, but only {} to choose from: ask for fewer gauges or allow more sites",
         plain::either(*.wanted, "gauge was", "gauges were"),
         plain::either(*.available, "site is there", "sites are there")
     )]
-    TooFewSites { wanted: usize, available: usize },
+    TooFewSites {
+        /// Gauges asked for.
+        wanted: usize,
+        /// Sites there are.
+        available: usize,
+    },
+    /// Too few touches to train on.
     #[error("{} too few to learn from: ask for at least {least}", plain::either(*.touches, "touch is", "touches are"))]
-    TooFewTouches { touches: usize, least: usize },
+    TooFewTouches {
+        /// Touches there are.
+        touches: usize,
+        /// Touches needed.
+        least: usize,
+    },
+    /// Too few places to divide into folds.
     #[error(
         "{places} places are too few to learn from and to judge on in {folds} folds: at least {least} are needed, or fewer folds (the {touches} touches are repeats of them, which are never divided)"
     )]
     TooFewPlaces {
+        /// Places there are.
         places: usize,
+        /// Touches at these places.
         touches: usize,
+        /// Folds asked for.
         folds: usize,
+        /// Places needed.
         least: usize,
     },
+    /// Too few touches to divide into folds.
     #[error(
         "{touches} touches are too few to learn from and to judge on in {folds} folds: at least {least} are needed, or fewer folds"
     )]
     TooFewForFolds {
+        /// Touches there are.
         touches: usize,
+        /// Folds asked for.
         folds: usize,
+        /// Touches needed.
         least: usize,
     },
+    /// Constraints leave no site.
     #[error("no gauge can be placed: {why}")]
-    NoRoom { why: String },
+    NoRoom {
+        /// Which ones, and what to change.
+        why: String,
+    },
+    /// The covariance cannot be factored.
     #[error(
         "the covariance of the sites is singular: raise the noise of the Gaussian process or merge sites that lie together"
     )]
     Singular,
+    /// A constraint contradicts itself.
     #[error("{what}")]
-    Constraint { what: &'static str },
+    Constraint {
+        /// Which one, and what to change.
+        what: &'static str,
+    },
+    /// A constraint that this selector cannot heed.
     #[error("{selector} cannot take this into account: {why}")]
     Refused {
+        /// Its name, for people.
         selector: &'static str,
+        /// Which constraint, and what to use instead.
         why: &'static str,
     },
+    /// The signals have no components.
     #[error(transparent)]
     Signals(#[from] PcaError),
+    /// The caller asked for a stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

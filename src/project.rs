@@ -49,31 +49,45 @@ const MICRO: f64 = 1e-6;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Project {
+    /// Version of the file's format.
     pub format: u32,
+    /// Table `part`.
     pub part: Part,
+    /// Table `material`.
     #[serde(default)]
     pub material: MaterialKeys,
+    /// Tables `support`.
     #[serde(default, rename = "support")]
     pub supports: Vec<SupportKeys>,
+    /// Table `touch`.
     #[serde(default)]
     pub touch: TouchKeys,
+    /// Table `sites`.
     #[serde(default)]
     pub sites: SiteKeys,
+    /// Table `gauge`.
     #[serde(default)]
     pub gauge: GaugeKeys,
     // As `touch.forces_n`.
+    /// Table `calibration`.
     #[serde(default, skip_serializing_if = "is_default")]
     pub calibration: CalibrationKeys,
+    /// Table `feasible`.
     #[serde(default)]
     pub feasible: FeasibleKeys,
+    /// Table `candidates`.
     #[serde(default)]
     pub candidates: CandidateKeys,
+    /// Table `selection`.
     #[serde(default)]
     pub selection: SelectionKeys,
+    /// Table `evaluation`.
     #[serde(default)]
     pub evaluation: EvaluationKeys,
+    /// Table `budget`.
     #[serde(default)]
     pub budget: BudgetKeys,
+    /// Table `live`.
     #[serde(default)]
     pub live: LiveKeys,
     /// Selections that were kept to be compared.
@@ -81,19 +95,24 @@ pub struct Project {
     pub kept: Vec<Kept>,
 }
 
+/// Keys of the table `touch`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TouchKeys {
+    /// Force of the touches that are simulated, along the inward normal (N).
     pub force_n: f64,
     // What is usual is not serialized: the fingerprints of trades that were measured before this key still hold.
     /// How hard touches come, the lightest and the hardest: evenly over the logarithm between.
     #[serde(skip_serializing_if = "are_usual_forces")]
     pub forces_n: [f64; 2],
+    /// Radius over which the tip spreads the force as (1 - r²/a²)² (mm).
     pub tip_radius_mm: f64,
     /// How far off that is (standard deviation): larger tips, or smaller ones, touch too.
     #[serde(skip_serializing_if = "is_default")]
     pub tip_tolerance_mm: f64,
+    /// Touches to simulate; lower qualities take fewer.
     pub count: usize,
+    /// Least distance of a touch from a free edge (mm).
     pub edge_margin_mm: f64,
     /// Radius of the fingertip or stylus that comes: touches lie only where it gets to from outside.
     #[serde(skip_serializing_if = "is_usual_reach")]
@@ -132,32 +151,44 @@ pub enum Lattice {
     Unrolled,
 }
 
+/// Keys of the table `sites`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SiteKeys {
+    /// Between possible gauge positions (mm).
     pub spacing_mm: f64,
+    /// How they are laid out.
     pub lattice: Lattice,
 }
 
+/// Keys of the table `gauge`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GaugeKeys {
+    /// What a gauge reports.
     pub signal: Signal,
     /// Directions that a gauge may have at one place: the one with the largest strain, and others evenly
     /// turned from it.
     pub directions: usize,
+    /// Standard deviation of a reading (microstrain).
     pub noise_microstrain: f64,
     /// What all channels have drifted by together since the rest was taken (standard deviation). A tare and a rest that
     /// follows take away what is slower than a touch, and what wanders faster is in the noise as it is measured: beside
     /// them nothing is left, unless touches last for minutes or warm the part.
     #[serde(skip_serializing_if = "is_default")]
     pub drift_microstrain: f64,
+    /// Largest strain that gauge and amplifier can take (microstrain).
     pub range_microstrain: f64,
+    /// Rms strain over noise that a site must reach.
     pub least_signal_to_noise: f64,
+    /// Length of the measuring grid, along the gauge (mm).
     pub grid_length_mm: f64,
+    /// Its width (mm).
     pub grid_width_mm: f64,
+    /// Largest height of the surface over the gauge's plane (mm).
     pub flatness_mm: f64,
     // As `touch.forces_n`.
+    /// Table `gauge.tolerance`.
     #[serde(skip_serializing_if = "ToleranceKeys::is_usual")]
     pub tolerance: ToleranceKeys,
 }
@@ -168,7 +199,9 @@ pub struct GaugeKeys {
 pub struct ToleranceKeys {
     /// Rms distance, in any direction along the surface.
     pub place_mm: f64,
+    /// Of the direction (degrees).
     pub angle_deg: f64,
+    /// Of the reading (%).
     pub gain_percent: f64,
 }
 
@@ -188,11 +221,15 @@ pub struct CalibrationKeys {
     pub force_percent: f64,
 }
 
+/// Keys of the table `feasible`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FeasibleKeys {
+    /// Least distance over the surface from anything held (mm).
     pub support_clearance_mm: f64,
+    /// k of the paper's centre-of-mass filter.
     pub edge_neighbours: usize,
+    /// Its radius (mm).
     pub edge_radius_mm: f64,
     /// Name of the painted mask (one value a vertex) in the arrays beside the project file.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -202,14 +239,18 @@ pub struct FeasibleKeys {
     pub keep_out: Option<String>,
 }
 
+/// Keys of the table `candidates`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CandidateKeys {
+    /// Share of the held-out variance that the candidates may leave unexplained.
     pub unexplained: f64,
+    /// A fixed number of candidates instead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
 }
 
+/// Keys of the table `evaluation`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationKeys {
@@ -236,20 +277,26 @@ fn are_usual_judged_forces(forces_n: &[f64]) -> bool {
     forces_n == JUDGED_N
 }
 
+/// Keys of a table `evaluation.region`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RegionKeys {
+    /// For people.
     pub name: String,
+    /// Touches inside it belong to the region (mm).
     pub box_mm: BoxMm,
     /// As of a support.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub box_axis: Option<[f64; 3]>,
 }
 
+/// Keys of the table `budget`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BudgetKeys {
+    /// How much to spend.
     pub quality: Quality,
+    /// Of every random draw.
     pub seed: u64,
     /// In place of some of the quality's own.
     #[serde(skip_serializing_if = "Limits::are_none")]
@@ -399,6 +446,7 @@ impl Project {
         }
     }
 
+    /// Material and thickness of a shell.
     #[must_use]
     pub fn section(&self) -> Section {
         Section {
@@ -410,6 +458,7 @@ impl Project {
         }
     }
 
+    /// What a gauge needs, in SI units.
     #[must_use]
     pub fn feasible_rules(&self) -> FeasibleRules {
         FeasibleRules {
@@ -428,6 +477,7 @@ impl Project {
         }
     }
 
+    /// When the reduction stops keeping sites.
     #[must_use]
     pub fn reduction(&self) -> Reduction {
         self.candidates.count.map_or(
@@ -455,6 +505,7 @@ impl Project {
             || self.candidates.count.is_some()
     }
 
+    /// Settings of greedy SVR's regression.
     #[must_use]
     pub fn hyper(&self) -> Hyper {
         Hyper {

@@ -40,6 +40,7 @@ pub struct Data {
 /// How a choice is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
+    /// Who chooses.
     pub kind: SelectorKind,
     /// Greedy SVR's own, and what every choice's criterion in mm is computed with.
     pub svr: GreedySvr,

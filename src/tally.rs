@@ -36,10 +36,15 @@ pub fn count(done: Done, number: usize) {
 pub struct Tally {
     /// Stiffnesses assembled and factored.
     pub factorizations: u64,
+    /// Right-hand sides solved.
     pub solves: u64,
+    /// Entries of kernels computed.
     pub kernel_evaluations: u64,
+    /// Regressions fitted.
     pub fits: u64,
+    /// Buffers sent to the graphics adapter.
     pub uploads: u64,
+    /// Scenes drawn.
     pub redraws: u64,
 }
 

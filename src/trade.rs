@@ -8,6 +8,7 @@
 mod front;
 mod knobs;
 mod setting;
+mod spent;
 mod sweep;
 
 use serde::{Deserialize, Serialize};
@@ -18,7 +19,8 @@ use crate::project::BadValue;
 
 pub use self::front::{Asked, answer, clock, front};
 pub use self::knobs::{Bought, KnobReport, knobs};
-pub use self::setting::{Knob, Setting, Spent};
+pub use self::setting::Setting;
+pub use self::spent::{Knob, Spent};
 pub use self::sweep::{Sweep, standards};
 
 /// What a setting costs and achieves.
@@ -26,6 +28,7 @@ pub use self::sweep::{Sweep, standards};
 pub struct Measured {
     /// CPU time (s) from the project to the judged answer, and the same by the clock.
     pub cpu_seconds: f64,
+    /// Wall time of the same (s).
     pub seconds: f64,
     /// By the clock, stage by stage.
     pub stages: Vec<StageSeconds>,
@@ -37,10 +40,13 @@ pub struct Measured {
     /// mean, median, 95th percentile, and the mean as a workshop would build it.
     #[serde(deserialize_with = "number")]
     pub error_mm: f64,
+    /// Median error (mm).
     #[serde(deserialize_with = "number")]
     pub median_mm: f64,
+    /// 95th percentile of the error (mm).
     #[serde(deserialize_with = "number")]
     pub p95_mm: f64,
+    /// Mean error as built (mm).
     #[serde(deserialize_with = "number")]
     pub workshop_mm: f64,
     /// Mean error that the design itself states, by the same estimator at the same force, on touches of its own and
@@ -50,6 +56,7 @@ pub struct Measured {
     /// Estimated error of the model's displacements (%).
     #[serde(deserialize_with = "number")]
     pub model_percent: f64,
+    /// Candidates that the reduction kept.
     pub candidates: usize,
     /// The chosen gauges (mm), in the order of their choice.
     pub sites_mm: Vec<[f64; 3]>,
@@ -63,7 +70,9 @@ fn number<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
 /// Seconds by the clock of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StageSeconds {
+    /// Name of the stage.
     pub stage: String,
+    /// Wall time (s).
     pub seconds: f64,
 }
 
@@ -79,11 +88,14 @@ impl From<&StageTime> for StageSeconds {
 /// A setting and what came of it; a message where it cannot be computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Point {
+    /// The setting.
     pub setting: Setting,
+    /// What it costs and achieves, or why it cannot be computed.
     pub outcome: Result<Measured, String>,
 }
 
 impl Point {
+    /// What was measured, where it could be.
     #[must_use]
     pub fn measured(&self) -> Option<&Measured> {
         self.outcome.as_ref().ok()

@@ -123,6 +123,7 @@ pub struct Uncertainty {
     /// What one count of the converter stands for (strain); zero where nobody knows it yet, or where the noise was
     /// measured behind the converter and has it.
     pub resolution: f64,
+    /// How gauges are glued.
     pub gluing: Gluing,
     /// What the elements leave, as a share of a reading, each gauge for itself.
     pub elements: f64,

@@ -21,15 +21,20 @@ pub enum Illness {
 /// A channel that is ill for a while.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChannelFault {
+    /// Number of the channel, from 0.
     pub channel: usize,
+    /// What it does.
     pub illness: Illness,
+    /// Start, on the board's clock (s).
     pub from_s: f64,
+    /// End (s); infinite where it never recovers.
     pub until_s: f64,
 }
 
 /// One thing that goes wrong, as it is asked for: `dead:7@5+2`, `unplug@10+1.5`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
+    /// A channel fails.
     Channel(ChannelFault),
     /// From and until (s).
     Unplug(f64, f64),
@@ -40,11 +45,15 @@ pub enum Fault {
 pub struct Faults {
     /// Probability of each byte to have a bit turned over, and to be left out.
     pub flip: f64,
+    /// Probability of each byte to be dropped.
     pub drop: f64,
     /// Probability of each frame of data to be sent twice, and never.
     pub duplicate: f64,
+    /// Probability of each data frame never to be sent.
     pub lose: f64,
+    /// Channels that fail for a while.
     pub channels: Vec<ChannelFault>,
+    /// From when until when nothing is connected (s).
     pub unplugged: Vec<(f64, f64)>,
 }
 
@@ -100,6 +109,7 @@ impl FromStr for Fault {
 }
 
 impl Faults {
+    /// Takes in one more.
     pub fn add(&mut self, fault: Fault) {
         match fault {
             Fault::Channel(fault) => self.channels.push(fault),

@@ -11,7 +11,9 @@ use crate::elasticity::Touch;
 /// One press: the force rises, stays and falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Press {
+    /// When it begins, on the board's clock (s).
     pub start_s: f64,
+    /// How long it lasts, rise and fall included (s).
     pub duration_s: f64,
     /// With its largest force.
     pub touch: Touch,
@@ -23,7 +25,9 @@ pub const PRESSES: RangeInclusive<f64> = 0.001..=1e4;
 /// A press as it was asked for: its place need not be on the part's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GivenPress {
+    /// When it begins, on the board's clock (s).
     pub start_s: f64,
+    /// How long it lasts, rise and fall included (s).
     pub duration_s: f64,
     /// m.
     pub position: DVec3,
@@ -34,6 +38,7 @@ pub struct GivenPress {
 /// Presses in the order of their time.
 #[derive(Clone, Debug)]
 pub enum Script {
+    /// These presses, once.
     Given(Vec<Press>),
     /// Places in the order given, again and again, with drawn forces and pauses.
     Random(Box<Random>),

@@ -9,7 +9,9 @@ use crate::elasticity::respond::{Pressed, Reading};
 /// A gauge and what it reads of every touch (strain).
 #[derive(Clone, Debug)]
 pub struct Surveyed {
+    /// Where it is.
     pub site: Site,
+    /// What it reads of each touch (strain).
     pub x: Vec<f64>,
     /// The mean over all directions there.
     mean: Vec<f64>,
@@ -21,8 +23,11 @@ pub struct Surveyed {
 /// (radians).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Move {
+    /// Along the gauge (m).
     pub along: f64,
+    /// Across the gauge (m).
     pub across: f64,
+    /// From along to across (radians).
     pub turn: f64,
 }
 

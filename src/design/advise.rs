@@ -29,6 +29,7 @@ pub struct Advice {
     pub wall_mm: [f64; 3],
     /// Radius (mm) that a tenth and half of the walls are bent tighter than; infinite where they are flat.
     pub radius_mm: [f64; 2],
+    /// Diagonal of the part's box (mm).
     pub size_mm: f64,
     /// Share of a closed part's area that is the face of a wall, and not its end or a lump.
     pub walls: f64,
@@ -38,6 +39,7 @@ pub struct Advice {
     pub costs: [Cost; 2],
     /// In words.
     pub words: Vec<String>,
+    /// What each vertex belongs to; absent for an open part.
     #[serde(skip)]
     pub faces: Option<Faces>,
 }
@@ -45,14 +47,17 @@ pub struct Advice {
 /// What a model would cost at the project's quality, and how far off it would be, as on other parts.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Cost {
+    /// The model that this is of.
     pub model: PartModel,
     /// Order that the tetrahedra of the part's file are raised to, where those are used.
     pub order: Option<usize>,
     /// Size of its elements (mm).
     pub element_mm: f64,
+    /// Degrees of freedom.
     pub unknowns: f64,
     /// CPU time of all its stages (s), and memory of the largest (GB).
     pub seconds: f64,
+    /// Memory of the largest stage (GB).
     pub memory_gb: f64,
     /// Error of the displacement under a touch (%) that finer elements would take away; no number where it could not
     /// be computed.
@@ -100,6 +105,7 @@ impl Cost {
 /// The faces of a closed part, by its vertices.
 #[derive(Clone, Debug)]
 pub struct Faces {
+    /// The side of its wall that each vertex is on.
     pub sides: Vec<Side>,
     /// m; zero where there is no wall.
     pub thickness: Vec<f64>,

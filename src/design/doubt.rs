@@ -7,8 +7,11 @@ use super::{Checks, Design, Simulated};
 /// A number beyond its limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Doubt {
+    /// What is beyond its limit, for people.
     pub number: &'static str,
+    /// What it is.
     pub value: f64,
+    /// What it may be.
     pub limit: f64,
     /// What it means and what to do, in plain words.
     pub words: String,

@@ -36,8 +36,11 @@ pub struct Finest {
 /// Errors (mm) over the judge's touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judged {
+    /// Mean (mm).
     pub mean_mm: f64,
+    /// Median (mm).
     pub median_mm: f64,
+    /// 95th percentile (mm).
     pub p95_mm: f64,
     /// Mean as a workshop would build it.
     pub workshop_mm: f64,
@@ -76,11 +79,13 @@ impl Finest {
         self.meshed.element_mm()
     }
 
+    /// Degrees of freedom of the judge's model.
     #[must_use]
     pub fn unknowns(&self) -> usize {
         self.model.system().dimension()
     }
 
+    /// How many touches it judges on.
     #[must_use]
     pub fn touches(&self) -> usize {
         self.touches.len()

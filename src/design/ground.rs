@@ -23,20 +23,27 @@ use crate::project::{Elements as ElementKind, PartModel, Project};
 /// A part with its supports, ready to have elements laid on it or cells around it.
 #[derive(Clone)]
 pub enum Ground {
+    /// A mid-surface, to be meshed with facets.
     Shell(Arc<grade::Ground>),
+    /// A closed surface, to be immersed in cells.
     Solid(Arc<SolidGround>),
 }
 
 /// The elements, with the model built on them.
 pub struct Built {
+    /// What the model stands on.
     pub meshed: Meshed,
+    /// The factored model.
     pub model: Box<dyn Model>,
+    /// How far it is from converged.
     pub estimate: Discretization,
     /// Of a shell; a solid's is not estimated.
     pub linearity: Option<Linearity>,
+    /// The worst balance of forces and energies over a sample of the loads.
     pub balance: LoadCheck,
     /// Assemblies and factorizations, and loads solved on the way here.
     pub models: u64,
+    /// Loads solved on the way here.
     pub solves: u64,
 }
 

@@ -9,7 +9,9 @@ use crate::project::{Masks, Project};
 /// What a design starts from.
 #[derive(Clone)]
 pub struct Inputs {
+    /// What is asked for.
     pub project: Project,
+    /// The part's surface (m).
     pub part: Arc<TriMesh>,
     /// One value a vertex of the part; absent when nothing was painted.
     pub painted: Option<Arc<Vec<bool>>>,

@@ -13,7 +13,9 @@ use crate::mesh::remesh::Remeshed;
 /// Elements together with what they were laid on: triangles of a shell, cells or tetrahedra of a solid.
 #[derive(Clone)]
 pub enum Meshed {
+    /// Facets of a shell.
     Shell(Arc<grade::Ground>, Remeshed),
+    /// Cells or tetrahedra of a solid.
     Solid(Arc<SolidGround>, Fineness),
 }
 

@@ -19,25 +19,34 @@ use crate::placement::{Selection, SelectorKind, SensorSet};
 /// Everything a design produced; what it shares with another costs nothing.
 #[derive(Clone)]
 pub struct Design {
+    /// What might be spent.
     pub budget: Budget,
+    /// The elastic stage.
     pub simulated: Arc<Simulated>,
+    /// Which sites gauges fit on, and why not on the others.
     pub feasibility: Arc<Feasibility>,
+    /// The feasible sites.
     pub reduced: Arc<Reduced>,
     /// What the feasible sites were reduced to; absent where nobody asked for that, and all of them are candidates.
     pub candidates: Option<Arc<Candidates>>,
+    /// What each selector chose.
     pub selections: Arc<Vec<Selection>>,
     /// Whose sites are shown and reported.
     pub lead: SelectorKind,
     /// Whether gauges of the chosen set were moved by hand.
     pub by_hand: bool,
+    /// The model that judged.
     pub reference: Arc<Reference>,
+    /// What it found.
     pub evaluation: Arc<Evaluation>,
+    /// Time of each stage.
     pub seconds: Vec<StageTime>,
 }
 
 /// What is there already of a design: each as its stage would bring it anew from the same inputs.
 #[derive(Clone, Default)]
 pub struct Known {
+    /// Feasibility, and the sites that passed.
     pub reduced: Option<(Arc<Feasibility>, Arc<Reduced>)>,
     /// By the same selectors in the same order; of the simulation that goes with them, which has the gauges that were
     /// moved off its lattice.
@@ -51,8 +60,11 @@ pub struct Known {
 /// The steps of a design after its simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
+    /// Filters and candidates.
     Reduce,
+    /// The selectors.
     Select,
+    /// The judge.
     Evaluate,
 }
 
@@ -60,16 +72,22 @@ pub enum Step {
 /// clock of its own.
 #[derive(Clone, Copy)]
 pub struct Hooks<'a> {
+    /// Seconds since any fixed moment.
     pub clock: &'a dyn Fn() -> f64,
+    /// Told of progress; may ask for a stop.
     pub watch: Watch<'a>,
+    /// Told of each set as soon as it is known.
     pub found: Found<'a>,
+    /// Told of each step as it begins.
     pub entered: &'a dyn Fn(Step),
 }
 
 /// Seconds by the clock of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageTime {
+    /// Name of the stage.
     pub stage: &'static str,
+    /// Wall time (s).
     pub seconds: f64,
 }
 
@@ -201,6 +219,7 @@ impl Design {
 pub struct Words {
     /// What may change a decision.
     pub open: Vec<String>,
+    /// How the numbers came about; for whoever looks closer.
     pub folded: Vec<String>,
 }
 

@@ -22,6 +22,7 @@ use crate::regression::folds::evenly;
 
 /// The feasible sites, and what selectors that ask for it make of them: once, whoever asks first.
 pub struct Reduced {
+    /// Feasible sites, as numbered in the dataset.
     pub feasible: Vec<usize>,
     /// Signals of the feasible sites.
     pub x: SignalMatrix,
@@ -43,6 +44,7 @@ struct Asked {
 
 /// A Gaussian process and where its locations are.
 pub struct Located {
+    /// The process over them.
     pub geometry: Geometry,
     /// The feasible ones among them, which come first: rows of the reduced signals.
     pub rows: Vec<usize>,

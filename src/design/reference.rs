@@ -12,15 +12,19 @@ use crate::uncertainty::Uncertainty;
 /// The judge: a model of finer elements, with touches of its own.
 #[derive(Clone)]
 pub struct Reference {
+    /// The held-out touches.
     pub touches: Vec<Touch>,
+    /// Regions that errors are quoted for.
     pub regions: Vec<Region>,
     /// Element size of the reference model (mm).
     pub element_mm: f64,
+    /// What it took.
     pub work: Work,
     /// Dataset sites that were measured, rising, and their signals.
     pub sites: Vec<usize>,
     /// Where they are: gauges off the lattice may have moved under the same number.
     pub drawn: Vec<Site>,
+    /// Signals of these sites (sites × touches).
     pub x: SignalMatrix,
     /// The same sites as a workshop would build them.
     pub workshop: SignalMatrix,

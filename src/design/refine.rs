@@ -15,19 +15,18 @@
 //! It costs one factorization, and a round seven right-hand sides a gauge that still moves: for ten gauges two blocks of
 //! 64, so at most 26 blocks in [`ROUNDS`] and to begin with, where the simulation of 4000 touches took 63.
 
+mod room;
+
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::filter::painted_sites;
+use self::room::Room;
 use super::known::{FINE, Known, detail};
 use super::{DesignError, Inputs, Reduced, Simulated};
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Move, Signal, Site, Surveyed, survey};
 use crate::elasticity::respond::Pressed;
-use crate::elasticity::support::supported_vertices;
-use crate::feasible::{FeasibleInput, FeasibleRules, Surroundings, clearance, feasible_beside};
-use crate::mesh::SurfacePoint;
 use crate::placement::expected_error::Moving;
 use crate::placement::{Constraints, Selection, SensorSet};
 
@@ -384,123 +383,6 @@ fn moves(step: f64, turn: f64) -> Vec<Move> {
     let moved = ways.flat_map(|turn| (0..WAYS).map(move |w| (w, turn)));
     let moved = moved.map(|(w, turn)| way(w, turn));
     moved.chain([still(turn), still(-turn)]).collect()
-}
-
-/// Where gauges may be.
-struct Room<'a> {
-    inputs: &'a Inputs,
-    simulated: &'a Simulated,
-    rules: FeasibleRules,
-    /// From what is held (m), a vertex of the surface.
-    clearance: Vec<f64>,
-    /// Where the sites of the lattice are (m), and how far from each other.
-    lattice: Vec<DVec3>,
-    spacing: f64,
-}
-
-impl<'a> Room<'a> {
-    fn new(inputs: &'a Inputs, simulated: &'a Simulated) -> Self {
-        let sites = &simulated.dataset.sites[..simulated.lattice];
-        let held = supported_vertices(&simulated.held);
-        Self {
-            rules: inputs.project.feasible_rules(),
-            clearance: clearance(&simulated.mesh, &held),
-            lattice: sites.iter().map(|site| site.position).collect(),
-            spacing: inputs.project.sites.spacing_mm * 1e-3,
-            inputs,
-            simulated,
-        }
-    }
-
-    /// A gauge after a move along the surface; nothing where that ends or turns away.
-    fn moved(&self, gauge: &Site, to: Move) -> Option<Site> {
-        /// Share of a step that the surface may be off its end.
-        const OFF: f64 = 0.5;
-        /// Cosine of the angle that it may turn by.
-        const BENT: f64 = 0.5;
-        let across = gauge.normal.cross(gauge.direction);
-        let step = gauge.direction * to.along + across * to.across;
-        let (sin, cos) = to.turn.sin_cos();
-        let direction = gauge.direction * cos + across * sin;
-        if step == DVec3::ZERO {
-            return Some(Site {
-                direction,
-                ..*gauge
-            });
-        }
-        let aim = gauge.position + step;
-        let mesh = &self.simulated.mesh;
-        let at = mesh.index().nearest(aim).0;
-        let (position, normal) = (mesh.point(at), mesh.normal(at));
-        let on = position.distance(aim) <= OFF * step.length() && normal.dot(gauge.normal) >= BENT;
-        let flat = (direction - normal * direction.dot(normal)).try_normalize();
-        Some(Site {
-            position,
-            normal,
-            direction: flat.filter(|_| on)?,
-            ..*gauge
-        })
-    }
-
-    /// Whether gauges may be where these are, for all that is seen of the surface around them.
-    fn allowed(&self, gauges: &[Site]) -> Vec<bool> {
-        self.judged(gauges, &self.points(gauges), None)
-    }
-
-    /// The same, and whether they can be reached there.
-    fn allowed_wholly(&self, gauges: &[Site], watch: Watch) -> Result<Vec<bool>, DesignError> {
-        let points = self.points(gauges);
-        let around = self.simulated.surroundings_of(&points, watch)?;
-        Ok(self.judged(gauges, &points, around.as_ref()))
-    }
-
-    fn points(&self, gauges: &[Site]) -> Vec<SurfacePoint> {
-        let index = self.simulated.mesh.index();
-        let at = |gauge: &Site| index.nearest(gauge.position).0;
-        gauges.iter().map(at).collect()
-    }
-
-    fn judged(
-        &self,
-        gauges: &[Site],
-        points: &[SurfacePoint],
-        surroundings: Option<&Surroundings>,
-    ) -> Vec<bool> {
-        let on = |mask: &Arc<Vec<bool>>| painted_sites(&self.inputs.part, mask, gauges);
-        let named = self.inputs.project.feasible.keep_out.as_ref();
-        let painted = self.inputs.painted.as_ref().map(on);
-        let kept_out = named.and_then(|name| self.inputs.masks.get(name)).map(on);
-        let input = FeasibleInput {
-            mesh: &self.simulated.mesh,
-            supported: &[],
-            points,
-            sites: gauges,
-            surroundings,
-            painted: painted.as_deref(),
-            kept_out: kept_out.as_deref(),
-        };
-        let found = feasible_beside(&input, &self.rules, &self.clearance, &self.lattice);
-        found.verdicts.iter().map(Option::is_none).collect()
-    }
-
-    /// Whether a gauge that goes from one place to another keeps its distance from a third: the spacing that is asked
-    /// for, and that of the lattice, where it was not nearer before. Gauges at one place stay together.
-    fn keeps_apart(&self, from: DVec3, to: DVec3, other: DVec3) -> bool {
-        /// Nearer than this (m) is the same place.
-        const SAME: f64 = 1e-9;
-        let least = self.inputs.project.selection.spacing_mm * 1e-3;
-        let (before, after) = (from.distance(other), to.distance(other));
-        if before <= SAME {
-            return after <= SAME;
-        }
-        after >= least && (after >= self.spacing || after >= before)
-    }
-
-    /// Whether a gauge costs no more at one place than at another.
-    fn is_no_dearer(&self, chosen: DVec3, to: DVec3) -> bool {
-        let cost = self.inputs.project.selection.costs_at(&[chosen, to]);
-        cost[1] <= cost[0]
-    }
 }
 
 #[cfg(test)]

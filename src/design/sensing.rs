@@ -22,7 +22,9 @@ use crate::uncertainty::{Gluing, Uncertainty};
 
 /// A model of the chosen gauges, without the stiffness it came from.
 pub struct Sensing {
+    /// The gauges, a channel each.
     pub gauges: Vec<Gauge>,
+    /// What nodal forces make them read.
     pub sensitivity: Arc<Sensitivity>,
     /// Readings everywhere, as drawn and as they change with the way gauges are glued.
     pub drawn: Arc<AsDrawn>,
@@ -42,7 +44,9 @@ pub struct Sensing {
 pub struct Lesson {
     /// Channels × touches, strain.
     pub x: SignalMatrix,
+    /// Where each touch was (mm).
     pub places_mm: Vec<[f64; 3]>,
+    /// How hard each was (N).
     pub forces: Vec<f64>,
 }
 

@@ -8,7 +8,9 @@ use crate::plain;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{words}")]
 pub struct Shortage {
+    /// Gauges asked for.
     pub wanted: usize,
+    /// Sites that are feasible.
     pub available: usize,
     /// The filter whose relaxation helps most.
     pub blamed: Option<Filter>,

@@ -32,7 +32,9 @@ pub struct Simulated {
     pub held: Vec<DofSet>,
     /// Where the vertices of the part that is shown lie on it.
     pub carried: Vec<SurfacePoint>,
+    /// How far the model is from converged.
     pub discretization: Discretization,
+    /// Where the sites lie on the mesh.
     pub points: Vec<SurfacePoint>,
     /// What lies before and behind the sites of a solid.
     pub surroundings: Option<Surroundings>,
@@ -42,10 +44,13 @@ pub struct Simulated {
     pub lattice: usize,
     /// Shared by all that have only other gauges off the lattice.
     mark: Arc<()>,
+    /// Degrees of freedom.
     pub unknowns: usize,
     /// Of a shell.
     pub linearity: Option<Linearity>,
+    /// What the solution was checked for.
     pub checks: Checks,
+    /// What was reached, and at what effort.
     pub achieved: Achieved,
 }
 
@@ -326,6 +331,7 @@ pub struct Checks {
     /// Worst over the sample of the loads: |sum of reactions + load| over the load, and
     /// |½ u·f - strain energy| over the energy.
     pub reaction_error: f64,
+    /// |½ u·f - strain energy| over the energy, the worst over the sample of the loads.
     pub energy_error: f64,
     /// Of the stiffness scaled to a unit diagonal; one over it bounds the condition from below.
     pub smallest_pivot: f64,
@@ -334,6 +340,7 @@ pub struct Checks {
 }
 
 impl Checks {
+    /// The checks of a model as it was built.
     #[must_use]
     pub fn of(built: &Built) -> Self {
         Self {

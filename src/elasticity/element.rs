@@ -9,7 +9,9 @@ use super::bending::Bending;
 use super::material::Section;
 use super::membrane::{Matrix3x9, Matrix9, Membrane};
 
+/// Stiffness of a facet: six degrees of freedom at each of three nodes.
 pub type Matrix18 = SMatrix<f64, 18, 18>;
+/// Strains (εx, εy, γxy) from the degrees of freedom of a facet.
 pub type Matrix3x18 = SMatrix<f64, 3, 18>;
 
 /// Local degrees of freedom (u, v, θz) and (w, θx, θy) of a node within its six.

@@ -7,60 +7,100 @@ use glam::DVec3;
 /// Why a model cannot be built or solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ElasticError {
+    /// No support touches the part.
     #[error(
         "no triangle of the part is held by a support: move a support box onto the part, or where there is none write a project that has one, as in [[support]] kind = \"clamped\", box_mm = [[x, y, z], [x, y, z]] (the part lies between {lower:.1} and {upper:.1} mm)"
     )]
-    NothingHeld { lower: DVec3, upper: DVec3 },
+    NothingHeld {
+        /// Lower corner of the part's box (mm).
+        lower: DVec3,
+        /// Upper corner (mm).
+        upper: DVec3,
+    },
+    /// Supports leave a rigid motion.
     #[error(
         "the part can still move as a rigid body: the supports hold it, but not in every direction. Clamp it, or add supports"
     )]
     Loose,
+    /// A piece of the part is not held.
     #[error(
         "the shell is not held anywhere near vertex {vertex} at {place:.1} mm: join it to the rest or support it"
     )]
-    NotHeld { vertex: usize, place: DVec3 },
+    NotHeld {
+        /// A vertex of that piece.
+        vertex: usize,
+        /// Where it lies (mm).
+        place: DVec3,
+    },
+    /// A value is out of its range.
     #[error("{what} must be {rule}, but is {value}")]
     Value {
+        /// Which value.
         what: &'static str,
+        /// What it must be.
         rule: &'static str,
+        /// What it is.
         value: f64,
     },
+    /// Everything is held.
     #[error(
         "every point of the part is held, so nothing can deform: make the support boxes smaller"
     )]
     AllHeld,
+    /// A facet has no area.
     #[error(
         "a triangle of the mesh near {place:.1} mm has no area, so nothing can be computed on it: repair the mesh there (part.weld_mm joins what lies too close)"
     )]
-    NoArea { place: DVec3 },
+    NoArea {
+        /// Where it lies (mm).
+        place: DVec3,
+    },
+    /// A solid whose surface is not closed.
     #[error(
         "the mesh encloses nothing (it has {}), so it is no solid: {} in the program that wrote it, fill its holes (part.fill_holes_mm), or take it as a shell (part.model = \"shell\")",
         plain::count(*rims, "free edge"),
         closing(*closes_within)
     )]
     Open {
+        /// Its free edges.
         rims: usize,
         /// Distance (m) within which its vertices would have to be joined to close it, where that does.
         closes_within: Option<f64>,
     },
+    /// Walls too thin for the cells to find.
     #[error(
         "no material was found in cells of {size_mm:.3} mm: the walls are thinner than a thousandth of that. Check the unit of the mesh, or take its middle as a shell (part.model = \"shell\")"
     )]
-    NoMaterial { size_mm: f64 },
+    NoMaterial {
+        /// Size of the cells (mm).
+        size_mm: f64,
+    },
+    /// No inside or no outside was found.
     #[error(
         "no {face} face was found on the part: paint it, so that it is known where gauges go and where touches land"
     )]
-    NoFace { face: &'static str },
+    NoFace {
+        /// Which of the two.
+        face: &'static str,
+    },
+    /// The factor would need more memory than may be taken.
     #[error(
         "the factored model would take {}, more than the {} that may be taken: choose a lower quality, lower budget.limits.vertices, mesh the part coarser where the file's own elements are taken, or allow more with --memory-gb",
         plain::needed_gb(*needed_gb),
         plain::allowed_gb(*limit_gb)
     )]
-    TooLarge { needed_gb: f64, limit_gb: f64 },
+    TooLarge {
+        /// How much it needs (GB).
+        needed_gb: f64,
+        /// How much may be taken (GB).
+        limit_gb: f64,
+    },
+    /// The machine has no memory left.
     #[error(
         "the model does not fit into memory: choose a lower quality, lower budget.limits.vertices, or end other programs"
     )]
     OutOfMemory,
+    /// The caller asked for a stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

@@ -36,6 +36,7 @@ pub struct Discretization {
     pub strain_percent: f64,
     /// Loads and places it was measured with.
     pub loads: usize,
+    /// Places it was measured at.
     pub places: usize,
 }
 

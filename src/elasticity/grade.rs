@@ -31,15 +31,21 @@ pub struct Ground {
 
 /// The elements, with the model built on them.
 pub struct Graded {
+    /// The elements.
     pub remeshed: Remeshed,
+    /// What is held at each of their vertices.
     pub held: Vec<DofSet>,
+    /// The factored model on them.
     pub model: ShellModel,
+    /// How far it is from converged.
     pub estimate: Discretization,
+    /// What linearity costs.
     pub linearity: Linearity,
     /// The worst balance over the sample of the loads.
     pub balance: LoadCheck,
     /// Assemblies and factorizations, and loads solved on the way here.
     pub models: u64,
+    /// Loads solved on the way here.
     pub solves: u64,
 }
 

@@ -23,6 +23,7 @@ pub struct Linearity {
     pub median_percent: f64,
     /// Loads at which the expansion has no answer: the shell snaps or folds.
     pub beyond: usize,
+    /// Loads it was tried on.
     pub loads: usize,
     /// The largest force (N).
     pub force_n: f64,

@@ -38,6 +38,7 @@ impl Material {
 /// A shell of one thickness whose mid-surface is the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
+    /// What it is made of.
     pub material: Material,
     /// Thickness (m).
     pub thickness: f64,

@@ -8,7 +8,9 @@ use nalgebra::{Matrix3, SMatrix};
 
 use super::material::Section;
 
+/// Stiffness of a membrane: u, v and θz at each of three nodes.
 pub type Matrix9 = SMatrix<f64, 9, 9>;
+/// Membrane strains (εx, εy, γxy) from these.
 pub type Matrix3x9 = SMatrix<f64, 3, 9>;
 
 const ALPHA_B: f64 = 1.5;

@@ -24,7 +24,9 @@ const CREASE: f64 = 0.866;
 pub enum Face {
     /// Where the gauges are glued.
     Inside,
+    /// The mid-surface.
     Middle,
+    /// Where touches land.
     Outside,
 }
 

@@ -15,7 +15,9 @@ use crate::budget::{Cancelled, Watch};
 /// Which side was solved for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
+    /// One solve a load.
     Loads,
+    /// One solve an output, by reciprocity.
     Outputs,
 }
 
@@ -38,6 +40,7 @@ pub enum Reading<'a> {
 pub struct Responses {
     loads: usize,
     rows: usize,
+    /// Which side was cheaper and was solved for.
     pub side: Side,
     /// Right-hand sides solved.
     pub solves: usize,
@@ -48,6 +51,7 @@ pub struct Responses {
 }
 
 impl Responses {
+    /// Number of outputs.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
@@ -180,12 +184,14 @@ pub struct Pressed<'a> {
 }
 
 impl<'a> Pressed<'a> {
+    /// These touches as loads of a model.
     #[must_use]
     pub fn new(model: &'a dyn Model, touches: &[Touch]) -> Self {
         let loads = touch_rows(model, touches);
         Self { model, loads }
     }
 
+    /// The model they press.
     #[must_use]
     pub fn model(&self) -> &'a dyn Model {
         self.model

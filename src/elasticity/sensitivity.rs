@@ -27,6 +27,7 @@ pub struct Gauge {
     pub normal: DVec3,
     /// Along and across the direction (m).
     pub length: f64,
+    /// Across the direction (m).
     pub width: f64,
 }
 
@@ -57,6 +58,7 @@ impl Gauge {
 
 /// The weights of nodal forces in every gauge's strain.
 pub struct Sensitivity {
+    /// The surface that touches press on (m).
     pub mesh: Arc<TriMesh>,
     gauges: usize,
     /// Vertices × gauges: strain a newton along x, y and z there.
@@ -91,6 +93,7 @@ impl Sensitivity {
         })
     }
 
+    /// How many gauges there are.
     #[must_use]
     pub fn gauges(&self) -> usize {
         self.gauges

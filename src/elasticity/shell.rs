@@ -18,7 +18,9 @@ use rayon::prelude::*;
 
 /// A shell: mesh, section and supports, assembled once and factored once.
 pub struct ShellModel {
+    /// The elements: facets of the mid-surface (m).
     pub mesh: Arc<TriMesh>,
+    /// Material and thickness.
     pub section: Section,
     system: System,
 }

@@ -98,6 +98,7 @@ impl SolidModel {
         Ok(model)
     }
 
+    /// What it was assembled from.
     #[must_use]
     pub fn elements(&self) -> &dyn Elements {
         &*self.elements

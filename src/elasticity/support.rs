@@ -15,7 +15,9 @@ use crate::mesh::{Edge, SurfacePoint, TriMesh};
 pub struct DofSet(pub u8);
 
 impl DofSet {
+    /// All six: clamped.
     pub const ALL: Self = Self(0b11_1111);
+    /// The three displacements: pinned.
     pub const DISPLACEMENTS: Self = Self(0b00_0111);
 
     /// Held degrees of freedom by index, 0–5.
@@ -24,6 +26,7 @@ impl DofSet {
         Self(indices.iter().fold(0, |mask, i| mask | 1 << i))
     }
 
+    /// Whether the degree of freedom of this index, 0–5, is held.
     #[must_use]
     pub fn holds(self, index: usize) -> bool {
         self.0 >> index & 1 == 1
@@ -50,7 +53,9 @@ pub enum Region {
 /// A region in which some degrees of freedom are held.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Support {
+    /// Where.
     pub region: Region,
+    /// What.
     pub held: DofSet,
 }
 
@@ -77,6 +82,7 @@ pub const MOST: usize = Members::BITS as usize;
 /// A part with its supports, cut so that what is held has edges of the mesh for its border.
 #[derive(Clone, Debug)]
 pub struct HeldPart {
+    /// The part, cut along the boxes of its supports (m).
     pub mesh: Arc<TriMesh>,
     /// For each vertex what is held there.
     pub held: Vec<DofSet>,

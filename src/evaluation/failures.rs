@@ -13,30 +13,38 @@ use crate::regression::{Hyper, PositionModel};
 pub struct FailureTrial<'a> {
     /// Signals of the set (gauges × touches).
     pub train: &'a SignalMatrix,
+    /// Where the training touches were (mm).
     pub train_targets: &'a [[f64; 3]],
+    /// Signals of the same gauges under the test touches (gauges × touches).
     pub test: &'a SignalMatrix,
+    /// Where the test touches were (mm).
     pub test_targets: &'a [[f64; 3]],
     /// Tuned for the whole set; γ grows as gauges are lost, because distances shrink.
     pub hyper: Hyper,
+    /// Of each fit.
     pub effort: Effort,
     /// Most failed gauges.
     pub failed: usize,
     /// Most subsets of failed gauges that are retrained for; ten times as many are tried without.
     pub subsets: usize,
+    /// Of the draw of subsets.
     pub seed: u64,
 }
 
 /// Errors with a number of failed gauges (mm).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FailureRow {
+    /// How many gauges failed.
     pub failed: usize,
     /// Whether the regression was trained anew without them; otherwise they report their mean.
     pub retrained: bool,
     /// Subsets tried, of all there are.
     pub subsets: usize,
+    /// How many such subsets there are.
     pub of: u64,
     /// Mean over the subsets of the mean error, and the largest.
     pub error_mm: f64,
+    /// The largest of these means (mm).
     pub worst_mm: f64,
 }
 

@@ -14,6 +14,7 @@ pub enum EstimatorKind {
 }
 
 impl EstimatorKind {
+    /// All, the default first.
     pub const ALL: [Self; 2] = [Self::Matching, Self::Svr];
 
     /// As in files.
@@ -63,6 +64,7 @@ impl Forces {
 }
 
 impl Judging {
+    /// Which estimator it is.
     #[must_use]
     pub fn estimator(&self) -> EstimatorKind {
         match self {

@@ -12,6 +12,7 @@ use crate::statistics::mean;
 pub struct Matched {
     /// Selector's name.
     pub selector: String,
+    /// Gauges of the set.
     pub sensors: usize,
     /// N.
     pub force_n: f64,
@@ -28,15 +29,21 @@ pub struct Matched {
 /// Errors of one set under touches of one force in one region (mm).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MatchedRow {
+    /// What located the touches.
     pub estimator: EstimatorKind,
+    /// How hard the touches were (N).
     pub force_n: f64,
     /// Selector's name.
     pub selector: String,
+    /// Gauges of the set.
     pub sensors: usize,
+    /// Name of the region, or of all touches.
     pub region: String,
     /// Mean Euclidean error as drawn.
     pub error_mm: f64,
+    /// Median error as drawn (mm).
     pub median_mm: f64,
+    /// 95th percentile of the error as drawn (mm).
     pub p95_mm: f64,
     /// Mean as a workshop would build it, uncalibrated.
     pub as_built_mm: f64,
@@ -44,6 +51,7 @@ pub struct MatchedRow {
     pub calibrated_mm: Option<f64>,
     /// Mean as drawn over the touches that are not blind; absent where all are.
     pub sighted_mm: Option<f64>,
+    /// Test touches in the region.
     pub touches: usize,
     /// Share of the touches that move no gauge so far that it is told from noise.
     pub blind: f64,

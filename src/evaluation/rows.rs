@@ -8,6 +8,7 @@ use crate::statistics::{mean, quantile};
 /// A named part of the touches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
+    /// For people.
     pub name: String,
     /// One value a test touch.
     pub contains: Vec<bool>,
@@ -27,15 +28,20 @@ impl Region {
 pub struct EvaluationRow {
     /// Selector's name, or "all-candidates" for the baseline.
     pub selector: String,
+    /// Gauges of the set.
     pub sensors: usize,
+    /// Name of the region, or of all touches.
     pub region: String,
     /// Mean Euclidean error.
     pub error_mm: f64,
+    /// Median error (mm).
     pub median_mm: f64,
+    /// 95th percentile of the error (mm).
     pub p95_mm: f64,
     /// Mean error of the set as a workshop would build it, read with the regression trained for the
     /// ideal one, or with a model that knows no more of it than how far off gauges usually are.
     pub workshop_mm: f64,
+    /// Test touches in the region.
     pub touches: usize,
     /// Settings of the regression, where it was one.
     pub hyper: Option<Hyper>,

@@ -15,7 +15,9 @@ const STEEPEST: f64 = 30.0;
 /// A table of given points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Table {
+    /// Touches.
     Touches,
+    /// Gauges.
     Sites,
 }
 
@@ -42,9 +44,11 @@ impl Table {
 /// A row that cannot be answered, and why.
 #[derive(Debug)]
 pub struct LeftOut {
+    /// The table it stands in.
     pub table: Table,
     /// Counted from 0.
     pub row: usize,
+    /// The error that answering it would be.
     pub why: DesignError,
 }
 
@@ -53,10 +57,13 @@ pub struct LeftOut {
 pub struct Sifted {
     /// Rows that are left, counted from 0.
     pub touches: Vec<usize>,
+    /// Rows of sites that are left, counted from 0.
     pub sites: Vec<usize>,
+    /// What was left out, and why.
     pub left_out: Vec<LeftOut>,
     /// How far each row lies from the part (m).
     pub touch_distances: Vec<f64>,
+    /// How far each site lies from the part (m).
     pub site_distances: Vec<f64>,
     /// How far the direction of each gauge points out of the surface (degrees).
     pub site_angles: Vec<f64>,

@@ -38,6 +38,7 @@ use crate::uncertainty::Uncertainty;
 /// A touch that was put where it was asked for, or nearly: see [`crate::uncertainty::Pressing`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
+    /// Where it was asked for.
     pub at: SurfacePoint,
     /// N.
     pub force: f64,
@@ -57,6 +58,7 @@ pub struct Calibration {
     pub deviations: Vec<f64>,
     /// What is still off beside that, over the reading; see [`Errors::relative`].
     pub relative: f64,
+    /// Known touches it was learned from.
     pub touches: usize,
 }
 

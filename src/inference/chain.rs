@@ -16,6 +16,7 @@ pub struct Chain {
     pub active_arms: u8,
     /// Of the amplifier.
     pub gain: f64,
+    /// Of the converter.
     pub bits: u8,
     /// Full scale of the converter (V).
     pub reference_v: f64,
@@ -44,6 +45,7 @@ impl Chain {
         volts * f64::from(1_u32 << self.bits) / self.reference_v
     }
 
+    /// The end of the converter's range.
     #[must_use]
     pub fn highest_count(&self) -> u32 {
         (1_u32 << self.bits) - 1

@@ -10,6 +10,7 @@ use crate::uncertainty::{Gluing, Uncertainty};
 
 /// What gauges read as drawn, and how that changes with the way they are glued.
 pub struct AsDrawn {
+    /// Readings as drawn.
     pub map: Arc<ResponseMap>,
     /// A millimetre along the gauge, a millimetre across it, and a degree.
     pub changes: [ResponseMap; 3],

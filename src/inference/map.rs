@@ -19,6 +19,7 @@ pub(super) const LANES: usize = 64;
 /// Readings per newton over a surface, quadratic on each triangle: known at its corners and the middles of
 /// its sides. The corners are the templates that a reading is first compared with.
 pub struct ResponseMap {
+    /// The surface that it covers (m).
     pub mesh: Arc<TriMesh>,
     channels: usize,
     /// Nodes (vertices, then edges) × channels: strain a newton.
@@ -32,6 +33,7 @@ pub struct ResponseMap {
 
 /// A reading per newton and how it changes over the surface.
 pub struct Slope {
+    /// Of each channel (strain a newton).
     pub reading: Vec<f64>,
     /// Change a metre along the two directions of the triangle's plane.
     pub change: Vec<DVec2>,
@@ -86,6 +88,7 @@ impl ResponseMap {
         }
     }
 
+    /// How many gauges it has.
     #[must_use]
     pub fn channels(&self) -> usize {
         self.channels

@@ -39,9 +39,11 @@ use self::weighed::Observation;
 pub struct Contact {
     /// On the surface (m), and the outward normal there: a touch presses against it.
     pub position: DVec3,
+    /// Outward unit normal there.
     pub normal: DVec3,
     /// N, and its standard deviation.
     pub force: f64,
+    /// Standard deviation of the force (N).
     pub force_deviation: f64,
     /// Where it may be.
     pub region: Region,
@@ -56,7 +58,9 @@ pub struct Contact {
 /// The estimator, with its own working memory.
 #[derive(Clone)]
 pub struct Matching {
+    /// What gauges read of a newton anywhere.
     pub map: Arc<ResponseMap>,
+    /// What is known of the readings' errors.
     pub errors: Errors,
     /// Channels that are trusted.
     pub used: Vec<bool>,
@@ -68,6 +72,7 @@ pub struct Matching {
 }
 
 impl Matching {
+    /// All channels trusted. `most_force` is the largest force that anybody presses with (N).
     #[must_use]
     pub fn new(map: Arc<ResponseMap>, errors: Errors, most_force: f64) -> Self {
         Self {

@@ -11,14 +11,19 @@ use crate::regression::{Hyper, SvrParams};
 
 /// What a machine is trained on: readings (channels × touches, strain), places (mm) and forces (N).
 pub struct Lessons<'a> {
+    /// Readings, channels × touches (strain).
     pub x: &'a SignalMatrix,
+    /// Where each touch was (mm).
     pub places_mm: &'a [[f64; 3]],
+    /// How hard each was (N).
     pub forces: &'a [f64],
     /// Channels that are trusted; the others are not looked at.
     pub used: &'a [bool],
     /// Standard deviation of the noise (strain), and of what gains are off by, that are added.
     pub noise: f64,
+    /// Standard deviation of what gains are off by, as a share.
     pub jitter: f64,
+    /// Of the noise.
     pub seed: u64,
 }
 
@@ -118,6 +123,7 @@ impl Trained {
         ([out[0], out[1], out[2]], force)
     }
 
+    /// Touches that the regression kept.
     #[must_use]
     pub fn support_vectors(&self) -> usize {
         self.predictor.support_vectors()

@@ -3,16 +3,18 @@
 mod certificate;
 mod matched;
 mod part;
+mod settings;
 mod words;
 
 use std::fmt::Write as _;
 
+use self::settings::settings;
 use self::words::judged_on;
-use super::run::{Provenance, range, run_key, signal_to_noise, signal_unit};
+use super::run::{Provenance, range, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Paint, Series, escape};
 use crate::colormap::ColorMap;
 use crate::design::curves::{curve, failure_curve, failure_name, failure_ways, title_of};
-use crate::design::{Design, Inputs, Simulated};
+use crate::design::{Design, Inputs};
 use crate::evaluation::{BASELINE, EstimatorKind};
 use crate::gaussian_process::GpTrial;
 use crate::mesh::flatten::Flat;
@@ -488,113 +490,4 @@ fn settings_of(hyper: Option<Hyper>) -> [String; 3] {
             ]
         },
     )
-}
-
-/// What the elastic model says of its own error, and what it was checked for.
-fn trust(simulated: &Simulated) -> [(&'static str, String); 3] {
-    [
-        (
-            "Error of the mesh, estimated",
-            format!(
-                "{:.1e} mm ({:.1} %) under a touch, {:.1} % of a touch's largest strain (rms over {} touches)",
-                simulated.discretization.displacement_mm,
-                simulated.discretization.displacement_percent,
-                simulated.discretization.strain_percent,
-                simulated.discretization.loads
-            ),
-        ),
-        (
-            "Error of linearity, estimated",
-            simulated.linearity.as_ref().map_or_else(
-                || "not estimated for solids".into(),
-                |l| {
-                    format!(
-                        "up to {:.1} %, half of the touches below {:.1} %, at {} N",
-                        l.largest_percent.abs(),
-                        l.median_percent,
-                        l.force_n
-                    )
-                },
-            ),
-        ),
-        (
-            "Checks",
-            format!(
-                "reactions sum to the load to {:.0e}, ½ u·f is the strain energy to {:.0e}, pieces held: {}",
-                simulated.checks.reaction_error,
-                simulated.checks.energy_error,
-                simulated.checks.pieces_held
-            ),
-        ),
-    ]
-}
-
-fn settings(page: &mut String, inputs: &Inputs, design: &Design, provenance: &Provenance) {
-    page.push_str("<h2>Filters</h2><table><tr><th>Filter</th><th>Sites taken</th></tr>");
-    for (filter, count) in design.feasibility.taken() {
-        let _ = write!(page, "<tr><td>{}</td><td>{count}</td></tr>", filter.label());
-    }
-    page.push_str("</table><h2>Settings and what was achieved</h2><table>");
-    let p = &inputs.project;
-    let work = design.work();
-    let rows: Vec<(&str, String)> = vec![
-        (
-            "Touch",
-            format!(
-                "{} N over a radius of {} mm; expected from {} to {} N",
-                p.touch.force_n, p.touch.tip_radius_mm, p.touch.forces_n[0], p.touch.forces_n[1]
-            ),
-        ),
-        (
-            "Gauge noise and range",
-            format!(
-                "{} and {} microstrain",
-                p.gauge.noise_microstrain, p.gauge.range_microstrain
-            ),
-        ),
-        (
-            "Gauge grid",
-            format!("{} × {} mm", p.gauge.grid_length_mm, p.gauge.grid_width_mm),
-        ),
-        (
-            "Quality and seed",
-            format!("{}, {}", design.budget.quality.name(), p.budget.seed),
-        ),
-        (
-            "Model",
-            format!(
-                "{} vertices, {} unknowns, smallest scaled pivot {:.1e}",
-                design.simulated.mesh.positions().len(),
-                design.simulated.unknowns,
-                design.simulated.checks.smallest_pivot
-            ),
-        ),
-        (
-            "Work",
-            format!(
-                "{} assemblies, {} factorizations, {} solves, {} kernel entries, {} fits",
-                work.assemblies,
-                work.factorizations,
-                work.solves,
-                work.kernel_evaluations,
-                work.fits
-            ),
-        ),
-    ];
-    for (label, value) in rows.into_iter().chain(trust(&design.simulated)) {
-        let _ = write!(page, "<tr><td>{label}</td><td>{value}</td></tr>");
-    }
-    for stage in &design.seconds {
-        let _ = write!(
-            page,
-            "<tr><td>Time, {}</td><td>{:.2} s</td></tr>",
-            stage.stage, stage.seconds
-        );
-    }
-    let _ = write!(
-        page,
-        "<tr><td>Version</td><td>HapDef {}</td></tr><tr><td>Run, as in the files beside this one</td><td>{}</td></tr></table>",
-        provenance.version,
-        run_key(inputs, design)
-    );
 }

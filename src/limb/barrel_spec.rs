@@ -9,6 +9,7 @@ pub struct BarrelSpec {
     pub radius: f64,
     /// Radius at the ends over the widest.
     pub ends: f64,
+    /// From end to end.
     pub height: f64,
     /// Triangles that stand upright in a row around the limb; as many hang between them.
     pub around: usize,
@@ -20,9 +21,11 @@ pub struct BarrelSpec {
     pub rim: f64,
     /// Radius of the windows' corners; 0 leaves them sharp.
     pub corner_radius: f64,
+    /// Thickness of the wall.
     pub wall: f64,
     /// Largest side of an element along the lattice.
     pub element: f64,
+    /// The frame inside.
     pub frame: FrameSpec,
 }
 
@@ -30,12 +33,15 @@ pub struct BarrelSpec {
 /// millimetres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameSpec {
+    /// How many rods there are.
     pub rods: usize,
+    /// Radius of a rod.
     pub rod_radius: f64,
     /// Of the rods from the axis.
     pub distance: f64,
     /// Between each two neighbours, evenly over the height.
     pub braces: usize,
+    /// Radius of a brace.
     pub brace_radius: f64,
 }
 

@@ -6,6 +6,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Health {
+    /// Nothing is wrong.
     #[default]
     Good,
     /// At the end of the converter's range: bridge, wiring or too hard a touch.
@@ -19,6 +20,7 @@ pub enum Health {
 }
 
 impl Health {
+    /// Whether it can be trusted.
     #[must_use]
     pub fn is_good(self) -> bool {
         self == Self::Good
@@ -60,9 +62,11 @@ pub struct Watcher {
 pub struct Expected {
     /// Ends of the converter's range.
     pub lowest: f64,
+    /// Upper end of the converter's range (counts).
     pub highest: f64,
     /// Noise at rest (counts) of this channel, and what is usual.
     pub own_noise: f64,
+    /// Usual noise at rest of all channels (counts).
     pub usual_noise: f64,
     /// Samples a second.
     pub rate: f64,
@@ -85,6 +89,7 @@ const SILENT: f64 = 24.0;
 const MOST_OF_A_LOOK: f64 = 4.0;
 
 impl Watcher {
+    /// Looks at one more sample.
     pub fn push(&mut self, count: f64, expected: &Expected) {
         let [a, b] = self.last;
         self.same = if self.seen > 0 && count == b {
@@ -122,6 +127,7 @@ impl Watcher {
         self.dead |= self.silence >= SILENT;
     }
 
+    /// Whether touches leave no trace on it.
     #[must_use]
     pub fn is_dead(&self) -> bool {
         self.dead
@@ -132,6 +138,7 @@ impl Watcher {
         (self.dead, self.silence) = (true, SILENT);
     }
 
+    /// What is to be thought of it now.
     #[must_use]
     pub fn health(&self, expected: &Expected) -> Health {
         let within = |samples: u64, seconds: f64| (samples as f64) < seconds * expected.rate;

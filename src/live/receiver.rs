@@ -5,18 +5,27 @@ use crate::wire::{Decoder, Event, Hello, LineReader, Message, Reading, Refusal, 
 /// What was understood.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Input {
+    /// What board it is.
     Hello(Hello),
+    /// One sample of raw counts.
     Sample(Sample),
+    /// Something that the board says.
     Log {
+        /// 0 debug, 1 information, 2 warning, 3 error.
         level: u8,
+        /// Its words, as they came.
         text: String,
+        /// The board's clock (µs).
         time_us: u64,
     },
     /// Only a recording may say this: what was done while it was made.
     Note {
+        /// Its words, as they were recorded.
         text: String,
+        /// The board's clock (µs).
         time_us: u64,
     },
+    /// The answer to the ping of this number.
     Pong(u32),
 }
 
@@ -32,7 +41,9 @@ pub struct Sample {
 /// What came through so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
+    /// Bytes received.
     pub bytes: u64,
+    /// Samples understood.
     pub samples: u64,
     /// Known to be missing from the sequence.
     pub lost: u64,
@@ -112,6 +123,7 @@ pub struct Receiver {
     time: Timeline,
     /// Why what came since the last sample was not used.
     doubt: Option<Doubt>,
+    /// What came through so far.
     pub traffic: Traffic,
     /// What had come when the line was cut last.
     before: Traffic,

@@ -5,7 +5,9 @@ use crate::statistics::{mean, median};
 /// Rest of every channel: counts and the standard deviation of their noise.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rest {
+    /// Mean of each channel (counts).
     pub level: Vec<f64>,
+    /// Standard deviation of each channel (counts).
     pub noise: Vec<f64>,
 }
 

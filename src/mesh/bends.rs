@@ -22,7 +22,9 @@ const PLACES: usize = 4001;
 /// A place's share of the area looked at (m²), and its largest curvature (1/m).
 #[derive(Clone, Copy, Debug)]
 pub struct Bend {
+    /// Share of the area (m²).
     pub area: f64,
+    /// Largest curvature (1/m).
     pub curvature: f64,
 }
 

@@ -80,7 +80,9 @@ impl Frame {
 /// A part in its frame, its vertices in the order of their places.
 #[derive(Clone, Debug)]
 pub struct Canonical {
+    /// The part in that frame and order (m).
     pub mesh: Arc<TriMesh>,
+    /// From the file's coordinates and back.
     pub frame: Frame,
     /// For each vertex its number in the part.
     pub numbers: Vec<u32>,

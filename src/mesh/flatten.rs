@@ -30,7 +30,9 @@ pub struct Flat {
     pub triangles: Vec<[u32; 3]>,
     /// The part's vertex that each vertex is.
     pub vertices: Vec<u32>,
+    /// Lower corner of its box (m).
     pub lower: DVec2,
+    /// Upper corner (m).
     pub upper: DVec2,
     /// What became of lengths.
     pub stretch: Stretch,

@@ -177,6 +177,7 @@ pub struct March {
 }
 
 impl March {
+    /// Prepares distances over this mesh.
     #[must_use]
     pub fn over(mesh: &TriMesh) -> Self {
         Self {

@@ -38,6 +38,7 @@ const PARTING: u8 = 1;
 const UNCLEAR: u8 = 2;
 
 impl SignedDistance {
+    /// Prepares distances to a closed mesh.
     #[must_use]
     pub fn new(mesh: &Arc<TriMesh>) -> Self {
         let (lower, upper) = mesh.bounds();

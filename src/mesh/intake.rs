@@ -13,7 +13,9 @@ use super::{MeshError, TriMesh};
 /// A surface that was taken in, with what was changed and where its vertices went.
 #[derive(Clone, Debug)]
 pub struct TakenIn {
+    /// The surface (m).
     pub mesh: TriMesh,
+    /// What was changed.
     pub repairs: RepairReport,
     /// For each vertex that was given its number in the mesh; nothing where it is no part of it.
     pub vertices: Vec<Option<u32>>,

@@ -9,9 +9,11 @@ use crate::bounds::Bounds;
 /// A box whose edges lie along the front, the right and the up of a stance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrientedBox {
+    /// The directions of its edges.
     pub stance: Stance,
     /// Its corners (m), in the coordinates of the stance.
     pub lower: DVec3,
+    /// Upper corner (m).
     pub upper: DVec3,
 }
 

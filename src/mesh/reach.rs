@@ -143,6 +143,7 @@ pub struct Reach {
     pub usual: f64,
     /// Shares of what faces outward: out of reach, and of the frame.
     pub unreached: f64,
+    /// Share of what faces outward that belongs to a frame.
     pub framed: f64,
     /// Whether there are walls with a back.
     pub walled: bool,

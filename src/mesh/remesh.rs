@@ -32,6 +32,7 @@ const TINY: f64 = 0.2;
 /// A mesh laid on a surface.
 #[derive(Clone, Debug)]
 pub struct Remeshed {
+    /// The mesh (m).
     pub mesh: Arc<TriMesh>,
     /// Where on the part each vertex lies.
     pub places: Vec<SurfacePoint>,

@@ -11,7 +11,9 @@ pub struct RepairReport {
     pub welded_vertices: usize,
     /// Vertices merged because they were nearer than the tolerance asked for.
     pub joined_vertices: usize,
+    /// Triangles without area, which were left out.
     pub degenerate_triangles: usize,
+    /// Triangles that repeat another, which were left out.
     pub duplicate_triangles: usize,
     /// Triangles turned over so that neighbours agree on the outside.
     pub flipped_triangles: usize,

@@ -85,12 +85,16 @@ impl Default for Stance {
 /// The directions of a part, in the order of their coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
+    /// Towards who looks at its front.
     Front,
+    /// To the right of who looks at its front.
     Right,
+    /// Upwards.
     Up,
 }
 
 impl Direction {
+    /// All three, in the order of the coordinates.
     pub const ALL: [Self; 3] = [Self::Front, Self::Right, Self::Up];
 }
 

@@ -24,6 +24,7 @@ const BULGE: f64 = 0.1;
 /// How a point of the surface may move along it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Mobility {
+    /// In any direction.
     Free,
     /// Along its feature line.
     Line,
@@ -33,6 +34,7 @@ pub enum Mobility {
 
 /// A part seen as a smooth surface with feature lines.
 pub struct Surface {
+    /// The part (m).
     pub mesh: Arc<TriMesh>,
     /// For each edge of the part whether it is on a feature line.
     pub features: Vec<bool>,

@@ -3,8 +3,11 @@
 /// An edge between two vertices (`a < b`) and the triangles on it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Edge {
+    /// Its vertex of the lower number.
     pub a: u32,
+    /// Its vertex of the higher number.
     pub b: u32,
+    /// One at a free rim, two inside, more where shells are joined.
     pub triangles: Vec<u32>,
 }
 

@@ -11,7 +11,9 @@ use super::stance::Stance;
 /// radius, with the seam opposite to `zero`; lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unrolling {
+    /// A point of the axis (m).
     pub origin: DVec3,
+    /// Unit direction of the axis, upwards.
     pub axis: DVec3,
     /// Direction of the middle of the unrolled strip, at right angles to the axis.
     pub zero: DVec3,
@@ -25,13 +27,17 @@ pub struct Unrolling {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Axis {
+    /// The x axis.
     X,
+    /// The y axis.
     Y,
+    /// The z axis.
     #[default]
     Z,
 }
 
 impl Axis {
+    /// Its unit direction.
     #[must_use]
     pub fn direction(self) -> DVec3 {
         match self {

@@ -15,7 +15,9 @@ use crate::budget::{Cancelled, Watch, report};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
+    /// Where touches land.
     Outside,
+    /// Where gauges go.
     Inside,
     /// The end of a wall.
     Rim,
@@ -26,6 +28,7 @@ pub enum Side {
 /// What is known of a part's walls, one value a facet.
 #[derive(Clone, Debug)]
 pub struct Walls {
+    /// The side that each facet is on.
     pub sides: Vec<Side>,
     /// Through the material to the facing surface (m); NaN where there is none.
     pub thickness: Vec<f64>,

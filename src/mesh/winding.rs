@@ -51,6 +51,7 @@ struct Node {
 }
 
 impl Winding {
+    /// Prepares winding numbers around a mesh.
     #[must_use]
     pub fn new(mesh: &TriMesh) -> Self {
         let (lower, upper) = mesh.bounds();

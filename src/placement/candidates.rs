@@ -12,13 +12,16 @@ use crate::pca::{Pca, PcaError, Reconstruction, Spectrum};
 pub enum Reduction {
     /// As many as leave at most this share of the held-out variance unexplained.
     Unexplained(f64),
+    /// So many.
     Count(usize),
 }
 
 /// One point of the curve: sites kept and the share of held-out variance they leave unexplained.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CurvePoint {
+    /// Sites kept.
     pub sites: usize,
+    /// Share of the held-out variance that they leave unexplained.
     pub unexplained: f64,
 }
 
@@ -29,7 +32,9 @@ pub struct Candidates {
     pub rows: Vec<usize>,
     /// Rising in sites.
     pub curve: Vec<CurvePoint>,
+    /// Share that they leave unexplained in the end; absent where none was measured.
     pub unexplained: Option<f64>,
+    /// How the number came about, one sentence each.
     pub notes: Vec<String>,
 }
 

@@ -26,7 +26,9 @@ pub struct Constraints {
     pub target_mm: Option<f64>,
     /// Probability that gauges are lost when they are needed, as `loss` says.
     pub failure: f64,
+    /// Which gauges are lost, where any are.
     pub loss: Loss,
+    /// What is done beyond gauge after gauge.
     pub thorough: Thorough,
 }
 
@@ -35,6 +37,7 @@ pub struct Constraints {
 pub struct Loss {
     /// How many together, any of them.
     pub gauges: usize,
+    /// What counts of all such losses.
     pub by: LostBy,
 }
 
@@ -60,6 +63,7 @@ pub enum LostBy {
 }
 
 impl LostBy {
+    /// All, the default first.
     pub const ALL: [Self; 2] = [Self::Expected, Self::Worst];
 
     /// As in files.
@@ -109,6 +113,7 @@ impl Thorough {
 }
 
 impl Constraints {
+    /// So many gauges, and nothing else.
     #[must_use]
     pub fn count(sensors: usize) -> Self {
         Self {
@@ -340,6 +345,7 @@ impl<'a> Field<'a> {
         cost <= self.dearest && self.spent + cost <= budget * (1.0 + ROUNDING)
     }
 
+    /// Cost of a place in the pool.
     #[must_use]
     pub fn cost(&self, place: usize) -> f64 {
         self.constraints.costs.as_ref().map_or(1.0, |c| c[place])

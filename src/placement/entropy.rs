@@ -9,6 +9,7 @@ use crate::budget::{Cancelled, report};
 
 /// The selector. The pool's sites must be the first locations of the geometry.
 pub struct Entropy<'a> {
+    /// The process.
     pub geometry: &'a Geometry,
 }
 

@@ -35,7 +35,9 @@ use crate::budget::{Achieved, Cancelled, StopReason, Work};
 
 /// The selector.
 pub struct ExpectedError<'a> {
+    /// Noise, forces, and what else is off.
     pub known: Knowledge<'a>,
+    /// How many places and presses are looked at.
     pub detail: Detail,
     /// How often each gauge may be exchanged after all are chosen; none where sets must contain one another.
     pub rounds: usize,

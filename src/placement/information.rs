@@ -14,7 +14,9 @@ use crate::plain;
 /// A Gaussian process over locations on the surface; the pool's sites come first, then those where no
 /// gauge can go.
 pub struct Geometry {
+    /// Between all locations.
     pub covariance: Covariance,
+    /// The kernel it was made with.
     pub kernel: GpKernel,
     /// How distances were measured, for people.
     pub distance: &'static str,
@@ -27,13 +29,18 @@ pub struct Geometry {
 /// The parts of a geometry that go into reports.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GeometrySummary {
+    /// The kernel.
     pub kernel: GpKernel,
+    /// How distances were measured, for people.
     pub distance: &'static str,
+    /// Share of the spectrum that was negative and set to zero.
     pub clipped: f64,
+    /// The search that the kernel came from; empty where it was given.
     pub map: Vec<GpTrial>,
 }
 
 impl Geometry {
+    /// The parts that go into reports.
     #[must_use]
     pub fn summary(&self) -> GeometrySummary {
         GeometrySummary {

@@ -36,6 +36,7 @@ impl Best {
         }
     }
 
+    /// The best so far; absent before the first.
     #[must_use]
     pub fn place(&self) -> Option<usize> {
         self.best.map(|b| b.0)

@@ -16,6 +16,7 @@ use crate::budget::{Cancelled, Watch, report};
 
 /// The selector. The pool's sites must be the first locations of the geometry.
 pub struct MutualInformation<'a> {
+    /// The process.
     pub geometry: &'a Geometry,
 }
 

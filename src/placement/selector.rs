@@ -6,7 +6,9 @@ use crate::budget::Watch;
 
 /// What is asked of a selector.
 pub struct Request<'a> {
+    /// What the set must keep to.
     pub constraints: &'a Constraints,
+    /// Told of progress; may ask for a stop.
     pub watch: Watch<'a>,
     /// Called with each set as soon as it is known.
     pub found: &'a (dyn Fn(&SensorSet) + Sync),
@@ -14,6 +16,7 @@ pub struct Request<'a> {
 
 /// Anything that chooses sites from a pool.
 pub trait Selector: Sync {
+    /// Which one it is.
     fn kind(&self) -> SelectorKind;
 
     /// Whether each set contains the one before it.

@@ -16,6 +16,7 @@ pub enum PartAxis {
     /// As the part's shape says.
     #[default]
     Auto,
+    /// An axis of the file.
     Coordinate(Axis),
     /// A direction of any length.
     Along([f64; 3]),

@@ -13,6 +13,7 @@ pub struct LiveKeys {
     /// The board's channel (from 0) of each gauge; in their order when empty.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub channels: Vec<usize>,
+    /// Relative change of resistance over strain.
     pub gauge_factor: f64,
     /// Arms of each bridge that the strain changes.
     pub active_arms: u8,
@@ -47,9 +48,13 @@ fn is_usual_stiffness(percent: &f64) -> bool {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GluedKeys {
+    /// What its readings are multiplied by.
     pub gain: f64,
+    /// How far along itself it lies from where it was drawn (mm).
     pub along_mm: f64,
+    /// How far across itself (mm).
     pub across_mm: f64,
+    /// How far it is turned from its direction (degrees).
     pub turned_degrees: f64,
     /// What is not known of these four: the upper triangle of their covariance.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -13,19 +13,25 @@ use crate::mesh::unroll::Axis;
 /// Unit of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Unit {
+    /// mm.
     #[serde(rename = "mm")]
     Millimetre,
+    /// cm.
     #[serde(rename = "cm")]
     Centimetre,
+    /// m.
     #[serde(rename = "m")]
     Metre,
+    /// in, 25.4 mm.
     #[serde(rename = "in")]
     Inch,
 }
 
 impl Unit {
+    /// All, in the order of menus.
     pub const ALL: [Self; 4] = [Self::Millimetre, Self::Centimetre, Self::Metre, Self::Inch];
 
+    /// How long it is (m).
     #[must_use]
     pub fn metres(self) -> f64 {
         match self {
@@ -36,6 +42,7 @@ impl Unit {
         }
     }
 
+    /// As in files and options.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -47,6 +54,7 @@ impl Unit {
     }
 }
 
+/// Keys of the table `part`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
@@ -55,6 +63,7 @@ pub struct Part {
     /// Unit of the mesh; glTF is in metres by its specification and needs none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
+    /// Which connected body of the file, 0 being the largest.
     #[serde(default)]
     pub body: usize,
     /// Vertices nearer to each other than this are joined; zero joins equal ones only.
@@ -73,14 +82,17 @@ pub struct Part {
     /// What the elastic model is computed on.
     #[serde(default)]
     pub elements: Elements,
+    /// Shell or solid.
     #[serde(default)]
     pub model: PartModel,
+    /// Thickness of the wall of a shell (mm).
     #[serde(default = "defaults::thickness")]
     pub thickness_mm: f64,
     /// Of a solid: masks of the part's vertices that say where gauges can go and where touches land, where
     /// what is found by itself is wrong.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inside: Option<String>,
+    /// Name of a mask of what is outside, where what is found by itself is wrong.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outside: Option<String>,
     /// Which way the part stands.
@@ -122,10 +134,13 @@ pub enum PartModel {
     Solid,
 }
 
+/// Keys of the table `material`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaterialKeys {
+    /// Young's modulus, in gigapascals.
     pub youngs_modulus_gpa: f64,
+    /// Above -1 and below 0.5.
     pub poissons_ratio: f64,
 }
 
@@ -138,6 +153,7 @@ impl Default for MaterialKeys {
     }
 }
 
+/// What a support holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SupportKind {
@@ -150,9 +166,11 @@ pub enum SupportKind {
     Symmetry,
 }
 
+/// Keys of a table `support`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupportKeys {
+    /// What it holds.
     #[serde(default)]
     pub kind: SupportKind,
     /// Every point of the part inside it is held.
@@ -166,6 +184,7 @@ pub struct SupportKeys {
     /// file, or a group of the mesh file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vertices: Option<String>,
+    /// Normal of a symmetry plane; unused otherwise.
     #[serde(default)]
     pub normal: Axis,
 }

@@ -16,22 +16,30 @@ use crate::evaluation::failures::MOST_FAILED;
 /// How many gauges can be asked for, how many touches, and how many neighbours the edge filter looks at: in a
 /// file as in the window.
 pub const GAUGES: RangeInclusive<usize> = 1..=10_000;
+/// `touch.count`.
 pub const TOUCHES: RangeInclusive<usize> = 3..=1_000_000;
+/// `feasible.edge_neighbours`.
 pub const EDGE_NEIGHBOURS: RangeInclusive<usize> = 0..=1000;
 /// How many gauges may be lost together, and from how many first gauges a set may be begun: likewise.
 pub const LOST: RangeInclusive<usize> = 1..=MOST_FAILED;
+/// `selection.starts`.
 pub const STARTS: RangeInclusive<usize> = 1..=20;
 /// How many forces sets may be judged at.
 const JUDGED: RangeInclusive<usize> = 1..=20;
 /// How hard touches may come (N), and how far off gauges may be glued (mm, degrees, percent): likewise.
 pub const FORCES: RangeInclusive<f64> = 1e-3..=1e5;
+/// How far off places may be (mm).
 pub const PLACE_OFF: RangeInclusive<f64> = 0.0..=50.0;
+/// How far off directions may be (degrees).
 pub const ANGLE_OFF: RangeInclusive<f64> = 0.0..=45.0;
+/// How far off gains may be (%).
 pub const GAIN_OFF: RangeInclusive<f64> = 0.0..=50.0;
 /// How far off a hand presses (percent of the force), how much larger or smaller tips are (mm), and how far all channels
 /// drift together (µε): likewise.
 pub const FORCE_OFF: RangeInclusive<f64> = 0.0..=50.0;
+/// How far off the tip's radius may be (mm).
 pub const TIP_OFF: RangeInclusive<f64> = 0.0..=50.0;
+/// `gauge.drift_microstrain`.
 pub const DRIFT: RangeInclusive<f64> = 0.0..=1e6;
 
 /// Of anything that is made (mm): from a nanometre to a kilometre.

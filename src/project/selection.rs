@@ -11,6 +11,7 @@ use crate::placement::SelectorKind;
 use crate::placement::constraints::{Loss, LostBy, Thorough};
 use crate::regression::Hyper;
 
+/// Keys of the table `selection`.
 #[allow(
     clippy::struct_excessive_bools,
     reason = "keys of a file that do not depend on each other"
@@ -18,11 +19,15 @@ use crate::regression::Hyper;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SelectionKeys {
+    /// Whose sites are reported.
     pub selector: SelectorKind,
+    /// Gauges to place.
     pub sensors: usize,
     /// Settings of greedy SVR's regression (targets in mm, features standardized).
     pub c_mm: f64,
+    /// ε: half-width of the tube without loss (mm).
     pub epsilon_mm: f64,
+    /// γ of the Gaussian kernel.
     pub gamma: f64,
     /// Least distance between two gauges.
     pub spacing_mm: f64,
@@ -39,7 +44,9 @@ pub struct SelectionKeys {
     pub with_noise: bool,
     /// Probability that gauges are lost, how many together, and whether the mean or the worst of such losses counts.
     pub failure: f64,
+    /// How many gauges are lost together.
     pub lost: usize,
+    /// What counts of all such losses.
     pub lost_by: LostBy,
     /// Whether the paper's selectors exchange gauges after all are chosen, as expected error does in any case.
     pub exchange: bool,
@@ -49,6 +56,7 @@ pub struct SelectionKeys {
     pub refine: bool,
     /// Whether the other selectors choose too, to be compared.
     pub compare: bool,
+    /// Table `selection.gaussian_process`.
     pub gaussian_process: GaussianProcessKeys,
     /// What a gauge costs inside a box, the last box counting; 1 elsewhere.
     #[serde(rename = "cost", skip_serializing_if = "Vec::is_empty")]
@@ -118,8 +126,10 @@ pub struct GaussianProcessKeys {
     /// Length and power of the kernel; searched by cross-validation when left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length_mm: Option<f64>,
+    /// Power of the kernel, up to 2; searched when left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub power: Option<f64>,
+    /// Variance of a measurement's noise over the field's.
     pub noise: f64,
 }
 
@@ -147,19 +157,25 @@ impl GaussianProcessKeys {
     }
 }
 
+/// Keys of a table `selection.cost`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CostKeys {
+    /// Gauges inside it (mm) …
     pub box_mm: BoxMm,
     /// As of a support.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub box_axis: Option<[f64; 3]>,
+    /// … cost this.
     pub cost: f64,
 }
 
+/// Keys of a table `selection.site`: a chosen gauge.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChosenSite {
+    /// Its middle (mm).
     pub position_mm: [f64; 3],
+    /// Unit direction along which it measures.
     pub direction: [f64; 3],
 }

@@ -9,8 +9,11 @@ pub(super) const MM: f64 = 1e-3;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key} must be {rule}, but is {value}")]
 pub struct BadValue {
+    /// Path of the key, such as `touch.force_n`.
     pub key: String,
+    /// What it must be.
     pub rule: Cow<'static, str>,
+    /// What it is.
     pub value: String,
 }
 

@@ -25,7 +25,9 @@ pub struct Setting {
     pub y: Mat<f64>,
     /// Each fold's test touches.
     pub folds: Vec<Range<usize>>,
+    /// Bound of the coefficients.
     pub c: f64,
+    /// Half-width of the tube without loss.
     pub epsilon: f64,
     /// Penalty on z ≠ Φw + b - y.
     pub rho: f64,
@@ -34,11 +36,14 @@ pub struct Setting {
 /// Where the iteration stands: residuals and scaled multipliers, both touches × (3 × folds).
 #[derive(Clone)]
 pub struct State {
+    /// Residuals.
     pub z: Mat<f64>,
+    /// Scaled multipliers.
     pub u: Mat<f64>,
 }
 
 impl State {
+    /// Where nothing is known yet.
     #[must_use]
     pub fn zero(setting: &Setting) -> Self {
         let (n, columns) = (setting.y.nrows(), setting.y.ncols());

@@ -5,6 +5,7 @@ use crate::dataset::SignalMatrix;
 /// Mean and standard deviation of each site's signal over the touches it was made from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Standardizer {
+    /// A site each.
     pub mean: Vec<f64>,
     /// Zero for a signal that is constant to rounding.
     pub deviation: Vec<f64>,
@@ -14,6 +15,7 @@ pub struct Standardizer {
 const CONSTANT: f64 = 1e-10;
 
 impl Standardizer {
+    /// From signals, sites × touches.
     #[must_use]
     pub fn of(x: &SignalMatrix) -> Self {
         let n = x.columns().max(1) as f64;

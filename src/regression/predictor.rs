@@ -59,6 +59,7 @@ impl Predictor {
         }
     }
 
+    /// Points that it keeps.
     #[must_use]
     pub fn support_vectors(&self) -> usize {
         self.support_vectors

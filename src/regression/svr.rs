@@ -25,6 +25,7 @@ pub use problem::{Problem, Start, SvrParams};
 pub struct Fit {
     /// One a point; zero for those held out.
     pub beta: Vec<f64>,
+    /// Added to every prediction.
     pub bias: f64,
     /// Prediction less target at every point, those held out included.
     pub residuals: Vec<f64>,
@@ -32,7 +33,9 @@ pub struct Fit {
     pub objective: f64,
     /// Largest violation left.
     pub gap: f64,
+    /// Steps it took.
     pub steps: usize,
+    /// Whether the tolerance was met.
     pub converged: bool,
 }
 

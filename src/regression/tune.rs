@@ -39,6 +39,7 @@ impl Default for Hyper {
 pub struct Effort {
     /// Tolerance of the optimality conditions (mm).
     pub tolerance: f64,
+    /// Most steps.
     pub max_steps: usize,
 }
 
@@ -64,6 +65,7 @@ impl Hyper {
         }
     }
 
+    /// For one fit of this effort.
     #[must_use]
     pub fn params(&self, effort: Effort) -> svr::SvrParams {
         svr::SvrParams {
@@ -82,6 +84,7 @@ pub struct PositionModel {
     training: SignalMatrix,
     gamma: f64,
     fits: [Fit; 3],
+    /// What the fits took.
     pub work: Work,
 }
 
@@ -150,13 +153,16 @@ pub fn distances(predicted: &[[f64; 3]], truth: &[[f64; 3]]) -> Vec<f64> {
 /// One point of a search: the settings and their cross-validated error (mm).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Trial {
+    /// The settings.
     pub hyper: Hyper,
+    /// Cross-validated error (mm).
     pub error_mm: f64,
 }
 
 /// The outcome of a search: the best settings and every trial, in order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Search {
+    /// Every trial, in order.
     pub trials: Vec<Trial>,
 }
 
@@ -187,8 +193,11 @@ impl Search {
 /// standardized signals grows with their number. The default is for parts of the bundled limb's size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
+    /// Values of C (mm).
     pub c: Vec<f64>,
+    /// Values of ε (mm).
     pub epsilon: Vec<f64>,
+    /// Values of γ for ten gauges.
     pub gamma: Vec<f64>,
 }
 
@@ -216,10 +225,13 @@ impl Grid {
 /// What cross-validation spends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrossValidation {
+    /// Number of folds.
     pub folds: usize,
+    /// Of the folds.
     pub seed: u64,
     /// What is never divided between folds.
     pub grouping: Grouping,
+    /// Of each fit.
     pub effort: Effort,
 }
 

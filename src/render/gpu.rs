@@ -1,88 +1,24 @@
 //! The wgpu side: draws the limb into a target of its own (4× anti-aliased, with depth), which the window
 //! then copies. Nothing is uploaded or drawn again that has not changed.
 
+mod data;
+mod pipelines;
+
 use std::sync::Arc;
 
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
 use eframe::wgpu::{self, util::DeviceExt};
 
+pub use self::data::{Shown, Solid, Uniforms, Vertex};
+use self::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES, layout};
 use crate::colormap::{ColorMap, TABLE};
-use crate::mesh::TriMesh;
 use crate::tally::{self, Done};
-
-const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-const SAMPLES: u32 = 4;
-
-/// A vertex of a [`Solid`].
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Vertex {
-    /// m.
-    pub position: [f32; 3],
-    pub normal: [f32; 3],
-    /// The share that lengths are off by as it is drawn.
-    pub stretch: f32,
-}
-
-/// Triangles to be drawn.
-pub struct Solid {
-    pub vertices: Vec<Vertex>,
-    pub triangles: Vec<[u32; 3]>,
-}
-
-impl Solid {
-    #[must_use]
-    pub fn of(mesh: &TriMesh) -> Self {
-        let vertices = mesh.positions().iter().zip(mesh.vertex_normals());
-        Self {
-            vertices: vertices
-                .map(|(p, n)| Vertex {
-                    position: p.as_vec3().to_array(),
-                    normal: n.as_vec3().to_array(),
-                    stretch: 0.0,
-                })
-                .collect(),
-            triangles: mesh.triangles().to_vec(),
-        }
-    }
-}
 
 /// Pictures that a window shows side by side, each with a target of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slot {
     Limb,
     Unrolled,
-}
-
-/// What changes with field and region, a vertex.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Shown {
-    /// Displacement (m).
-    pub displacement: [f32; 3],
-    /// Field, 0–1 over the legend's range.
-    pub value: f32,
-    /// 255 where a layer is: gauges may go (or what is blind, where that is marked), touches come, held, gauges
-    /// must not go.
-    pub region: [u8; 4],
-}
-
-/// The uniforms of the shader, as it names them.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Uniforms {
-    pub matrix: [[f32; 4]; 4],
-    pub eye: [f32; 4],
-    pub target_scale: [f32; 4],
-    pub deform: [f32; 4],
-    /// A plane: what lies on its positive side is cut away.
-    pub section: [f32; 4],
-    /// x: how much of the wall that faces the eye covers what is behind it, 1 for all; y: 1 where the first layer
-    /// marks what is blind.
-    pub look: [f32; 4],
-    /// xyz: the direction up; w: the stretch above which lengths are marked as off, 0 for none.
-    pub up: [f32; 4],
 }
 
 /// One frame to be drawn.
@@ -106,14 +42,6 @@ pub struct SceneGpu {
     blit_layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
     slots: [SlotGpu; 2],
-}
-
-struct Pipelines {
-    whole: wgpu::RenderPipeline,
-    /// The walls that face away, and those that face the eye drawn over them.
-    away: wgpu::RenderPipeline,
-    ghost: wgpu::RenderPipeline,
-    blit: wgpu::RenderPipeline,
 }
 
 /// What a picture that lies in a target was drawn with, beside its buffers.
@@ -410,174 +338,6 @@ impl Targets {
             bind,
         }
     }
-}
-
-/// Bindings of the scene (uniforms, map, sampler) or of the blit (picture).
-fn layout(device: &wgpu::Device, scene: bool) -> wgpu::BindGroupLayout {
-    let texture = wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable: true },
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    };
-    let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-    let uniforms = wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Uniform,
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    };
-    let kinds = if scene {
-        vec![uniforms, texture, sampler]
-    } else {
-        vec![texture]
-    };
-    let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
-        .zip(kinds)
-        .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
-            ty,
-            count: None,
-        })
-        .collect();
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: None,
-        entries: &entries,
-    })
-}
-
-/// Which walls a pipeline draws.
-#[derive(Clone, Copy, PartialEq)]
-enum Walls {
-    /// Both sides: through the windows the inside is seen.
-    All,
-    FacingAway,
-    /// Those that face the eye, over what is behind them.
-    Ghost,
-}
-
-impl Pipelines {
-    fn new(
-        device: &wgpu::Device,
-        scene: &wgpu::BindGroupLayout,
-        blit: &wgpu::BindGroupLayout,
-        window: wgpu::TextureFormat,
-    ) -> Self {
-        let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("limb"),
-            source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/limb.wgsl").into()),
-        });
-        let of = |walls| scene_pipeline(device, scene, &shader, walls);
-        Self {
-            whole: of(Walls::All),
-            away: of(Walls::FacingAway),
-            ghost: of(Walls::Ghost),
-            blit: blit_pipeline(device, blit, window),
-        }
-    }
-}
-
-fn scene_pipeline(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    shader: &wgpu::ShaderModule,
-    walls: Walls,
-) -> wgpu::RenderPipeline {
-    let ghost = walls == Walls::Ghost;
-    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("limb"),
-        bind_group_layouts: &[Some(layout)],
-        immediate_size: 0,
-    });
-    let fixed = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 5 => Float32];
-    let changing = wgpu::vertex_attr_array![2 => Float32x3, 3 => Float32, 4 => Unorm8x4];
-    let buffer = |stride, attributes| {
-        Some(wgpu::VertexBufferLayout {
-            array_stride: stride,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes,
-        })
-    };
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("limb"),
-        layout: Some(&pipeline_layout),
-        vertex: wgpu::VertexState {
-            module: shader,
-            entry_point: Some("vs"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers: &[
-                buffer(size_of::<Vertex>() as u64, &fixed),
-                buffer(size_of::<Shown>() as u64, &changing),
-            ],
-        },
-        primitive: wgpu::PrimitiveState {
-            cull_mode: match walls {
-                Walls::All => None,
-                Walls::FacingAway => Some(wgpu::Face::Front),
-                Walls::Ghost => Some(wgpu::Face::Back),
-            },
-            ..Default::default()
-        },
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH,
-            depth_write_enabled: Some(!ghost),
-            depth_compare: Some(wgpu::CompareFunction::Less),
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState {
-            count: SAMPLES,
-            ..Default::default()
-        },
-        fragment: Some(wgpu::FragmentState {
-            module: shader,
-            entry_point: Some(if ghost { "fs_ghost" } else { "fs" }),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            targets: &[Some(wgpu::ColorTargetState {
-                format: COLOR,
-                blend: ghost.then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-                write_mask: wgpu::ColorWrites::ALL,
-            })],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
-}
-
-fn blit_pipeline(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    window: wgpu::TextureFormat,
-) -> wgpu::RenderPipeline {
-    let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("blit"),
-        source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/blit.wgsl").into()),
-    });
-    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("blit"),
-        bind_group_layouts: &[Some(layout)],
-        immediate_size: 0,
-    });
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("blit"),
-        layout: Some(&pipeline_layout),
-        vertex: wgpu::VertexState {
-            module: &shader,
-            entry_point: Some("vs"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: None,
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &shader,
-            entry_point: Some("fs"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            targets: &[Some(window.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
 }
 
 impl CallbackTrait for Frame3d {

@@ -23,7 +23,9 @@ use crate::placement::{
 /// A choice with what it was made from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
+    /// What was chosen.
     pub selection: Selection,
+    /// The Gaussian process, where one chose.
     pub geometry: Option<GeometrySummary>,
     /// What a choice by expected error weighed.
     pub weighed: Option<Weighed>,
@@ -38,6 +40,7 @@ pub struct Weighed {
     pub noise: f64,
     /// The lightest and the hardest touch that come (N); absent where the data do not say how hard touches were.
     pub forces_n: Option<[f64; 2]>,
+    /// Of places, presses and noise.
     pub seed: u64,
     /// For each gauge of the last set: standard deviation of a reading about its template, as the data show it, over
     /// the rms of its readings (%).
@@ -49,8 +52,11 @@ pub struct Weighed {
 /// Seconds by the caller's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ChoiceSeconds {
+    /// Of the distances (s).
     pub distances: f64,
+    /// Of the search for the kernel (s).
     pub kernel_search: f64,
+    /// Of the choice itself (s).
     pub selection: f64,
 }
 

@@ -24,11 +24,14 @@ pub enum Estimator {
 
 /// What is asked about given sites.
 pub struct Question<'a> {
+    /// Rows of the data, in the order of their importance.
     pub sites: &'a [usize],
+    /// What turns readings into places.
     pub estimator: Estimator,
     /// The group of each touch, numbered from zero without gaps: none is divided between learning and judging. Where
     /// nobody says, by the regression's grouping.
     pub groups: Option<&'a [usize]>,
+    /// Settings of regression, folds and seed.
     pub svr: &'a GreedySvr,
     /// Standard deviation of the noise added to the signals, in their unit. Regression learns from noisy signals;
     /// templates are as they were measured, and what is compared with them is noisy.
@@ -37,21 +40,29 @@ pub struct Question<'a> {
     pub tune: bool,
     /// Share of the touches held out.
     pub held_out: f64,
+    /// Most failed gauges to try.
     pub failed: usize,
+    /// Most subsets of failed gauges to try.
     pub subsets: usize,
+    /// Whether all sites together are judged too.
     pub baseline: bool,
 }
 
 /// Errors on the touches held out (mm).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HeldOut {
+    /// So many gauges, the first ones.
     pub sensors: usize,
+    /// Mean (mm).
     pub error_mm: f64,
+    /// Median (mm).
     pub median_mm: f64,
+    /// 95th percentile (mm).
     pub p95_mm: f64,
     /// Of the regression, and whether its fit ended.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hyper: Option<Hyper>,
+    /// Whether the regression's fit converged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged: Option<bool>,
     /// How many nearest touches are averaged.
@@ -81,14 +92,19 @@ impl HeldOut {
 pub struct Verdict {
     /// Cross-validated over all touches.
     pub criteria_mm: Vec<f64>,
+    /// The fold that each touch is tested in.
     pub fold_of_touch: Vec<usize>,
+    /// On the touches held out.
     pub errors: Vec<HeldOut>,
+    /// The same with all sites of the data, where that was asked for.
     pub baseline: Option<HeldOut>,
+    /// What is left of all sites given when some fail.
     pub failures: Vec<FailureRow>,
     /// The touches that were held out.
     pub test_touches: Vec<usize>,
     /// Groups of touches that were not divided.
     pub places: usize,
+    /// What a reader must know, one sentence each.
     pub notes: Vec<String>,
 }
 

@@ -24,14 +24,19 @@ pub enum Bought {
 /// matching, from another selector to the one that chooses for the estimator in force.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KnobReport {
+    /// Which knob.
     pub knob: Knob,
+    /// Pairs of settings that differ in it alone.
     pub pairs: usize,
     /// Medians of the change (%): CPU time, mean and median error.
     pub cpu_percent: f64,
+    /// Median change of the mean error (%).
     pub error_percent: f64,
+    /// Median change of the median error (%).
     pub median_percent: f64,
     /// Standard error of the change of the mean error (%).
     pub scatter_percent: f64,
+    /// What the change is worth.
     pub bought: Bought,
 }
 

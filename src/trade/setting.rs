@@ -4,6 +4,11 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
+use super::spent::{
+    ELEMENTS_PERCENT, EXPECTED_PLACES, EXPECTED_PRESSES, FOLDS, Knob, MOST_CANDIDATES,
+    SELECTION_CANDIDATES, SELECTION_TOUCHES, SIGNALS, SVR_TOLERANCE_MM, Spent, TOUCHES,
+    TUNING_TOUCHES, UNEXPLAINED, USUAL, USUAL_UNEXPLAINED, VERTICES,
+};
 use crate::budget::{Budget, Limits, Quality};
 use crate::dataset::Signal;
 use crate::design::{Inputs, walled};
@@ -18,148 +23,16 @@ pub struct Setting {
     pub quality: Quality,
     /// Added to the project's seed: how much an error moves when nothing else does.
     pub repeat: u64,
+    /// Who chooses.
     pub selector: SelectorKind,
+    /// What the sites report.
     pub signal: Signal,
     /// Share of the variance that candidates may leave unexplained.
     pub unexplained: f64,
     /// What finds the touches that the setting is judged by.
     pub estimator: EstimatorKind,
+    /// Values of its own; absent where it is the quality as it is.
     pub limits: Option<Spent>,
-}
-
-/// The knobs with values of their own.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Spent {
-    /// Most vertices of the elastic model.
-    pub vertices: usize,
-    pub touches: usize,
-    pub point_tip: bool,
-    /// The wall of a shell as the solid that it is.
-    pub as_solid: bool,
-    /// What a choice by expected error looks at.
-    pub expected_places: usize,
-    pub expected_presses: usize,
-    /// What greedy SVR scores.
-    pub selection_touches: usize,
-    pub selection_candidates: usize,
-    /// Of regressions, where any are trained.
-    pub svr_tolerance_mm: f64,
-    pub folds: usize,
-    pub tuning_touches: usize,
-}
-
-/// Where the ladders begin, and where a knob stands that nothing uses.
-const USUAL: Spent = Spent {
-    vertices: 2400,
-    touches: 400,
-    point_tip: false,
-    as_solid: false,
-    expected_places: 320,
-    expected_presses: 96,
-    selection_touches: 200,
-    selection_candidates: 40,
-    svr_tolerance_mm: FIXED_TOLERANCE_MM,
-    folds: FIXED_FOLDS,
-    tuning_touches: FIXED_TUNING,
-};
-const USUAL_UNEXPLAINED: f64 = 0.05;
-
-/// Of what was found to buy nothing beyond and is offered to nobody.
-const FIXED_FOLDS: usize = 3;
-const FIXED_TOLERANCE_MM: f64 = 0.1;
-const FIXED_TUNING: usize = 100;
-
-impl Spent {
-    /// Whether a project can ask for it.
-    fn is_offered(&self) -> bool {
-        !self.as_solid
-            && !self.point_tip
-            && self.folds == FIXED_FOLDS
-            && self.tuning_touches == FIXED_TUNING.min(self.touches)
-            && self.svr_tolerance_mm == FIXED_TOLERANCE_MM
-    }
-}
-
-/// What can be turned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Knob {
-    Vertices,
-    Touches,
-    PointTip,
-    AsSolid,
-    Unexplained,
-    Selector,
-    ExpectedPlaces,
-    ExpectedPresses,
-    SelectionTouches,
-    SelectionCandidates,
-    SvrTolerance,
-    Folds,
-    TuningTouches,
-    Signal,
-    Estimator,
-}
-
-const VERTICES: [usize; 7] = [300, 600, 1200, 2400, 4800, 9600, 19_200];
-const TOUCHES: [usize; 6] = [100, 200, 400, 800, 1600, 3200];
-const UNEXPLAINED: [f64; 5] = [0.2, 0.1, 0.05, 0.02, 0.01];
-const EXPECTED_PLACES: [usize; 5] = [80, 160, 320, 640, 1280];
-const EXPECTED_PRESSES: [usize; 5] = [24, 48, 96, 192, 384];
-const SELECTION_TOUCHES: [usize; 5] = [50, 100, 200, 400, 800];
-const SELECTION_CANDIDATES: [usize; 5] = [20, 40, 80, 160, 320];
-const SVR_TOLERANCE_MM: [f64; 4] = [1.0, 0.3, 0.1, 0.02];
-const FOLDS: [usize; 3] = [2, 3, 5];
-const TUNING_TOUCHES: [usize; 4] = [50, 100, 300, 1000];
-const SIGNALS: [Signal; 3] = [
-    Signal::Strain,
-    Signal::NormalDisplacement,
-    Signal::Displacement,
-];
-/// Estimated error of displacements (%) below which no vertices are added, however many are allowed.
-const ELEMENTS_PERCENT: f64 = 0.5;
-/// No fewer candidates than the variance that they are to explain asks for.
-const MOST_CANDIDATES: usize = 100_000;
-
-impl Knob {
-    pub const ALL: [Self; 15] = [
-        Self::Vertices,
-        Self::Touches,
-        Self::PointTip,
-        Self::AsSolid,
-        Self::Unexplained,
-        Self::Selector,
-        Self::ExpectedPlaces,
-        Self::ExpectedPresses,
-        Self::SelectionTouches,
-        Self::SelectionCandidates,
-        Self::SvrTolerance,
-        Self::Folds,
-        Self::TuningTouches,
-        Self::Signal,
-        Self::Estimator,
-    ];
-
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Vertices => "vertices of the model",
-            Self::Touches => "touches of the model",
-            Self::PointTip => "tip model: a point",
-            Self::AsSolid => "shell taken as a solid",
-            Self::Unexplained => "variance left unexplained",
-            Self::Selector => "selector: the estimator's own",
-            Self::ExpectedPlaces => "places that expected error compares",
-            Self::ExpectedPresses => "presses that expected error tries",
-            Self::SelectionTouches => "touches that greedy SVR scores on",
-            Self::SelectionCandidates => "candidates that greedy SVR scores",
-            Self::SvrTolerance => "tolerance of regressions",
-            Self::Folds => "folds",
-            Self::TuningTouches => "touches that settings are searched on",
-            Self::Signal => "signal: displacements",
-            Self::Estimator => "estimator: matching",
-        }
-    }
 }
 
 impl Setting {
@@ -564,114 +437,4 @@ fn others<T: Copy + PartialEq>(all: &[T], now: T, with: impl Fn(T) -> Setting) -
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_answers_a_project_can_be_asked_of_it() {
-        let project = Project::around("a.stl", None);
-        let mut settings = vec![
-            Setting::centre(&project),
-            Setting::fine(&project),
-            Setting::named(&project, Quality::Draft),
-        ];
-        for k in 0..2 {
-            let around: Vec<Setting> = (Knob::ALL.iter())
-                .flat_map(|&knob| settings[k].neighbours(knob))
-                .collect();
-            settings.extend(around);
-        }
-        let mut answering = 0;
-        for setting in settings.iter().filter(|s| s.answers(&project)) {
-            let mut applied = project.clone();
-            setting.apply(&mut applied);
-            assert_eq!(
-                setting.budget(&applied),
-                applied.budget.budget(),
-                "{setting:?}"
-            );
-            assert!(setting.is_of(&applied));
-            applied.check().unwrap();
-            answering += 1;
-        }
-        assert!(answering > 20, "{answering}");
-    }
-
-    #[test]
-    fn knobs_that_nothing_hears_stay_where_they_are() {
-        let project = Project::around("a.stl", None);
-        let centre = Setting::centre(&project);
-        let offered = |s: &Setting| -> Vec<Knob> {
-            let turns = |knob: &Knob| !s.neighbours(*knob).is_empty();
-            Knob::ALL.into_iter().filter(turns).collect()
-        };
-        assert_eq!(
-            offered(&centre),
-            [
-                Knob::Vertices,
-                Knob::Touches,
-                Knob::AsSolid,
-                Knob::Selector,
-                Knob::ExpectedPlaces,
-                Knob::ExpectedPresses,
-                Knob::Signal,
-                Knob::Estimator
-            ]
-        );
-        // The paper's way has the knobs of its regressions, and their way back ends where it began.
-        let mut paper = project.clone();
-        paper.evaluation.estimator = EstimatorKind::Svr;
-        paper.selection.selector = SelectorKind::GreedySvr;
-        let trained = Setting::centre(&paper);
-        for knob in [
-            Knob::Unexplained,
-            Knob::SelectionTouches,
-            Knob::Folds,
-            Knob::TuningTouches,
-        ] {
-            assert!(offered(&trained).contains(&knob), "{knob:?}");
-            let turned = trained.neighbours(knob)[0];
-            let back = Setting {
-                selector: centre.selector,
-                estimator: centre.estimator,
-                ..turned
-            };
-            assert_eq!(back.canonical(), centre, "{knob:?}");
-        }
-        assert!(!centre.in_words().contains("folds") && trained.in_words().contains("folds"));
-        // More places than there are touches are no other setting.
-        let few = Setting {
-            limits: centre.limits.map(|s| Spent { touches: 100, ..s }),
-            ..centre
-        }
-        .canonical();
-        assert_eq!(few.neighbours(Knob::ExpectedPlaces).len(), 0);
-        assert_eq!(few.neighbours(Knob::Touches).len(), 1);
-    }
-
-    #[test]
-    fn a_setting_is_judged_by_its_own_estimator() {
-        let project = Project::around("a.stl", None);
-        let centre = Setting::centre(&project);
-        assert_eq!(centre.estimator, EstimatorKind::Matching);
-        for setting in [centre, centre.neighbours(Knob::Estimator)[0]] {
-            let mut applied = project.clone();
-            setting.apply(&mut applied);
-            assert_eq!(applied.judging().estimator(), setting.estimator);
-        }
-        // What nobody uses is left as the project has it.
-        let mut applied = project.clone();
-        centre.apply(&mut applied);
-        assert_eq!(applied.candidates, project.candidates);
-        assert_eq!(applied.evaluation, project.evaluation);
-        let limits = applied.budget.limits;
-        assert_eq!(
-            (limits.selection_touches, limits.tuning_touches),
-            (None, None)
-        );
-        // Sites that report displacements are judged by regression, whatever is asked for.
-        let shifted = centre.neighbours(Knob::Signal)[0];
-        shifted.apply(&mut applied);
-        assert_eq!(applied.judging().estimator(), shifted.estimator);
-    }
-}
+mod tests;

@@ -15,7 +15,9 @@ use crate::uncertainty::Pressing;
 /// A press, as it was asked for and as it was made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Press {
+    /// What was asked for.
     pub asked: Touch,
+    /// What was done.
     pub made: Touch,
 }
 

@@ -101,6 +101,7 @@ impl FiniteCells {
         self.places.len()
     }
 
+    /// The box of the cell of this number.
     #[must_use]
     pub fn cell(&self, number: usize) -> Cell {
         self.grid.cell(self.places[number])

@@ -15,11 +15,14 @@ use crate::mesh::inside::SignedDistance;
 /// A box: lower corner and sides (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
+    /// Lower corner (m).
     pub lower: DVec3,
+    /// Lengths of its sides (m).
     pub sides: DVec3,
 }
 
 impl Cell {
+    /// Its middle (m).
     #[must_use]
     pub fn centre(&self) -> DVec3 {
         self.lower + self.sides / 2.0
@@ -51,7 +54,9 @@ pub struct Cutting {
 /// number i + n (j + n k) for degrees below n.
 #[derive(Clone, Debug)]
 pub struct Moments {
+    /// n: one more than the highest degree along each axis.
     pub degrees: usize,
+    /// n³ integrals.
     pub values: Vec<f64>,
 }
 
@@ -211,6 +216,7 @@ pub struct Cutter<'s> {
 }
 
 impl<'s> Cutter<'s> {
+    /// For elements of this order, cut by this surface.
     #[must_use]
     pub fn new(surface: &'s SignedDistance, cutting: Cutting, order: usize) -> Self {
         Self {

@@ -8,7 +8,9 @@ use crate::elasticity::Material;
 /// What a displacement at a point is made of.
 #[derive(Clone, Debug)]
 pub struct Shape {
+    /// The element that holds the point.
     pub element: u32,
+    /// Its nodes.
     pub nodes: Vec<u32>,
     /// Value and gradient (1/m) of each node's shape function.
     pub values: Vec<(f64, DVec3)>,
@@ -22,6 +24,7 @@ pub trait Elements: Send + Sync {
     /// How many elements there are.
     fn count(&self) -> usize;
 
+    /// The nodes of an element, in its own order.
     fn nodes_of(&self, element: usize) -> &[u32];
 
     /// How far apart points may be for the smallest elements (m).

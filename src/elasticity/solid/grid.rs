@@ -55,6 +55,7 @@ impl Grid {
         steps.map(|p| p[1] - p[0]).fold(0.0, f64::max)
     }
 
+    /// The box of a cell.
     #[must_use]
     pub fn cell(&self, at: Place) -> Cell {
         self.span(at, at.map(|i| i + 1))

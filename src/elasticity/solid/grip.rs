@@ -40,6 +40,7 @@ const STIFF: f64 = 1e4;
 const RULE: [[f64; 3]; 3] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
 
 impl Grip {
+    /// Nothing held yet.
     #[must_use]
     pub fn new(elements: &dyn Elements) -> Self {
         Self {

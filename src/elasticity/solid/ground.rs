@@ -37,12 +37,15 @@ pub struct SolidGround {
     surface: Surface,
     /// Even triangles all over the part: what is pressed on and read.
     pub whole: Arc<TriMesh>,
+    /// Which side of which wall each facet of `whole` is on.
     pub walls: Walls,
     /// What a fingertip of this radius (m) reaches of it.
     pub reach: Reach,
+    /// Radius of that fingertip (m).
     pub fingertip: f64,
     /// Its faces: what faces inward, and where touches land.
     pub inside: Arc<TriMesh>,
+    /// Where touches land (m).
     pub outside: Arc<TriMesh>,
     /// What is held at the vertices of the inside.
     pub inside_held: Vec<DofSet>,

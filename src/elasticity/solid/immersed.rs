@@ -24,6 +24,7 @@ use crate::mesh::volume::VolumeMesh;
 pub struct Immersed {
     /// The part, cut along its support boxes.
     pub held: HeldPart,
+    /// What it is made of.
     pub material: Material,
     part: Arc<TriMesh>,
     supports: Vec<Support>,
@@ -68,6 +69,7 @@ impl Fineness {
 }
 
 impl Immersed {
+    /// Prepares a closed part to be cut by cells.
     #[must_use]
     pub fn new(part: &Arc<TriMesh>, material: Material, supports: &[Support]) -> Self {
         Self {

@@ -29,6 +29,7 @@ impl Lagrange {
         Self { points }
     }
 
+    /// Polynomial degree along each axis.
     #[must_use]
     pub fn order(&self) -> usize {
         self.points.len() - 1

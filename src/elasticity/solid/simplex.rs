@@ -41,6 +41,7 @@ impl Simplex {
         (order + 1) * (order + 2) * (order + 3) / 6
     }
 
+    /// Polynomial degree.
     #[must_use]
     pub fn order(&self) -> usize {
         self.order

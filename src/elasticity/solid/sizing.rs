@@ -30,6 +30,7 @@ const MOST_UNKNOWNS: f64 = 300_000.0;
 pub struct Shape {
     /// Of the surface (m²), and of what it encloses (m³).
     pub area: f64,
+    /// Of what the surface encloses (m³).
     pub volume: f64,
     /// Thickness that cells are sized by (m).
     pub wall: f64,

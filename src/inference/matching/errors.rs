@@ -26,6 +26,7 @@ pub struct Errors {
 }
 
 impl Errors {
+    /// The same noise (strain) on every channel, and nothing else.
     #[must_use]
     pub fn of_noise(noise: f64, channels: usize) -> Self {
         Self::of_noises(&vec![noise; channels])

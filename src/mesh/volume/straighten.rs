@@ -17,9 +17,11 @@ use crate::plain;
 pub struct Straightened {
     /// Tetrahedra that were turned inside out somewhere, before or when an edge of theirs was straightened.
     pub tetrahedra: usize,
+    /// Edges that were straightened.
     pub edges: usize,
     /// The farthest that a node was moved (m), and from where.
     pub largest: f64,
+    /// Where that node was (m).
     pub place: DVec3,
 }
 

@@ -22,7 +22,9 @@ pub struct Mistaken {
 /// Two places of which the first is taken for the second.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pair {
+    /// Where the touch is (mm).
     pub from_mm: DVec3,
+    /// Where it is taken to be.
     pub taken: Mistaken,
 }
 

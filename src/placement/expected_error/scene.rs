@@ -3,21 +3,22 @@
 
 mod around;
 mod merged;
+mod places;
 mod scatter;
 
 use glam::DVec3;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 pub use self::scatter::Scatter;
 
-use self::around::{Around, Neighbour, longest};
+use self::around::{Around, Neighbour};
 use self::merged::Merged;
-use crate::bounds::Bounds;
+pub(super) use self::places::{Level, Place};
+use self::places::{
+    REACH, draws, farthest_first, in_neighbourhoods, in_turns, levels, spacing, standing,
+};
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
-use crate::draw::normal;
 use crate::regression::folds::evenly;
 
 /// How many places and presses a choice looks at.
@@ -77,6 +78,7 @@ pub struct Knowledge<'a> {
     pub among: Option<&'a [usize]>,
     /// Absent where the signals are what they are.
     pub forces: Option<Forces<'a>>,
+    /// Of places, presses and noise.
     pub seed: u64,
 }
 
@@ -115,25 +117,6 @@ impl Reports {
     }
 }
 
-/// A place that a touch may come to.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    /// mm.
-    pub position: DVec3,
-    /// Standard deviation along the surface (mm) of where a touch is that this place stands for.
-    pub reach: f64,
-    /// How likely it is that a touch comes here.
-    pub mass: f64,
-}
-
-/// Presses of one force.
-pub(super) struct Level {
-    /// N; 1 where forces do not matter.
-    pub force: f64,
-    /// Of the presses.
-    pub presses: std::ops::Range<usize>,
-}
-
 /// Everything that a choice needs to know of the touches; the readings of all sites are in it.
 pub struct Scene {
     pub(super) places: Vec<Place>,
@@ -147,13 +130,8 @@ pub struct Scene {
     sites: usize,
 }
 
-/// Forces that presses have, evenly between the lightest and the hardest by their logarithm.
-const LEVELS: usize = 3;
 /// Gauges with noise of their own; many more are never chosen.
 const TURNS: usize = 64;
-/// What a place stands for reaches so far, over the distance of its neighbours: normal distributions around a lattice
-/// of places then add up to an even one, to a few thousandths.
-const REACH: f64 = 0.65;
 /// Noise is taken to be no less than this share of the signals' rms: no model is better than that.
 const LEAST_NOISE: f64 = 1e-3;
 
@@ -175,6 +153,7 @@ impl Scene {
         self.draws[turn % TURNS * self.presses.len() + press]
     }
 
+    /// How many sites there are.
     #[must_use]
     pub fn sites(&self) -> usize {
         self.sites
@@ -293,123 +272,6 @@ fn unit(x: &SignalMatrix, noise: f64) -> f64 {
     noise.max(LEAST_NOISE * rms).max(f64::MIN_POSITIVE)
 }
 
-/// Every third of some places, then the next of every three, and so on: however data are ordered, each force comes
-/// everywhere.
-fn in_turns(places: &[usize]) -> Vec<usize> {
-    let turn = move |first: usize| places.iter().skip(first).step_by(LEVELS).copied();
-    (0..LEVELS).flat_map(turn).collect()
-}
-
-/// A third of the presses for each force.
-fn levels(presses: usize, range: Option<[f64; 2]>) -> Vec<Level> {
-    let Some([lightest, hardest]) = range else {
-        return vec![Level {
-            force: 1.0,
-            presses: 0..presses,
-        }];
-    };
-    (0..LEVELS)
-        .map(|k| {
-            let share = (k as f64 + 0.5) / LEVELS as f64;
-            Level {
-                force: lightest * (hardest / lightest).powf(share),
-                presses: k * presses / LEVELS..(k + 1) * presses / LEVELS,
-            }
-        })
-        .collect()
-}
-
-/// Noise of unit deviation: turns of gauges × presses.
-fn draws(turns: usize, presses: usize, seed: u64) -> Vec<f32> {
-    const SEED: u64 = 0xd4a3;
-    (0..turns)
-        .flat_map(|turn| {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(SEED));
-            rng.set_stream(turn as u64);
-            (0..presses)
-                .map(move |_| normal(&mut rng) as f32)
-                .collect::<Vec<_>>()
-        })
-        .collect()
-}
-
-/// At most `count` of some places, each as far as possible from those before it; the first is the one farthest from
-/// the middle.
-fn farthest_first(positions: &[DVec3], among: &[usize], count: usize) -> Vec<usize> {
-    let middle = positions.iter().sum::<DVec3>() / positions.len().max(1) as f64;
-    let mut away: Vec<f64> = (among.iter())
-        .map(|&k| positions[k].distance_squared(middle))
-        .collect();
-    let count = count.min(among.len());
-    let mut order = Vec::with_capacity(count);
-    while order.len() < count {
-        let mut next = 0;
-        for k in 1..away.len() {
-            if away[k] > away[next] {
-                next = k;
-            }
-        }
-        let first = order.is_empty();
-        let centre = positions[among[next]];
-        for (a, &k) in away.iter_mut().zip(among) {
-            let here = positions[k].distance_squared(centre);
-            *a = if first { here } else { a.min(here) };
-        }
-        away[next] = f64::NEG_INFINITY;
-        order.push(among[next]);
-    }
-    order
-}
-
-/// Puts places into an order in which those that follow each other lie together: halves along the longest extent,
-/// and each of them again.
-fn in_neighbourhoods(places: &mut [usize], positions: &[DVec3]) {
-    if places.len() <= 2 {
-        return;
-    }
-    let axis = longest(Bounds::around(places.iter().map(|&k| positions[k])).size());
-    places.sort_by(|&a, &b| {
-        positions[a][axis]
-            .total_cmp(&positions[b][axis])
-            .then(a.cmp(&b))
-    });
-    let (low, high) = places.split_at_mut(places.len() / 2);
-    in_neighbourhoods(low, positions);
-    in_neighbourhoods(high, positions);
-}
-
-/// Some of the places with what each stands for: the places that are nearest to it.
-fn standing(positions: &[DVec3], of: &[usize]) -> Vec<Place> {
-    let nearest = |at: &DVec3| {
-        let away = |k: &usize| positions[of[*k]].distance_squared(*at);
-        (0..of.len()).min_by(|a, b| away(a).total_cmp(&away(b)))
-    };
-    let owners: Vec<Option<usize>> = positions.par_iter().map(nearest).collect();
-    let mut masses = vec![0.0; of.len()];
-    for owner in owners.into_iter().flatten() {
-        masses[owner] += 1.0 / positions.len() as f64;
-    }
-    of.par_iter()
-        .zip(masses)
-        .map(|(&at, mass)| Place {
-            position: positions[at],
-            reach: REACH * spacing(positions, of.iter().copied(), at),
-            mass,
-        })
-        .collect()
-}
-
-/// How far the nearest others are away (mm), of six the mean.
-fn spacing(positions: &[DVec3], of: impl Iterator<Item = usize>, at: usize) -> f64 {
-    const OTHERS: usize = 6;
-    let mut away: Vec<f64> = (of.filter(|&o| o != at))
-        .map(|o| positions[o].distance(positions[at]))
-        .collect();
-    away.sort_by(f64::total_cmp);
-    away.truncate(OTHERS);
-    away.iter().sum::<f64>() / away.len().max(1) as f64
-}
-
 struct Reader<'a> {
     x: &'a SignalMatrix,
     merged: &'a Merged,
@@ -492,6 +354,7 @@ pub struct Template {
 /// What one site reports of a template.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
+    /// How much.
     pub value: f64,
     /// A millimetre.
     pub slopes: [f64; 2],

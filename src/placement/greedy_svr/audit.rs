@@ -5,9 +5,12 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
+use super::race::Scored;
 use super::screen::LEVELS;
-use super::{Constraints, GreedySvr, PlacementError, Pool, Request, Scored, Search};
+use super::search::Search;
+use super::settings::GreedySvr;
 use crate::budget::Watch;
+use crate::placement::{Constraints, PlacementError, Pool, Request};
 
 /// How many others are compared at each step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +19,7 @@ pub struct Audit {
     pub top: usize,
     /// Drawn at random from the rest.
     pub random: usize,
+    /// Of that draw.
     pub seed: u64,
 }
 
@@ -28,7 +32,9 @@ pub struct Comparison {
     pub chosen_mm: f64,
     /// The least with one of the others instead, and which (by place in the pool).
     pub best_other_mm: f64,
+    /// Place in the pool of the best other site.
     pub best_other: usize,
+    /// Sites that were fitted exactly.
     pub compared: usize,
     /// Largest departure of the last screen from the exact fit, as a share.
     pub departure: f64,

@@ -2,10 +2,11 @@
 
 use super::exact::Judged;
 use super::screen::Base;
-use super::{PlacementError, Search, SensorSet};
+use super::search::Search;
 use crate::budget::Cancelled;
 use crate::placement::constraints::{Field, reached};
 use crate::placement::exchange::Criterion;
+use crate::placement::{PlacementError, SensorSet};
 use crate::regression::kernel;
 
 impl Criterion for Search<'_> {

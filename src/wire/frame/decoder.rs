@@ -10,14 +10,18 @@ const BEGUN_ANEW: u32 = 16;
 /// What the decoder makes of bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
+    /// A message, sound and of a known kind.
     Message {
+        /// Number of its frame, modulo 65536.
         sequence: u16,
         /// The board's clock; see [`crate::wire::Timeline`].
         time_us: u32,
+        /// What it says.
         message: Message,
     },
     /// So many frames are missing before the next one.
     Lost(u16),
+    /// Bytes that were no message.
     Refused(Refusal),
 }
 

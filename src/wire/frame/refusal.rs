@@ -15,12 +15,20 @@ pub enum Refusal {
     Version(u8),
     /// A HELLO with a value that nothing can be computed with.
     Value {
+        /// Which value.
         name: &'static str,
+        /// What it must be.
         rule: &'static str,
+        /// What it is.
         found: u32,
     },
     /// Data of another size (bytes) than the HELLO before them announces.
-    Size { found: usize, announced: usize },
+    Size {
+        /// Bytes that came.
+        found: usize,
+        /// Bytes that the HELLO announces.
+        announced: usize,
+    },
     /// Data before the board has said how many channels and bits they have.
     NoLayout,
     /// It was there already, or came after one that was sent later.

@@ -27,15 +27,19 @@ const PIECES: usize = 6;
 /// What the part's own tetrahedra will be raised to, and what that takes.
 #[derive(Clone, Copy, Debug)]
 pub struct Foreseen {
+    /// Order of the shape functions.
     pub order: usize,
     /// Mean distance between their corners (m).
     pub edge: f64,
+    /// Degrees of freedom at that order.
     pub unknowns: f64,
     /// Entries of the last factor, and memory that it and its matrix take (bytes).
     pub entries: f64,
+    /// Memory of factor and matrix (bytes).
     pub bytes: f64,
     /// Entries of the elements' matrices and multiplications of the factorizations, of all orders on the way.
     pub assembled: f64,
+    /// Multiplications of all factorizations on the way.
     pub multiplications: f64,
     /// What is left at that order.
     pub estimate: Discretization,

@@ -12,12 +12,17 @@ use crate::elasticity::solid::immersed::Fineness;
 
 /// The cells, with the model built on them.
 pub struct SolidGraded {
+    /// Size or order of the elements.
     pub fineness: Fineness,
+    /// The factored model.
     pub model: SolidModel,
+    /// How far it is from converged.
     pub estimate: Discretization,
     /// The worst balance over the sample of the loads.
     pub balance: LoadCheck,
+    /// Assemblies and factorizations on the way here.
     pub models: u64,
+    /// Loads solved on the way here.
     pub solves: u64,
 }
 

@@ -1,0 +1,145 @@
+//! What the pipeline is given, and what it answers.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::inference::{Chain, Contact, Errors, Matching, ResponseMap};
+use crate::uncertainty::{UNESTIMATED, Uncertainty};
+
+/// Which estimator is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimator {
+    /// Model matching.
+    #[default]
+    Matching,
+    /// Regression on the readings over their norm.
+    Normalized,
+    /// Regression on the readings as they are: as in the paper.
+    Raw,
+}
+
+impl Estimator {
+    /// All, the default first.
+    pub const ALL: [Self; 3] = [Self::Matching, Self::Normalized, Self::Raw];
+
+    /// For people.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Matching => "Model matching",
+            Self::Normalized => "SVR on the normalized signal",
+            Self::Raw => "SVR on the raw signal (paper)",
+        }
+    }
+}
+
+/// What the pipeline must know beside the samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Gauge factor and active arms; what the board says of itself takes the place of the rest.
+    pub chain: Chain,
+    /// The board's channel of each gauge.
+    pub channels: Vec<usize>,
+    /// What model and gauges are off by, over the reading, where that is more than the model says of itself; see
+    /// [`Errors::relative`].
+    pub relative: f64,
+    /// Noise of a reading below which it is never taken to be (strain).
+    pub least_noise: f64,
+    /// The largest force that anybody presses with (N).
+    pub most_force: f64,
+    /// Seconds in which the rest follows what channels read without a touch; nothing: never.
+    pub drift_s: Option<f64>,
+    /// Seconds of rest that a tare takes.
+    pub tare_s: f64,
+}
+
+impl Settings {
+    /// For so many gauges, the first channel for the first of them.
+    #[must_use]
+    pub fn of(gauges: usize) -> Self {
+        Self {
+            chain: Chain::default(),
+            channels: (0..gauges).collect(),
+            relative: UNESTIMATED,
+            least_noise: 0.3e-6,
+            most_force: 60.0,
+            drift_s: Some(3.0),
+            tare_s: 0.5,
+        }
+    }
+}
+
+/// Where and how hard, by an estimator that says no more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guess {
+    /// m.
+    pub position: DVec3,
+    /// How hard (N).
+    pub force: f64,
+}
+
+/// What one sample said.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Update {
+    /// The board's clock (µs).
+    pub time_us: u64,
+    /// Strain of each gauge since the tare; nothing before it.
+    pub strain: Option<Vec<f64>>,
+    /// By matching, while there is a touch.
+    pub contact: Option<Contact>,
+    /// By the trained estimators, where they are trained and there is a touch: normalized, raw.
+    pub guesses: [Option<Guess>; 2],
+    /// Gauges that are trusted.
+    pub good: usize,
+}
+
+impl Update {
+    /// Where and how hard, by one of the estimators.
+    #[must_use]
+    pub fn by(&self, estimator: Estimator) -> Option<Guess> {
+        match estimator {
+            Estimator::Matching => self.contact.map(|c| Guess {
+                position: c.position,
+                force: c.force,
+            }),
+            Estimator::Normalized => self.guesses[0],
+            Estimator::Raw => self.guesses[1],
+        }
+    }
+}
+
+/// What gauges read of a newton anywhere, and how far off that may be.
+#[derive(Clone)]
+pub struct GaugeModel {
+    /// Readings as the gauges are thought to be glued.
+    pub map: Arc<ResponseMap>,
+    /// See [`Errors::gluing_deviation`].
+    pub gluing_deviation: Option<Arc<ResponseMap>>,
+    /// What else is known to be off. Noise and resolution are read off the signals.
+    pub off: Uncertainty,
+}
+
+impl From<Arc<ResponseMap>> for GaugeModel {
+    /// Gauges just as the map says.
+    fn from(map: Arc<ResponseMap>) -> Self {
+        Self {
+            map,
+            gluing_deviation: None,
+            off: Uncertainty::NONE,
+        }
+    }
+}
+
+impl GaugeModel {
+    /// The estimator, with this noise of each channel (strain).
+    pub(super) fn matching(self, noise: Vec<f64>, settings: &Settings) -> Matching {
+        let channels = self.map.channels();
+        let errors = Errors {
+            noise,
+            relative: settings.relative.max(self.off.elements),
+            ..Errors::known(&self.off, channels, self.gluing_deviation)
+        };
+        Matching::new(self.map, errors, settings.most_force)
+    }
+}
