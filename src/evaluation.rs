@@ -354,10 +354,6 @@ impl Evaluation {
     }
 }
 
-pub(crate) fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
 impl Evaluation {
     /// Of what was found by matching: rows and errors of every set are those at the force in the middle.
     #[must_use]

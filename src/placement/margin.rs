@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_of_equal_ones_is_best_and_has_no_lead() {
+    fn the_first_of_equal_ones_is_best_and_has_no_margin() {
         let mut best = Best::default();
         assert_eq!(best.margin(), None);
         for (place, worth) in [(3, 1.0), (5, 2.0), (7, 2.0), (9, 1.5)] {
@@ -107,5 +107,20 @@ mod tests {
         assert_eq!((best.place(), best.margin()), (Some(5), Some(0.0)));
         best.offer(11, 4.0);
         assert_eq!((best.place(), best.margin()), (Some(11), Some(0.5)));
+    }
+
+    #[test]
+    fn files_keep_their_name_for_it() {
+        let set = SensorSet {
+            sites: vec![4],
+            criterion: None,
+            criterion_mm: None,
+            gap: None,
+            margin: Some(0.25),
+            certificate: None,
+        };
+        let written = serde_json::to_value(&set).unwrap();
+        assert_eq!(written["lead"], 0.25);
+        assert!(written.get("margin").is_none());
     }
 }

@@ -22,13 +22,12 @@ use crate::draw::normal;
 use crate::elasticity::sensitivity::Gauge;
 use crate::elasticity::{Model, Touch};
 use crate::evaluation::failures::{Draw, FailureRow, MOST_FAILED};
-use crate::evaluation::{
-    Candidate, Evaluation, Failures, Forces, Judging, Matched, is_largest, mean,
-};
+use crate::evaluation::{Candidate, Evaluation, Failures, Forces, Judging, Matched, is_largest};
 use crate::inference::{AsDrawn, Errors, Known, Matching, ResponseMap, calibrate};
 use crate::mesh::TriMesh;
 use crate::placement::expected_error::BLIND;
 use crate::regression::folds::evenly;
+use crate::statistics::mean;
 use crate::uncertainty::{Gluing, Uncertainty};
 
 /// Sites whose readings are known everywhere at the same time: those of more sets would fill the memory.

@@ -118,7 +118,7 @@ impl Seen {
 
     /// The variance of a reading at each place; and its mean over that of the squares.
     fn variances(&self, near: &[Vec<Neighbour>]) -> (Vec<f64>, f64) {
-        let (square, left) = (mean(&self.squares), mean(&self.left));
+        let (square, left) = (mean_or_zero(&self.squares), mean_or_zero(&self.left));
         let [off, free] = sums(&self.repeats);
         // Of a single press; what neighbours leave is the first guess at it.
         let press = (off + PRIOR_REPEATS * left) / (free + PRIOR_REPEATS);
@@ -143,7 +143,7 @@ impl Seen {
         };
         let variances: Vec<f64> = (0..near.len()).map(at).collect();
         let share = if square > 0.0 {
-            mean(&variances) / square
+            mean_or_zero(&variances) / square
         } else {
             0.0
         };
@@ -165,7 +165,8 @@ fn left(value: f64, near: &[Neighbour], values: &[f64]) -> f64 {
     (value - guess).powi(2) / (1.0 + weights)
 }
 
-fn mean(values: &[f64]) -> f64 {
+/// The mean; zero of none.
+fn mean_or_zero(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
