@@ -12,6 +12,10 @@ use crate::inference::region::Region;
 /// Log-likelihoods so far below the best count for nothing.
 const NOTHING: f64 = 14.0;
 
+/// Of more templates than these that a reading leaves possible, an even share stands for all: where thousands are as
+/// likely, their mean is known to a share of a template.
+const LOOKED_AT: usize = 4096;
+
 impl Matching {
     /// How much better than nothing a touch at each template explains the reading.
     pub(super) fn score(&mut self, observed: &Observation) {
@@ -72,13 +76,13 @@ impl Matching {
         let highest = self.highest.iter().fold(0.0_f32, |m, s| m.max(*s));
         let highest = f64::from(highest).max(0.5 * observed.squares - best.cost);
         let floor = (highest - NOTHING - 1e-5 * highest) as f32;
-        let mut places = Vec::new();
+        let possible: Vec<usize> = (0..map.places.len())
+            .filter(|&node| self.scores[node] >= floor)
+            .collect();
+        let share = possible.len().div_ceil(LOOKED_AT).max(1);
+        let mut places = Vec::with_capacity(possible.len() / share + 1);
         let (mut total, mut centre, mut force, mut squares) = (0.0, DVec3::ZERO, 0.0, 0.0);
-        for (node, _) in self.scores[..map.places.len()]
-            .iter()
-            .enumerate()
-            .filter(|(_, s)| **s >= floor)
-        {
+        for &node in possible.iter().step_by(share) {
             let (mean, variance, log_likelihood) = self.force_at(observed, node);
             let weight = map.areas[node] * (log_likelihood - highest).exp();
             places.push((map.places[node], weight));
@@ -124,6 +128,8 @@ mod tests {
     use super::super::Errors;
     use super::super::tests::{CHANNELS, maps};
     use super::*;
+    use crate::inference::ResponseMap;
+    use crate::mesh::TriMesh;
 
     /// What a touch at a template explains, in double precision and one by one.
     fn explained(matching: &Matching, observed: &Observation, node: usize) -> f64 {
@@ -139,6 +145,33 @@ mod tests {
         let (s, d) = measured.products(g);
         let left = measured.squares - force * (2.0 * s - force * d);
         0.5 * (observed.squares - left) - weighed.log
+    }
+
+    #[test]
+    fn where_nothing_is_known_a_share_of_the_templates_says_what_all_say() {
+        const SIDE: u32 = 150;
+        let points: Vec<DVec3> = (0..SIDE * SIDE)
+            .map(|k| DVec3::new(f64::from(k % SIDE), f64::from(k / SIDE), 0.0) * 1e-3)
+            .collect();
+        let squares = (0..SIDE * (SIDE - 1)).filter(|k| (k + 1) % SIDE != 0);
+        let triangles: Vec<[u32; 3]> = squares
+            .flat_map(|k| [[k, k + 1, k + SIDE], [k + 1, k + SIDE + 1, k + SIDE]])
+            .collect();
+        let (mesh, _) = TriMesh::new(&points, &triangles, 0).unwrap();
+        let mesh = Arc::new(mesh);
+        // By Euler's formula as many edges as this.
+        let nodes = points.len() + (points.len() + triangles.len() - 1);
+        let map = ResponseMap::of(Arc::clone(&mesh), CHANNELS, vec![0.0; nodes * CHANNELS]);
+        let errors = Errors::of_noise(1e-6, CHANNELS);
+        let mut matching = Matching::new(Arc::new(map), errors, 50.0);
+        let observed = Observation::new(&[0.0; CHANNELS], &matching.errors, &matching.used);
+        matching.score(&observed);
+        let start = mesh.index().nearest(points[0]).0;
+        let best = matching.follow(&observed, start, None);
+        let said = matching.mean_of_templates(&observed, &best);
+        let middle = DVec3::new(74.5e-3, 74.5e-3, 0.0);
+        assert!(points.len() > 4 * LOOKED_AT);
+        assert!(said.position.distance(middle) < 1e-3, "{}", said.position);
     }
 
     #[test]

@@ -93,7 +93,7 @@ fn selection(ui: &mut Ui, project: &mut Project) {
     losses(ui, project);
     let name = ui.label("Compare selectors");
     ui.checkbox(&mut project.selection.compare, "")
-        .on_hover_text("Let the other selectors choose too: four curves of errors instead of one, for the time that they take")
+        .on_hover_text("Let the other selectors choose too: a curve of errors for each of them, for the time that they take")
         .labelled_by(name.id)
         .accessible_name("Compare selectors");
     ui.end_row();
