@@ -1,5 +1,7 @@
 //! A touch: a force pressed onto the surface by a tip that spreads it smoothly.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use crate::mesh::{SurfacePoint, TriMesh};
@@ -57,19 +59,16 @@ pub fn pressure(mesh: &TriMesh, touch: &Touch, apart: f64) -> Vec<(SurfacePoint,
     let grain = apart.min(touch.tip_radius / PIECES_PER_RADIUS);
     let index = mesh.index();
     let (at, _) = index.nearest(touch.position);
-    let centre = mesh.point(at);
+    let tip = Tip {
+        centre: mesh.point(at),
+        radius: touch.tip_radius,
+        grain,
+    };
     let mut shares: Vec<(SurfacePoint, f64)> = Vec::new();
-    for t in index.triangles_near(centre, touch.tip_radius) {
+    for t in index.triangles_near(tip.centre, tip.radius) {
         let seen = touch.tip_radius > FINEST * farthest(&mesh.corners(t));
         if seen && mesh.facet_normal(t).dot(touch.normal) > SAME_WALL {
-            integrate(
-                mesh,
-                t,
-                &WHOLE,
-                (centre, touch.tip_radius, grain),
-                AT_ONCE,
-                &mut shares,
-            );
+            integrate(mesh, t, &WHOLE, &tip, AT_ONCE, &mut shares);
         }
     }
     let total: f64 = shares.iter().map(|s| s.1).sum();
@@ -91,13 +90,51 @@ const WHOLE: Piece = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 const AT_ONCE: f64 = 64.0;
 const OF_A_QUARTER: f64 = 8.0;
 
+/// A tip where it stands (m).
+struct Tip {
+    centre: DVec3,
+    radius: f64,
+    /// How far from each other its points may be.
+    grain: f64,
+}
+
+impl Tip {
+    /// Which of the pieces of a row the tip may reach: all that it does, and few others. The row goes from `start` by
+    /// `step` a piece, and is so `wide` (m).
+    fn over_row(&self, start: DVec3, step: DVec3, wide: f64, count: usize) -> Range<usize> {
+        let (off, reach) = (self.centre - start, self.radius + wide);
+        let nearest = off.dot(step) / step.length_squared();
+        if !nearest.is_finite() {
+            return 0..count;
+        }
+        let aside = off.distance(step * nearest);
+        if aside > reach {
+            return 0..0;
+        }
+        let half = (reach * reach - aside * aside).sqrt() / step.length();
+        // A piece more on either side, for what rounding takes. Below nothing, `as` is nothing.
+        let (first, end) = (nearest - half - 1.0, nearest + half + 2.0);
+        (first as usize).min(count)..(end as usize).min(count)
+    }
+
+    /// The pieces that it may reach of a triangle split into `n` a side.
+    fn over(&self, ends: &[DVec3; 3], n: usize) -> impl Iterator<Item = Piece> {
+        let [across, along] = [1, 2].map(|k| (ends[k] - ends[0]) / n as f64);
+        (0..n).flat_map(move |i| {
+            let start = ends[0] + across * i as f64;
+            let reached = self.over_row(start, along, across.length(), n - i);
+            row(n, i, reached)
+        })
+    }
+}
+
 /// Adds the pressure on a piece of a facet, split into equal pieces with the three-point rule on each: no more of them a
 /// side than are taken at once.
 fn integrate(
     mesh: &TriMesh,
     t: u32,
     piece: &Piece,
-    (centre, radius, grain): (DVec3, f64, f64),
+    tip: &Tip,
     at_once: f64,
     into: &mut Vec<(SurfacePoint, f64)>,
 ) {
@@ -107,19 +144,12 @@ fn integrate(
     let longest = (0..3)
         .map(|i| ends[i].distance(ends[(i + 1) % 3]))
         .fold(0.0, f64::max);
-    let n = (longest / grain).ceil().max(1.0);
+    let n = (longest / tip.grain).ceil().max(1.0);
     if n > at_once {
-        if ends[0].distance(centre) < radius + longest {
+        if ends[0].distance(tip.centre) < tip.radius + longest {
             for quarter in pieces(2) {
                 let quarter = quarter.each_ref().map(|zeta| within(piece, zeta));
-                integrate(
-                    mesh,
-                    t,
-                    &quarter,
-                    (centre, radius, grain),
-                    OF_A_QUARTER,
-                    into,
-                );
+                integrate(mesh, t, &quarter, tip, OF_A_QUARTER, into);
             }
         }
         return;
@@ -127,11 +157,11 @@ fn integrate(
     let n = n as usize;
     let area = (ends[1] - ends[0]).cross(ends[2] - ends[0]).length() / 2.0;
     let share = area / (n * n) as f64 / 3.0;
-    for small in pieces(n) {
+    for small in tip.over(&ends, n) {
         for k in 0..3 {
             let middle = std::array::from_fn(|i| f64::midpoint(small[k][i], small[(k + 1) % 3][i]));
             let zeta = within(piece, &middle);
-            let r2 = point(&zeta).distance_squared(centre) / radius.powi(2);
+            let r2 = point(&zeta).distance_squared(tip.centre) / tip.radius.powi(2);
             if r2 < 1.0 {
                 let at = SurfacePoint {
                     triangle: t,
@@ -149,17 +179,20 @@ fn within(piece: &Piece, zeta: &[f64; 3]) -> [f64; 3] {
 }
 
 /// The n² equal triangles of a split facet, by the barycentric coordinates of their corners.
-pub(super) fn pieces(n: usize) -> impl Iterator<Item = [[f64; 3]; 3]> {
+pub(super) fn pieces(n: usize) -> impl Iterator<Item = Piece> {
+    (0..n).flat_map(move |i| row(n, i, 0..n - i))
+}
+
+/// Those of them in one row, at some places of it.
+fn row(n: usize, i: usize, places: Range<usize>) -> impl Iterator<Item = Piece> {
     let at = move |i: usize, j: usize| {
         let (u, v) = (i as f64 / n as f64, j as f64 / n as f64);
         [1.0 - u - v, u, v]
     };
-    (0..n).flat_map(move |i| {
-        (0..n - i).flat_map(move |j| {
-            let up = [at(i, j), at(i + 1, j), at(i, j + 1)];
-            let down = [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-            std::iter::once(up).chain((i + j + 1 < n).then_some(down))
-        })
+    places.flat_map(move |j| {
+        let up = [at(i, j), at(i + 1, j), at(i, j + 1)];
+        let down = [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        std::iter::once(up).chain((i + j + 1 < n).then_some(down))
     })
 }
 
@@ -180,6 +213,36 @@ pub(super) fn merge(mut shares: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
 mod tests {
     use super::*;
     use crate::limb::LimbSpec;
+
+    /// Facets of all shapes, a tip at their edge or in the middle: what it reaches is all there, in its order, and what
+    /// is looked at for that follows the tip and not the facet.
+    #[test]
+    fn what_a_tip_reaches_of_a_facet_is_found_without_looking_at_all_of_it() {
+        const A_SIDE: usize = 64;
+        let tall = |x: f64, y: f64| DVec3::new(x, y, 0.01 * x);
+        for third in [(0.0, 64.0), (60.0, 0.5), (32.0, 1e-9), (-500.0, 20.0)] {
+            let mut ends = [tall(0.0, 0.0), tall(64.0, 0.0), tall(third.0, third.1)];
+            for turn in 0..9 {
+                ends.rotate_left(1);
+                let share = f64::from(turn) / 8.0;
+                let tip = Tip {
+                    centre: ends[0].lerp(ends[1], share) * 0.9 + ends[2] * 0.1,
+                    radius: 4.0,
+                    grain: 1.0,
+                };
+                let point = |zeta: &[f64; 3]| -> DVec3 { (0..3).map(|i| ends[i] * zeta[i]).sum() };
+                let reached = |piece: &Piece| {
+                    (0..3).any(|k| point(&piece[k]).distance(tip.centre) < tip.radius)
+                };
+                let looked_at: Vec<Piece> = tip.over(&ends, A_SIDE).collect();
+                let found: Vec<Piece> = looked_at.iter().copied().filter(reached).collect();
+                let all: Vec<Piece> = pieces(A_SIDE).filter(reached).collect();
+                assert_eq!(found, all, "{third:?} {turn}");
+                let few = 3 * all.len() + 6 * A_SIDE;
+                assert!(looked_at.len() < few, "{} {few}", looked_at.len());
+            }
+        }
+    }
 
     #[test]
     fn a_touch_keeps_its_force_and_its_place() {

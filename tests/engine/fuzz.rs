@@ -119,3 +119,58 @@ fn words_for_people_are_told_from_others() {
         assert!(property::message(bad).is_err(), "{bad}");
     }
 }
+
+/// The targets for libFuzzer are a workspace of their own, which no build of the program looks at: what is forgotten
+/// there is found here.
+mod guided {
+    use std::collections::BTreeSet;
+
+    use toml::Table;
+
+    use super::Reader;
+
+    const PROGRAM: &str = include_str!("../../Cargo.toml");
+    const TARGETS: &str = include_str!("../../fuzz/Cargo.toml");
+    const LOCK: &str = include_str!("../../fuzz/Cargo.lock");
+
+    fn parsed(text: &str) -> Table {
+        text.parse().unwrap()
+    }
+
+    /// What the program needs on every system and without the window.
+    fn needed() -> BTreeSet<String> {
+        let program = parsed(PROGRAM);
+        let always = |(_, wanted): &(&String, &toml::Value)| {
+            wanted.get("optional").and_then(toml::Value::as_bool) != Some(true)
+        };
+        let all = program["dependencies"].as_table().unwrap().iter();
+        all.filter(always).map(|(name, _)| name.clone()).collect()
+    }
+
+    /// What the lock of the targets knows that the program needs: names, without versions.
+    fn locked() -> BTreeSet<String> {
+        let lock = parsed(LOCK);
+        let packages = lock["package"].as_array().unwrap();
+        let program = packages.iter().find(|p| p["name"].as_str() == Some("hapdef"));
+        let needs = program.unwrap()["dependencies"].as_array().unwrap();
+        let name = |need: &toml::Value| need.as_str()?.split(' ').next().map(str::to_owned);
+        needs.iter().filter_map(name).collect()
+    }
+
+    #[test]
+    fn the_lock_of_the_targets_knows_all_that_the_program_needs() {
+        let missing: Vec<String> = needed().difference(&locked()).cloned().collect();
+        assert!(
+            missing.is_empty(),
+            "{missing:?}: run `cargo metadata --manifest-path fuzz/Cargo.toml`"
+        );
+    }
+
+    #[test]
+    fn every_reader_has_its_target() {
+        let targets = parsed(TARGETS);
+        let bins = targets["bin"].as_array().unwrap();
+        let found: BTreeSet<&str> = bins.iter().filter_map(|b| b["name"].as_str()).collect();
+        assert_eq!(found, Reader::ALL.map(Reader::name).into());
+    }
+}
