@@ -1,7 +1,6 @@
 //! The judge: a finer model, touches of its own, and gauges as a workshop glues them.
 
 mod matched;
-mod presses;
 
 use rayon::prelude::*;
 
@@ -9,6 +8,7 @@ use super::as_built::{gains, sites_as_built};
 use super::drawn::{gauge_at, proposed};
 use super::known;
 use super::layout::touches_on;
+use super::presses::{self, Press, Pressed};
 use super::reference::{Reference, grid, regions};
 use super::{DesignError, Inputs, NOISE_SEED, PRESS_SEED, Reduced, Simulated, TEST_SEED};
 use crate::budget::{Budget, Cancelled, Watch, Work};
@@ -22,7 +22,6 @@ use crate::placement::Selection;
 use crate::regression::folds::evenly;
 
 pub(super) use self::matched::ByMatching;
-pub use self::presses::{Press, Pressed};
 pub use crate::placement::expected_error::BLIND;
 
 /// Measures sites on the reference model: a mesh of half the element size, test touches drawn uniformly at random

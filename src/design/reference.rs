@@ -1,6 +1,6 @@
 //! The judge's model, and what gauges read on it.
 
-use super::judge::Pressed;
+use super::presses::Pressed;
 use super::{Inputs, NOISE_SEED};
 use crate::budget::Work;
 use crate::dataset::{SignalMatrix, Site};
@@ -68,7 +68,18 @@ pub(super) fn noisy<'a>(
     draw: u64,
     streams: &[u64],
 ) -> std::borrow::Cow<'a, SignalMatrix> {
-    let noise = inputs.project.gauge.noise_microstrain * 1e-6;
+    noisy_means(inputs, x, 1.0, draw, streams)
+}
+
+/// As [`noisy`], where every signal is the mean of so many samples.
+pub(super) fn noisy_means<'a>(
+    inputs: &Inputs,
+    x: &'a SignalMatrix,
+    samples: f64,
+    draw: u64,
+    streams: &[u64],
+) -> std::borrow::Cow<'a, SignalMatrix> {
+    let noise = inputs.project.gauge.noise_microstrain * 1e-6 / samples.sqrt();
     let seed = inputs.project.budget.seed.wrapping_add(NOISE_SEED);
     evaluation::add_noise_by(x, noise, seed.wrapping_add(draw), &|row| streams[row])
 }

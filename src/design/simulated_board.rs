@@ -1,10 +1,17 @@
 //! The simulated board of a project: what it is like, where it is touched, and the truth that it reads.
 
-use super::{DesignError, Inputs, Sensing, Workshop};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::presses::{self, Press};
+use super::{DesignError, Inputs, PRESS_SEED, Sensing, Workshop};
 use crate::board::{Faults, Options, Script, SimulatedBoard, fitting_gain};
 use crate::budget::Watch;
+use crate::draw::normal;
 use crate::elasticity::Touch;
-use crate::inference::Chain;
+use crate::elasticity::sensitivity::Sensitivity;
+use crate::inference::calibration::noise_of_mean;
+use crate::inference::{Chain, Known};
 
 /// What a simulated board of a project is like where nothing else is asked for.
 #[must_use]
@@ -57,4 +64,30 @@ pub fn simulated(
     Ok(SimulatedBoard::new(
         reference, gains, script, options, faults,
     ))
+}
+
+/// The known presses that are proposed, made by hand on such a board, as they are read: what the judge foresees of a
+/// calibration. `truth` and `gains` are those of its gauges, and the seed is of the hand and the noise.
+#[must_use]
+pub fn pressed_by_hand(
+    inputs: &Inputs,
+    sensing: &Sensing,
+    (truth, gains): (&Sensitivity, &[f64]),
+    seed: u64,
+) -> Vec<Known> {
+    let surface = &sensing.drawn.map.mesh;
+    let (asked, off) = (sensing.proposed.clone(), &sensing.off);
+    let noise = noise_of_mean(&vec![off.of_channel(); gains.len()]);
+    let seed = seed.wrapping_add(PRESS_SEED);
+    let presses = presses::by_hand(surface, asked, &inputs.project.pressing(), seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(1));
+    let mut known = |press: Press| {
+        let read = truth.read(&press.made).into_iter().zip(gains).zip(&noise);
+        Known {
+            at: surface.index().nearest(press.asked.position).0,
+            force: press.asked.force,
+            reading: (read.map(|((x, gain), noise)| x * gain + noise * normal(&mut rng))).collect(),
+        }
+    };
+    presses.into_iter().map(&mut known).collect()
 }

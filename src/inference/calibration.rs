@@ -42,7 +42,7 @@ pub struct Known {
     pub at: SurfacePoint,
     /// N.
     pub force: f64,
-    /// Strain, a channel each.
+    /// Strain, a channel each: the mean of [`SAMPLES`].
     pub reading: Vec<f64>,
 }
 
@@ -62,6 +62,16 @@ pub struct Calibration {
     pub touches: usize,
 }
 
+/// Samples that the reading of a known touch is the mean of: whoever takes one, and whoever foresees what known touches
+/// will show, takes as many.
+pub const SAMPLES: usize = 9;
+
+/// Noise of such a mean (strain), by that of a sample, channel by channel.
+#[must_use]
+pub fn noise_of_mean(noise: &[f64]) -> Vec<f64> {
+    noise.iter().map(|n| n / (SAMPLES as f64).sqrt()).collect()
+}
+
 /// Model and gauges are never trusted better than this.
 const LEAST: f64 = 0.002;
 /// Times that the slopes are taken at what was found.
@@ -69,7 +79,7 @@ const TURNS: usize = 3;
 /// Readings that the estimate of the elements' error counts for.
 const BEFORE: f64 = 10.0;
 
-/// Fits all channels to known touches with this noise (strain, a channel each); `off` is what is known of everything
+/// Fits all channels to known touches with this noise of a sample (strain, a channel each); `off` is what is known of everything
 /// else that is off. Touches that read no numbers are left out.
 #[must_use]
 pub fn calibrate(
@@ -78,6 +88,7 @@ pub fn calibrate(
     noise: &[f64],
     off: &Uncertainty,
 ) -> Calibration {
+    let noise = &noise_of_mean(noise);
     let read = |k: &&Known| k.reading.iter().all(|x| x.is_finite());
     let known: Vec<&Known> = known.iter().filter(read).collect();
     let channels = noise.len();

@@ -7,9 +7,9 @@ use std::process::Command;
 
 use glam::DVec3;
 use hapdef::budget::{Quality, unwatched};
+use hapdef::design::simulated_board::pressed_by_hand;
 use hapdef::design::{self, Inputs, Sensing};
-use hapdef::elasticity::Touch;
-use hapdef::inference::{Known, calibrate};
+use hapdef::inference::calibrate;
 use hapdef::io::project_file;
 use serde_json::Value;
 
@@ -205,48 +205,16 @@ impl Designed {
 
     /// The project after known presses, made by hand, on the gauges of a workshop.
     fn calibrated(&self, seed: u64) -> PathBuf {
-        let (drawn, gluing) = (&self.sensing.drawn, self.inputs.project.gluing());
-        let (truth, gains) = self.sensing.reference(&gluing, seed, &unwatched).unwrap();
-        let known: Vec<Known> = (self.sensing.proposed.iter().enumerate())
-            .map(|(k, asked)| {
-                let read = truth.read(&self.by_hand(asked, k));
-                Known {
-                    at: drawn.map.mesh.index().nearest(asked.position).0,
-                    force: asked.force,
-                    reading: read.iter().zip(&gains).map(|(x, gain)| x * gain).collect(),
-                }
-            })
-            .collect();
+        let (sensing, gluing) = (&self.sensing, self.inputs.project.gluing());
+        let (truth, gains) = sensing.reference(&gluing, seed, &unwatched).unwrap();
+        let known = pressed_by_hand(&self.inputs, sensing, (&truth, &gains), seed);
         let mut project = self.inputs.project.clone();
-        let noise = project.gauge.noise_microstrain * 1e-6;
-        let noise = vec![noise; gains.len()];
-        let off = &self.sensing.off;
-        project.live.take(&calibrate(drawn, &known, &noise, off));
+        let noise = vec![sensing.off.of_channel(); gains.len()];
+        let found = calibrate(&sensing.drawn, &known, &noise, &sensing.off);
+        project.live.take(&found);
         let path = self.beside(&format!("calibrated-{seed}.hapdef.toml"));
         project_file::save(&path, &project, None, &self.inputs.masks).unwrap();
         path
-    }
-
-    /// A press that was asked for, as a hand makes it: beside its place in any direction, and too hard or too soft.
-    fn by_hand(&self, asked: &Touch, k: usize) -> Touch {
-        let (map, hand) = (&self.sensing.drawn.map, self.inputs.project.pressing());
-        // The golden angle: no two alike, and all round.
-        let (sin, cos) = (2.4 * k as f64).sin_cos();
-        let along = asked.normal.any_orthonormal_vector();
-        let across = asked.normal.cross(along);
-        let beside = asked.position + (along * cos + across * sin) * hand.place;
-        let at = map.mesh.index().nearest(beside).0;
-        let off = if k.is_multiple_of(2) {
-            hand.force
-        } else {
-            -hand.force
-        };
-        Touch {
-            position: map.mesh.point(at),
-            normal: map.mesh.normal(at),
-            force: asked.force * (1.0 + off),
-            ..*asked
-        }
     }
 
     /// The mean error (mm) of what is found in a recording with a project, at each force.
@@ -332,6 +300,7 @@ fn what_is_promised_is_what_is_achieved() {
         let recording = designed.recording("all", seed, &script);
         built.push(Designed::achieved(&recording, &designed.project()));
         calibrated.push(Designed::achieved(&recording, &designed.calibrated(seed)));
+        println!("workshop {seed}: {:.3?} built, {:.3?} calibrated", built.last(), calibrated.last());
     }
     let mut broken = Vec::new();
     for (which, achieved) in [

@@ -16,13 +16,14 @@ use crate::budget::{Budget, Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::design::drawn::{MOVES, POINT, drawn_on, gauge_at, map_size};
 use crate::design::known;
-use crate::design::reference::{Reference, noisy};
+use crate::design::reference::{Reference, noisy, noisy_means};
 use crate::design::{DesignError, Ground, Inputs, Simulated};
 use crate::draw::normal;
 use crate::elasticity::sensitivity::Gauge;
 use crate::elasticity::{Model, Touch};
 use crate::evaluation::failures::{Draw, FailureRow, MOST_FAILED};
 use crate::evaluation::{Candidate, Evaluation, Failures, Forces, Judging, Matched, is_largest};
+use crate::inference::calibration::SAMPLES;
 use crate::inference::{AsDrawn, Errors, Known, Matching, ResponseMap, calibrate};
 use crate::mesh::TriMesh;
 use crate::placement::expected_error::BLIND;
@@ -284,7 +285,14 @@ impl<'a> Set<'a> {
             return Vec::new();
         };
         let drawn = everywhere.drawn.mixed(&self.channels);
-        let x = noisy(trial.inputs, &pressed.x, PRESS_DRAW, trial.streams);
+        let samples = SAMPLES as f64;
+        let x = noisy_means(
+            trial.inputs,
+            &pressed.x,
+            samples,
+            PRESS_DRAW,
+            trial.streams,
+        );
         let x = trial.drifted(x.into_owned(), PRESS_DRAW);
         let x = x.select_rows(&self.candidate.rows);
         let known = |k: usize| {

@@ -70,7 +70,8 @@ fn press(real: &ResponseMap, pressing: &Pressing, rng: &mut ChaCha8Rng) -> Known
     let moved = DVec3::X * (beside * normal(rng)) + DVec3::Y * (beside * normal(rng));
     let there = real.mesh.index().nearest(real.mesh.point(at) + moved).0;
     let force = FORCE * (1.0 + pressing.force * normal(rng));
-    let read = |g: f64| force * g + NOISE[0] * normal(rng);
+    let noise = noise_of_mean(&NOISE)[0];
+    let read = |g: f64| force * g + noise * normal(rng);
     Known {
         at,
         force: FORCE,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::design::Sensing;
+use crate::inference::calibration::SAMPLES;
 use crate::inference::{Calibration, Known, calibrate};
 use crate::job::Reporter;
 use crate::session::jobs::Task;
@@ -14,8 +15,8 @@ use crate::uncertainty::{Pressing, Uncertainty};
 /// How many are proposed, and how many a calibration takes at least.
 pub const WANTED: usize = crate::design::PROPOSED;
 pub const LEAST: usize = 4;
-/// Pictures that a reading is averaged over.
-const FRAMES: usize = 10;
+/// Pictures that are taken of a press: the first may still show the rise.
+const FRAMES: usize = 1 + SAMPLES;
 
 impl Session {
     /// Where the next known touch is proposed (m).
