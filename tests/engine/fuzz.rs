@@ -151,7 +151,9 @@ mod guided {
     fn locked() -> BTreeSet<String> {
         let lock = parsed(LOCK);
         let packages = lock["package"].as_array().unwrap();
-        let program = packages.iter().find(|p| p["name"].as_str() == Some("hapdef"));
+        let program = packages
+            .iter()
+            .find(|p| p["name"].as_str() == Some("hapdef"));
         let needs = program.unwrap()["dependencies"].as_array().unwrap();
         let name = |need: &toml::Value| need.as_str()?.split(' ').next().map(str::to_owned);
         needs.iter().filter_map(name).collect()

@@ -300,7 +300,11 @@ fn what_is_promised_is_what_is_achieved() {
         let recording = designed.recording("all", seed, &script);
         built.push(Designed::achieved(&recording, &designed.project()));
         calibrated.push(Designed::achieved(&recording, &designed.calibrated(seed)));
-        println!("workshop {seed}: {:.3?} built, {:.3?} calibrated", built.last(), calibrated.last());
+        println!(
+            "workshop {seed}: {:.3?} built, {:.3?} calibrated",
+            built.last(),
+            calibrated.last()
+        );
     }
     let mut broken = Vec::new();
     for (which, achieved) in [

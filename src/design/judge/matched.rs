@@ -286,13 +286,7 @@ impl<'a> Set<'a> {
         };
         let drawn = everywhere.drawn.mixed(&self.channels);
         let samples = SAMPLES as f64;
-        let x = noisy_means(
-            trial.inputs,
-            &pressed.x,
-            samples,
-            PRESS_DRAW,
-            trial.streams,
-        );
+        let x = noisy_means(trial.inputs, &pressed.x, samples, PRESS_DRAW, trial.streams);
         let x = trial.drifted(x.into_owned(), PRESS_DRAW);
         let x = x.select_rows(&self.candidate.rows);
         let known = |k: usize| {

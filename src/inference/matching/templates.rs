@@ -79,10 +79,9 @@ impl Matching {
         let possible: Vec<usize> = (0..map.places.len())
             .filter(|&node| self.scores[node] >= floor)
             .collect();
-        let share = possible.len().div_ceil(LOOKED_AT).max(1);
-        let mut places = Vec::with_capacity(possible.len() / share + 1);
+        let mut places = Vec::new();
         let (mut total, mut centre, mut force, mut squares) = (0.0, DVec3::ZERO, 0.0, 0.0);
-        for &node in possible.iter().step_by(share) {
+        for node in even_share(&possible) {
             let (mean, variance, log_likelihood) = self.force_at(observed, node);
             let weight = map.areas[node] * (log_likelihood - highest).exp();
             places.push((map.places[node], weight));
@@ -119,6 +118,17 @@ impl Matching {
             0.5 * observed.squares - cost - weighed.log + 0.5 * variance.ln(),
         )
     }
+}
+
+/// All of a list, or of a long one a share of it: by multiples of the golden section, for every so many-th would be a
+/// row of a regular mesh and miss the next.
+fn even_share(all: &[usize]) -> impl Iterator<Item = usize> {
+    /// 2³² divided by the golden section (D. Knuth, The Art of Computer Programming 3, 6.4).
+    const GOLDEN: u32 = 2_654_435_769;
+    let share = all.len().div_ceil(LOOKED_AT).max(1) as u32;
+    (all.iter().enumerate())
+        .filter(move |(k, _)| (*k as u32).wrapping_mul(GOLDEN) <= u32::MAX / share)
+        .map(|(_, &node)| node)
 }
 
 #[cfg(test)]
