@@ -18,16 +18,10 @@ static OPEN: Mutex<Option<Display>> = Mutex::new(None);
 /// Says why the window is gone, where the program ends while one is open on a display that has gone: Xlib ends it on
 /// the spot, with words of its own. To be called at the program's end, whoever ends it.
 pub fn last_words() {
-    /// A server that ends lets go of its windows a little before it stops to answer.
-    const LOOKS: u32 = 10;
-    const PAUSE: Duration = Duration::from_millis(20);
-    let Some(display) = taken() else { return };
-    for _ in 0..LOOKS {
-        if !display.answers() {
-            say(&format!("hapdef: {}", display.farewell()));
-            return;
-        }
-        std::thread::sleep(PAUSE);
+    if let Some(display) = taken()
+        && display.has_gone()
+    {
+        say(&format!("hapdef: {}", display.farewell()));
     }
 }
 
@@ -116,6 +110,19 @@ impl Display {
         }
     }
 
+    /// Whether nobody is there any more. A server that ends lets go of its windows a little before it stops to answer:
+    /// it is looked for some times.
+    fn has_gone(&self) -> bool {
+        const LOOKS: u32 = 10;
+        const PAUSE: Duration = Duration::from_millis(20);
+        (0..LOOKS).any(|look| {
+            if look > 0 {
+                std::thread::sleep(PAUSE);
+            }
+            !self.answers()
+        })
+    }
+
     /// Why no window could be opened, and what to do.
     pub fn refusal(&self, error: &eframe::Error) -> String {
         match (self, error) {
@@ -159,10 +166,10 @@ impl Display {
 
     /// Why an open window ended by itself.
     pub fn ending(&self, error: &eframe::Error) -> String {
-        if self.answers() {
-            format!("the window ended: {}", cause(&error.to_string()))
-        } else {
+        if self.has_gone() {
             self.farewell()
+        } else {
+            format!("the window ended: {}", cause(&error.to_string()))
         }
     }
 
@@ -172,13 +179,13 @@ impl Display {
     pub fn end_with_it(self) {
         let others = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
-            if self.answers() {
+            if !self.has_gone() {
                 others(panic);
-            } else {
-                Self::closed();
-                say(&format!("hapdef: {}", self.farewell()));
-                std::process::exit(1);
+                return;
             }
+            Self::closed();
+            say(&format!("hapdef: {}", self.farewell()));
+            std::process::exit(1);
         }));
     }
 }

@@ -34,8 +34,6 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
     let open = |cc: &eframe::CreationContext<'_>| -> Result<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>> {
         let mut studio = Studio::new(cc, loaded, path)?;
         opened.set(true);
-        display.opened();
-        display.clone().end_with_it();
         if let Some(home) = eframe::storage_dir("hapdef-studio") {
             studio.keep_unsaved_in(&home.join("unsaved"));
             studio.keep_recent_in(&home);
@@ -46,6 +44,11 @@ pub fn run(file: Option<&Path>, unit: Option<crate::project::Unit>) -> anyhow::R
         }
         Ok(Box::new(studio))
     };
+    // Before there is a window: the display may go while it is made.
+    if display.answers() {
+        display.opened();
+        display.clone().end_with_it();
+    }
     let ended = eframe::run_native("hapdef-studio", options, Box::new(open));
     display::Display::closed();
     ended.map_err(|error| {
