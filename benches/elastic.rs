@@ -15,6 +15,7 @@ use hapdef::dataset::{self, Signal, SignalMatrix};
 use hapdef::design::{self, Inputs};
 use hapdef::elasticity::{ShellModel, Touch};
 use hapdef::mesh::sample;
+use hapdef::uncertainty::Making;
 use timing::{cpu_seconds, reference_seconds};
 
 fn main() {
@@ -245,7 +246,15 @@ fn trade(text: &mut String) {
             .collect();
         let solve = |signal| {
             on_one_core(|| {
-                dataset::simulate(&model, many.clone(), &points, signal, 1, &[], &unwatched)
+                dataset::simulate(
+                    &model,
+                    many.clone(),
+                    &points,
+                    signal,
+                    1,
+                    (&[], &Making::EXACT),
+                    &unwatched,
+                )
             })
             .1
         };

@@ -1,5 +1,6 @@
 //! What every site reports under every touch, and where the touches were.
 
+mod making;
 mod site;
 mod slopes;
 mod survey;
@@ -11,12 +12,14 @@ use serde::{Deserialize, Serialize};
 use crate::budget::{Cancelled, Watch, Work};
 use crate::elasticity::observe::{Face, along};
 use crate::elasticity::respond::{Reading, respond};
-use crate::elasticity::{Model, Touch};
+use crate::elasticity::{Model, Push, Touch};
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
+use crate::uncertainty::Making;
 
 use site::{Moments, gauges_on};
 use std::f64::consts::PI;
 
+pub use making::MakingSlopes;
 pub use site::Site;
 pub use slopes::GluingSlopes;
 pub use survey::{Move, Surveyed, survey};
@@ -135,6 +138,8 @@ pub struct Dataset {
     pub x: SignalMatrix,
     /// What readings change by as gauges are glued a little off, where that was asked for.
     pub slopes: Option<GluingSlopes>,
+    /// What readings change by as touches are made otherwise, under the same touches.
+    pub making: Option<MakingSlopes>,
     /// What it took.
     pub work: Work,
 }
@@ -147,6 +152,9 @@ impl Dataset {
         if let Some(slopes) = &mut self.slopes {
             slopes.truncate(sites);
         }
+        if let Some(making) = &mut self.making {
+            making.truncate(sites);
+        }
     }
 
     /// One site more, read under every touch.
@@ -155,6 +163,9 @@ impl Dataset {
         self.x.values.extend_from_slice(&gauge.x);
         if let Some(slopes) = &mut self.slopes {
             slopes.push(&gauge.slopes);
+        }
+        if let Some(making) = &mut self.making {
+            making.push(&gauge.making);
         }
     }
 
@@ -220,7 +231,7 @@ pub fn distribute_touches(
 /// Simulates all touches and reads the signal at all sites. Gauge directions follow the strain over
 /// these very touches: of `directions` sites one after the other at the same point, the first lies along
 /// the largest and the others are evenly turned from it. Of strain, what gluing changes is found for the touches
-/// numbered in `slope_touches`.
+/// numbered in the list, and what changes as they are made otherwise.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
@@ -230,7 +241,7 @@ pub fn simulate(
     points: &[SurfacePoint],
     signal: Signal,
     directions: usize,
-    slope_touches: &[usize],
+    (slope_touches, making): (&[usize], &Making),
     watch: Watch,
 ) -> Result<Dataset, Cancelled> {
     let observer = model.observer(points, Face::Inside);
@@ -277,13 +288,17 @@ pub fn simulate(
     work.solves += responses.solves as u64;
     // The strains go before moved gauges are read.
     drop(responses);
-    let mut slopes = None;
+    let (mut slopes, mut otherwise) = (None, None);
     if signal == Signal::Strain && !slope_touches.is_empty() {
         let turned = by_angle.into_iter().flatten().collect();
         let (found, solves) =
             GluingSlopes::of(model, &sites, &touches, slope_touches, turned, watch)?;
         work.solves += solves as u64;
         slopes = Some(found);
+        let (found, solves) =
+            MakingSlopes::of(model, &sites, &touches, slope_touches, making, watch)?;
+        work.solves += solves as u64;
+        otherwise = Some(found);
     }
     Ok(Dataset {
         signal,
@@ -291,6 +306,7 @@ pub fn simulate(
         touches,
         x: SignalMatrix::new(count, values),
         slopes,
+        making: otherwise,
         work,
     })
 }
@@ -300,13 +316,17 @@ pub fn simulate(
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
-pub fn measure(
+pub fn measure<'t, T>(
     model: &dyn Model,
-    touches: &[Touch],
+    touches: &'t [T],
     sites: &[Site],
     signal: Signal,
     watch: Watch,
-) -> Result<(SignalMatrix, usize), Cancelled> {
+) -> Result<(SignalMatrix, usize), Cancelled>
+where
+    T: Sync,
+    Push: From<&'t T>,
+{
     let (observer, angles) = gauges_on(model, sites);
     let reading = match signal {
         Signal::Strain => Reading::Gauge(&angles),

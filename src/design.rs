@@ -4,6 +4,7 @@
 
 mod advise;
 mod as_built;
+mod as_made;
 mod by_hand;
 mod choose;
 pub mod curves;
@@ -274,3 +275,4 @@ const NOISE_SEED: u64 = 0x0153;
 const SELECTION_NOISE_SEED: u64 = 0x4ea8d;
 const WORKSHOP_SEED: u64 = 0x30b0;
 const PRESS_SEED: u64 = 0x94e55;
+const MADE_SEED: u64 = 0x3ade;

@@ -322,13 +322,23 @@ mod tests {
         assert_eq!(stale(other, pressed), [false; 3]);
         assert_eq!(stale(knows, glued), [false, true, true]);
         assert_eq!(stale(knows, pressed), [false, true, true]);
-        // What only the judge's estimator knows.
         let drifting = |p: &mut Project| p.gauge.drift_microstrain = 2.0;
         let by_machine = |p: &mut Project| p.calibration.place_mm = 0.0;
-        let sized = |p: &mut Project| p.touch.tip_tolerance_mm = 0.5;
         assert_eq!(stale(knows, drifting), [false, true, true]);
+        // What only the judge's estimator knows.
         assert_eq!(stale(knows, by_machine), [false, false, true]);
-        assert_eq!(stale(knows, sized), [false, false, true]);
+        // What readings change by is simulated as soon as touches are made otherwise, by however much.
+        let sized = |p: &mut Project| p.touch.tip_tolerance_mm = 0.5;
+        let dragged = |p: &mut Project| p.touch.friction_percent = 10.0;
+        assert_eq!(stale(knows, sized), [true; 3]);
+        assert_eq!(stale(knows, dragged), [true; 3]);
+        let mut document = document();
+        let simulated = |d: &Document| d.simulation_inputs(d.state.project.budget.quality);
+        let chosen = |d: &Document| d.selection_inputs(d.state.project.budget.quality);
+        dragged(&mut document.state.project);
+        let before = (simulated(&document), chosen(&document));
+        document.state.project.touch.friction_percent = 20.0;
+        assert!(simulated(&document) == before.0 && chosen(&document) != before.1);
     }
 
     #[test]

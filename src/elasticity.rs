@@ -28,7 +28,7 @@ pub mod support;
 pub mod system;
 
 pub use error::ElasticError;
-pub use load::{NodalForces, Touch};
+pub use load::{NodalForces, Push, Touch};
 pub use material::{Material, Section};
 pub use model::Model;
 pub use shell::ShellModel;

@@ -24,7 +24,7 @@ use crate::mesh::reach::FINGERTIP;
 use crate::placement::SelectorKind;
 use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
-use crate::uncertainty::{Gluing, Pressing, Uncertainty};
+use crate::uncertainty::{Gluing, Making, Pressing, Uncertainty};
 
 use value::MM;
 
@@ -34,8 +34,8 @@ pub use live::{GluedKeys, LiveKeys};
 pub use masks::Masks;
 pub use part::{Elements, MaterialKeys, Part, PartModel, SupportKeys, SupportKind, Unit};
 pub use ranges::{
-    ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCE_OFF, FORCES, GAIN_OFF, GAUGES, LENGTH, LOST,
-    PLACE_OFF, STARTS, TIP_OFF, TOUCHES,
+    ANGLE_OFF, DRIFT, EDGE_NEIGHBOURS, FARTHEST, FORCE_OFF, FORCES, FRICTION, GAIN_OFF, GAUGES,
+    LENGTH, LOST, PLACE_OFF, STARTS, TIP_OFF, TOUCHES,
 };
 pub use selection::{ChosenSite, CostKeys, GaussianProcessKeys, SelectionKeys};
 pub use value::BadValue;
@@ -110,6 +110,9 @@ pub struct TouchKeys {
     /// How far off that is (standard deviation): larger tips, or smaller ones, touch too.
     #[serde(skip_serializing_if = "is_default")]
     pub tip_tolerance_mm: f64,
+    /// How much of a touch's force acts along the surface beside what presses (%, rms, in any direction): friction.
+    #[serde(skip_serializing_if = "is_default")]
+    pub friction_percent: f64,
     /// Touches to simulate; lower qualities take fewer.
     pub count: usize,
     /// Least distance of a touch from a free edge (mm).
@@ -334,6 +337,7 @@ impl Default for TouchKeys {
             forces_n: FORCES_N,
             tip_radius_mm: 5.0,
             tip_tolerance_mm: 0.0,
+            friction_percent: 0.0,
             count: 4000,
             edge_margin_mm: 2.4,
             reach_mm: REACH_MM,
@@ -535,6 +539,15 @@ impl Project {
         }
     }
 
+    /// How far off touches are made.
+    #[must_use]
+    pub fn making(&self) -> Making {
+        Making {
+            tip: self.touch.tip_tolerance_mm * MM,
+            friction: self.touch.friction_percent / 100.0,
+        }
+    }
+
     /// Everything that is known to be off. What the elements leave is not: a simulation says that, and
     /// [`Uncertainty::with_elements`] takes it in. Nor is the converter's resolution, which the board knows.
     #[must_use]
@@ -543,7 +556,7 @@ impl Project {
             noise: self.gauge.noise_microstrain * MICRO,
             gluing: self.gluing(),
             stiffness: self.live.stiffness_percent / 100.0,
-            tip: self.touch.tip_tolerance_mm * MM,
+            making: self.making(),
             drift: self.gauge.drift_microstrain * MICRO,
             pressing: self.pressing(),
             ..Uncertainty::default()

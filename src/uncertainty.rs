@@ -9,12 +9,14 @@
 //! | gluing | by the reading's slopes over the gauge's place and direction, and by its gain: grows with the force |
 //! | elements | a share of the readings |
 //! | tip | by the reading's slope over the tip's radius: grows with the force |
+//! | friction | by what a force along the surface reads there: grows with the force |
 //! | drift | common to all channels: a matrix of rank one beside the diagonal |
 //! | stiffness | a common factor of all readings, the same as another force: no place is worse for it, every force is |
 //! | pressing | nothing that is read later; known presses are off by it while gauges are calibrated |
 //!
-//! Friction is not among them: a tangential share of the force needs the readings of tangential touches too, which no
-//! map holds yet.
+//! Tip and friction are of a touch, and all gauges feel the same of them; only where gauges are calibrated is that taken
+//! in full. Elsewhere each channel is off by them for itself, with the variance that they have there, which leaves some
+//! of what could be told apart untold.
 
 use std::f64::consts::PI;
 
@@ -89,6 +91,31 @@ impl Default for Pressing {
     }
 }
 
+/// How far off touches are made beside where and how hard they press (standard deviations).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Making {
+    /// Of the tip's radius (m).
+    pub tip: f64,
+    /// Of the force along the surface, over the one that presses: rms, in any direction.
+    pub friction: f64,
+}
+
+impl Making {
+    /// By the tip that there is said to be, straight in.
+    pub const EXACT: Self = Self {
+        tip: 0.0,
+        friction: 0.0,
+    };
+
+    /// Variance that it puts on a reading that changes by so much a metre of the tip's radius, and by `shear` (root of
+    /// the sum of the squares over two directions) where as much force acts along the surface as presses. To first order
+    /// in both, in the square of the reading's unit.
+    #[must_use]
+    pub fn variance(&self, tip: f64, shear: f64) -> f64 {
+        (self.tip * tip).powi(2) + (self.friction * shear).powi(2) / 2.0
+    }
+}
+
 /// A figure for a sentence.
 fn tidy(value: f64) -> f64 {
     (value * 100.0).round() / 100.0
@@ -129,8 +156,8 @@ pub struct Uncertainty {
     pub elements: f64,
     /// Of the factor by which the part is stiffer or softer than its model.
     pub stiffness: f64,
-    /// Of the tip's radius (m).
-    pub tip: f64,
+    /// How touches are made.
+    pub making: Making,
     /// Of what all channels have drifted by together since the rest (strain).
     pub drift: f64,
     /// How known presses are made.
@@ -146,7 +173,7 @@ impl Default for Uncertainty {
             gluing: Gluing::default(),
             elements: UNESTIMATED,
             stiffness: 0.0,
-            tip: 0.0,
+            making: Making::EXACT,
             drift: 0.0,
             pressing: Pressing::default(),
         }
@@ -161,7 +188,7 @@ impl Uncertainty {
         gluing: Gluing::EXACT,
         elements: 0.0,
         stiffness: 0.0,
-        tip: 0.0,
+        making: Making::EXACT,
         drift: 0.0,
         pressing: Pressing::EXACT,
     };
@@ -196,7 +223,7 @@ impl Uncertainty {
     /// judged for one holds for the other.
     #[must_use]
     pub fn builds_as(&self, other: &Self) -> bool {
-        let built = |off: &Self| (off.gluing, off.tip, off.drift, off.pressing);
+        let built = |off: &Self| (off.gluing, off.making, off.drift, off.pressing);
         built(self) == built(other)
     }
 }

@@ -1,10 +1,13 @@
 //! Gauges anywhere on a part under the touches of a dataset: what they read where they are, and to first order beside it.
 
+use super::making::MakingSlopes;
 use super::site::{Moments, Site, gauges_on};
 use super::slopes::{self, GluingSlopes};
 use crate::budget::{Cancelled, Watch};
+use crate::elasticity::Touch;
 use crate::elasticity::observe::along;
 use crate::elasticity::respond::{Pressed, Reading};
+use crate::uncertainty::Making;
 
 /// A gauge and what it reads of every touch (strain).
 #[derive(Clone, Debug)]
@@ -17,6 +20,8 @@ pub struct Surveyed {
     mean: Vec<f64>,
     /// Of this one gauge, under every touch.
     pub slopes: GluingSlopes,
+    /// Likewise.
+    pub making: MakingSlopes,
 }
 
 /// How a gauge is moved: along itself and across itself (m; normal × direction), and turned from the one to the other
@@ -47,13 +52,14 @@ impl Surveyed {
 }
 
 /// Solves for gauges at some places, with their directions as they are. Also how many right-hand sides that took: seven
-/// a gauge.
+/// a gauge, and one or two more where touches may be made otherwise: `touches` are those that are pressed.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
 pub fn survey(
     pressed: &Pressed,
     gauges: &[Site],
+    (touches, making): (&[Touch], &Making),
     watch: Watch,
 ) -> Result<(Vec<Surveyed>, usize), Cancelled> {
     let (observer, angles) = gauges_on(pressed.model(), gauges);
@@ -79,13 +85,16 @@ pub fn survey(
     }
     let sites: Vec<Site> = read.iter().map(|(site, ..)| *site).collect();
     let (changes, solves) = GluingSlopes::under(pressed, &sites, turned, watch)?;
+    let (otherwise, more) =
+        MakingSlopes::of(pressed.model(), &sites, touches, &columns, making, watch)?;
     let surveyed = (read.into_iter().enumerate()).map(|(i, (site, x, mean))| Surveyed {
         site,
         x,
         mean,
         slopes: changes.select_rows(&[i]),
+        making: otherwise.only(i),
     });
-    Ok((surveyed.collect(), strains.solves + solves))
+    Ok((surveyed.collect(), strains.solves + solves + more))
 }
 
 #[cfg(test)]
@@ -108,6 +117,7 @@ mod tests {
             x: vec![xx],
             mean: vec![f64::midpoint(xx, yy)],
             slopes: GluingSlopes::known(vec![0], [vec![10.0], vec![-20.0], vec![xy as f32]]),
+            making: MakingSlopes::default(),
         };
         for turn in [0.0_f64, 0.3, 1.2, 2.0] {
             let weights = along(turn);

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::layout::touches_on;
 use super::{DesignError, Ground, Inputs};
 use crate::budget::{Cancelled, Watch};
@@ -10,6 +12,7 @@ use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::elasticity::{Model, Touch};
 use crate::inference::{AsDrawn, ResponseMap};
 use crate::mesh::TriMesh;
+use crate::uncertainty::Making;
 
 /// Known touches that are proposed.
 pub const PROPOSED: usize = 12;
@@ -35,19 +38,27 @@ pub(super) fn gauge_at(site: &Site, [length, width]: [f64; 2]) -> Gauge {
     }
 }
 
-/// What gauges read everywhere on a mesh, as drawn, as it changes with the way they are glued, and with the tip where its
-/// radius (m) may be off (its standard deviation, m).
+/// What gauges read everywhere on a mesh, as drawn, as it changes with the way they are glued, and with that in which
+/// touches by a tip of some radius (m) are made, as far as that may be off.
 pub(super) fn drawn_on(
     model: &dyn Model,
     gauges: &[Gauge],
     mesh: &Arc<TriMesh>,
-    (tip_radius, off): (f64, f64),
+    (tip_radius, making): (f64, &Making),
     watch: Watch,
 ) -> Result<AsDrawn, Cancelled> {
     let moved: Vec<Gauge> = gauges.iter().flat_map(moved).collect();
     let sensitivity = Sensitivity::new(model, &moved, watch)?;
     let pressed = |radius: f64| ResponseMap::new(&sensitivity, Arc::clone(mesh), radius, watch);
     let mut drawn = as_drawn(&pressed(tip_radius)?, gauges.len());
+    if making.friction > 0.0 {
+        let own = Sensitivity::new(model, gauges, watch)?;
+        let along = |axis: DVec3| {
+            ResponseMap::pushed(&own, Arc::clone(mesh), tip_radius, Some(axis), watch)
+        };
+        drawn.axes = Some([along(DVec3::X)?, along(DVec3::Y)?, along(DVec3::Z)?]);
+    }
+    let off = making.tip;
     if off > 0.0 {
         let larger = as_drawn(&pressed(tip_radius + off)?, gauges.len());
         let rise = vec![[off.recip(), -off.recip()]; gauges.len()];
@@ -107,6 +118,7 @@ fn as_drawn(all: &ResponseMap, gauges: usize) -> AsDrawn {
             change(5, STEP_DEGREES),
         ],
         tip: None,
+        axes: None,
     }
 }
 

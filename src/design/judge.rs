@@ -5,16 +5,17 @@ mod matched;
 use rayon::prelude::*;
 
 use super::as_built::{gains, sites_as_built};
+use super::as_made::as_made;
 use super::drawn::{gauge_at, proposed};
 use super::known;
-use super::layout::touches_on;
+use super::layout::test_touches;
 use super::presses::{self, Press, Pressed};
 use super::reference::{Reference, grid, regions};
-use super::{DesignError, Inputs, NOISE_SEED, PRESS_SEED, Reduced, Simulated, TEST_SEED};
+use super::{DesignError, Inputs, MADE_SEED, NOISE_SEED, PRESS_SEED, Reduced, Simulated};
 use crate::budget::{Budget, Cancelled, Watch, Work};
 use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
 use crate::elasticity::Model;
-use crate::elasticity::load::Touch;
+use crate::elasticity::load::{Push, Touch};
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::evaluation::{self, Candidate, EstimatorKind, Evaluation, Judging, Trial};
 use crate::mesh::TriMesh;
@@ -38,8 +39,7 @@ pub fn reference(
 ) -> Result<Reference, DesignError> {
     let (meshed, model) = simulated.meshed.reference_model(watch)?;
     let mesh = meshed.touched_surface();
-    let seed = inputs.project.budget.seed.wrapping_add(TEST_SEED);
-    let touches = touches_on(&mesh, inputs, budget.test_touches, seed, false)?;
+    let touches = test_touches(&mesh, inputs, budget.test_touches)?;
     let grid = grid(&inputs.project);
     let mut reference = measured_by(&*model, inputs, simulated, sites, touches, grid, watch)?;
     if inputs.project.judging().estimator() == EstimatorKind::Matching {
@@ -71,6 +71,7 @@ impl Reference {
             })
             .collect();
         let made: Vec<Touch> = presses.iter().map(|p| p.made).collect();
+        let made = as_made(&made, &self.off.making, seed.wrapping_add(MADE_SEED + 1));
         let built = sites_as_built(simulated, &self.sites, &self.off.gluing, seed);
         let (x, solves) = read(model, inputs, &made, &built, self.grid, watch)?;
         self.work.solves += solves as u64;
@@ -82,25 +83,27 @@ impl Reference {
     }
 }
 
-/// What gauges read under touches (sites × touches), over grids of this length and width (m) or at a point, and how many
+/// What gauges read under pushes (sites × pushes), over grids of this length and width (m) or at a point, and how many
 /// right-hand sides that took.
 fn read(
     model: &dyn Model,
     inputs: &Inputs,
-    touches: &[Touch],
+    pushes: &[Push],
     sites: &[Site],
     grid: Option<[f64; 2]>,
     watch: Watch,
 ) -> Result<(SignalMatrix, usize), Cancelled> {
     let Some(grid) = grid else {
-        return dataset::measure(model, touches, sites, inputs.project.gauge.signal, watch);
+        return dataset::measure(model, pushes, sites, inputs.project.gauge.signal, watch);
     };
     let gauges: Vec<Gauge> = sites.iter().map(|site| gauge_at(site, grid)).collect();
     let sensitivity = Sensitivity::new(model, &gauges, watch)?;
-    let columns: Vec<Vec<f64>> = touches.par_iter().map(|t| sensitivity.read(t)).collect();
+    let columns: Vec<Vec<f64>> = (pushes.par_iter())
+        .map(|push| sensitivity.read_push(push))
+        .collect();
     let values = (0..gauges.len()).flat_map(|g| columns.iter().map(move |column| column[g]));
     Ok((
-        SignalMatrix::new(touches.len(), values.collect()),
+        SignalMatrix::new(pushes.len(), values.collect()),
         gauges.len(),
     ))
 }
@@ -126,7 +129,8 @@ pub(super) fn measured_by(
     let (off, seed) = (known::off(project, simulated), project.budget.seed);
     let built = sites_as_built(simulated, &rows, &off.gluing, seed);
     let gauges: Vec<Site> = drawn.iter().copied().chain(built).collect();
-    let (signals, solves) = read(model, inputs, &touches, &gauges, grid, watch)?;
+    let pushes = as_made(&touches, &off.making, seed.wrapping_add(MADE_SEED));
+    let (signals, solves) = read(model, inputs, &pushes, &gauges, grid, watch)?;
     let half =
         |k: usize| signals.select_rows(&(k * rows.len()..(k + 1) * rows.len()).collect::<Vec<_>>());
     let (x, workshop) = (half(0), half(1));

@@ -1,16 +1,15 @@
-//! What is known of the signals of a simulation beside their values: noise, gluing, and what its elements leave.
+//! What is known of the signals of a simulation beside their values: noise, gluing, how touches are made, and what its
+//! elements leave: all that [`Uncertainty`] describes.
 //!
-//! Of what [`Uncertainty`] describes the choice leaves out two things. A drift that is common to all channels counts as
-//! noise of each, of the same variance: that they share it, so that differences between channels are free of it, would
-//! take an unknown more in every filter. And the tip's size counts for nothing: a tip of another size blurs readings
-//! alike at most sites, and what it does under every touch would take as many solves again.
+//! A drift that is common to all channels counts as noise of each, of the same variance: that they share it, so that
+//! differences between channels are free of it, would take an unknown more in every filter.
 
 use super::{Inputs, SELECTION_NOISE_SEED, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
-use crate::dataset::{GluingSlopes, Signal};
+use crate::dataset::{GluingSlopes, MakingSlopes, Signal};
 use crate::placement::expected_error::{Detail, Forces, Knowledge, Scene, Variance, expected};
 use crate::project::Project;
-use crate::uncertainty::Uncertainty;
+use crate::uncertainty::{Making, Uncertainty};
 
 /// A few sites are looked at in more detail than a choice among thousands can.
 pub(super) const FINE: Detail = Detail {
@@ -44,28 +43,31 @@ impl<'a> Known<'a> {
         }
     }
 
-    /// What gluing and elements put on the signal of a site (as numbered in the dataset) under a touch.
+    /// What gluing, the way touches are made and elements put on the signal of a site (as numbered in the dataset) under a touch.
     pub fn variance(&self, site: usize, touch: usize) -> f64 {
         let reading = self.simulated.dataset.x.row(site)[touch];
-        let slopes = self.simulated.dataset.slopes.as_ref();
-        self.variance_of(reading, slopes.map(|s| (s, site)), touch)
+        let dataset = &self.simulated.dataset;
+        let changes = dataset.slopes.as_ref().zip(dataset.making.as_ref());
+        self.variance_of(reading, changes, site, touch)
     }
 
-    /// What they put on a gauge's reading of a touch that its slopes, those of a site among some, are known for.
+    /// What they put on a gauge's reading of a touch where it is known what that changes by: of a site among some.
     pub fn variance_of(
         &self,
         reading: f64,
-        slopes: Option<(&GluingSlopes, usize)>,
+        changes: Option<(&GluingSlopes, &MakingSlopes)>,
+        site: usize,
         touch: usize,
     ) -> f64 {
-        let column = slopes.and_then(|(s, _)| s.touches().binary_search(&touch).ok());
-        let glued = match (slopes, column) {
-            (Some((slopes, site)), Some(column)) => {
-                slopes.variance(site, column, reading, &self.off.gluing)
-            }
-            _ => 0.0,
+        let elements = (self.off.elements * reading).powi(2);
+        let Some((glued, made)) = changes else {
+            return elements;
         };
-        glued + (self.off.elements * reading).powi(2)
+        let Ok(column) = glued.touches().binary_search(&touch) else {
+            return elements;
+        };
+        let glued = glued.variance(site, column, reading, &self.off.gluing);
+        glued + made.variance(site, column, &self.off.making) + elements
     }
 
     /// For a pool with this variance of its rows.
@@ -94,6 +96,7 @@ pub(super) fn off(project: &Project, simulated: &Simulated) -> Uncertainty {
         Signal::Displacement | Signal::NormalDisplacement => Uncertainty {
             noise: 0.0,
             drift: 0.0,
+            making: Making::EXACT,
             elements: 0.0,
             ..off
         },

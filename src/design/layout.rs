@@ -4,7 +4,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{DesignError, Inputs, LAYOUT, MOST_SITES, SaidBy};
+use super::{DesignError, Inputs, LAYOUT, MOST_SITES, SaidBy, TEST_SEED};
 use crate::bounds::Bounds;
 use crate::budget::Budget;
 use crate::dataset::{self, GluingSlopes, Signal, TouchRegion};
@@ -166,6 +166,17 @@ pub(super) fn lay_out_touches(
         }
     }
     Ok(touches)
+}
+
+/// The touches that designs are judged on, on the surface of the judge's elements: drawn uniformly at random with a seed
+/// of their own, so that they lie off any node and are nobody's training touches.
+pub(super) fn test_touches(
+    surface: &TriMesh,
+    inputs: &Inputs,
+    count: usize,
+) -> Result<Vec<Touch>, DesignError> {
+    let seed = inputs.project.budget.seed.wrapping_add(TEST_SEED);
+    touches_on(surface, inputs, count, seed, false)
 }
 
 pub(super) fn touches_on(

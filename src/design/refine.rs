@@ -26,9 +26,11 @@ use super::known::{FINE, Known, detail};
 use super::{DesignError, Inputs, Reduced, Simulated};
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Move, Signal, Site, Surveyed, survey};
+use crate::elasticity::Touch;
 use crate::elasticity::respond::Pressed;
 use crate::placement::expected_error::Moving;
 use crate::placement::{Constraints, Selection, SensorSet};
+use crate::uncertainty::Making;
 
 const REFINING: &str = "Refining places";
 /// Most rounds.
@@ -173,7 +175,9 @@ fn search(
     let model = simulated.meshed.model(watch)?;
     let pressed = Pressed::new(&*model, &simulated.dataset.touches);
     let sites: Vec<Site> = set.iter().map(|&s| simulated.dataset.sites[s]).collect();
-    let (surveyed, solves) = survey(&pressed, &sites, watch)?;
+    let making = inputs.project.making();
+    let made = (&simulated.dataset.touches[..], &making);
+    let (surveyed, solves) = survey(&pressed, &sites, made, watch)?;
     let mut work = model.system().work();
     work.solves += solves as u64;
     let gauges = surveyed.into_iter().zip(&sites).map(|(now, from)| Gauge {
@@ -186,6 +190,7 @@ fn search(
         room: Room::new(inputs, simulated),
         known: &known,
         pressed: &pressed,
+        made,
         gauges: gauges.collect(),
         fixed: keys.required_mm.len(),
         criterion,
@@ -202,6 +207,8 @@ struct Search<'a> {
     room: Room<'a>,
     known: &'a Known<'a>,
     pressed: &'a Pressed<'a>,
+    /// The touches that are pressed, and how far off they are made.
+    made: (&'a [Touch], &'a Making),
     gauges: Vec<Gauge>,
     /// How many of them, the first, must stay where they are.
     fixed: usize,
@@ -269,7 +276,7 @@ impl Search<'_> {
             return Ok(());
         }
         let sites: Vec<Site> = asked.iter().map(|(_, site)| *site).collect();
-        let (found, solves) = survey(self.pressed, &sites, self.watch)?;
+        let (found, solves) = survey(self.pressed, &sites, self.made, self.watch)?;
         self.work.solves += solves as u64;
         let sites: Vec<Site> = found.iter().map(|gauge| gauge.site).collect();
         let allowed = self.room.allowed_wholly(&sites, self.watch)?;
@@ -360,8 +367,10 @@ impl Search<'_> {
 
 /// Puts a gauge into a seat that reads `x`, and is off as `like` is.
 fn seat_in(moving: &mut Moving, known: &Known, seat: usize, x: &[f64], like: &Surveyed) {
-    let slopes = Some((&like.slopes, 0));
-    moving.seat(seat, x, &|touch| known.variance_of(x[touch], slopes, touch));
+    let changes = Some((&like.slopes, &like.making));
+    moving.seat(seat, x, &|touch| {
+        known.variance_of(x[touch], changes, 0, touch)
+    });
 }
 
 /// All moves of a length (m) and an angle (radians): on a circle, unturned and turned, and turned alone.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::as_built::{as_built, workshop_draw};
 use super::drawn::{drawn_on, map_size, proposed};
-use super::layout::{lay_out_sites, lay_out_touches, touches_on};
+use super::layout::{lay_out_sites, lay_out_touches, test_touches, touches_on};
 use super::{DesignError, Inputs, Meshed, ground};
 use crate::budget::{Budget, Watch};
 use crate::dataset::{SignalMatrix, Site};
@@ -30,7 +30,7 @@ pub struct Sensing {
     pub drawn: Arc<AsDrawn>,
     /// What is known to be off.
     pub off: Uncertainty,
-    /// What the project's tolerance of gluing, and of the tip, puts on the readings, while nothing is known of these
+    /// What the project's tolerance of gluing, and the way touches are made, put on the readings, while nothing is known of these
     /// gauges.
     pub gluing_deviation: Arc<ResponseMap>,
     /// Where known touches are best pressed: evenly over the part.
@@ -99,7 +99,7 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
     let tip_radius = project.tip().1;
     let mesh = ground.of_size(map_size(&ground, tip_radius));
     let off = (project.uncertainty()).with_elements(graded.estimate.strain_percent);
-    let tip = (tip_radius, off.tip);
+    let tip = (tip_radius, &off.making);
     let drawn = drawn_on(&*graded.model, &gauges, &mesh, tip, watch)?;
     let proposed = proposed(&drawn.map.mesh, inputs)?;
     Ok(Sensing {
@@ -181,6 +181,20 @@ impl Sensing {
                 .collect(),
             forces,
         })
+    }
+
+    /// The touches that a design of this quality is judged on.
+    ///
+    /// # Errors
+    /// [`DesignError`] as for a simulation, and where none lands on the part.
+    pub fn judged_touches(
+        &self,
+        inputs: &Inputs,
+        budget: &Budget,
+        watch: Watch,
+    ) -> Result<Vec<Touch>, DesignError> {
+        let (meshed, _) = self.meshed.reference_model(watch)?;
+        test_touches(&meshed.touched_surface(), inputs, budget.test_touches)
     }
 
     /// Touches on the part's surface for training, evenly spread, or for tests, at random.

@@ -233,9 +233,9 @@ fn read(
     let unknowns = model.system().dimension();
     let gauge = &project.gauge;
     let (signal, directions) = (gauge.signal, gauge.directions);
-    let slopes = evenly(touches.len(), SLOPE_TOUCHES);
+    let changes = (&evenly(touches.len(), SLOPE_TOUCHES)[..], &project.making());
     let mut dataset =
-        dataset::simulate(model, touches, &points, signal, directions, &slopes, watch)?;
+        dataset::simulate(model, touches, &points, signal, directions, changes, watch)?;
     dataset.work += before;
     let mut notes = if dataset.touches.len() < project.touch.count {
         vec![format!(

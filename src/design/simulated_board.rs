@@ -3,13 +3,14 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::as_made::as_made;
 use super::presses::{self, Press};
 use super::{DesignError, Inputs, PRESS_SEED, Sensing, Workshop};
 use crate::board::{Faults, Options, Script, SimulatedBoard, fitting_gain};
 use crate::budget::Watch;
 use crate::draw::normal;
-use crate::elasticity::Touch;
 use crate::elasticity::sensitivity::Sensitivity;
+use crate::elasticity::{Push, Touch};
 use crate::inference::calibration::noise_of_mean;
 use crate::inference::{Chain, Known};
 
@@ -70,7 +71,6 @@ pub fn simulated(
 /// calibration. `truth` and `gains` are those of its gauges, and the seed is of the hand and the noise.
 #[must_use]
 pub fn pressed_by_hand(
-    inputs: &Inputs,
     sensing: &Sensing,
     (truth, gains): (&Sensitivity, &[f64]),
     seed: u64,
@@ -79,15 +79,17 @@ pub fn pressed_by_hand(
     let (asked, off) = (sensing.proposed.clone(), &sensing.off);
     let noise = noise_of_mean(&vec![off.of_channel(); gains.len()]);
     let seed = seed.wrapping_add(PRESS_SEED);
-    let presses = presses::by_hand(surface, asked, &inputs.project.pressing(), seed);
-    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(1));
-    let mut known = |press: Press| {
-        let read = truth.read(&press.made).into_iter().zip(gains).zip(&noise);
+    let presses = presses::by_hand(surface, asked, &off.pressing, seed);
+    let made: Vec<Touch> = presses.iter().map(|press| press.made).collect();
+    let made = as_made(&made, &off.making, seed.wrapping_add(1));
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(2));
+    let mut known = |(press, push): (&Press, &Push)| {
+        let read = truth.read_push(push).into_iter().zip(gains).zip(&noise);
         Known {
             at: surface.index().nearest(press.asked.position).0,
             force: press.asked.force,
             reading: (read.map(|((x, gain), noise)| x * gain + noise * normal(&mut rng))).collect(),
         }
     };
-    presses.into_iter().map(&mut known).collect()
+    presses.iter().zip(&made).map(&mut known).collect()
 }

@@ -36,8 +36,8 @@ pub struct ModelInputs {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ElementInputs {
     model: ModelInputs,
-    /// Without how hard touches come, which is for whoever chooses and judges: signals grow with the force. Nor is any
-    /// touch simulated with another tip.
+    /// Without how hard touches come, which is for whoever chooses and judges: signals grow with the force. Of how far
+    /// off they are made only whether they are at all: what signals change by is simulated then.
     touch: TouchKeys,
     region: Option<Mask>,
     sites: SiteKeys,
@@ -46,6 +46,26 @@ pub struct ElementInputs {
     limits: Limits,
     /// A region that is not there cannot be computed with.
     keep_out_missing: bool,
+}
+
+/// How far off gauges are, and touches, and the rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Off {
+    tolerance: ToleranceKeys,
+    drift_microstrain: f64,
+    tip_tolerance_mm: f64,
+    friction_percent: f64,
+}
+
+impl Off {
+    fn of(project: &Project) -> Self {
+        Self {
+            tolerance: project.gauge.tolerance,
+            drift_microstrain: project.gauge.drift_microstrain,
+            tip_tolerance_mm: project.touch.tip_tolerance_mm,
+            friction_percent: project.touch.friction_percent,
+        }
+    }
 }
 
 /// What a simulation depends on.
@@ -83,8 +103,8 @@ pub struct ReductionInputs {
 pub struct SelectionInputs {
     pub reduction: ReductionInputs,
     asked: SelectionKeys,
-    /// One selector knows how hard touches come, and how far off gauges are glued and drift.
-    known: Option<([f64; 2], ToleranceKeys, f64)>,
+    /// One selector knows how hard touches come, and how far off all is that a project says it of.
+    known: Option<([f64; 2], Off)>,
 }
 
 /// What a whole design depends on.
@@ -92,10 +112,8 @@ pub struct SelectionInputs {
 pub struct DesignInputs {
     pub selection: SelectionInputs,
     evaluation: EvaluationKeys,
-    tolerance: ToleranceKeys,
-    drift_microstrain: f64,
+    off: Off,
     calibration: CalibrationKeys,
-    tip_tolerance_mm: f64,
     /// One estimator knows how hard anybody presses.
     judging: Judging,
 }
@@ -144,9 +162,7 @@ pub struct SensingInputs {
     simulation: SimulationInputs,
     sites: Vec<ChosenSite>,
     grid_mm: [f64; 2],
-    tolerance: ToleranceKeys,
-    tip_tolerance_mm: f64,
-    drift_microstrain: f64,
+    off: Off,
 }
 
 impl Document {
@@ -184,7 +200,8 @@ impl Document {
             model: self.model_inputs(),
             touch: TouchKeys {
                 forces_n: usual.forces_n,
-                tip_tolerance_mm: usual.tip_tolerance_mm,
+                tip_tolerance_mm: f64::from(p.touch.tip_tolerance_mm > 0.0),
+                friction_percent: f64::from(p.touch.friction_percent > 0.0),
                 ..p.touch.clone()
             },
             region: p.touch.region.as_ref().map(|name| self.mask(name)),
@@ -248,11 +265,6 @@ impl Document {
             p.selection.selector
         };
         let knows = p.selectors().contains(&SelectorKind::ExpectedError);
-        let known = (
-            p.touch.forces_n,
-            p.gauge.tolerance,
-            p.gauge.drift_microstrain,
-        );
         SelectionInputs {
             reduction: self.reduction_inputs(quality),
             asked: SelectionKeys {
@@ -260,7 +272,7 @@ impl Document {
                 selector,
                 ..p.selection.clone()
             },
-            known: knows.then_some(known),
+            known: knows.then_some((p.touch.forces_n, Off::of(p))),
         }
     }
 
@@ -271,10 +283,8 @@ impl Document {
         DesignInputs {
             selection: self.selection_inputs(quality),
             evaluation: p.evaluation.clone(),
-            tolerance: p.gauge.tolerance,
-            drift_microstrain: p.gauge.drift_microstrain,
+            off: Off::of(p),
             calibration: p.calibration,
-            tip_tolerance_mm: p.touch.tip_tolerance_mm,
             judging: p.judging(),
         }
     }
@@ -334,9 +344,7 @@ impl Document {
             simulation: self.simulation_inputs(p.budget.quality),
             sites: p.selection.sites.clone(),
             grid_mm: [p.gauge.grid_length_mm, p.gauge.grid_width_mm],
-            tolerance: p.gauge.tolerance,
-            tip_tolerance_mm: p.touch.tip_tolerance_mm,
-            drift_microstrain: p.gauge.drift_microstrain,
+            off: Off::of(p),
         }
     }
 }

@@ -19,6 +19,31 @@ pub struct Touch {
     pub tip_radius: f64,
 }
 
+/// A touch whose force need not push straight in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Push {
+    /// Where the tip is, and how it spreads what it carries.
+    pub touch: Touch,
+    /// The force on the part (N).
+    pub force: DVec3,
+}
+
+impl From<&Touch> for Push {
+    /// Straight in.
+    fn from(touch: &Touch) -> Self {
+        Self {
+            touch: *touch,
+            force: -touch.normal * touch.force,
+        }
+    }
+}
+
+impl From<&Self> for Push {
+    fn from(push: &Self) -> Self {
+        *push
+    }
+}
+
 /// Forces on the nodes: vertex and force (N); they sum to the touch's force to rounding.
 pub type NodalForces = Vec<(u32, DVec3)>;
 
@@ -41,15 +66,20 @@ fn farthest(corners: &[DVec3; 3]) -> f64 {
 /// The nodal forces of a touch, by quadrature of the tip's pressure with the linear shape functions.
 #[must_use]
 pub fn nodal_forces(mesh: &TriMesh, touch: &Touch) -> NodalForces {
+    pushed(mesh, &touch.into())
+}
+
+/// As [`nodal_forces`], of a force that may have any direction.
+#[must_use]
+pub fn pushed(mesh: &TriMesh, push: &Push) -> NodalForces {
     let mut shares: Vec<(u32, f64)> = Vec::new();
-    for (at, share) in pressure(mesh, touch, f64::INFINITY) {
+    for (at, share) in pressure(mesh, &push.touch, f64::INFINITY) {
         let corners = mesh.triangles()[at.triangle as usize];
         let own = |(v, w): (u32, f64)| (w > 0.0).then_some((v, w * share));
         shares.extend(corners.into_iter().zip(at.barycentric).filter_map(own));
     }
-    let force = -touch.normal * touch.force;
     let shares = merge(shares).into_iter();
-    shares.map(|(v, w)| (v, force * w)).collect()
+    shares.map(|(v, w)| (v, push.force * w)).collect()
 }
 
 /// Points under the tip with their shares of its force; they sum to one. `apart` (m) is how far from each other

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::load::Touch;
+use super::load::{Push, Touch};
 use super::observe::{Face, Observer};
 use super::system::System;
 use crate::mesh::locate::SurfaceIndex;
@@ -33,8 +33,13 @@ pub trait Model: Send + Sync {
     /// The factored stiffness.
     fn system(&self) -> &System;
 
+    /// Forces of a push by degree of freedom (N).
+    fn push(&self, push: &Push) -> Vec<(usize, f64)>;
+
     /// Forces of a touch by degree of freedom (N).
-    fn load(&self, touch: &Touch) -> Vec<(usize, f64)>;
+    fn load(&self, touch: &Touch) -> Vec<(usize, f64)> {
+        self.push(&touch.into())
+    }
 
     /// Operators that read displacement and strain at points of the surface. A shell is read on the
     /// face that is named, a solid where the points are.

@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::load::Touch;
+use super::load::{Push, Touch};
 use super::observe::Observer;
 use super::rows::Rows;
 use super::solver::BLOCK;
@@ -102,17 +102,21 @@ fn along_gauges(strain: &[f64], angles: &[f64]) -> Vec<f64> {
     along
 }
 
-/// Reads `observer`'s points under all touches.
+/// Reads `observer`'s points under all touches, which may push in any direction ([`Push`]).
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
-pub fn respond(
+pub fn respond<'t, T>(
     model: &dyn Model,
-    touches: &[Touch],
+    touches: &'t [T],
     observer: &Observer,
     reading: Reading,
     watch: Watch,
-) -> Result<Responses, Cancelled> {
+) -> Result<Responses, Cancelled>
+where
+    T: Sync,
+    Push: From<&'t T>,
+{
     let side = if reading.rows(observer.frames().len()) < touches.len() {
         Side::Outputs
     } else {
@@ -125,18 +129,22 @@ pub fn respond(
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
-pub fn respond_from(
+pub fn respond_from<'t, T>(
     side: Side,
     model: &dyn Model,
-    touches: &[Touch],
+    touches: &'t [T],
     observer: &Observer,
     reading: Reading,
     watch: Watch,
-) -> Result<Responses, Cancelled> {
-    if side == Side::Outputs {
-        return Pressed::new(model, touches).read(observer, reading, watch);
-    }
+) -> Result<Responses, Cancelled>
+where
+    T: Sync,
+    Push: From<&'t T>,
+{
     let loads = touch_rows(model, touches);
+    if side == Side::Outputs {
+        return Pressed { model, loads }.read(observer, reading, watch);
+    }
     let points = observer.frames().len();
     let blocks = model.system().solve_rows(
         &loads,
@@ -252,11 +260,15 @@ fn by_outputs(
 }
 
 /// The touches' nodal forces as rows over solved blocks.
-fn touch_rows(model: &dyn Model, touches: &[Touch]) -> Rows {
+fn touch_rows<'t, T>(model: &dyn Model, touches: &'t [T]) -> Rows
+where
+    T: Sync,
+    Push: From<&'t T>,
+{
     let forces: Vec<Vec<(u32, f64)>> = touches
         .par_iter()
         .map(|touch| {
-            (model.load(touch).into_iter())
+            (model.push(&touch.into()).into_iter())
                 .filter_map(|(dof, force)| {
                     let (place, scale) = model.system().place(dof)?;
                     Some((place, force * scale))

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::Model;
-use super::load::{Touch, nodal_forces};
+use super::load::{Push, Touch, pushed};
 use super::observe::Face;
 use super::respond::{Reading, output_rows};
 use super::rows::Rows;
@@ -102,8 +102,14 @@ impl Sensitivity {
     /// Strains of all gauges under a touch.
     #[must_use]
     pub fn read(&self, touch: &Touch) -> Vec<f64> {
+        self.read_push(&touch.into())
+    }
+
+    /// Strains of all gauges under a push.
+    #[must_use]
+    pub fn read_push(&self, push: &Push) -> Vec<f64> {
         let mut strains = vec![0.0; self.gauges];
-        for (vertex, force) in nodal_forces(&self.mesh, touch) {
+        for (vertex, force) in pushed(&self.mesh, push) {
             let row = &self.weights[vertex as usize * self.gauges..][..self.gauges];
             for (strain, weight) in strains.iter_mut().zip(row) {
                 *strain += weight.dot(force);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::DofSet;
 use super::element::Facet;
 use super::error::{ElasticError, range};
-use super::load::{NodalForces, Touch, nodal_forces};
+use super::load::{NodalForces, Push, Touch, nodal_forces, pushed};
 use super::material::Section;
 use super::model::{LoadCheck, Model};
 use super::observe::{Face, Observer};
@@ -145,8 +145,8 @@ impl Model for ShellModel {
         &self.system
     }
 
-    fn load(&self, touch: &Touch) -> Vec<(usize, f64)> {
-        by_dof(&self.forces(touch))
+    fn push(&self, push: &Push) -> Vec<(usize, f64)> {
+        by_dof(&pushed(&self.mesh, push))
     }
 
     fn observer(&self, points: &[SurfacePoint], face: Face) -> Observer {

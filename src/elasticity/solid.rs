@@ -34,7 +34,7 @@ use self::grip::Grip;
 use self::pressed::nodal_shares;
 use super::Material;
 use super::error::ElasticError;
-use super::load::{Touch, pressure};
+use super::load::{Push, Touch, pressure};
 use super::model::{LoadCheck, Model};
 use super::observe::{Face, Observer, tangent_frame};
 use super::rows::Rows;
@@ -178,9 +178,9 @@ impl Model for SolidModel {
         &self.system
     }
 
-    fn load(&self, touch: &Touch) -> Vec<(usize, f64)> {
-        let force = -touch.normal * touch.force;
-        let pressure = pressure(&self.mesh, touch, self.elements.grain());
+    fn push(&self, push: &Push) -> Vec<(usize, f64)> {
+        let force = push.force;
+        let pressure = pressure(&self.mesh, &push.touch, self.elements.grain());
         let shares = nodal_shares(&*self.elements, &self.mesh, &self.guesses, &pressure);
         let along = |(node, share)| (0..3).map(move |i| (3 * node as usize + i, share * force[i]));
         shares.into_iter().flat_map(along).collect()

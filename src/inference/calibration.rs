@@ -2,8 +2,9 @@
 //!
 //! A gauge that is off by a little reads f·bᵀθ of a touch, with b = (g, ∂g/∂s, ∂g/∂t, ∂g/∂φ) at its place and θ = (gain,
 //! millimetres along and across, degrees). Known presses are off themselves: a hand is a millimetre beside the place and
-//! some per cent too hard. So each press k has three unknowns of its own, u = (two steps along the surface, a share of
-//! the force), and with the slopes J over them
+//! some per cent too hard. So each press k has unknowns of its own, u = (two steps along the surface, a share of
+//! the force; the tip's radius, and two shares of it along the surface, where these are off), and with the slopes J over
+//! them
 //!
 //! ```text
 //! x = B θ + J u + n,    u ~ N(0, S),  n ~ N(0, D)        (all channels of one press)
@@ -132,7 +133,8 @@ struct Press<'a> {
     reading: &'a [f64],
     /// What each of θ says of each channel.
     basis: Vec<Vector4<f64>>,
-    /// Slopes over the place and the share of the force, each times its standard deviation: channels × 3.
+    /// Slopes over the place and the share of the force, and over all else that is off with the way it was made, each
+    /// times its standard deviation: channels × these.
     moved: DMatrix<f64>,
 }
 
@@ -145,13 +147,15 @@ impl<'a> Press<'a> {
         // In any direction: half of the square along each of two.
         let place = off.pressing.place / 2.0_f64.sqrt() * known.force;
         let force = off.pressing.force * known.force;
+        let made = drawn.made(known.at, &off.making);
         Self {
             reading: &known.reading,
             basis: basis.into_iter().map(|b| b * known.force).collect(),
-            moved: DMatrix::from_fn(reading.len(), 3, |c, k| match k {
+            moved: DMatrix::from_fn(reading.len(), 3 + made.len(), |c, k| match k {
                 0 => place * change[c].x,
                 1 => place * change[c].y,
-                _ => force * reading[c],
+                2 => force * reading[c],
+                _ => known.force * made[k - 3][c],
             }),
         }
     }

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
 use nalgebra::{Matrix4, Vector4};
 
 use super::map::{ResponseMap, Slope};
 use crate::mesh::SurfacePoint;
-use crate::uncertainty::{Gluing, Uncertainty};
+use crate::uncertainty::{Gluing, Making, Uncertainty};
 
 /// What gauges read as drawn, and how that changes with the way they are glued.
 pub struct AsDrawn {
@@ -16,6 +17,8 @@ pub struct AsDrawn {
     pub changes: [ResponseMap; 3],
     /// A metre more of the tip's radius; absent where the tip is taken to be as large as it is said to be.
     pub tip: Option<ResponseMap>,
+    /// A newton along x, y and z, whichever way the surface lies; absent where touches press straight in.
+    pub axes: Option<[ResponseMap; 3]>,
 }
 
 /// What is not known of one gauge, as far as a covariance of its gain, millimetres along and across, and degrees says
@@ -71,7 +74,7 @@ impl AsDrawn {
         self.map.combined(&self.changes, glued)
     }
 
-    /// How far off readings per newton are by gluing and the tip's size (standard deviations), at every node of the map
+    /// How far off readings per newton are by gluing and the way touches are made (standard deviations), at every node of the map
     /// and for every channel, while nothing is known of these gauges.
     #[must_use]
     pub fn gluing_deviation(&self, off: &Uncertainty) -> ResponseMap {
@@ -86,12 +89,11 @@ impl AsDrawn {
         let doubts: Vec<Matrix4<f64>> = doubts.iter().map(covariance).collect();
         let mut values = Vec::with_capacity(nodes * self.map.channels());
         for node in 0..nodes {
-            let tip = self.tip.as_ref().map(|m| m.node(node));
             let rows = self.basis_at_node(node).zip(&doubts).enumerate();
             values.extend(rows.map(|(c, (row, doubt))| {
-                let sized = tip.map_or(0.0, |t| off.tip * t[c]);
+                let made = self.made_at_node(node, c, &off.making);
                 // What was inverted may be a little less than nothing.
-                (row.dot(&(doubt * row)).max(0.0) + sized * sized).sqrt()
+                (row.dot(&(doubt * row)).max(0.0) + made).sqrt()
             }));
         }
         ResponseMap::of(Arc::clone(mesh), self.map.channels(), values)
@@ -104,7 +106,38 @@ impl AsDrawn {
             map: Arc::new(self.map.mixed(channels)),
             changes: self.changes.each_ref().map(|m| m.mixed(channels)),
             tip: self.tip.as_ref().map(|m| m.mixed(channels)),
+            axes: (self.axes.as_ref()).map(|axes| axes.each_ref().map(|m| m.mixed(channels))),
         }
+    }
+
+    /// Variance that the way touches are made puts on a channel's reading of one newton at a node of the map.
+    fn made_at_node(&self, node: usize, channel: usize, making: &Making) -> f64 {
+        let of = |map: &ResponseMap| map.node(node)[channel];
+        // What presses there is one of three directions; the other two lie in the surface.
+        let shear = self.axes.as_ref().map_or(0.0, |axes| {
+            let all: f64 = axes.iter().map(|m| of(m).powi(2)).sum();
+            (all - of(&self.map).powi(2)).max(0.0).sqrt()
+        });
+        making.variance(self.tip.as_ref().map_or(0.0, of), shear)
+    }
+
+    /// What the way a touch is made puts on the readings of one newton at a place: for each way that it may be off, by as
+    /// much as is usual, what all channels feel of it together.
+    pub(super) fn made(&self, at: SurfacePoint, making: &Making) -> Vec<Vec<f64>> {
+        let scaled =
+            |by: f64, of: Vec<f64>| -> Vec<f64> { of.into_iter().map(|v| by * v).collect() };
+        let sized = self.tip.iter().map(|tip| scaled(making.tip, tip.at(at)));
+        let normal = self.map.mesh.normal(at);
+        let along = normal.any_orthonormal_vector();
+        let rubbed = self.axes.iter().flat_map(|axes| {
+            let [x, y, z] = axes.each_ref().map(|m| m.at(at));
+            [along, normal.cross(along)].map(|way| {
+                let of = |c: usize| way.dot(DVec3::new(x[c], y[c], z[c]));
+                let by = making.friction / 2.0_f64.sqrt();
+                scaled(by, (0..x.len()).map(of).collect())
+            })
+        });
+        sized.chain(rubbed).collect()
     }
 
     /// Readings and slopes at one place for gauges that are glued like that.
@@ -162,6 +195,7 @@ mod tests {
             map: Arc::new(map(&mesh, [2e-6, -1e-6])),
             changes: [[3e-7, 0.0], [-4e-7, 1e-7], [1e-7, 2e-7]].map(|c| map(&mesh, c)),
             tip: Some(map(&mesh, [1e-3, -2e-3])),
+            axes: None,
         };
         let gluing = Gluing::default();
         // Every way of being off as far as a workshop is, each as likely as its opposite.
@@ -186,7 +220,10 @@ mod tests {
         }
         let off = |gluing: Gluing, tip: f64| Uncertainty {
             gluing,
-            tip,
+            making: Making {
+                tip,
+                ..Making::EXACT
+            },
             ..Uncertainty::default()
         };
         let gluing_deviation = drawn.gluing_deviation(&off(gluing, 0.0)).at(at);
@@ -202,6 +239,39 @@ mod tests {
         let sized = drawn.gluing_deviation(&off(Gluing::EXACT, 0.5e-3)).at(at);
         for (sized, expected) in sized.into_iter().zip([0.5e-6, 1e-6]) {
             assert!((sized - expected).abs() < 1e-12, "{sized}");
+        }
+    }
+
+    #[test]
+    fn all_channels_together_feel_of_a_touch_what_each_is_off_by() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let (mesh, _) = TriMesh::new(&corners, &[[0, 1, 2]], 0).unwrap();
+        let mesh = Arc::new(mesh);
+        let drawn = AsDrawn {
+            map: Arc::new(map(&mesh, [2e-6, -1e-6])),
+            changes: [[0.0; 2]; 3].map(|c| map(&mesh, c)),
+            tip: Some(map(&mesh, [1e-3, -2e-3])),
+            // The surface faces along z: what presses straight in pushes against that.
+            axes: Some([[3e-6, 1e-6], [-4e-6, 2e-6], [-2e-6, 1e-6]].map(|c| map(&mesh, c))),
+        };
+        let making = Making {
+            tip: 0.5e-3,
+            friction: 0.2,
+        };
+        let at = SurfacePoint {
+            triangle: 0,
+            barycentric: [0.2, 0.3, 0.5],
+        };
+        let off = Uncertainty {
+            making,
+            ..Uncertainty::NONE
+        };
+        let deviations = drawn.gluing_deviation(&off).at(at);
+        let expected = [0.25 + 0.02 * 25.0, 1.0 + 0.02 * 5.0];
+        for (c, (deviation, expected)) in deviations.into_iter().zip(expected).enumerate() {
+            assert!((deviation * deviation * 1e12 - expected).abs() < 1e-9);
+            let together = drawn.made(at, &making).into_iter().map(|m| m[c] * m[c]);
+            assert!((together.sum::<f64>() * 1e12 - expected).abs() < 1e-9);
         }
     }
 }

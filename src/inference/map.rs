@@ -9,8 +9,8 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::budget::{Cancelled, Watch, report};
-use crate::elasticity::Touch;
 use crate::elasticity::sensitivity::Sensitivity;
+use crate::elasticity::{Push, Touch};
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// Templates that are compared side by side.
@@ -52,6 +52,20 @@ impl ResponseMap {
         tip_radius: f64,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
+        Self::pushed(sensitivity, mesh, tip_radius, None, watch)
+    }
+
+    /// Pushes with one newton at every node of a mesh: in one direction all over, or straight in where none is given.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn pushed(
+        sensitivity: &Sensitivity,
+        mesh: Arc<TriMesh>,
+        tip_radius: f64,
+        toward: Option<DVec3>,
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
         /// Nodes between two reports.
         const PIECE: usize = 512;
         let places = nodes(&mesh);
@@ -61,12 +75,14 @@ impl ResponseMap {
         for (k, piece) in all.chunks(PIECE).enumerate() {
             report(watch, "Pressing everywhere", k * PIECE, all.len())?;
             let read = |&(position, normal): &(DVec3, DVec3)| {
-                sensitivity.read(&Touch {
+                let touch = Touch {
                     position,
                     normal,
                     force: 1.0,
                     tip_radius,
-                })
+                };
+                let force = toward.unwrap_or(-normal);
+                sensitivity.read_push(&Push { touch, force })
             };
             values.par_extend(piece.par_iter().flat_map_iter(read));
         }

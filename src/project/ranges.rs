@@ -39,6 +39,8 @@ pub const GAIN_OFF: RangeInclusive<f64> = 0.0..=50.0;
 pub const FORCE_OFF: RangeInclusive<f64> = 0.0..=50.0;
 /// How far off the tip's radius may be (mm).
 pub const TIP_OFF: RangeInclusive<f64> = 0.0..=50.0;
+/// How much of a touch's force may act along the surface (%): more than presses would slide off.
+pub const FRICTION: RangeInclusive<f64> = 0.0..=100.0;
 /// `gauge.drift_microstrain`.
 pub const DRIFT: RangeInclusive<f64> = 0.0..=1e6;
 
@@ -143,6 +145,11 @@ impl Project {
                 "touch.tip_tolerance_mm",
                 self.touch.tip_tolerance_mm,
                 TIP_OFF,
+            ),
+            (
+                "touch.friction_percent",
+                self.touch.friction_percent,
+                FRICTION,
             ),
             ("calibration.place_mm", hand.place_mm, PLACE_OFF),
             ("calibration.force_percent", hand.force_percent, FORCE_OFF),

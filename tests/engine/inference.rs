@@ -7,6 +7,7 @@ use hapdef::budget::{Quality, unwatched};
 use hapdef::design::simulated_board as board;
 use hapdef::design::{self, Inputs, Sensing, Workshop};
 use hapdef::elasticity::Touch;
+use hapdef::inference::calibration::noise_of_mean;
 use hapdef::inference::{
     Errors, Features, Known, Lessons, Matching, Trained, calibrate, cramer_rao,
 };
@@ -155,6 +156,7 @@ fn known_touches_show_how_gauges_are_glued() {
         })
         .collect();
     let real = lab.sensing.drawn.glued(&glued);
+    let noise = vec![NOISE; glued.len()];
     let known: Vec<Known> = touches(24, 8, 10.0)
         .iter()
         .map(|t| {
@@ -163,11 +165,12 @@ fn known_touches_show_how_gauges_are_glued() {
             Known {
                 at,
                 force: 10.0,
-                reading: noisy(&clean, &mut rng),
+                reading: (clean.iter().zip(noise_of_mean(&noise)))
+                    .map(|(x, n)| x + n * normal(&mut rng))
+                    .collect(),
             }
         })
         .collect();
-    let noise = vec![NOISE; glued.len()];
     // Pressed by a machine, on the very model.
     let off = Uncertainty {
         pressing: Pressing::EXACT,

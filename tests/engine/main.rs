@@ -25,6 +25,7 @@ mod given_tetrahedra;
 mod inference;
 mod judge;
 mod libsvm;
+mod making;
 mod mesh_files;
 mod pictures;
 mod placement;

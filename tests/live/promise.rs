@@ -14,8 +14,6 @@ use hapdef::io::project_file;
 use serde_json::Value;
 
 const FORCES_N: [f64; 3] = [3.0, 10.0, 25.0];
-/// Presses of each force: every build feels the same.
-const PRESSES: usize = 150;
 /// Workshops that the gauges are glued by: a single one is a tenth better or worse than they are in the mean.
 const WORKSHOPS: [u64; 3] = [1, 2, 3];
 /// Where errors are compared: outside it are touches that move no gauge. Live says of them that nothing touches, and
@@ -66,6 +64,9 @@ struct Designed {
     rows: Vec<Value>,
     inputs: Inputs,
     sensing: Sensing,
+    /// Where every build is pressed with each force (mm): the touches of the judge, which no design has seen. At others
+    /// its mean would be another by a tenth, because there are hardly two hundred of them.
+    places: Vec<DVec3>,
 }
 
 impl Designed {
@@ -101,7 +102,9 @@ impl Designed {
             .unwrap()
             .inputs;
         let sensing = design::sensing(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
+        let places = places(&inputs, &sensing);
         Self {
+            places,
             folder,
             rows: summary["evaluation"].as_array().unwrap().clone(),
             inputs,
@@ -129,23 +132,12 @@ impl Designed {
         row.and_then(|r| r[which].as_f64()).unwrap()
     }
 
-    /// Presses of all forces, one after another, at places of the region that no design has seen.
+    /// Presses of all forces, one after another.
     fn script(&self) -> PathBuf {
-        const SEED: u64 = 0x9e37;
-        let keys = &self.inputs.project.evaluation.regions;
-        let [low, high] = keys.iter().find(|r| r.name == REGION).unwrap().box_mm;
-        let (low, high) = (DVec3::from_array(low), DVec3::from_array(high));
-        let touches = self.sensing.touches(&self.inputs, 3 * PRESSES, SEED, false);
-        let places: Vec<DVec3> = (touches.unwrap().iter())
-            .map(|t| t.position * 1e3)
-            .filter(|p| p.cmpge(low).all() && p.cmple(high).all())
-            .take(PRESSES)
-            .collect();
-        assert_eq!(places.len(), PRESSES);
         let mut script = String::from("start_s,duration_s,x_mm,y_mm,z_mm,force_n\n");
         let presses = FORCES_N
             .iter()
-            .flat_map(|f| places.iter().map(move |p| (f, p)));
+            .flat_map(|f| self.places.iter().map(move |p| (f, p)));
         for (k, (force, p)) in presses.enumerate() {
             let start = FIRST_S + EVERY_S * k as f64;
             let _ = writeln!(
@@ -183,7 +175,7 @@ impl Designed {
             text(&path),
         ]);
         let said: Value = serde_json::from_str(&said).unwrap();
-        let seconds = FIRST_S + EVERY_S * (FORCES_N.len() * PRESSES) as f64;
+        let seconds = FIRST_S + EVERY_S * (FORCES_N.len() * self.places.len()) as f64;
         assert!(
             said["seconds"]
                 .as_f64()
@@ -207,7 +199,7 @@ impl Designed {
     fn calibrated(&self, seed: u64) -> PathBuf {
         let (sensing, gluing) = (&self.sensing, self.inputs.project.gluing());
         let (truth, gains) = sensing.reference(&gluing, seed, &unwatched).unwrap();
-        let known = pressed_by_hand(&self.inputs, sensing, (&truth, &gains), seed);
+        let known = pressed_by_hand(sensing, (&truth, &gains), seed);
         let mut project = self.inputs.project.clone();
         let noise = vec![sensing.off.of_channel(); gains.len()];
         let found = calibrate(&sensing.drawn, &known, &noise, &sensing.off);
@@ -218,7 +210,7 @@ impl Designed {
     }
 
     /// The mean error (mm) of what is found in a recording with a project, at each force.
-    fn achieved(recording: &Path, project: &Path) -> [f64; 3] {
+    fn achieved(&self, recording: &Path, project: &Path) -> [f64; 3] {
         let table = recording.with_extension("csv");
         hapdef(&[
             "listen",
@@ -245,14 +237,26 @@ impl Designed {
             if since < 0.0 || !FULL_S.contains(&(since - press * EVERY_S)) {
                 continue;
             }
-            let number = press as usize / PRESSES;
+            let number = press as usize / self.places.len();
             let (Some(was), Some(found)) = (place(&row[was..]), found.get_mut(number)) else {
                 continue;
             };
             found.take(place(&row[at..]).map(|at| at.distance(was)));
         }
-        found.map(|f| f.mean())
+        found.map(|f| f.mean(self.places.len()))
     }
+}
+
+/// Where the judge touches in the region (mm).
+fn places(inputs: &Inputs, sensing: &Sensing) -> Vec<DVec3> {
+    let keys = &inputs.project.evaluation.regions;
+    let [low, high] = keys.iter().find(|r| r.name == REGION).unwrap().box_mm;
+    let (low, high) = (DVec3::from_array(low), DVec3::from_array(high));
+    let touches = sensing.judged_touches(inputs, &Quality::Draft.budget(), &unwatched);
+    (touches.unwrap().iter())
+        .map(|t| t.position * 1e3)
+        .filter(|p| p.cmpge(low).all() && p.cmple(high).all())
+        .collect()
 }
 
 /// Three columns (mm), where they hold anything.
@@ -276,9 +280,9 @@ impl Found {
         }
     }
 
-    fn mean(&self) -> f64 {
+    fn mean(&self, presses: usize) -> f64 {
         let felt = self.errors.len() as f64;
-        assert!(felt > 5.0 * PRESSES as f64, "{felt} samples");
+        assert!(felt > 5.0 * presses as f64, "{felt} samples");
         let share = felt / (felt + self.unfelt as f64);
         assert!(share >= FELT, "{} samples were not felt", self.unfelt);
         self.errors.iter().sum::<f64>() / felt
@@ -294,12 +298,12 @@ fn what_is_promised_is_what_is_achieved() {
     let designed = Designed::new();
     let script = designed.script();
     let exact = designed.recording("exact", 0, &script);
-    let exact = Designed::achieved(&exact, &designed.exact());
+    let exact = designed.achieved(&exact, &designed.exact());
     let (mut built, mut calibrated) = (Vec::new(), Vec::new());
     for seed in WORKSHOPS {
         let recording = designed.recording("all", seed, &script);
-        built.push(Designed::achieved(&recording, &designed.project()));
-        calibrated.push(Designed::achieved(&recording, &designed.calibrated(seed)));
+        built.push(designed.achieved(&recording, &designed.project()));
+        calibrated.push(designed.achieved(&recording, &designed.calibrated(seed)));
         println!(
             "workshop {seed}: {:.3?} built, {:.3?} calibrated",
             built.last(),

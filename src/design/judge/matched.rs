@@ -29,7 +29,7 @@ use crate::mesh::TriMesh;
 use crate::placement::expected_error::BLIND;
 use crate::regression::folds::evenly;
 use crate::statistics::mean;
-use crate::uncertainty::{Gluing, Uncertainty};
+use crate::uncertainty::{Gluing, Making, Uncertainty};
 
 /// Sites whose readings are known everywhere at the same time: those of more sets would fill the memory.
 const MOST_SITES: usize = 60;
@@ -66,10 +66,10 @@ struct Everywhere {
     /// Of the reference, rising: a channel each.
     rows: Vec<usize>,
     drawn: AsDrawn,
-    /// What gluing and the tip's size put on the readings.
+    /// What gluing and the way touches are made put on the readings.
     gluing_deviation: ResponseMap,
-    /// What the tip's size puts on them, where it may be off: gauges that are glued just so have that too.
-    sized: Option<ResponseMap>,
+    /// What the latter alone does, where it may be off: gauges that are glued just so have that too.
+    made: Option<ResponseMap>,
 }
 
 impl ByMatching<'_> {
@@ -177,7 +177,7 @@ impl ByMatching<'_> {
             })
             .collect();
         let off = self.off();
-        let tip = (self.tip_radius(), off.tip);
+        let tip = (self.tip_radius(), &off.making);
         let drawn = drawn_on(model, &gauges, mesh, tip, watch)?;
         let exact = Uncertainty {
             gluing: Gluing::EXACT,
@@ -185,7 +185,7 @@ impl ByMatching<'_> {
         };
         Ok(Everywhere {
             gluing_deviation: drawn.gluing_deviation(&off),
-            sized: drawn.tip.is_some().then(|| drawn.gluing_deviation(&exact)),
+            made: (off.making != Making::EXACT).then(|| drawn.gluing_deviation(&exact)),
             rows,
             drawn,
         })
@@ -245,7 +245,7 @@ impl<'a> Set<'a> {
             let gluing_deviation = gluing_deviation.map(|s| Arc::new(s.mixed(&channels)));
             Errors::known(&trial.off(), channels.len(), gluing_deviation)
         };
-        let exact = errors(everywhere.sized.as_ref());
+        let exact = errors(everywhere.made.as_ref());
         let glued = errors(Some(&everywhere.gluing_deviation));
         let most_n = trial.forces.most_n;
         Self {

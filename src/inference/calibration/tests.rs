@@ -8,7 +8,7 @@ use super::*;
 use crate::draw::normal;
 use crate::inference::ResponseMap;
 use crate::mesh::TriMesh;
-use crate::uncertainty::{Gluing, Pressing};
+use crate::uncertainty::{Gluing, Making, Pressing};
 
 const CHANNELS: usize = 5;
 const NOISE: [f64; CHANNELS] = [1e-6; CHANNELS];
@@ -29,6 +29,7 @@ fn drawn() -> AsDrawn {
         map: Arc::new(map(10e-6, 1.7)),
         changes: [map(1e-6, 2.3), map(0.8e-6, 0.7), map(0.5e-6, 3.1)],
         tip: None,
+        axes: None,
     }
 }
 
@@ -210,4 +211,52 @@ fn a_machine_finds_a_part_that_is_softer() {
     let [before, after] =
         [&drawn.map, &fitted].map(|map| places.iter().map(|&at| apart(map, at)).sum::<f64>());
     assert!(after < 0.1 * before, "{after:e} {before:e}");
+}
+
+#[test]
+fn what_all_gauges_feel_of_a_tip_is_not_taken_for_gluing() {
+    const WORLDS: u64 = 20;
+    let tip = 1e-3;
+    let larger = drawn().changes.into_iter().nth(1).unwrap();
+    // A metre of the tip's radius, in strain: a few per cent of a reading for a millimetre.
+    let rise: Vec<Vec<(usize, f64)>> = (0..CHANNELS).map(|c| vec![(c, 2.0 / tip)]).collect();
+    let drawn = AsDrawn {
+        tip: Some(larger.mixed(&rise)),
+        ..drawn()
+    };
+    let told = Uncertainty {
+        making: Making {
+            tip,
+            ..Making::EXACT
+        },
+        pressing: Pressing::EXACT,
+        ..off()
+    };
+    let untold = Uncertainty {
+        making: Making::EXACT,
+        ..told
+    };
+    let mut apart = [0.0; 2];
+    for seed in 0..WORLDS {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let real = drawn.glued(&built(&told.gluing, &mut rng));
+        let mut known = Vec::new();
+        for _ in 0..12 {
+            let mut press = press(&real, &told.pressing, &mut rng);
+            let off = tip * normal(&mut rng) * FORCE;
+            let felt = drawn.tip.as_ref().unwrap().at(press.at);
+            for (x, felt) in press.reading.iter_mut().zip(felt) {
+                *x += off * felt;
+            }
+            known.push(press);
+        }
+        for (apart, off) in apart.iter_mut().zip([&told, &untold]) {
+            let fitted = drawn.calibrated(&calibrate(&drawn, &known, &NOISE, off));
+            for node in 0..6 {
+                let pairs = fitted.node(node).iter().zip(real.node(node));
+                *apart += pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            }
+        }
+    }
+    assert!(apart[0] < 0.8 * apart[1], "{apart:?}");
 }

@@ -47,6 +47,7 @@ fn full() -> Project {
     };
     p.gauge.drift_microstrain = 1.0 / 3.0;
     p.touch.tip_tolerance_mm = 0.75;
+    p.touch.friction_percent = 12.5;
     p.touch.reach_mm = 1.25;
     p.calibration = crate::project::CalibrationKeys {
         place_mm: 0.0,
@@ -130,6 +131,7 @@ fn a_file_from_before_a_key_means_what_is_usual() {
                 "angle_deg",
                 "gain_percent",
                 "tip_tolerance_mm",
+                "friction_percent",
                 "reach_mm",
                 "drift_microstrain",
                 "[calibration]",

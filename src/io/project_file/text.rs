@@ -161,6 +161,11 @@ fn touch(t: &mut Text, project: &Project) {
         "how far off that is (standard deviation): larger tips and smaller ones touch too",
     );
     t.key(
+        "friction_percent",
+        float(project.touch.friction_percent),
+        "how much of the force drags along the surface, beside what presses (rms, any direction)",
+    );
+    t.key(
         "count",
         project.touch.count,
         "touches simulated; lower qualities take fewer",

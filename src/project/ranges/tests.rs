@@ -1,6 +1,6 @@
 use super::*;
 use crate::project::{CostKeys, RegionKeys};
-use crate::uncertainty::{Gluing, Pressing};
+use crate::uncertainty::{Gluing, Making, Pressing};
 
 fn project() -> Project {
     let mut project = Project::around("part.stl", None);
@@ -24,7 +24,7 @@ fn project() -> Project {
 type Place = fn(&mut Project) -> &mut f64;
 
 /// Every number of a project that may not be just any.
-const NUMBERS: [(&str, Place); 39] = [
+const NUMBERS: [(&str, Place); 40] = [
     ("part.thickness_mm", |p| &mut p.part.thickness_mm),
     ("part.weld_mm", |p| &mut p.part.weld_mm),
     ("part.fill_holes_mm", |p| &mut p.part.fill_holes_mm),
@@ -40,6 +40,7 @@ const NUMBERS: [(&str, Place); 39] = [
     ("touch.edge_margin_mm", |p| &mut p.touch.edge_margin_mm),
     ("touch.reach_mm", |p| &mut p.touch.reach_mm),
     ("touch.tip_tolerance_mm", |p| &mut p.touch.tip_tolerance_mm),
+    ("touch.friction_percent", |p| &mut p.touch.friction_percent),
     ("gauge.drift_microstrain", |p| {
         &mut p.gauge.drift_microstrain
     }),
@@ -183,12 +184,13 @@ fn gluing_is_exact_to_much_too_far_and_usually_that_of_the_paper() {
 fn what_is_off_is_what_the_keys_say() {
     let mut project = project();
     let usual = project.uncertainty();
-    assert_eq!((usual.drift, usual.tip), (0.0, 0.0));
+    assert_eq!((usual.drift, usual.making), (0.0, Making::EXACT));
     assert_eq!(usual.pressing, Pressing::default());
     project.gauge.noise_microstrain = 2.0;
     project.gauge.drift_microstrain = 3.0;
     project.gauge.tolerance.place_mm = 0.5;
     project.touch.tip_tolerance_mm = 0.25;
+    project.touch.friction_percent = 15.0;
     project.calibration.place_mm = 2.0;
     project.calibration.force_percent = 10.0;
     project.live.stiffness_percent = 20.0;
@@ -198,7 +200,8 @@ fn what_is_off_is_what_the_keys_say() {
     close(off.noise, 2e-6);
     close(off.drift, 3e-6);
     close(off.gluing.place, 0.5e-3);
-    close(off.tip, 0.25e-3);
+    close(off.making.tip, 0.25e-3);
+    close(off.making.friction, 0.15);
     close(off.pressing.place, 2e-3);
     close(off.pressing.force, 0.1);
     close(off.stiffness, 0.2);

@@ -7,7 +7,7 @@ use super::super::form::{choice, count, number, rows};
 use super::super::view::Tab;
 use crate::budget::{Limits, Quality};
 use crate::dataset::Signal;
-use crate::project::{FORCES, Lattice, PartModel, Project, TIP_OFF, TOUCHES};
+use crate::project::{FORCES, FRICTION, Lattice, PartModel, Project, TIP_OFF, TOUCHES};
 
 /// The settings of the simulation.
 pub fn simulation_form(ask: &mut Ask<'_>, ui: &mut Ui) {
@@ -101,6 +101,15 @@ fn touch(ui: &mut Ui, project: &mut Project) {
         0.01,
         " mm",
         "How much larger or smaller tips are that touch (standard deviation)",
+    );
+    number(
+        ui,
+        "Friction",
+        &mut touch.friction_percent,
+        FRICTION,
+        0.5,
+        " %",
+        "How much of a touch's force drags along the surface, beside what presses (rms, in any direction)",
     );
     count(
         ui,

@@ -1,0 +1,154 @@
+//! How readings change with the way touches are made: by a tip of another size, and where a part of the force drags along
+//! the surface.
+//!
+//! Under some of the touches of a dataset, and solved for only where either may be off: they are other loads.
+
+use super::site::{Site, gauges_on};
+use crate::budget::{Cancelled, Watch};
+use crate::elasticity::respond::{Reading, Responses, respond};
+use crate::elasticity::{Model, Push, Touch};
+use crate::uncertainty::Making;
+
+/// Of a tip's radius: as far as it is made larger and smaller for the slope.
+const STEP: f64 = 0.1;
+/// Loads that stand for a touch, of either cause.
+const WAYS: usize = 2;
+
+/// What the reading of every site changes by under some of the touches of a dataset, at their force. In single precision:
+/// they make up variances. Nothing is held for what is not off.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MakingSlopes {
+    /// The touches of the dataset, rising.
+    touches: Vec<usize>,
+    /// Sites × touches: strain a metre of the tip's radius.
+    tip: Vec<f32>,
+    /// Sites × touches: strain where as much force acts along the surface as presses, as the root of the sum of the
+    /// squares over two directions.
+    shear: Vec<f32>,
+}
+
+impl MakingSlopes {
+    /// Solves for the touches in `columns` made otherwise, as far as `making` says that they may be. Also how many
+    /// right-hand sides that took.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub(super) fn of(
+        model: &dyn Model,
+        sites: &[Site],
+        touches: &[Touch],
+        columns: &[usize],
+        making: &Making,
+        watch: Watch,
+    ) -> Result<(Self, usize), Cancelled> {
+        let pressed: Vec<Touch> = columns.iter().map(|&t| touches[t]).collect();
+        let solve = |wanted: bool, ways: fn(&Touch) -> [Push; WAYS]| {
+            if !wanted || sites.is_empty() {
+                return Ok(None);
+            }
+            let pushes: Vec<Push> = pressed.iter().flat_map(ways).collect();
+            let (observer, angles) = gauges_on(model, sites);
+            let reading = Reading::Gauge(&angles);
+            respond(model, &pushes, &observer, reading, watch).map(Some)
+        };
+        let mut found = Self {
+            touches: columns.to_vec(),
+            ..Self::default()
+        };
+        let mut solves = 0;
+        // One after the other: the answers to both together might not fit where those to one do.
+        if let Some(sized) = solve(making.tip > 0.0, of_two_sizes)? {
+            solves += sized.solves;
+            let radius = |t: usize| pressed[t].tip_radius;
+            let slope = |t: usize, [larger, smaller]: [f64; WAYS]| {
+                (larger - smaller) / (2.0 * STEP * radius(t))
+            };
+            found.tip = each(&sized, sites.len(), pressed.len(), slope);
+        }
+        if let Some(dragged) = solve(making.friction > 0.0, along_the_surface)? {
+            solves += dragged.solves;
+            let size = |_: usize, [along, across]: [f64; WAYS]| along.hypot(across);
+            found.shear = each(&dragged, sites.len(), pressed.len(), size);
+        }
+        Ok((found, solves))
+    }
+
+    /// Variance that touches made like that put on a site's reading of the touch of a column.
+    #[must_use]
+    pub fn variance(&self, site: usize, column: usize, making: &Making) -> f64 {
+        let at = site * self.touches.len() + column;
+        let of = |values: &[f32]| values.get(at).map_or(0.0, |v| f64::from(*v));
+        making.variance(of(&self.tip), of(&self.shear))
+    }
+
+    /// Those of one site alone.
+    #[must_use]
+    pub(super) fn only(&self, site: usize) -> Self {
+        let count = self.touches.len();
+        let own = |values: &[f32]| match values {
+            [] => Vec::new(),
+            all => all[site * count..][..count].to_vec(),
+        };
+        Self {
+            touches: self.touches.clone(),
+            tip: own(&self.tip),
+            shear: own(&self.shear),
+        }
+    }
+
+    /// Forgets all sites but the first.
+    pub(super) fn truncate(&mut self, sites: usize) {
+        let count = sites * self.touches.len();
+        self.tip.truncate(count);
+        self.shear.truncate(count);
+    }
+
+    /// One site more, of which they are known under every touch.
+    pub(super) fn push(&mut self, site: &Self) {
+        for &touch in &self.touches {
+            self.tip.extend(site.tip.get(touch));
+            self.shear.extend(site.shear.get(touch));
+        }
+    }
+}
+
+/// Straight in, by a tip that is larger and by one that is smaller.
+fn of_two_sizes(touch: &Touch) -> [Push; WAYS] {
+    [1.0 + STEP, 1.0 - STEP].map(|by| {
+        Push::from(&Touch {
+            tip_radius: by * touch.tip_radius,
+            ..*touch
+        })
+    })
+}
+
+/// As hard as the touch, in two directions along the surface.
+fn along_the_surface(touch: &Touch) -> [Push; WAYS] {
+    let along = touch.normal.any_orthonormal_vector();
+    [along, touch.normal.cross(along)].map(|way| Push {
+        touch: *touch,
+        force: way * touch.force,
+    })
+}
+
+/// What every site makes of what it reads of each touch made in two ways: sites × touches.
+fn each(
+    responses: &Responses,
+    sites: usize,
+    touches: usize,
+    of: impl Fn(usize, [f64; WAYS]) -> f64,
+) -> Vec<f32> {
+    let mut row = vec![0.0; WAYS * touches];
+    let mut values = Vec::with_capacity(sites * touches);
+    for site in 0..sites {
+        responses.row_into(site, &mut row);
+        let (pairs, _) = row.as_chunks::<WAYS>();
+        values.extend(
+            pairs
+                .iter()
+                .enumerate()
+                .map(|(t, pair)| of(t, *pair) as f32),
+        );
+    }
+    values
+}

@@ -1,0 +1,172 @@
+//! Touches that are made otherwise than they are said to be: by other tips, and dragging along the surface. Whoever
+//! matches readings, calibrates or chooses knows of it, and is better for it.
+
+use std::sync::{Arc, OnceLock};
+
+use glam::DVec3;
+use hapdef::budget::{Budget, Quality, unwatched};
+use hapdef::dataset::{self, Signal};
+use hapdef::design::{self, Inputs, Simulated};
+use hapdef::elasticity::{Push, Touch};
+use hapdef::inference::{Errors, Matching};
+use hapdef::placement::SelectorKind;
+use hapdef::project::ChosenSite;
+use hapdef::uncertainty::{Making, Uncertainty};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::coarse;
+
+const GAUGES: usize = 6;
+
+/// A limb that is touched by fingers that drag a third of what they press, with gauges that are glued just so.
+fn dragged() -> Inputs {
+    let mut inputs = coarse::limb();
+    let project = &mut inputs.project;
+    project.selection.sensors = GAUGES;
+    project.touch.friction_percent = 33.0;
+    let tolerance = &mut project.gauge.tolerance;
+    (
+        tolerance.place_mm,
+        tolerance.angle_deg,
+        tolerance.gain_percent,
+    ) = (0.0, 0.0, 0.0);
+    inputs
+}
+
+/// The same, by whoever was not told.
+fn untold() -> Inputs {
+    let mut inputs = dragged();
+    inputs.project.touch.friction_percent = 0.0;
+    inputs
+}
+
+fn budget() -> Budget {
+    Budget {
+        touches: 200,
+        ..Quality::Draft.budget()
+    }
+}
+
+fn simulated() -> &'static Arc<Simulated> {
+    static SIMULATED: OnceLock<Arc<Simulated>> = OnceLock::new();
+    let simulate = || design::simulate(&dragged(), &budget(), &unwatched).unwrap();
+    SIMULATED.get_or_init(|| Arc::new(simulate()))
+}
+
+/// What is chosen by whoever takes that for off which the inputs say.
+fn chosen(inputs: &Inputs) -> Vec<usize> {
+    let (simulated, budget) = (simulated(), budget());
+    let feasibility = design::filter(inputs, simulated);
+    let reduced = design::reduce_sites(inputs, simulated, &feasibility, &budget).unwrap();
+    let kind = SelectorKind::ExpectedError;
+    let selection = design::select(inputs, simulated, &reduced, kind, &budget, &unwatched);
+    selection.unwrap().sets.pop().unwrap().sites
+}
+
+#[test]
+fn variances_are_those_of_touches_that_are_made_so() {
+    let all = &simulated().dataset;
+    let (slopes, made) = (all.slopes.as_ref().unwrap(), all.making.as_ref().unwrap());
+    let touches: Vec<Touch> = slopes.touches().iter().map(|&t| all.touches[t]).collect();
+    let model = simulated().model().unwrap();
+    let friction = 0.2;
+    // Four ways round, each as likely: their mean is what any way has.
+    let mut squares = vec![0.0; touches.len()];
+    for way in 0..4 {
+        let drag = |touch: &Touch| {
+            let along = touch.normal.any_orthonormal_vector();
+            let across = touch.normal.cross(along);
+            let (sin, cos) = (0.3 + std::f64::consts::FRAC_PI_2 * f64::from(way)).sin_cos();
+            let straight = Push::from(touch);
+            Push {
+                force: straight.force + (along * cos + across * sin) * (friction * touch.force),
+                ..straight
+            }
+        };
+        let pushes: Vec<Push> = touches.iter().map(drag).collect();
+        let sites = &all.sites[17..18];
+        let read = dataset::measure(&*model, &pushes, sites, Signal::Strain, &unwatched).unwrap();
+        let columns = slopes.touches().iter().zip(read.0.row(0));
+        for (square, (&t, read)) in squares.iter_mut().zip(columns) {
+            *square += (read - all.x.row(17)[t]).powi(2) / 4.0;
+        }
+    }
+    let making = Making {
+        friction,
+        ..Making::EXACT
+    };
+    for (column, square) in squares.into_iter().enumerate() {
+        let variance = made.variance(17, column, &making);
+        assert!(
+            (variance - square).abs() < 1e-3 * square + 1e-18,
+            "{variance:e} {square:e}"
+        );
+        // Nobody asked for other tips.
+        let sized = Making {
+            tip: 1e-3,
+            ..Making::EXACT
+        };
+        assert_eq!(made.variance(17, column, &sized), 0.0);
+    }
+}
+
+#[test]
+fn gauges_are_chosen_for_touches_that_drag() {
+    let [knows, other] = [dragged(), untold()].map(|inputs| chosen(&inputs));
+    assert_ne!(knows, other);
+    let expected = |inputs: &Inputs| {
+        let sets = [knows.clone(), other.clone()];
+        design::expected_errors(inputs, simulated(), &sets, &unwatched).unwrap()
+    };
+    let (of_dragged, of_straight) = (expected(&dragged()), expected(&untold()));
+    println!("dragged {of_dragged:?}, straight {of_straight:?} mm");
+    assert!(of_dragged[0] < of_dragged[1], "{of_dragged:?}");
+    assert!(of_straight[1] < of_dragged[1], "{of_straight:?}");
+}
+
+#[test]
+fn whoever_knows_of_friction_finds_touches_better() {
+    const TOUCHES: usize = 200;
+    let mut inputs = dragged();
+    let sites = &simulated().dataset.sites;
+    inputs.project.selection.sites = (chosen(&inputs).into_iter())
+        .map(|s| ChosenSite {
+            position_mm: (sites[s].position * 1e3).to_array(),
+            direction: sites[s].direction.to_array(),
+        })
+        .collect();
+    let sensing = design::sensing(&inputs, &budget(), &unwatched).unwrap();
+    let touches = sensing.touches(&inputs, TOUCHES, 5, false).unwrap();
+    let friction = sensing.off.making.friction;
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let mut drag = |touch: &Touch| {
+        let way = std::f64::consts::TAU * rng.random::<f64>();
+        let along = touch.normal.any_orthonormal_vector();
+        let aside: DVec3 = along * way.cos() + touch.normal.cross(along) * way.sin();
+        let straight = Push::from(touch);
+        Push {
+            force: straight.force + aside * (friction * touch.force),
+            ..straight
+        }
+    };
+    let pushes: Vec<Push> = touches.iter().map(&mut drag).collect();
+    let error = |off: Uncertainty| {
+        let deviation = Arc::new(sensing.drawn.gluing_deviation(&off));
+        let errors = Errors::known(&off, GAUGES, Some(deviation));
+        let mut matching = Matching::new(Arc::clone(&sensing.drawn.map), errors, 60.0);
+        let pairs = touches.iter().zip(&pushes);
+        let away = pairs.map(|(touch, push)| {
+            let found = matching.find(&sensing.sensitivity.read_push(push));
+            found.position.distance(touch.position) * 1e3
+        });
+        away.sum::<f64>() / TOUCHES as f64
+    };
+    let untold = Uncertainty {
+        making: Making::EXACT,
+        ..sensing.off
+    };
+    let [told, untold] = [sensing.off, untold].map(error);
+    println!("told of friction {told:.2} mm, untold {untold:.2} mm");
+    assert!(told < 0.95 * untold, "{told} {untold}");
+}
