@@ -316,17 +316,13 @@ pub fn simulate(
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
-pub fn measure<'t, T>(
+pub fn measure(
     model: &dyn Model,
-    touches: &'t [T],
+    touches: &[impl Copy + Sync + Into<Push>],
     sites: &[Site],
     signal: Signal,
     watch: Watch,
-) -> Result<(SignalMatrix, usize), Cancelled>
-where
-    T: Sync,
-    Push: From<&'t T>,
-{
+) -> Result<(SignalMatrix, usize), Cancelled> {
     let (observer, angles) = gauges_on(model, sites);
     let reading = match signal {
         Signal::Strain => Reading::Gauge(&angles),

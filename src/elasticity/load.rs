@@ -28,19 +28,19 @@ pub struct Push {
     pub force: DVec3,
 }
 
-impl From<&Touch> for Push {
+impl From<Touch> for Push {
     /// Straight in.
-    fn from(touch: &Touch) -> Self {
+    fn from(touch: Touch) -> Self {
         Self {
-            touch: *touch,
+            touch,
             force: -touch.normal * touch.force,
         }
     }
 }
 
-impl From<&Self> for Push {
-    fn from(push: &Self) -> Self {
-        *push
+impl From<&Touch> for Push {
+    fn from(touch: &Touch) -> Self {
+        Self::from(*touch)
     }
 }
 

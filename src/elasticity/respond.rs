@@ -106,17 +106,13 @@ fn along_gauges(strain: &[f64], angles: &[f64]) -> Vec<f64> {
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
-pub fn respond<'t, T>(
+pub fn respond(
     model: &dyn Model,
-    touches: &'t [T],
+    touches: &[impl Copy + Sync + Into<Push>],
     observer: &Observer,
     reading: Reading,
     watch: Watch,
-) -> Result<Responses, Cancelled>
-where
-    T: Sync,
-    Push: From<&'t T>,
-{
+) -> Result<Responses, Cancelled> {
     let side = if reading.rows(observer.frames().len()) < touches.len() {
         Side::Outputs
     } else {
@@ -129,18 +125,14 @@ where
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
-pub fn respond_from<'t, T>(
+pub fn respond_from(
     side: Side,
     model: &dyn Model,
-    touches: &'t [T],
+    touches: &[impl Copy + Sync + Into<Push>],
     observer: &Observer,
     reading: Reading,
     watch: Watch,
-) -> Result<Responses, Cancelled>
-where
-    T: Sync,
-    Push: From<&'t T>,
-{
+) -> Result<Responses, Cancelled> {
     let loads = touch_rows(model, touches);
     if side == Side::Outputs {
         return Pressed { model, loads }.read(observer, reading, watch);
@@ -260,14 +252,10 @@ fn by_outputs(
 }
 
 /// The touches' nodal forces as rows over solved blocks.
-fn touch_rows<'t, T>(model: &dyn Model, touches: &'t [T]) -> Rows
-where
-    T: Sync,
-    Push: From<&'t T>,
-{
+fn touch_rows(model: &dyn Model, touches: &[impl Copy + Sync + Into<Push>]) -> Rows {
     let forces: Vec<Vec<(u32, f64)>> = touches
         .par_iter()
-        .map(|touch| {
+        .map(|&touch| {
             (model.push(&touch.into()).into_iter())
                 .filter_map(|(dof, force)| {
                     let (place, scale) = model.system().place(dof)?;
