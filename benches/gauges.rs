@@ -4,6 +4,7 @@
 
 #[path = "../tests/agreement/mod.rs"]
 mod agreement;
+mod page;
 mod timing;
 
 use std::fmt::Write as _;
@@ -25,8 +26,6 @@ use timing::{cpu_seconds, reference_seconds};
 
 const FILE: &str = "benches/gauges.md";
 const PICTURE: &str = "assets/agreement.svg";
-const BEGIN: &str = "<!-- gauges: from benches/gauges.md, by `cargo bench --bench gauges` -->\n";
-const END: &str = "<!-- end of gauges -->";
 const SHIN: &str = "../shared/meshes/poppy_humanoid_l_shin_visual.STL";
 /// Numbers of gauges.
 const SIZES: [usize; 2] = [5, 10];
@@ -66,8 +65,7 @@ fn main() {
     println!("{text}");
     if !quick {
         std::fs::write(FILE, &text).expect("the figures can be written");
-        let results = std::fs::read_to_string("RESULTS.md").expect("RESULTS.md is here");
-        std::fs::write("RESULTS.md", spliced(&results, &text)).expect("RESULTS.md can be written");
+        page::remake();
     }
 }
 
@@ -77,15 +75,6 @@ fn head() -> String {
         "Remade by `cargo bench --bench gauges`. Processor seconds of the whole process; a 4000 × 4000 matrix product on one core took {reference:.1} s beside them. Seed 0, all touches, held ones among them, judged on finer elements.\n\n\
 Errors are mean / median / 95 % (mm) as designed. As built: every gauge as far off as `gauge.tolerance` says, of which matching knows no more than that, and the regression nothing. Calibrated: the same gauges after twelve known presses made by hand. Three lost: left out of the matching, nothing is retrained. Blind: touches that move no gauge by three times its noise; they count in every mean. The regression is trained anew for each force, under touches of that force; it cannot be calibrated.\n\n"
     )
-}
-
-/// `RESULTS.md` with the figures between its marks; as it is where it has none.
-fn spliced(results: &str, text: &str) -> String {
-    let Some((before, rest)) = results.split_once(BEGIN) else {
-        return results.to_owned();
-    };
-    let after = rest.split_once(END).map_or("", |(_, after)| after);
-    format!("{before}{BEGIN}\n{}\n\n{END}{after}", text.trim_end())
 }
 
 fn limb(text: &mut String, quick: bool) {

@@ -19,7 +19,8 @@ use hapdef::design::{self, Inputs, Sensing, Workshop};
 use hapdef::elasticity::Touch;
 use hapdef::elasticity::sensitivity::Sensitivity;
 use hapdef::inference::{
-    Errors, Features, Known, Lessons, Matching, ResponseMap, Trained, calibrate, cramer_rao,
+    Deviations, Errors, Features, Known, Lessons, Matching, ResponseMap, Trained, calibrate,
+    cramer_rao,
 };
 use hapdef::link::{Address, BAUD, Doorway, Listener, Pace, SessionEvent, State, host};
 use hapdef::live::{Input, Pipeline, Receiver};
@@ -96,7 +97,7 @@ struct Scene<'a> {
     map: Arc<ResponseMap>,
     relative: f64,
     /// What gluing may put on the readings, where the estimator is told of it.
-    gluing_deviation: Option<Arc<ResponseMap>>,
+    deviations: Option<Deviations>,
 }
 
 /// Errors of one estimator: places (mm) and forces (N).
@@ -165,7 +166,7 @@ impl Lab {
             gains: gains.to_vec(),
             map: Arc::clone(drawn),
             relative,
-            gluing_deviation: None,
+            deviations: None,
         };
         let mut scenes = vec![
             scene(
@@ -177,7 +178,7 @@ impl Lab {
             scene("Truth from elements of half the size", finer, &none, 0.03),
             scene("Half the size, gains off by 3 %", finer, gains, 0.05),
             Scene {
-                gluing_deviation: Some(Arc::clone(&self.sensing.gluing_deviation)),
+                deviations: Some(self.sensing.deviations.clone()),
                 ..scene(
                     "Half the size; gains off by 3 %, places by 1 mm, directions by 3°",
                     built,
@@ -202,11 +203,11 @@ impl Lab {
                 gains: gains.to_vec(),
                 map,
                 relative: found.relative,
-                gluing_deviation: Some(Arc::new(
+                deviations: Some(
                     self.sensing
                         .drawn
-                        .gluing_deviation_of(&found.doubts, &self.sensing.off),
-                )),
+                        .deviations_of(&found.doubts, &self.sensing.off),
+                ),
             });
         }
         scenes
@@ -303,7 +304,7 @@ impl Lab {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let errors = Errors {
             relative: scene.relative,
-            gluing_deviation: scene.gluing_deviation.clone(),
+            deviations: scene.deviations.clone(),
             ..Errors::of_noise(NOISE, gauges)
         };
         let mut matching = Matching::new(Arc::clone(&scene.map), errors, 60.0);
@@ -342,7 +343,7 @@ impl Lab {
                     off.push(DVec3::from_array(place) * 1e-3, force, &touch);
                 }
             }
-            let (bound, _) = cramer_rao(&self.sensing.drawn.map, at, force, &noise);
+            let (bound, _) = cramer_rao(&self.sensing.drawn.map, at, force, &noise, &[]);
             ratios.push(squares.sqrt() / bound);
         }
         Row {

@@ -1,6 +1,8 @@
-//! Remakes `RESULTS.md`: `cargo bench --bench results`. With `-- draft` it runs only the Draft designs and
-//! prints without writing; with `-- assemble` it only puts together what the benchmarks have left.
+//! Designs of the bundled limb, measured: `cargo bench --bench results` writes `benches/designs.md`. With `-- draft` it runs
+//! only the Draft designs and prints without writing; with `-- assemble` it only puts what all benchmarks have written
+//! between the marks of `RESULTS.md`.
 
+mod page;
 mod timing;
 
 use std::fmt::Write as _;
@@ -18,7 +20,7 @@ use hapdef::mesh::remesh::Remeshed;
 use hapdef::placement::SelectorKind;
 use timing::{cpu_seconds, reference_seconds};
 
-/// What the designs take most of an hour of, kept for when only the other figures were made anew.
+/// Where the figures go.
 const DESIGNS: &str = "benches/designs.md";
 
 fn main() {
@@ -32,7 +34,7 @@ fn main() {
         }
         std::fs::write(DESIGNS, text).expect("the figures can be written");
     }
-    std::fs::write("RESULTS.md", assembled()).expect("RESULTS.md can be written");
+    page::remake();
 }
 
 /// The figures of the designs.
@@ -65,47 +67,6 @@ Data: the bundled limb (`hapdef limb`), seed 0. Truth: a model of half the eleme
     failures(&mut text, &designs);
     reduction(&mut text, &designs);
     times(&mut text, &designs, reference);
-    text
-}
-
-/// All figures, as the benchmarks left them.
-fn assembled() -> String {
-    let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
-    let mut text = read(DESIGNS);
-    let _ = writeln!(
-        text,
-        "## Gauges for the estimator that reads them\n\n<!-- gauges: from benches/gauges.md, by `cargo bench --bench gauges` -->\n\n{}\n\n<!-- end of gauges -->\n",
-        read("benches/gauges.md").trim_end()
-    );
-    for path in [
-        "benches/elastic.md",
-        "benches/solid.md",
-        "benches/selection.md",
-    ] {
-        let _ = writeln!(text, "{}", read(path));
-    }
-    let _ = writeln!(
-        text,
-        "### The criterion by scikit-learn\n\n60 sites × 800 touches of the bundled limb on strain, every step and every other site, by `benches/sklearn_criterion.py` (its commands are in the file); fits to a tolerance of 0.001 mm.\n\n```\n{}```\n",
-        read("benches/sklearn.txt")
-    );
-    let _ = writeln!(
-        text,
-        "## Speed against accuracy\n\n`cargo bench --bench trade`; every point with its settings is in `assets/trade/trade.csv`.\n\n{}",
-        read("assets/trade/trade.md")
-    );
-    let _ = writeln!(text, "{}", read("benches/studio.md"));
-    let _ = writeln!(text, "{}", read("benches/live.md"));
-    let _ = writeln!(
-        text,
-        "A soak with an unplug, a dead and a stuck gauge every minute, bits turned over in 1e-5 of the bytes, 1e-5 of them left out, 1e-3 of the frames twice and as many never (`cargo bench --bench live -- soak 30`):\n\n```\n{}```\n",
-        read("benches/soak.txt")
-    );
-    let _ = writeln!(
-        text,
-        "## Build times\n\n{}",
-        read("benches/build-times.txt")
-    );
     text
 }
 

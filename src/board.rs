@@ -73,6 +73,8 @@ pub struct SimulatedBoard {
 /// Between two HELLOs while nothing is sent, and between two STATUSes (µs).
 const HELLO_EVERY: u64 = 1_000_000;
 const STATUS_EVERY: u64 = 5_000_000;
+/// Seconds after the first START of a listener in which random presses leave it alone: it takes its rest.
+const REST_S: f64 = 2.0;
 /// The fastest that is simulated (Hz).
 const FASTEST: u16 = 10_000;
 
@@ -158,6 +160,10 @@ impl SimulatedBoard {
             match message {
                 Message::AskHello => self.send(&Message::Hello(self.hello()), now_us, out),
                 Message::Start => {
+                    if !self.streaming {
+                        let now_s = now_us as f64 * 1e-6;
+                        self.script.leave_alone(now_s + REST_S);
+                    }
                     self.streaming = true;
                     self.next_us = self.next_us.max(now_us);
                 }

@@ -23,6 +23,7 @@ const HOPELESS: f64 = 1e-6;
 
 /// Eigenpairs by falling value.
 pub struct Leading {
+    /// By falling value, none below [`RANK`] of the largest.
     pub values: Vec<f64>,
     /// One column a value.
     pub vectors: Mat<f64>,

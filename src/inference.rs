@@ -3,6 +3,7 @@
 pub mod bound;
 pub mod calibration;
 pub mod chain;
+pub mod deviation;
 pub mod drawn;
 pub mod map;
 pub mod matching;
@@ -13,6 +14,7 @@ pub mod trained;
 pub use bound::cramer_rao;
 pub use calibration::{Calibration, Known, calibrate};
 pub use chain::Chain;
+pub use deviation::{Deviations, Nuisances};
 pub use drawn::{AsDrawn, Doubt};
 pub use map::ResponseMap;
 pub use matching::{Contact, Errors, Matching};

@@ -1,12 +1,15 @@
 //! Live touch, without any port: from a board's bytes to a place on the part.
 
 pub mod health;
+mod news;
 pub mod pipeline;
 pub mod receiver;
+mod release;
 pub mod tare;
 mod update;
 
 pub use health::Health;
+pub use news::News;
 pub use pipeline::Pipeline;
 pub use receiver::{Doubt, Input, Receiver, Sample, Traffic};
 pub use tare::Rest;

@@ -222,6 +222,20 @@ pub struct CalibrationKeys {
     pub place_mm: f64,
     /// Of the force that is asked for.
     pub force_percent: f64,
+    /// Of the force along the surface, over the one that presses (rms, in any direction).
+    #[serde(skip_serializing_if = "is_usual_tilt")]
+    pub friction_percent: f64,
+}
+
+/// Of a hand that presses upright as well as it can: six degrees.
+const TILT_PERCENT: f64 = 10.0;
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde asks with a reference"
+)]
+fn is_usual_tilt(percent: &f64) -> bool {
+    *percent == TILT_PERCENT
 }
 
 /// Keys of the table `feasible`.
@@ -383,6 +397,7 @@ impl Default for CalibrationKeys {
         Self {
             place_mm: 1.0,
             force_percent: 3.0,
+            friction_percent: TILT_PERCENT,
         }
     }
 }
@@ -536,6 +551,7 @@ impl Project {
         Pressing {
             place: self.calibration.place_mm * MM,
             force: self.calibration.force_percent / 100.0,
+            friction: self.calibration.friction_percent / 100.0,
         }
     }
 
@@ -557,6 +573,7 @@ impl Project {
             gluing: self.gluing(),
             stiffness: self.live.stiffness_percent / 100.0,
             making: self.making(),
+            allowed: self.live.friction_percent / 100.0,
             drift: self.gauge.drift_microstrain * MICRO,
             pressing: self.pressing(),
             ..Uncertainty::default()

@@ -14,9 +14,9 @@
 //! | stiffness | a common factor of all readings, the same as another force: no place is worse for it, every force is |
 //! | pressing | nothing that is read later; known presses are off by it while gauges are calibrated |
 //!
-//! Tip and friction are of a touch, and all gauges feel the same of them; only where gauges are calibrated is that taken
-//! in full. Elsewhere each channel is off by them for itself, with the variance that they have there, which leaves some
-//! of what could be told apart untold.
+//! Tip and friction are of a touch, and all gauges feel the same of them: matching and calibration take that in full, and
+//! tell them apart from the place. In the choice each channel is off by them for itself, with the variance that they have
+//! there.
 
 use std::f64::consts::PI;
 
@@ -79,14 +79,17 @@ pub struct Pressing {
     pub place: f64,
     /// Of the force, as a share of what was asked for.
     pub force: f64,
+    /// Of the force along the surface, over the one that presses: rms, in any direction.
+    pub friction: f64,
 }
 
 impl Default for Pressing {
-    /// A hand with a force gauge, at a mark on the part: 1 mm and 3 %.
+    /// A hand with a force gauge, at a mark on the part: 1 mm and 3 %, and six degrees off the upright.
     fn default() -> Self {
         Self {
             place: 1e-3,
             force: 0.03,
+            friction: 0.1,
         }
     }
 }
@@ -126,15 +129,17 @@ impl Pressing {
     pub const EXACT: Self = Self {
         place: 0.0,
         force: 0.0,
+        friction: 0.0,
     };
 
     /// How far off every press is, for a sentence.
     #[must_use]
     pub fn in_words(&self) -> String {
         format!(
-            "{} mm beside its place and {} % too hard or too soft",
+            "{} mm beside its place, {} % too hard or too soft, and with {} % of its force along the surface",
             tidy(self.place * 1e3),
-            tidy(self.force * 100.0)
+            tidy(self.force * 100.0),
+            tidy(self.friction * 100.0)
         )
     }
 }
@@ -156,8 +161,11 @@ pub struct Uncertainty {
     pub elements: f64,
     /// Of the factor by which the part is stiffer or softer than its model.
     pub stiffness: f64,
-    /// How touches are made.
+    /// How touches come to be made.
     pub making: Making,
+    /// Of the force along the surface that whoever finds touches allows for, over the one that presses, where that is
+    /// more than touches are said to have: fingers push aside, whatever a design was made for.
+    pub allowed: f64,
     /// Of what all channels have drifted by together since the rest (strain).
     pub drift: f64,
     /// How known presses are made.
@@ -174,6 +182,7 @@ impl Default for Uncertainty {
             elements: UNESTIMATED,
             stiffness: 0.0,
             making: Making::EXACT,
+            allowed: 0.0,
             drift: 0.0,
             pressing: Pressing::default(),
         }
@@ -189,6 +198,7 @@ impl Uncertainty {
         elements: 0.0,
         stiffness: 0.0,
         making: Making::EXACT,
+        allowed: 0.0,
         drift: 0.0,
         pressing: Pressing::EXACT,
     };
@@ -203,6 +213,34 @@ impl Uncertainty {
                 (percent / 100.0).clamp(0.0, 1.0)
             },
             ..self
+        }
+    }
+
+    /// How far off touches may be made, as far as whoever finds them knows.
+    #[must_use]
+    pub fn making_allowed(&self) -> Making {
+        Making {
+            friction: self.making.friction.max(self.allowed),
+            ..self.making
+        }
+    }
+
+    /// How far off known presses are made, beside their place and force.
+    #[must_use]
+    pub fn making_of_presses(&self) -> Making {
+        Making {
+            friction: self.pressing.friction,
+            ..self.making
+        }
+    }
+
+    /// The most that any of them is off by.
+    #[must_use]
+    pub fn making_at_most(&self) -> Making {
+        let allowed = self.making_allowed();
+        Making {
+            friction: allowed.friction.max(self.pressing.friction),
+            ..allowed
         }
     }
 
@@ -223,7 +261,7 @@ impl Uncertainty {
     /// judged for one holds for the other.
     #[must_use]
     pub fn builds_as(&self, other: &Self) -> bool {
-        let built = |off: &Self| (off.gluing, off.making, off.drift, off.pressing);
+        let built = |off: &Self| (off.gluing, off.making, off.allowed, off.drift, off.pressing);
         built(self) == built(other)
     }
 }
@@ -266,7 +304,10 @@ mod tests {
         let words = Gluing::default().in_words();
         assert_eq!(words, "1 mm and 3° off and its gain off by 3 %");
         let words = Pressing::default().in_words();
-        assert_eq!(words, "1 mm beside its place and 3 % too hard or too soft");
+        assert_eq!(
+            words,
+            "1 mm beside its place, 3 % too hard or too soft, and with 10 % of its force along the surface"
+        );
     }
 
     #[test]

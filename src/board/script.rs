@@ -81,6 +81,16 @@ impl Script {
         Self::Random(Box::new(random))
     }
 
+    /// Puts off random presses, as somebody does who lets go until a listener knows the rest. A script that was given is
+    /// kept to.
+    pub fn leave_alone(&mut self, until_s: f64) {
+        if let Self::Random(random) = self
+            && random.press.start_s < until_s
+        {
+            random.draw(until_s);
+        }
+    }
+
     /// The press that is on at a time, by its number, with its force at that moment. Times must not fall.
     pub fn at(&mut self, seconds: f64) -> Option<(usize, Touch)> {
         let (number, press) = match self {

@@ -1,13 +1,16 @@
 //! `hapdef listen`: live touch without a window.
 
+mod orders;
+
 use std::io::{BufWriter, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Sender, channel};
 
 use anyhow::Context as _;
 use clap::Args;
+use serde_json::json;
 
 use super::common::Common;
 use super::ranges::between;
@@ -15,10 +18,12 @@ use super::spared::Spared;
 use super::{out, progress::Bar};
 use crate::design;
 use crate::io::project_file::LoadedProject;
-use crate::link::{Address, BAUD, Listener, Pace, Recorder, SessionEvent, State, Table};
+use crate::link::{Address, BAUD, Command, Listener, Pace, Recorder, SessionEvent, State, Table};
 use crate::live::{Pipeline, Sample, Update};
 use crate::plain;
 use crate::wire::Hello;
+
+use orders::{Client, from_stdin, order};
 
 #[derive(Args, Debug, Clone)]
 pub struct ListenArgs {
@@ -48,7 +53,7 @@ pub struct ListenArgs {
     /// number of channels changes it goes on in a file beside it.
     #[arg(long)]
     pub csv: Option<PathBuf>,
-    /// Serve the same lines to whoever connects to HOST:PORT.
+    /// Serve the same lines to whoever connects to HOST:PORT, and obey what they write: `tare`.
     #[arg(long)]
     pub serve: Option<String>,
     /// End after so many seconds.
@@ -67,7 +72,8 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     // All that may be wrong is found before the model is computed.
     spared(&loaded, &address).check("--csv", args.csv.as_deref())?;
     address.check().map_err(anyhow::Error::msg)?;
-    let mut output = Output::new(args)?;
+    let (commands, inbox) = channel();
+    let mut output = Output::new(args, commands.clone())?;
     let recorder = args.record.as_deref().map(Recorder::create).transpose();
     let recorder = recorder.map_err(anyhow::Error::msg)?;
     let listener = Listener::new(address, pipeline(args, &loaded)?)
@@ -75,7 +81,7 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
         .recording(recorder);
 
     let stop = AtomicBool::new(false);
-    let (_commands, inbox) = channel();
+    from_stdin(commands, say);
     let begun = std::time::Instant::now();
     let mut shown: anyhow::Result<()> = Ok(());
     let ended = listener.run(&stop, &inbox, |event| {
@@ -146,7 +152,9 @@ fn say(text: &str) {
 struct Output {
     stdout: BufWriter<std::io::Stdout>,
     csv: Option<Table>,
-    served: Option<(TcpListener, Vec<TcpStream>)>,
+    served: Option<(TcpListener, Vec<Client>)>,
+    /// For whoever is served.
+    commands: Sender<Command>,
     period_us: u64,
     last_us: Option<u64>,
     /// As it was told last.
@@ -154,8 +162,9 @@ struct Output {
 }
 
 impl Output {
-    fn new(args: &ListenArgs) -> anyhow::Result<Self> {
+    fn new(args: &ListenArgs, commands: Sender<Command>) -> anyhow::Result<Self> {
         Ok(Self {
+            commands,
             served: args.serve.as_deref().map(serve).transpose()?,
             csv: args.csv.as_deref().map(Table::create).transpose()?,
             stdout: BufWriter::new(std::io::stdout()),
@@ -182,9 +191,29 @@ impl Output {
                 self.line(update)?;
             }
             // What waits is written as soon as nothing more is there.
-            SessionEvent::Turn { .. } => self.flush()?,
+            SessionEvent::Turn { .. } => {
+                self.obey();
+                self.flush()?;
+            }
         }
         Ok(())
+    }
+
+    /// What those who are served ask for; they are told why something is no order.
+    fn obey(&mut self) {
+        let Some((_, clients)) = &mut self.served else {
+            return;
+        };
+        for client in clients {
+            for line in client.hear() {
+                match order(&line) {
+                    Ok(None) => {}
+                    // A listener that has ended hears nothing any more.
+                    Ok(Some(command)) => drop(self.commands.send(command)),
+                    Err(why) => drop(client.tell(&json!({ "error": why }).to_string())),
+                }
+            }
+        }
     }
 
     /// Says which board it is, once: a board repeats itself.
@@ -228,11 +257,9 @@ impl Output {
         let line = line(update);
         if let Some((listener, clients)) = &mut self.served {
             while let Ok((client, _)) = listener.accept() {
-                let _ = client.set_nonblocking(true);
-                clients.push(client);
+                clients.extend(Client::new(client).ok());
             }
-            // One who does not keep up is let go rather than waited for.
-            clients.retain_mut(|c| c.write_all(format!("{line}\n").as_bytes()).is_ok());
+            clients.retain_mut(|client| client.tell(&line));
         }
         out::printed(writeln!(self.stdout, "{line}"))
     }
@@ -255,7 +282,7 @@ fn in_words(state: &State) -> &'static str {
     }
 }
 
-fn serve(address: &str) -> anyhow::Result<(TcpListener, Vec<TcpStream>)> {
+fn serve(address: &str) -> anyhow::Result<(TcpListener, Vec<Client>)> {
     let listener = TcpListener::bind(address).with_context(|| {
         format!("--serve {address}: nothing can be served there. Choose another address")
     })?;
@@ -264,22 +291,25 @@ fn serve(address: &str) -> anyhow::Result<(TcpListener, Vec<TcpStream>)> {
 }
 
 /// One sample as JSON: nulls where nothing touches. `uncertainty_mm` is the radius within which the touch lies
-/// with a probability of 90 %. Written by hand, because a thousand of them come in a second.
+/// with a probability of 90 %; `force_n` presses straight in, and `fx_n`, `fy_n` and `fz_n` are all of the force. Written by hand, because a thousand of them come in a second.
 fn line(update: &Update) -> String {
     let time = update.time_us;
     let good = update.good;
     let Some(c) = update.contact else {
         return format!(
-            "{{\"t_us\":{time},\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":null,\"uncertainty_mm\":null,\"channels_ok\":{good}}}"
+            "{{\"t_us\":{time},\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":null,\"fx_n\":null,\"fy_n\":null,\"fz_n\":null,\"uncertainty_mm\":null,\"channels_ok\":{good}}}"
         );
     };
-    let p = c.position * 1e3;
+    let (p, f) = (c.position * 1e3, c.on_part());
     format!(
-        "{{\"t_us\":{time},\"x_mm\":{:.3},\"y_mm\":{:.3},\"z_mm\":{:.3},\"force_n\":{:.4},\"uncertainty_mm\":{:.3},\"channels_ok\":{good}}}",
+        "{{\"t_us\":{time},\"x_mm\":{:.3},\"y_mm\":{:.3},\"z_mm\":{:.3},\"force_n\":{:.4},\"fx_n\":{:.4},\"fy_n\":{:.4},\"fz_n\":{:.4},\"uncertainty_mm\":{:.3},\"channels_ok\":{good}}}",
         p.x,
         p.y,
         p.z,
         c.force,
+        f.x,
+        f.y,
+        f.z,
         c.region.radius * 1e3
     )
 }

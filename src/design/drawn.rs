@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::layout::touches_on;
 use super::{DesignError, Ground, Inputs};
 use crate::budget::{Cancelled, Watch};
@@ -50,23 +48,22 @@ pub(super) fn drawn_on(
     let moved: Vec<Gauge> = gauges.iter().flat_map(moved).collect();
     let sensitivity = Sensitivity::new(model, &moved, watch)?;
     let pressed = |radius: f64| ResponseMap::new(&sensitivity, Arc::clone(mesh), radius, watch);
-    let mut drawn = as_drawn(&pressed(tip_radius)?, gauges.len());
-    if making.friction > 0.0 {
-        let own = Sensitivity::new(model, gauges, watch)?;
-        let along = |axis: DVec3| {
-            ResponseMap::pushed(&own, Arc::clone(mesh), tip_radius, Some(axis), watch)
-        };
-        drawn.axes = Some([along(DVec3::X)?, along(DVec3::Y)?, along(DVec3::Z)?]);
-    }
+    let mut drawn = if making.friction > 0.0 {
+        let axes = ResponseMap::along_axes(&sensitivity, mesh, tip_radius, watch)?;
+        let own = axes.each_ref().map(|m| m.mixed(&unmoved(gauges.len())));
+        AsDrawn {
+            axes: Some(Arc::new(own)),
+            ..as_drawn(&ResponseMap::pressing(&axes), gauges.len())
+        }
+    } else {
+        as_drawn(&pressed(tip_radius)?, gauges.len())
+    };
     let off = making.tip;
     if off > 0.0 {
         let larger = as_drawn(&pressed(tip_radius + off)?, gauges.len());
         let rise = vec![[off.recip(), -off.recip()]; gauges.len()];
-        drawn.tip = Some(
-            larger
-                .map
-                .combined(std::array::from_ref(&*drawn.map), &rise),
-        );
+        let change = (larger.map).combined(std::array::from_ref(&*drawn.map), &rise);
+        drawn.tip = Some(Arc::new(change));
     }
     Ok(drawn)
 }
@@ -101,6 +98,11 @@ const STEP_DEGREES: f64 = 3.0;
 
 pub(super) const MOVES: usize = 7;
 
+/// The gauges as they were drawn, among all that were moved.
+fn unmoved(gauges: usize) -> Vec<Vec<(usize, f64)>> {
+    (0..gauges).map(|g| vec![(MOVES * g, 1.0)]).collect()
+}
+
 fn as_drawn(all: &ResponseMap, gauges: usize) -> AsDrawn {
     let change = |forth: usize, step: f64| {
         let difference = |g: usize| {
@@ -109,9 +111,8 @@ fn as_drawn(all: &ResponseMap, gauges: usize) -> AsDrawn {
         };
         all.mixed(&(0..gauges).map(difference).collect::<Vec<_>>())
     };
-    let drawn: Vec<_> = (0..gauges).map(|g| vec![(MOVES * g, 1.0)]).collect();
     AsDrawn {
-        map: Arc::new(all.mixed(&drawn)),
+        map: Arc::new(all.mixed(&unmoved(gauges))),
         changes: [
             change(1, STEP_MM),
             change(3, STEP_MM),

@@ -71,7 +71,11 @@ impl Reference {
             })
             .collect();
         let made: Vec<Touch> = presses.iter().map(|p| p.made).collect();
-        let made = as_made(&made, &self.off.making, seed.wrapping_add(MADE_SEED + 1));
+        let made = as_made(
+            &made,
+            &self.off.making_of_presses(),
+            seed.wrapping_add(MADE_SEED + 1),
+        );
         let built = sites_as_built(simulated, &self.sites, &self.off.gluing, seed);
         let (x, solves) = read(model, inputs, &made, &built, self.grid, watch)?;
         self.work.solves += solves as u64;

@@ -29,6 +29,7 @@ pub(super) struct Known<'a> {
 }
 
 impl<'a> Known<'a> {
+    /// Gathers it from the project and from what was simulated of it.
     pub fn new(inputs: &Inputs, simulated: &'a Simulated) -> Self {
         let project = &inputs.project;
         Self {
@@ -97,6 +98,7 @@ pub(super) fn off(project: &Project, simulated: &Simulated) -> Uncertainty {
             noise: 0.0,
             drift: 0.0,
             making: Making::EXACT,
+            allowed: 0.0,
             elements: 0.0,
             ..off
         },

@@ -89,6 +89,7 @@ mod tests {
         let hand = Pressing {
             place: 2e-3,
             force: 0.05,
+            friction: 0.0,
         };
         let presses = by_hand(&mesh, all.clone(), &hand, 5);
         let mut directions = DVec3::ZERO;

@@ -15,7 +15,7 @@ use crate::budget::{Budget, Watch};
 use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::elasticity::{Model, Touch};
-use crate::inference::{AsDrawn, ResponseMap};
+use crate::inference::{AsDrawn, Deviations};
 use crate::live::GaugeModel;
 use crate::project::{LiveKeys, Project};
 use crate::uncertainty::{Gluing, Uncertainty};
@@ -32,7 +32,7 @@ pub struct Sensing {
     pub off: Uncertainty,
     /// What the project's tolerance of gluing, and the way touches are made, put on the readings, while nothing is known of these
     /// gauges.
-    pub gluing_deviation: Arc<ResponseMap>,
+    pub deviations: Deviations,
     /// Where known touches are best pressed: evenly over the part.
     pub proposed: Vec<Touch>,
     /// Mean edge of the elements (mm).
@@ -99,13 +99,13 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
     let tip_radius = project.tip().1;
     let mesh = ground.of_size(map_size(&ground, tip_radius));
     let off = (project.uncertainty()).with_elements(graded.estimate.strain_percent);
-    let tip = (tip_radius, &off.making);
+    let tip = (tip_radius, &off.making_at_most());
     let drawn = drawn_on(&*graded.model, &gauges, &mesh, tip, watch)?;
     let proposed = proposed(&drawn.map.mesh, inputs)?;
     Ok(Sensing {
         gauges,
         sensitivity: Arc::new(sensitivity),
-        gluing_deviation: Arc::new(drawn.gluing_deviation(&off)),
+        deviations: drawn.deviations(&off),
         off,
         drawn: Arc::new(drawn),
         proposed,
@@ -219,21 +219,21 @@ impl Sensing {
         let gauges = self.gauges.len();
         let off = Uncertainty {
             stiffness: live.stiffness_percent / 100.0,
+            allowed: live.friction_percent / 100.0,
             ..self.off
         };
         let Some(glued) = live.glued(gauges) else {
             return GaugeModel {
                 map: Arc::clone(&self.drawn.map),
-                gluing_deviation: Some(Arc::clone(&self.gluing_deviation)),
+                deviations: Some(self.deviations.clone()),
                 off,
             };
         };
         let doubts = live.doubts(gauges);
-        let gluing_deviation =
-            doubts.map(|doubts| Arc::new(self.drawn.gluing_deviation_of(&doubts, &off)));
+        let deviations = doubts.map(|doubts| self.drawn.deviations_of(&doubts, &off));
         GaugeModel {
             map: Arc::new(self.drawn.glued(&glued)),
-            gluing_deviation,
+            deviations,
             // What known touches have shown says more than what the elements were estimated to leave.
             off: Uncertainty {
                 elements: 0.0,

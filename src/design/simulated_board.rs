@@ -81,7 +81,7 @@ pub fn pressed_by_hand(
     let seed = seed.wrapping_add(PRESS_SEED);
     let presses = presses::by_hand(surface, asked, &off.pressing, seed);
     let made: Vec<Touch> = presses.iter().map(|press| press.made).collect();
-    let made = as_made(&made, &off.making, seed.wrapping_add(1));
+    let made = as_made(&made, &off.making_of_presses(), seed.wrapping_add(1));
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(2));
     let mut known = |(press, push): (&Press, &Push)| {
         let read = truth.read_push(push).into_iter().zip(gains).zip(&noise);

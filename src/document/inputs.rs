@@ -114,6 +114,7 @@ pub struct DesignInputs {
     evaluation: EvaluationKeys,
     off: Off,
     calibration: CalibrationKeys,
+    allowed_percent: f64,
     /// One estimator knows how hard anybody presses.
     judging: Judging,
 }
@@ -163,6 +164,8 @@ pub struct SensingInputs {
     sites: Vec<ChosenSite>,
     grid_mm: [f64; 2],
     off: Off,
+    /// What touches and known presses are allowed to have along the surface (%).
+    aside_percent: [f64; 2],
 }
 
 impl Document {
@@ -285,6 +288,7 @@ impl Document {
             evaluation: p.evaluation.clone(),
             off: Off::of(p),
             calibration: p.calibration,
+            allowed_percent: p.live.friction_percent,
             judging: p.judging(),
         }
     }
@@ -345,6 +349,7 @@ impl Document {
             sites: p.selection.sites.clone(),
             grid_mm: [p.gauge.grid_length_mm, p.gauge.grid_width_mm],
             off: Off::of(p),
+            aside_percent: [p.live.friction_percent, p.calibration.friction_percent],
         }
     }
 }

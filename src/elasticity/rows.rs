@@ -21,15 +21,18 @@ impl Default for Rows {
 }
 
 impl Rows {
+    /// Appends a row, given as (column, weight).
     pub fn push(&mut self, row: impl IntoIterator<Item = (u32, f64)>) {
         self.entries.extend(row);
         self.starts.push(self.entries.len());
     }
 
+    /// Number of rows.
     pub fn count(&self) -> usize {
         self.starts.len() - 1
     }
 
+    /// The entries of one row: (column, weight).
     pub fn row(&self, row: usize) -> &[(u32, f64)] {
         &self.entries[self.starts[row]..self.starts[row + 1]]
     }

@@ -105,6 +105,23 @@ impl Sensitivity {
         self.read_push(&touch.into())
     }
 
+    /// Strains of all gauges under one newton along x, y and z each, spread as the tip of a touch spreads its own.
+    #[must_use]
+    pub fn read_axes(&self, touch: &Touch) -> Vec<DVec3> {
+        let mut strains = vec![DVec3::ZERO; self.gauges];
+        let shares = Push {
+            touch: *touch,
+            force: DVec3::X,
+        };
+        for (vertex, share) in pushed(&self.mesh, &shares) {
+            let row = &self.weights[vertex as usize * self.gauges..][..self.gauges];
+            for (strain, weight) in strains.iter_mut().zip(row) {
+                *strain += *weight * share.x;
+            }
+        }
+        strains
+    }
+
     /// Strains of all gauges under a push.
     #[must_use]
     pub fn read_push(&self, push: &Push) -> Vec<f64> {

@@ -30,8 +30,9 @@ pub const BLOCK: usize = 64;
 pub struct Factor {
     symbolic: SymbolicCholesky<usize>,
     values: Vec<f64>,
-    /// Where each row of the matrix stands in the order of elimination, and 1/√ of its diagonal.
+    /// Where each row of the matrix stands in the order of elimination.
     pub order: Vec<u32>,
+    /// 1/√ of the diagonal, a row of the matrix each.
     pub scale: Vec<f64>,
     /// Supernode that each row (in the order of elimination) belongs to.
     supernode: Vec<u32>,
@@ -44,6 +45,7 @@ pub struct Factor {
 /// Right-hand sides, then solutions, of one block: rows in the order of elimination, scaled, [`BLOCK`]
 /// columns side by side.
 pub struct Block {
+    /// Row-major, dimension × [`BLOCK`].
     pub rows: Vec<f64>,
     /// Supernodes with anything on their right-hand sides.
     active: Vec<bool>,
@@ -131,6 +133,7 @@ impl Factor {
         SupernodalLltRef::new(nodes(&self.symbolic), &self.values)
     }
 
+    /// Number of unknowns.
     pub fn dimension(&self) -> usize {
         self.scale.len()
     }
@@ -248,8 +251,9 @@ pub fn check_bytes(bytes: f64) -> Result<(), FactorError> {
 pub struct Plan {
     /// Nodes in the order of elimination: by approximate minimum degree.
     pub order: Vec<u32>,
-    /// Entries of the factor and of the lower triangle of the matrix.
+    /// Entries of the factor.
     pub entries: f64,
+    /// Entries of the lower triangle of the matrix.
     pub of_matrix: f64,
     /// Multiplications of the factorization, about.
     pub multiplications: f64,

@@ -147,7 +147,7 @@ impl<'a> Press<'a> {
         // In any direction: half of the square along each of two.
         let place = off.pressing.place / 2.0_f64.sqrt() * known.force;
         let force = off.pressing.force * known.force;
-        let made = drawn.made(known.at, &off.making);
+        let made = drawn.nuisances(off.making_of_presses()).at(known.at);
         Self {
             reading: &known.reading,
             basis: basis.into_iter().map(|b| b * known.force).collect(),
@@ -155,7 +155,7 @@ impl<'a> Press<'a> {
                 0 => place * change[c].x,
                 1 => place * change[c].y,
                 2 => force * reading[c],
-                _ => known.force * made[k - 3][c],
+                _ => known.force * made[k - 3].reading[c],
             }),
         }
     }

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
 use nalgebra::{Matrix4, Vector4};
 
+use super::deviation::{Deviations, Nuisances};
 use super::map::{ResponseMap, Slope};
 use crate::mesh::SurfacePoint;
 use crate::uncertainty::{Gluing, Making, Uncertainty};
@@ -16,9 +16,9 @@ pub struct AsDrawn {
     /// A millimetre along the gauge, a millimetre across it, and a degree.
     pub changes: [ResponseMap; 3],
     /// A metre more of the tip's radius; absent where the tip is taken to be as large as it is said to be.
-    pub tip: Option<ResponseMap>,
+    pub tip: Option<Arc<ResponseMap>>,
     /// A newton along x, y and z, whichever way the surface lies; absent where touches press straight in.
-    pub axes: Option<[ResponseMap; 3]>,
+    pub axes: Option<Arc<[ResponseMap; 3]>>,
 }
 
 /// What is not known of one gauge, as far as a covariance of its gain, millimetres along and across, and degrees says
@@ -74,29 +74,34 @@ impl AsDrawn {
         self.map.combined(&self.changes, glued)
     }
 
-    /// How far off readings per newton are by gluing and the way touches are made (standard deviations), at every node of the map
-    /// and for every channel, while nothing is known of these gauges.
+    /// How far off readings per newton are by gluing and the way touches are made, everywhere, while nothing is known of
+    /// these gauges.
     #[must_use]
-    pub fn gluing_deviation(&self, off: &Uncertainty) -> ResponseMap {
-        self.gluing_deviation_of(&vec![doubt(&off.gluing); self.map.channels()], off)
+    pub fn deviations(&self, off: &Uncertainty) -> Deviations {
+        self.deviations_of(&vec![doubt(&off.gluing); self.map.channels()], off)
     }
 
-    /// As [`Self::gluing_deviation`], by what is still not known of each gauge.
+    /// As [`Self::deviations`], by what is still not known of each gauge.
     #[must_use]
-    pub fn gluing_deviation_of(&self, doubts: &[Doubt], off: &Uncertainty) -> ResponseMap {
+    pub fn deviations_of(&self, doubts: &[Doubt], off: &Uncertainty) -> Deviations {
         let mesh = &self.map.mesh;
         let nodes = mesh.positions().len() + mesh.edges().len();
         let doubts: Vec<Matrix4<f64>> = doubts.iter().map(covariance).collect();
         let mut values = Vec::with_capacity(nodes * self.map.channels());
         for node in 0..nodes {
-            let rows = self.basis_at_node(node).zip(&doubts).enumerate();
-            values.extend(rows.map(|(c, (row, doubt))| {
-                let made = self.made_at_node(node, c, &off.making);
-                // What was inverted may be a little less than nothing.
-                (row.dot(&(doubt * row)).max(0.0) + made).sqrt()
-            }));
+            let rows = self.basis_at_node(node).zip(&doubts);
+            // What was inverted may be a little less than nothing.
+            values.extend(rows.map(|(row, doubt)| row.dot(&(doubt * row)).max(0.0).sqrt()));
         }
-        ResponseMap::of(Arc::clone(mesh), self.map.channels(), values)
+        let own = ResponseMap::of(Arc::clone(mesh), self.map.channels(), values);
+        Deviations::new(Arc::new(own), self.nuisances(off.making_allowed()))
+    }
+
+    /// What a touch may have about it beside place and force, for gauges as they were drawn: what gluing changes of it is
+    /// a small part of a small part.
+    #[must_use]
+    pub fn nuisances(&self, making: Making) -> Nuisances {
+        Nuisances::new(making, self.tip.clone(), self.axes.clone())
     }
 
     /// Some of the gauges, with factors, as [`ResponseMap::mixed`].
@@ -105,39 +110,10 @@ impl AsDrawn {
         Self {
             map: Arc::new(self.map.mixed(channels)),
             changes: self.changes.each_ref().map(|m| m.mixed(channels)),
-            tip: self.tip.as_ref().map(|m| m.mixed(channels)),
-            axes: (self.axes.as_ref()).map(|axes| axes.each_ref().map(|m| m.mixed(channels))),
+            tip: (self.tip.as_ref()).map(|m| Arc::new(m.mixed(channels))),
+            axes: (self.axes.as_ref())
+                .map(|axes| Arc::new(axes.each_ref().map(|m| m.mixed(channels)))),
         }
-    }
-
-    /// Variance that the way touches are made puts on a channel's reading of one newton at a node of the map.
-    fn made_at_node(&self, node: usize, channel: usize, making: &Making) -> f64 {
-        let of = |map: &ResponseMap| map.node(node)[channel];
-        // What presses there is one of three directions; the other two lie in the surface.
-        let shear = self.axes.as_ref().map_or(0.0, |axes| {
-            let all: f64 = axes.iter().map(|m| of(m).powi(2)).sum();
-            (all - of(&self.map).powi(2)).max(0.0).sqrt()
-        });
-        making.variance(self.tip.as_ref().map_or(0.0, of), shear)
-    }
-
-    /// What the way a touch is made puts on the readings of one newton at a place: for each way that it may be off, by as
-    /// much as is usual, what all channels feel of it together.
-    pub(super) fn made(&self, at: SurfacePoint, making: &Making) -> Vec<Vec<f64>> {
-        let scaled =
-            |by: f64, of: Vec<f64>| -> Vec<f64> { of.into_iter().map(|v| by * v).collect() };
-        let sized = self.tip.iter().map(|tip| scaled(making.tip, tip.at(at)));
-        let normal = self.map.mesh.normal(at);
-        let along = normal.any_orthonormal_vector();
-        let rubbed = self.axes.iter().flat_map(|axes| {
-            let [x, y, z] = axes.each_ref().map(|m| m.at(at));
-            [along, normal.cross(along)].map(|way| {
-                let of = |c: usize| way.dot(DVec3::new(x[c], y[c], z[c]));
-                let by = making.friction / 2.0_f64.sqrt();
-                scaled(by, (0..x.len()).map(of).collect())
-            })
-        });
-        sized.chain(rubbed).collect()
     }
 
     /// Readings and slopes at one place for gauges that are glued like that.
@@ -194,7 +170,7 @@ mod tests {
         let drawn = AsDrawn {
             map: Arc::new(map(&mesh, [2e-6, -1e-6])),
             changes: [[3e-7, 0.0], [-4e-7, 1e-7], [1e-7, 2e-7]].map(|c| map(&mesh, c)),
-            tip: Some(map(&mesh, [1e-3, -2e-3])),
+            tip: Some(Arc::new(map(&mesh, [1e-3, -2e-3]))),
             axes: None,
         };
         let gluing = Gluing::default();
@@ -226,52 +202,19 @@ mod tests {
             },
             ..Uncertainty::default()
         };
-        let gluing_deviation = drawn.gluing_deviation(&off(gluing, 0.0)).at(at);
-        for (gluing_deviation, square) in gluing_deviation.into_iter().zip(squares) {
+        let deviations = drawn.deviations(&off(gluing, 0.0)).all.at(at);
+        for (deviation, square) in deviations.into_iter().zip(squares) {
             assert!(
-                (gluing_deviation - square.sqrt()).abs() < 1e-9 * gluing_deviation,
-                "{gluing_deviation}"
+                (deviation - square.sqrt()).abs() < 1e-9 * deviation,
+                "{deviation}"
             );
         }
-        let exact = drawn.gluing_deviation(&off(Gluing::EXACT, 0.0)).at(at);
+        let exact = drawn.deviations(&off(Gluing::EXACT, 0.0)).all.at(at);
         assert!(exact.iter().all(|&v| v == 0.0));
         // A tip that may be half a millimetre larger or smaller.
-        let sized = drawn.gluing_deviation(&off(Gluing::EXACT, 0.5e-3)).at(at);
+        let sized = drawn.deviations(&off(Gluing::EXACT, 0.5e-3)).all.at(at);
         for (sized, expected) in sized.into_iter().zip([0.5e-6, 1e-6]) {
             assert!((sized - expected).abs() < 1e-12, "{sized}");
-        }
-    }
-
-    #[test]
-    fn all_channels_together_feel_of_a_touch_what_each_is_off_by() {
-        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
-        let (mesh, _) = TriMesh::new(&corners, &[[0, 1, 2]], 0).unwrap();
-        let mesh = Arc::new(mesh);
-        let drawn = AsDrawn {
-            map: Arc::new(map(&mesh, [2e-6, -1e-6])),
-            changes: [[0.0; 2]; 3].map(|c| map(&mesh, c)),
-            tip: Some(map(&mesh, [1e-3, -2e-3])),
-            // The surface faces along z: what presses straight in pushes against that.
-            axes: Some([[3e-6, 1e-6], [-4e-6, 2e-6], [-2e-6, 1e-6]].map(|c| map(&mesh, c))),
-        };
-        let making = Making {
-            tip: 0.5e-3,
-            friction: 0.2,
-        };
-        let at = SurfacePoint {
-            triangle: 0,
-            barycentric: [0.2, 0.3, 0.5],
-        };
-        let off = Uncertainty {
-            making,
-            ..Uncertainty::NONE
-        };
-        let deviations = drawn.gluing_deviation(&off).at(at);
-        let expected = [0.25 + 0.02 * 25.0, 1.0 + 0.02 * 5.0];
-        for (c, (deviation, expected)) in deviations.into_iter().zip(expected).enumerate() {
-            assert!((deviation * deviation * 1e12 - expected).abs() < 1e-9);
-            let together = drawn.made(at, &making).into_iter().map(|m| m[c] * m[c]);
-            assert!((together.sum::<f64>() * 1e12 - expected).abs() < 1e-9);
         }
     }
 }

@@ -9,8 +9,8 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::budget::{Cancelled, Watch, report};
+use crate::elasticity::Touch;
 use crate::elasticity::sensitivity::Sensitivity;
-use crate::elasticity::{Push, Touch};
 use crate::mesh::{SurfacePoint, TriMesh};
 
 /// Templates that are compared side by side.
@@ -41,6 +41,17 @@ pub struct Slope {
     pub plane: [DVec3; 2],
 }
 
+impl Slope {
+    /// Of so many channels that read nothing.
+    pub(super) fn zero(channels: usize) -> Self {
+        Self {
+            reading: vec![0.0; channels],
+            change: vec![DVec2::ZERO; channels],
+            plane: [DVec3::ZERO; 2],
+        }
+    }
+}
+
 impl ResponseMap {
     /// Presses one newton at every node of a mesh.
     ///
@@ -52,41 +63,42 @@ impl ResponseMap {
         tip_radius: f64,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
-        Self::pushed(sensitivity, mesh, tip_radius, None, watch)
+        let read = |touch: &Touch| sensitivity.read(touch);
+        let values = at_nodes(&mesh, tip_radius, &read, watch)?;
+        Ok(Self::of(mesh, sensitivity.gauges(), values))
     }
 
-    /// Pushes with one newton at every node of a mesh: in one direction all over, or straight in where none is given.
+    /// Pushes with one newton along x, y and z, whichever way the surface lies, at every node of a mesh.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
-    pub fn pushed(
+    pub fn along_axes(
         sensitivity: &Sensitivity,
-        mesh: Arc<TriMesh>,
+        mesh: &Arc<TriMesh>,
         tip_radius: f64,
-        toward: Option<DVec3>,
         watch: Watch,
-    ) -> Result<Self, Cancelled> {
-        /// Nodes between two reports.
-        const PIECE: usize = 512;
-        let places = nodes(&mesh);
-        let normals = node_normals(&mesh);
-        let mut values = Vec::with_capacity(places.len() * sensitivity.gauges());
-        let all: Vec<(DVec3, DVec3)> = places.iter().copied().zip(normals).collect();
-        for (k, piece) in all.chunks(PIECE).enumerate() {
-            report(watch, "Pressing everywhere", k * PIECE, all.len())?;
-            let read = |&(position, normal): &(DVec3, DVec3)| {
-                let touch = Touch {
-                    position,
-                    normal,
-                    force: 1.0,
-                    tip_radius,
-                };
-                let force = toward.unwrap_or(-normal);
-                sensitivity.read_push(&Push { touch, force })
-            };
-            values.par_extend(piece.par_iter().flat_map_iter(read));
-        }
-        Ok(Self::of(mesh, sensitivity.gauges(), values))
+    ) -> Result<[Self; 3], Cancelled> {
+        let read = |touch: &Touch| sensitivity.read_axes(touch);
+        let values: Vec<DVec3> = at_nodes(mesh, tip_radius, &read, watch)?;
+        Ok([0, 1, 2].map(|axis| {
+            let along = values.iter().map(|v| v[axis]).collect();
+            Self::of(Arc::clone(mesh), sensitivity.gauges(), along)
+        }))
+    }
+
+    /// What presses straight in, from what pushes along the axes.
+    #[must_use]
+    pub fn pressing(axes: &[Self; 3]) -> Self {
+        let [x, y, z] = axes;
+        let values = x
+            .normals()
+            .into_iter()
+            .enumerate()
+            .flat_map(|(node, normal)| {
+                let rows = x.node(node).iter().zip(y.node(node)).zip(z.node(node));
+                rows.map(move |((x, y), z)| -normal.dot(DVec3::new(*x, *y, *z)))
+            });
+        Self::of(Arc::clone(&x.mesh), x.channels, values.collect())
     }
 
     /// From readings that are known at the vertices and the middles of the edges of a mesh (nodes ×
@@ -150,6 +162,11 @@ impl ResponseMap {
             })
             .collect();
         Self::of(Arc::clone(&self.mesh), channels.len(), values)
+    }
+
+    /// Outward unit normals at all nodes.
+    pub(super) fn normals(&self) -> Vec<DVec3> {
+        node_normals(&self.mesh)
     }
 
     pub(super) fn node(&self, node: usize) -> &[f64] {
@@ -220,6 +237,31 @@ impl ResponseMap {
         let gc = DVec2::new(-b.y, b.x) / twice;
         ([x, y], [-(gb + gc), gb, gc])
     }
+}
+
+/// What is read of one newton that presses at every node of a mesh, node by node.
+fn at_nodes<T: Send>(
+    mesh: &TriMesh,
+    tip_radius: f64,
+    read: &(dyn Fn(&Touch) -> Vec<T> + Sync),
+    watch: Watch,
+) -> Result<Vec<T>, Cancelled> {
+    /// Nodes between two reports.
+    const PIECE: usize = 512;
+    let all: Vec<(DVec3, DVec3)> = nodes(mesh).into_iter().zip(node_normals(mesh)).collect();
+    let mut values = Vec::new();
+    for (k, piece) in all.chunks(PIECE).enumerate() {
+        report(watch, "Pressing everywhere", k * PIECE, all.len())?;
+        values.par_extend(piece.par_iter().flat_map_iter(|&(position, normal)| {
+            read(&Touch {
+                position,
+                normal,
+                force: 1.0,
+                tip_radius,
+            })
+        }));
+    }
+    Ok(values)
 }
 
 /// Quadratic shape functions: corners, then middles of the sides that begin at them.

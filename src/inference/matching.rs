@@ -9,8 +9,9 @@
 //! Where it is known how gauges may be glued, a reading's variance is the template's own: it grows with the force and
 //! with what a gauge that is a little off would read there, and its determinant counts.
 //!
-//! What all channels have drifted by together is a covariance of rank one (`weighed`); a stiffness that is off is
-//! the same as another force, and widens that alone.
+//! What all channels feel together is a covariance of low rank (`weighed`): what they have drifted by, a tip of another
+//! size, a force along the surface, which is found with the place. A stiffness that is off is the same as another force,
+//! and widens that alone.
 //!
 //! `errors` is what is off with readings, `weighed` how one is compared under it, `kernels` that for all templates at once;
 //! `templates` and `modes` are what is made of it: the whole posterior, and the likeliest places.
@@ -26,6 +27,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::deviation::About;
 use super::map::{LANES, ResponseMap};
 use super::region::Region;
 use crate::mesh::SurfacePoint;
@@ -41,8 +43,13 @@ pub struct Contact {
     pub position: DVec3,
     /// Outward unit normal there.
     pub normal: DVec3,
-    /// N, and its standard deviation.
+    /// How hard it presses (N), and the standard deviation of that.
     pub force: f64,
+    /// Force along the surface (N), and its standard deviation along either of two directions: zero, both, where touches
+    /// are known to press straight in, and for a wide stretch of places a zero that may be off by all that is usual.
+    pub drag: DVec3,
+    /// See [`Self::drag`].
+    pub drag_deviation: f64,
     /// Standard deviation of the force (N).
     pub force_deviation: f64,
     /// Where it may be.
@@ -53,6 +60,37 @@ pub struct Contact {
     pub narrow: bool,
     /// Weighted squares that no touch explains; about channels - 3 where model and noise are right.
     pub unexplained: f64,
+}
+
+impl Contact {
+    /// What is known of it beside its place and how hard it presses. What was found of the tip is found again.
+    fn about(&self) -> About {
+        if self.force > 0.0 {
+            About {
+                aside: self.drag / self.force,
+                tip: 0.0,
+            }
+        } else {
+            About::default()
+        }
+    }
+
+    /// The whole force on the part (N): what presses, and what acts along the surface.
+    #[must_use]
+    pub fn on_part(&self) -> DVec3 {
+        self.drag - self.normal * self.force
+    }
+}
+
+/// How hard a touch at one place is.
+#[derive(Clone, Copy)]
+struct Load {
+    /// N, and the variance of that (N²).
+    force: f64,
+    variance: f64,
+    /// As in [`Contact`].
+    drag: DVec3,
+    drag_deviation: f64,
 }
 
 /// The estimator, with its own working memory.
@@ -112,6 +150,8 @@ impl Matching {
         same.then_some(Contact {
             force: (found.force * size).min(self.most_force),
             force_deviation: found.force_deviation * size,
+            drag: found.drag * size,
+            drag_deviation: found.drag_deviation * size,
             ..*found
         })
     }
@@ -120,7 +160,7 @@ impl Matching {
         &self,
         measured: &Observation,
         at: SurfacePoint,
-        force: (f64, f64),
+        load: Load,
         region: Region,
         cost: f64,
         narrow: bool,
@@ -128,9 +168,14 @@ impl Matching {
         Contact {
             position: self.map.mesh.point(at),
             normal: self.map.mesh.normal(at),
-            force: force.0,
+            force: load.force,
+            drag: load.drag,
+            drag_deviation: load.drag_deviation,
             // What the whole part is stiffer or softer by is another force, at the same place.
-            force_deviation: force.1.sqrt().hypot(self.errors.stiffness * force.0),
+            force_deviation: load
+                .variance
+                .sqrt()
+                .hypot(self.errors.stiffness * load.force),
             region,
             strength: measured.squares - 2.0 * cost,
             narrow,
@@ -142,6 +187,7 @@ impl Matching {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inference::Deviations;
     use crate::mesh::TriMesh;
 
     pub(super) const CHANNELS: usize = 4;
@@ -164,7 +210,7 @@ mod tests {
         let [map, gluing_deviation] = maps();
         for gluing_deviation in [None, Some(gluing_deviation)] {
             let errors = Errors {
-                gluing_deviation,
+                deviations: gluing_deviation.map(Deviations::of_gluing),
                 drift: 0.5e-6,
                 ..Errors::of_noise(1e-6, CHANNELS)
             };

@@ -292,7 +292,7 @@ pub fn markdown(project: &Project, record: &Record) -> String {
         None => format!("by regression on {} touches", judge.touches),
     };
     let mut text = format!(
-        "{count} settings of {} gauges on {}, judged {by} that none has seen, on elements of {:.2} mm ({} unknowns). Processor seconds are of the whole road with the chosen selector alone, up to the judged answer.\n\n| processor s | by the clock | memory | mean error | median | settings |\n|---|---|---|---|---|---|\n",
+        "{count} settings of {} gauges on {}, judged {by} that none has seen, on elements of {:.2} mm ({} unknowns). CPU time is that of the whole pipeline with the chosen selector alone, up to the judged answer.\n\n| CPU time (s) | wall time | memory | mean error | median | settings |\n|---|---|---|---|---|---|\n",
         project.selection.sensors,
         project.gauge.signal.name(),
         judge.element_mm,
@@ -319,7 +319,7 @@ pub fn markdown(project: &Project, record: &Record) -> String {
     let (reports, spread) = knobs(&record.points);
     let _ = writeln!(
         text,
-        "\nWhat one step of each knob brings (medians over pairs of settings that differ in it alone; the mean error with its standard error). With another seed and nothing else the mean error moves by {spread:.0} %.\n\n| knob | pairs | processor time | mean error | median error | buys |\n|---|---|---|---|---|---|"
+        "\nWhat one step of each knob brings (medians over pairs of settings that differ in it alone; the mean error with its standard error). With another seed and nothing else the mean error moves by {spread:.0} %.\n\n| knob | pairs | CPU time | mean error | median error | buys |\n|---|---|---|---|---|---|"
     );
     for r in &reports {
         let _ = writeln!(

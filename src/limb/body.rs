@@ -31,6 +31,7 @@ pub(super) struct Body {
 }
 
 impl Body {
+    /// Adds a point (mm); its number.
     pub fn add(&mut self, point: DVec3) -> u32 {
         self.points.push(point);
         (self.points.len() - 1) as u32
@@ -47,6 +48,7 @@ impl Body {
         }
     }
 
+    /// Adds a quadrilateral as two triangles; its corners run anticlockwise as seen from outside.
     pub fn quad(&mut self, corners: [u32; 4]) {
         let halves = self.halves(corners);
         self.triangles.extend(halves);

@@ -45,6 +45,7 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
+    /// The points and quadrilaterals of a whole barrel.
     pub fn new(spec: &BarrelSpec) -> Self {
         let pitch = spec.pitch();
         let side = 2 * (steps(pitch, 2.0 * spec.element) as isize).max(2);

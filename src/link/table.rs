@@ -102,7 +102,7 @@ impl Table {
         }
         writeln!(
             self.file,
-            ",x_mm,y_mm,z_mm,force_n,uncertainty_mm,channels_ok,true_x_mm,true_y_mm,true_z_mm,true_force_n"
+            ",x_mm,y_mm,z_mm,force_n,fx_n,fy_n,fz_n,uncertainty_mm,channels_ok,true_x_mm,true_y_mm,true_z_mm,true_force_n"
         )
     }
 
@@ -113,14 +113,21 @@ impl Table {
         }
         match update.contact {
             Some(c) => {
-                let (p, radius) = (c.position * 1e3, c.region.radius * 1e3);
+                let (p, f) = (c.position * 1e3, c.on_part());
                 write!(
                     self.file,
-                    ",{:.3},{:.3},{:.3},{:.4},{radius:.3}",
-                    p.x, p.y, p.z, c.force
+                    ",{:.3},{:.3},{:.3},{:.4},{:.4},{:.4},{:.4},{:.3}",
+                    p.x,
+                    p.y,
+                    p.z,
+                    c.force,
+                    f.x,
+                    f.y,
+                    f.z,
+                    c.region.radius * 1e3
                 )?;
             }
-            None => write!(self.file, ",,,,,")?,
+            None => write!(self.file, ",,,,,,,,")?,
         }
         write!(self.file, ",{}", update.good)?;
         match self.truth {

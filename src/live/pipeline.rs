@@ -5,7 +5,9 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::health::{Expected, Health, Watcher};
+use super::news::News;
 use super::receiver::Sample;
+use super::release::Release;
 use super::tare::{Rest, Taring};
 use super::update::{GaugeModel, Guess, Settings, Update};
 use crate::inference::{Contact, Matching, Trained};
@@ -21,6 +23,8 @@ const SEARCH_EVERY: u32 = 20;
 const LOOK_S: f64 = 0.2;
 /// A touch of which so much is left unexplained, over what it explains, is none.
 const DOUBTFUL: f64 = 0.5;
+/// What channels may move by during a tare (strain).
+const SLACK: f64 = 1.5e-6;
 /// A sample rate until it is known (Hz).
 const RATE: f64 = 1000.0;
 
@@ -49,6 +53,8 @@ pub struct Pipeline {
     /// The reading of the last search everywhere, and what it found.
     search: Option<(Vec<f64>, Contact)>,
     last_look: u64,
+    release: Release,
+    news: Option<News>,
 }
 
 impl Pipeline {
@@ -77,6 +83,8 @@ impl Pipeline {
             last: None,
             search: None,
             last_look: 0,
+            release: Release::default(),
+            news: None,
         }
     }
 
@@ -154,8 +162,16 @@ impl Pipeline {
 
     /// Takes what is read from now on for rest.
     pub fn tare(&mut self) {
-        self.taring = Some(Taring::over(self.settings.tare_s));
+        // What a drift may do in that time, and no touch that could be told.
+        let slack = SLACK * self.settings.chain.counts_per_strain();
+        self.taring = Some(Taring::over(self.settings.tare_s, slack));
         self.end_touch();
+    }
+
+    /// What has come to pass with the rest at the last sample.
+    #[must_use]
+    pub fn news(&self) -> Option<News> {
+        self.news
     }
 
     /// Whether rest is being taken just now.
@@ -185,10 +201,12 @@ impl Pipeline {
     fn end_touch(&mut self) {
         (self.above, self.below, self.touching) = (0, 0, false);
         (self.last, self.searched) = (None, 0);
+        self.release.forget();
     }
 
     /// Takes a sample in and says what it means.
     pub fn push(&mut self, sample: &Sample) -> Update {
+        self.news = None;
         let step_s = self.step(sample.time_us);
         let counts: Option<Vec<f64>> = (self.settings.channels.iter())
             .map(|&c| sample.counts.get(c).copied())
@@ -206,7 +224,12 @@ impl Pipeline {
         };
         self.watch(&counts);
         if let Some(taring) = &mut self.taring {
-            if let Some(rest) = taring.push(sample.time_us, &counts) {
+            let waited = taring.is_waiting();
+            let rest = taring.push(sample.time_us, &counts);
+            if taring.is_waiting() && !waited {
+                self.news = Some(News::Waiting);
+            }
+            if let Some(rest) = rest {
                 self.take_rest(rest);
             }
             return nothing;
@@ -224,8 +247,17 @@ impl Pipeline {
             *used = health.is_good();
         }
         self.feel(&strain);
-        let found = self.touching.then(|| self.find(&strain));
+        let found = if self.touching {
+            self.find(&strain)
+        } else {
+            None
+        };
         self.last = found;
+        if self.release.is_sure() {
+            self.tare();
+            self.news = Some(News::Released);
+            return nothing;
+        }
         // What no touch explains is a drift, and the rest follows it.
         let contact = found.filter(|c| c.unexplained < DOUBTFUL * c.strength);
         let guesses = if contact.is_some() {
@@ -319,7 +351,8 @@ impl Pipeline {
         }
     }
 
-    fn find(&mut self, strain: &[f64]) -> Contact {
+    /// The touch; nothing where the reading is rather of something that lets go.
+    fn find(&mut self, strain: &[f64]) -> Option<Contact> {
         let last = self
             .last
             .filter(|_| self.searched > 0 && self.searched < SEARCH_EVERY);
@@ -333,12 +366,15 @@ impl Pipeline {
         });
         if let Some(contact) = known {
             self.searched += 1;
-            return contact;
+            return Some(contact);
         }
         self.searched = 1;
         let found = self.matching.find(strain);
+        if self.release.is_seen(&mut self.matching, strain, &found) {
+            return None;
+        }
         self.search = Some((strain.to_vec(), found));
-        found
+        Some(found)
     }
 
     fn guess(&self, strain: &[f64]) -> [Option<Guess>; 2] {

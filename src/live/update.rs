@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::inference::{Chain, Contact, Errors, Matching, ResponseMap};
+use crate::inference::{Chain, Contact, Deviations, Errors, Matching, ResponseMap};
 use crate::uncertainty::{UNESTIMATED, Uncertainty};
 
 /// Which estimator is shown.
@@ -114,8 +114,8 @@ impl Update {
 pub struct GaugeModel {
     /// Readings as the gauges are thought to be glued.
     pub map: Arc<ResponseMap>,
-    /// See [`Errors::gluing_deviation`].
-    pub gluing_deviation: Option<Arc<ResponseMap>>,
+    /// See [`Errors::deviations`].
+    pub deviations: Option<Deviations>,
     /// What else is known to be off. Noise and resolution are read off the signals.
     pub off: Uncertainty,
 }
@@ -125,7 +125,7 @@ impl From<Arc<ResponseMap>> for GaugeModel {
     fn from(map: Arc<ResponseMap>) -> Self {
         Self {
             map,
-            gluing_deviation: None,
+            deviations: None,
             off: Uncertainty::NONE,
         }
     }
@@ -138,7 +138,7 @@ impl GaugeModel {
         let errors = Errors {
             noise,
             relative: settings.relative.max(self.off.elements),
-            ..Errors::known(&self.off, channels, self.gluing_deviation)
+            ..Errors::known(&self.off, channels, self.deviations)
         };
         Matching::new(self.map, errors, settings.most_force)
     }

@@ -156,6 +156,7 @@ pub(super) struct Conditional<'a> {
 }
 
 impl<'a> Conditional<'a> {
+    /// Before anything was measured: the variances of the field itself.
     pub fn nothing(covariance: &'a Covariance) -> Self {
         let n = covariance.k.nrows();
         Self {

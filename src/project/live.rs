@@ -24,6 +24,10 @@ pub struct LiveKeys {
     /// How far off the stiffness of the part is (standard deviation): every force is off by it, and no place.
     #[serde(skip_serializing_if = "is_usual_stiffness")]
     pub stiffness_percent: f64,
+    /// How much of a touch's force may act along the surface, over what presses (rms, in any direction), where that is
+    /// more than touches are said to have: fingers push aside.
+    #[serde(skip_serializing_if = "is_usual_friction")]
+    pub friction_percent: f64,
     /// The hardest press that is thought possible.
     pub largest_force_n: f64,
     /// Seconds in which the rest follows a drift; zero: never.
@@ -42,6 +46,17 @@ const STIFFNESS_PERCENT: f64 = 5.0;
 )]
 fn is_usual_stiffness(percent: &f64) -> bool {
     *percent == STIFFNESS_PERCENT
+}
+
+/// A finger that pushes fifteen degrees off the upright.
+const FRICTION_PERCENT: f64 = 25.0;
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde asks with a reference"
+)]
+fn is_usual_friction(percent: &f64) -> bool {
+    *percent == FRICTION_PERCENT
 }
 
 /// One gauge as it was found to be glued.
@@ -70,6 +85,7 @@ impl Default for LiveKeys {
             active_arms: chain.active_arms,
             model_error: 0.0,
             stiffness_percent: STIFFNESS_PERCENT,
+            friction_percent: FRICTION_PERCENT,
             largest_force_n: 60.0,
             drift_s: 3.0,
             glued: Vec::new(),

@@ -220,6 +220,7 @@ impl SupportKeys {
 
 /// What stands in place of a key that is left out.
 pub(super) mod defaults {
+    /// Of the wall (mm): the bundled limb's.
     pub fn thickness() -> f64 {
         1.5
     }
@@ -229,6 +230,7 @@ pub(super) mod defaults {
         10.0
     }
 
+    /// Whether a value (mm) is the usual one, and need not be written.
     #[allow(
         clippy::trivially_copy_pass_by_ref,
         reason = "serde asks with a reference"

@@ -153,6 +153,11 @@ impl Project {
             ),
             ("calibration.place_mm", hand.place_mm, PLACE_OFF),
             ("calibration.force_percent", hand.force_percent, FORCE_OFF),
+            (
+                "calibration.friction_percent",
+                hand.friction_percent,
+                FRICTION,
+            ),
             ("gauge.drift_microstrain", gauge.drift_microstrain, DRIFT),
             ("sites.spacing_mm", self.sites.spacing_mm, LENGTH),
             (

@@ -9,7 +9,7 @@ use crate::link::State;
 /// Where no sites are left out as candidates, and what would leave some out.
 pub const NOBODY_REDUCES: &str = "Nobody asks for fewer: greedy SVR chooses among candidates, a judge by regression compares sets with all of them together, and a fixed number may be asked for";
 
-/// The stages, in the order of the road.
+/// The stages, in the order of the pipeline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stage {
     Part,

@@ -1,4 +1,4 @@
-//! The left side: the stages of the road, how each stands, what it last achieved, and what to press next.
+//! The left side: the stages of the pipeline, how each stands, what it last achieved, and what to press next.
 
 use egui::{RichText, Ui};
 

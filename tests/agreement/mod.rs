@@ -57,6 +57,8 @@ impl Trial {
         let mut inputs = hapdef::cli::bundled().unwrap().inputs;
         inputs.project.selection.sites.clear();
         inputs.project.touch.edge_margin_mm = 0.0;
+        // Touches press straight in, and the choice and matching both know it.
+        inputs.project.live.friction_percent = 0.0;
         let simulated = design::simulate(&inputs, &budget(), &unwatched).unwrap();
         let feasibility = design::filter(&inputs, &simulated);
         let reduced = design::reduce_sites(&inputs, &simulated, &feasibility, &budget()).unwrap();
@@ -129,7 +131,7 @@ impl Trial {
         let drawn = &sensing.drawn;
         let errors = Errors {
             relative: share,
-            gluing_deviation: Some(Arc::clone(&sensing.gluing_deviation)),
+            deviations: Some(sensing.deviations.clone()),
             ..Errors::of_noise(noise, sensing.gauges.len())
         };
         let mut matching = Matching::new(Arc::clone(&drawn.map), errors, 60.0);

@@ -92,7 +92,7 @@ fn matching_is_as_good_as_can_be() {
                 }
             }
             let at = sensing.drawn.map.mesh.index().nearest(touch.position).0;
-            let (bound, _) = cramer_rao(&sensing.drawn.map, at, force, &vec![NOISE; gauges]);
+            let (bound, _) = cramer_rao(&sensing.drawn.map, at, force, &vec![NOISE; gauges], &[]);
             ratios.push(squares.sqrt() / bound);
         }
         ratios.sort_by(f64::total_cmp);
@@ -196,7 +196,7 @@ fn known_touches_show_how_gauges_are_glued() {
 }
 
 /// A board without a port, and what a pipeline makes of it.
-struct Bench {
+pub struct Bench {
     board: SimulatedBoard,
     receiver: Receiver,
     pipeline: Pipeline,
@@ -204,7 +204,7 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(script: Script, faults: Faults, drift: f64) -> Self {
+    pub fn new(script: Script, faults: Faults, drift: f64) -> Self {
         let lab = lab();
         let gauges = lab.sensing.gauges.len();
         let mut options = board::options(&lab.inputs, gauges);
@@ -232,7 +232,7 @@ impl Bench {
     }
 
     /// Runs so many milliseconds and tells of every sample, with what really happened.
-    fn run(&mut self, milliseconds: u64, mut tell: impl FnMut(&Pipeline, Update, Truth)) {
+    pub fn run(&mut self, milliseconds: u64, mut tell: impl FnMut(&Pipeline, Update, Truth)) {
         let mut to_board = Vec::new();
         encode(&Message::AskHello, 0, 0, 12, &mut to_board);
         encode(&Message::Start, 1, 0, 12, &mut to_board);
@@ -263,7 +263,7 @@ impl Bench {
     }
 }
 
-fn press(number: usize, force: f64, start_s: f64, duration_s: f64) -> Press {
+pub fn press(number: usize, force: f64, start_s: f64, duration_s: f64) -> Press {
     Press {
         start_s,
         duration_s,

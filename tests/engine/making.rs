@@ -6,18 +6,21 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::dataset::{self, Signal};
-use hapdef::design::{self, Inputs, Simulated};
+use hapdef::design::{self, Inputs, Sensing, Simulated};
 use hapdef::elasticity::{Push, Touch};
 use hapdef::inference::{Errors, Matching};
 use hapdef::placement::SelectorKind;
 use hapdef::project::ChosenSite;
-use hapdef::uncertainty::{Making, Uncertainty};
+use hapdef::uncertainty::{Gluing, Making, Uncertainty};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::agreement::normal;
 use crate::coarse;
 
 const GAUGES: usize = 6;
+/// What touches press with.
+const FORCE_N: f64 = 10.0;
 
 /// A limb that is touched by fingers that drag a third of what they press, with gauges that are glued just so.
 fn dragged() -> Inputs {
@@ -152,8 +155,8 @@ fn whoever_knows_of_friction_finds_touches_better() {
     };
     let pushes: Vec<Push> = touches.iter().map(&mut drag).collect();
     let error = |off: Uncertainty| {
-        let deviation = Arc::new(sensing.drawn.gluing_deviation(&off));
-        let errors = Errors::known(&off, GAUGES, Some(deviation));
+        let deviations = sensing.drawn.deviations(&off);
+        let errors = Errors::known(&off, GAUGES, Some(deviations));
         let mut matching = Matching::new(Arc::clone(&sensing.drawn.map), errors, 60.0);
         let pairs = touches.iter().zip(&pushes);
         let away = pairs.map(|(touch, push)| {
@@ -164,9 +167,79 @@ fn whoever_knows_of_friction_finds_touches_better() {
     };
     let untold = Uncertainty {
         making: Making::EXACT,
+        allowed: 0.0,
         ..sensing.off
     };
     let [told, untold] = [sensing.off, untold].map(error);
     println!("told of friction {told:.2} mm, untold {untold:.2} mm");
     assert!(told < 0.95 * untold, "{told} {untold}");
+}
+
+/// What is found of touches that are pushed aside by so much of their force, each in a direction of its own: the mean
+/// error of place (mm) and of the force along the surface (N), and how many lie in the region of 90 %.
+fn found_of(sensing: &Sensing, touches: &[Touch], aside: f64, off: &Uncertainty) -> [f64; 3] {
+    let errors = Errors::known(
+        off,
+        sensing.gauges.len(),
+        Some(sensing.drawn.deviations(off)),
+    );
+    let mut matching = Matching::new(Arc::clone(&sensing.drawn.map), errors, 60.0);
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let (mut sums, mut within) = ([0.0; 2], 0.0);
+    for touch in touches {
+        let way = std::f64::consts::TAU * rng.random::<f64>();
+        let along = touch.normal.any_orthonormal_vector();
+        let way = along * way.cos() + touch.normal.cross(along) * way.sin();
+        let drag = way * (aside * touch.force);
+        let straight = Push::from(touch);
+        let push = Push {
+            force: straight.force + drag,
+            ..straight
+        };
+        let mut reading = sensing.sensitivity.read_push(&push);
+        for x in &mut reading {
+            *x += off.of_channel() * normal(&mut rng);
+        }
+        let found = matching.find(&reading);
+        sums[0] += found.position.distance(touch.position) * 1e3;
+        sums[1] += found.drag.distance(drag);
+        within += f64::from(u8::from(found.region.holds(found.position, touch.position)));
+    }
+    [sums[0], sums[1], within].map(|sum| sum / touches.len() as f64)
+}
+
+#[test]
+fn a_finger_that_pushes_aside_is_found_with_its_direction() {
+    let inputs = coarse::limb();
+    let sensing = design::sensing(&inputs, &budget(), &unwatched).unwrap();
+    let touches = sensing.touches(&inputs, 300, 5, false).unwrap();
+    let off = Uncertainty {
+        gluing: Gluing::EXACT,
+        elements: 0.0,
+        ..sensing.off
+    };
+    let untold = Uncertainty {
+        allowed: 0.0,
+        ..off
+    };
+    let mut straight = 0.0;
+    for degrees in [0.0_f64, 10.0, 20.0] {
+        let aside = degrees.to_radians().tan();
+        let [told, drag_n, held] = found_of(&sensing, &touches, aside, &off);
+        let [other, _, held_by_other] = found_of(&sensing, &touches, aside, &untold);
+        println!(
+            "{degrees}°: {told:.2} mm, {drag_n:.2} N along the surface, {held:.2} held; by whoever takes it for straight {other:.2} mm, {held_by_other:.2} held"
+        );
+        assert!((0.84..0.96).contains(&held), "{held}");
+        if degrees == 0.0 {
+            straight = told;
+            assert!(told < 1.1 * other, "{told} {other}");
+        } else {
+            assert!(
+                told < 1.2 * straight && told < 0.5 * other,
+                "{told} {other}"
+            );
+            assert!(drag_n < 0.5 * aside * FORCE_N, "{drag_n}");
+        }
+    }
 }

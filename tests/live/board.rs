@@ -174,6 +174,9 @@ fn touches_are_found_where_they_are() {
             [
                 "channels_ok",
                 "force_n",
+                "fx_n",
+                "fy_n",
+                "fz_n",
                 "t_us",
                 "uncertainty_mm",
                 "x_mm",
@@ -509,6 +512,28 @@ fn what_is_wrong_is_said_before_the_model_is_computed() {
     assert!(begun.elapsed() < Duration::from_secs(30));
     assert!(!Path::new(&csv).exists(), "nothing was begun");
     assert_eq!(std::fs::read(&sound).unwrap(), recording(1));
+}
+
+/// Whoever is served may have the rest taken again, and is told what is no order.
+#[test]
+fn the_rest_is_taken_again_when_it_is_asked_for() {
+    let (_board, port) = board(&[]);
+    let door = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = door.local_addr().unwrap().to_string();
+    drop(door);
+    let listening = listen(&port, &["--every", "20", "--serve", &address]);
+    listening.json();
+    let mut client = TcpStream::connect(&address).unwrap();
+    let mut served = BufReader::new(client.try_clone().unwrap()).lines();
+    let mut line = move || served.next().unwrap().unwrap();
+    assert!(line().starts_with("{\"t_us\""));
+    for order in ["tare\n", "{\"command\":\"tare\"}\n"] {
+        client.write_all(order.as_bytes()).unwrap();
+        listening.says("the rest is taken again");
+    }
+    client.write_all(b"tear\n").unwrap();
+    let refused = (0..100).map(|_| line()).find(|l| l.contains("error"));
+    assert!(refused.unwrap().contains("no order: write"));
 }
 
 /// Nobody is left to believe that all is there: a full disk ends with a message, a closed pipe quietly.

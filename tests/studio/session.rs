@@ -16,7 +16,7 @@ use hapdef::project::ChosenSite;
 use hapdef::studio::{Field, Stage, Standing, Tool};
 use window::Window;
 
-/// What the stages say, in the order of the road.
+/// What the stages say, in the order of the pipeline.
 fn standings(w: &Window) -> Vec<Standing> {
     Stage::ALL
         .map(|stage| w.harness.state().standing(stage))

@@ -24,7 +24,7 @@ use crate::elasticity::{Model, Touch};
 use crate::evaluation::failures::{Draw, FailureRow, MOST_FAILED};
 use crate::evaluation::{Candidate, Evaluation, Failures, Forces, Judging, Matched, is_largest};
 use crate::inference::calibration::SAMPLES;
-use crate::inference::{AsDrawn, Errors, Known, Matching, ResponseMap, calibrate};
+use crate::inference::{AsDrawn, Deviations, Errors, Known, Matching, calibrate};
 use crate::mesh::TriMesh;
 use crate::placement::expected_error::BLIND;
 use crate::regression::folds::evenly;
@@ -67,9 +67,9 @@ struct Everywhere {
     rows: Vec<usize>,
     drawn: AsDrawn,
     /// What gluing and the way touches are made put on the readings.
-    gluing_deviation: ResponseMap,
+    deviations: Deviations,
     /// What the latter alone does, where it may be off: gauges that are glued just so have that too.
-    made: Option<ResponseMap>,
+    made: Option<Deviations>,
 }
 
 impl ByMatching<'_> {
@@ -177,15 +177,15 @@ impl ByMatching<'_> {
             })
             .collect();
         let off = self.off();
-        let tip = (self.tip_radius(), &off.making);
+        let tip = (self.tip_radius(), &off.making_at_most());
         let drawn = drawn_on(model, &gauges, mesh, tip, watch)?;
         let exact = Uncertainty {
             gluing: Gluing::EXACT,
             ..off
         };
         Ok(Everywhere {
-            gluing_deviation: drawn.gluing_deviation(&off),
-            made: (off.making != Making::EXACT).then(|| drawn.gluing_deviation(&exact)),
+            deviations: drawn.deviations(&off),
+            made: (off.making_allowed() != Making::EXACT).then(|| drawn.deviations(&exact)),
             rows,
             drawn,
         })
@@ -241,12 +241,12 @@ impl<'a> Set<'a> {
         let channel = |row: &usize| Some(vec![(everywhere.rows.binary_search(row).ok()?, 1.0)]);
         let channels: Vec<Vec<(usize, f64)>> = candidate.rows.iter().filter_map(channel).collect();
         let map = Arc::new(everywhere.drawn.map.mixed(&channels));
-        let errors = |gluing_deviation: Option<&ResponseMap>| {
-            let gluing_deviation = gluing_deviation.map(|s| Arc::new(s.mixed(&channels)));
-            Errors::known(&trial.off(), channels.len(), gluing_deviation)
+        let errors = |deviations: Option<&Deviations>| {
+            let deviations = deviations.map(|d| d.mixed(&channels));
+            Errors::known(&trial.off(), channels.len(), deviations)
         };
         let exact = errors(everywhere.made.as_ref());
-        let glued = errors(Some(&everywhere.gluing_deviation));
+        let glued = errors(Some(&everywhere.deviations));
         let most_n = trial.forces.most_n;
         Self {
             drawn: Matching::new(Arc::clone(&map), exact, most_n),
@@ -307,9 +307,7 @@ impl<'a> Set<'a> {
         let calibration = calibrate(drawn, known, &before.noise, &off);
         let errors = Errors {
             relative: calibration.relative,
-            gluing_deviation: Some(Arc::new(
-                drawn.gluing_deviation_of(&calibration.doubts, &off),
-            )),
+            deviations: Some(drawn.deviations_of(&calibration.doubts, &off)),
             ..before.clone()
         };
         let map = Arc::new(drawn.calibrated(&calibration));

@@ -3,26 +3,34 @@
 /// Why the factorization failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FactorError {
-    /// A pivot that is not positive, at this row.
+    /// A pivot that is not positive.
     NotPositive {
+        /// Which row it stands in.
         row: usize,
     },
+    /// The allocator had no memory for it.
     OutOfMemory,
-    /// The matrix and its factor would take so many bytes.
+    /// The matrix and its factor would take more memory than they may.
     TooLarge {
+        /// Of both together.
         bytes: f64,
     },
+    /// Whoever waited for it asked to stop.
     Cancelled,
 }
 
 /// The lower triangle of a symmetric matrix, by columns.
 pub struct SymmetricMatrix {
+    /// Where each column begins in `rows` and `values`, and the end of the last: dimension + 1 of them.
     pub columns: Vec<usize>,
+    /// Row of each entry, rising within a column, the diagonal first.
     pub rows: Vec<usize>,
+    /// Value of each entry, beside its row.
     pub values: Vec<f64>,
 }
 
 impl SymmetricMatrix {
+    /// Number of rows, and of columns.
     pub fn dimension(&self) -> usize {
         self.columns.len() - 1
     }
@@ -35,6 +43,7 @@ impl SymmetricMatrix {
         }
     }
 
+    /// The entry on the diagonal of a column.
     pub fn diagonal(&self, column: usize) -> f64 {
         // The diagonal is the first entry of its column in a lower triangle.
         self.values[self.columns[column]]

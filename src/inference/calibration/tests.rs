@@ -133,8 +133,8 @@ fn no_presses_leave_everything_as_it_was() {
     let found = calibrate(&drawn, &[], &NOISE, &off);
     assert_eq!(found.glued, [[1.0, 0.0, 0.0, 0.0]; CHANNELS]);
     assert!((found.relative - off.elements).abs() < 1e-6);
-    let before = drawn.gluing_deviation(&off);
-    let after = drawn.gluing_deviation_of(&found.doubts, &off);
+    let before = drawn.deviations(&off).all;
+    let after = drawn.deviations_of(&found.doubts, &off).all;
     for node in 0..6 {
         for (a, b) in before.node(node).iter().zip(after.node(node)) {
             assert!((a - b).abs() < 1e-6 * a, "{a} {b}");
@@ -221,7 +221,7 @@ fn what_all_gauges_feel_of_a_tip_is_not_taken_for_gluing() {
     // A metre of the tip's radius, in strain: a few per cent of a reading for a millimetre.
     let rise: Vec<Vec<(usize, f64)>> = (0..CHANNELS).map(|c| vec![(c, 2.0 / tip)]).collect();
     let drawn = AsDrawn {
-        tip: Some(larger.mixed(&rise)),
+        tip: Some(Arc::new(larger.mixed(&rise))),
         ..drawn()
     };
     let told = Uncertainty {

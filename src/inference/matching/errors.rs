@@ -1,8 +1,6 @@
 //! What is off with readings, as matching weighs it.
 
-use std::sync::Arc;
-
-use crate::inference::ResponseMap;
+use crate::inference::Deviations;
 use crate::uncertainty::Uncertainty;
 
 /// No reading is taken to be better than this (strain).
@@ -16,9 +14,9 @@ pub struct Errors {
     /// Standard deviation of what gains, places and model are off by, over the reading: half of it from the
     /// channel's own reading, half from the mean square of all.
     pub relative: f64,
-    /// Standard deviation a newton that gluing puts on each channel's reading, on the mesh of the readings; absent
-    /// where gauges are known to be glued as the readings say.
-    pub gluing_deviation: Option<Arc<ResponseMap>>,
+    /// What gluing and the way touches are made put on readings, on the mesh of the readings; absent where gauges are
+    /// known to be glued as the readings say, and touches to be made as they are said to be.
+    pub deviations: Option<Deviations>,
     /// Standard deviation of what all channels have drifted by together (strain).
     pub drift: f64,
     /// Standard deviation of the factor by which the part is stiffer or softer than its model: of every force.
@@ -38,26 +36,29 @@ impl Errors {
         Self {
             noise: noise.to_vec(),
             relative: 0.0,
-            gluing_deviation: None,
+            deviations: None,
             drift: 0.0,
             stiffness: 0.0,
         }
     }
 
-    /// As the project describes what is off, for so many channels whose gauges may be glued as `gluing_deviation` says.
+    /// As the project describes what is off, for so many channels that may be off as `deviations` say.
     #[must_use]
-    pub fn known(
-        off: &Uncertainty,
-        channels: usize,
-        gluing_deviation: Option<Arc<ResponseMap>>,
-    ) -> Self {
+    pub fn known(off: &Uncertainty, channels: usize, deviations: Option<Deviations>) -> Self {
         Self {
             relative: off.elements,
-            gluing_deviation,
+            deviations,
             drift: off.drift,
             stiffness: off.stiffness,
             ..Self::of_noise(off.of_channel().max(LEAST_NOISE), channels)
         }
+    }
+
+    /// Standard deviation of the force along the surface in either of two directions, over the force that presses.
+    pub(super) fn usual_drag(&self) -> f64 {
+        let nuisances = self.deviations.as_ref().and_then(|d| d.nuisances.as_ref());
+        let dragging = nuisances.filter(|n| n.axes.is_some());
+        dragging.map_or(0.0, |n| n.making.friction / 2.0_f64.sqrt())
     }
 
     /// One over the variance of every channel for this reading; zero for a channel that is left out.

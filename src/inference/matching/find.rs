@@ -40,7 +40,7 @@ impl Matching {
         let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
         let explained = |cost: f64| 2.0 * cost <= last.unexplained + differs;
         let start = self.map.mesh.index().nearest(last.position).0;
-        let mode = self.follow(&measured, start, Some(last.force));
+        let mode = self.follow(&measured, start, Some((last.force, last.about())));
         let broad = BROAD * self.map.spacing();
         (explained(mode.cost) && widest(mode.covariance) <= broad * broad)
             .then(|| self.contact_at(&measured, &mode, true))

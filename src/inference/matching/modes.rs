@@ -1,15 +1,21 @@
 //! The most likely places: Gauss–Newton from the best templates, and the normal distribution around what it finds.
 
+use std::borrow::Cow;
+
 use glam::{DMat2, DVec3};
 use nalgebra::Matrix3;
 
 use super::weighed::{Measured, Observation, Weighed};
-use super::{Contact, Matching};
+use super::{Contact, Load, Matching};
+use crate::inference::deviation::{About, Nuisance, Nuisances};
 use crate::inference::map::Slope;
 use crate::inference::region::{DEVIATIONS, Region};
 use crate::mesh::SurfacePoint;
 
 const STEPS: usize = 8;
+/// Of the distance between templates, and of the force that presses: what a touch may move and turn by before what was
+/// taken where it was is taken again.
+const SETTLED: f64 = 0.1;
 /// One place with this share of the probability is the answer; below it, the mean is.
 const CLEAR: f64 = 0.9;
 
@@ -20,6 +26,9 @@ pub(super) struct Mode {
     pub position: DVec3,
     pub force: f64,
     force_variance: f64,
+    /// What else is known of the touch, and how sure its force along the surface is (N).
+    about: About,
+    drag_deviation: f64,
     pub covariance: DMat2,
     plane: [DVec3; 2],
     /// Half the weighted squares left over.
@@ -28,13 +37,66 @@ pub(super) struct Mode {
     pub log_evidence: f64,
 }
 
+impl Mode {
+    /// The force along the surface (N).
+    fn drag(&self) -> DVec3 {
+        self.about.aside * self.force
+    }
+}
+
+/// What is held while places around one are tried.
+struct Terms<'a> {
+    weighed: Weighed,
+    nuisances: Vec<Nuisance>,
+    /// What is known of the touch already: what it reads changes with the place too.
+    about: About,
+    /// The reading, with as much more as makes a touch that is known to be made so one that is made otherwise only by
+    /// chance.
+    reading: Cow<'a, [f64]>,
+}
+
 impl Matching {
-    /// The weights for a touch at a place: of the force that is given, or else of the one that fits best.
-    fn weighed_at(&self, observed: &Observation, at: SurfacePoint, force: Option<f64>) -> Weighed {
-        let gluing_deviation = self.errors.gluing_deviation.as_ref().map(|s| s.at(at));
-        let gluing_deviation = gluing_deviation.as_deref();
-        let fitting = || self.fitting_force(observed, &self.map.at(at), gluing_deviation);
-        observed.weighed(gluing_deviation, force.unwrap_or_else(fitting))
+    /// What is taken at a place while others around it are tried: for the force that is given, or else for the one that
+    /// fits best there.
+    fn terms<'a>(
+        &self,
+        observed: &'a Observation,
+        at: SurfacePoint,
+        force: Option<f64>,
+        about: About,
+    ) -> Terms<'a> {
+        let deviations = self.errors.deviations.as_ref();
+        let own = deviations.map(|d| d.own.at(at));
+        let shared = self.nuisances();
+        let nuisances = shared.map_or_else(Vec::new, |n| n.at(at));
+        let fitting = || self.fitting_force(observed, &self.map.at(at), own.as_deref(), &nuisances);
+        let force = force.unwrap_or_else(fitting);
+        let mut reading = Cow::Borrowed(observed.reading());
+        if let Some(shared) = shared.filter(|_| about != About::default()) {
+            let known = shared.reading(&about, at);
+            for (x, known) in reading.to_mut().iter_mut().zip(known) {
+                *x += force * known;
+            }
+        }
+        Terms {
+            weighed: observed.weighed(own.as_deref(), &nuisances, force),
+            nuisances,
+            about,
+            reading,
+        }
+    }
+
+    fn nuisances(&self) -> Option<&Nuisances> {
+        self.errors.deviations.as_ref()?.nuisances.as_ref()
+    }
+
+    /// What a newton reads at a place, and how that changes, of a touch about which so much is known.
+    fn slope(&self, about: &About, at: SurfacePoint) -> Slope {
+        let mut slope = self.map.slope(at);
+        if let Some(shared) = self.nuisances().filter(|_| *about != About::default()) {
+            shared.add(about, at, &mut slope);
+        }
+        slope
     }
 
     /// The force that fits best at a place with these readings a newton: its weights depend on it, and two turns
@@ -43,38 +105,55 @@ impl Matching {
         &self,
         observed: &Observation,
         g: &[f64],
-        gluing_deviation: Option<&[f64]>,
+        deviation: Option<&[f64]>,
+        nuisances: &[Nuisance],
     ) -> f64 {
         let mut force = observed.first_force(g).clamp(0.0, self.most_force);
         for _ in 0..TURNS {
-            let weighed = observed.weighed(gluing_deviation, force);
+            let weighed = observed.weighed(deviation, nuisances, force);
             force = observed.measured(&weighed).fit(g, self.most_force).0;
         }
         force
     }
 
-    /// The most likely place near a start. Weights that depend on where and how hard the touch was are taken there
-    /// once more.
+    /// The most likely place near a start. What depends on where, how hard and how the touch was made is taken there
+    /// once more, and where it may have been made otherwise once again.
     pub(super) fn follow(
         &self,
         observed: &Observation,
         start: SurfacePoint,
-        force: Option<f64>,
+        known: Option<(f64, About)>,
     ) -> Mode {
-        let weighed = self.weighed_at(observed, start, force);
-        let mode = self.descend(&observed.measured(&weighed), weighed.log, start);
-        if self.errors.gluing_deviation.is_none() {
-            return mode;
+        let (force, about) = known.unzip();
+        let about = about.unwrap_or_default();
+        let terms = self.terms(observed, start, force, about);
+        let mut mode = self.descend(observed, &terms, start);
+        let mut before = (self.map.mesh.point(start), about);
+        let turns = match &self.errors.deviations {
+            None => 0,
+            Some(deviations) if deviations.nuisances.is_none() => 1,
+            Some(_) => TURNS,
+        };
+        for _ in 0..turns {
+            // A touch that goes on is where it was.
+            let moved = mode.position.distance(before.0) > SETTLED * self.map.spacing();
+            let turned = mode.about.aside.distance(before.1.aside) > SETTLED;
+            if known.is_some() && !moved && !turned {
+                break;
+            }
+            before = (mode.position, mode.about);
+            let terms = self.terms(observed, mode.at, Some(mode.force), mode.about);
+            mode = self.descend(observed, &terms, mode.at);
         }
-        let weighed = self.weighed_at(observed, mode.at, Some(mode.force));
-        self.descend(&observed.measured(&weighed), weighed.log, mode.at)
+        mode
     }
 
     /// Gauss–Newton on place and force, with Levenberg's damping.
-    fn descend(&self, measured: &Measured, log: f64, start: SurfacePoint) -> Mode {
+    fn descend(&self, observed: &Observation, terms: &Terms, start: SurfacePoint) -> Mode {
+        let measured = Measured::of(&terms.weighed, &terms.reading);
         let map = &self.map;
         let mut at = start;
-        let mut slope = map.slope(at);
+        let mut slope = self.slope(&terms.about, at);
         let (mut force, mut cost) = measured.fit(&slope.reading, self.most_force);
         let mut damping = 1e-4;
         for _ in 0..STEPS {
@@ -94,7 +173,7 @@ impl Matching {
             let within = (3.0 * map.spacing() / length.max(f64::MIN_POSITIVE)).min(1.0);
             let moved = slope.plane[0] * (step[0] * within) + slope.plane[1] * (step[1] * within);
             let there = map.mesh.index().nearest(map.mesh.point(at) + moved).0;
-            let next = map.slope(there);
+            let next = self.slope(&terms.about, there);
             let (next_force, next_cost) = measured.fit(&next.reading, self.most_force);
             if next_cost < cost {
                 let gained = cost - next_cost;
@@ -111,7 +190,13 @@ impl Matching {
                 damping = (damping * 20.0).max(1e-3);
             }
         }
-        self.mode(measured, at, &slope, force, cost + log)
+        let whole = observed.measured(&terms.weighed);
+        let (about, drag_deviation) = whole.about(&map.at(at), force, &terms.nuisances);
+        Mode {
+            about,
+            drag_deviation,
+            ..self.mode(&measured, at, &slope, force, cost + terms.weighed.log)
+        }
     }
 
     fn mode(
@@ -135,6 +220,8 @@ impl Matching {
             position: self.map.mesh.point(at),
             force,
             force_variance: covariance[(2, 2)],
+            about: About::default(),
+            drag_deviation: 0.0,
             covariance: DMat2::from_cols_array(&[
                 covariance[(0, 0)],
                 covariance[(1, 0)],
@@ -150,8 +237,13 @@ impl Matching {
     /// A mode alone, with its normal distribution.
     pub(super) fn contact_at(&self, measured: &Observation, mode: &Mode, narrow: bool) -> Contact {
         let region = Region::of_normal(mode.covariance, mode.plane);
-        let force = (mode.force, mode.force_variance);
-        self.contact(measured, mode.at, force, region, mode.cost, narrow)
+        let load = Load {
+            force: mode.force,
+            variance: mode.force_variance,
+            drag: mode.drag(),
+            drag_deviation: mode.drag_deviation,
+        };
+        self.contact(measured, mode.at, load, region, mode.cost, narrow)
     }
 
     /// Where one narrow place is far likelier than all others, that one; otherwise their mean.
@@ -169,10 +261,20 @@ impl Matching {
         let at = self.map.mesh.index().nearest(centre).0;
         let force = mean(&|m| m.force);
         let variance = mean(&|m| m.force_variance + (m.force - force).powi(2));
+        // Of places that face apart from each other, what lies in the surface where the mean is put.
+        let dragged: DVec3 = modes.iter().map(|m| m.drag() * (weight(m) / total)).sum();
+        let drag = dragged.reject_from_normalized(self.map.mesh.normal(at));
+        let apart = |m: &Mode| m.drag_deviation.powi(2) + m.drag().distance_squared(drag) / 2.0;
+        let load = Load {
+            force,
+            variance,
+            drag,
+            drag_deviation: mean(&apart).sqrt(),
+        };
         let places: Vec<(DVec3, f64)> =
             modes.iter().flat_map(|m| stand_ins(m, weight(m))).collect();
         let region = Region::of_places(&places, self.map.mesh.point(at), self.map.mesh.normal(at));
-        self.contact(measured, at, (force, variance), region, best.cost, false)
+        self.contact(measured, at, load, region, best.cost, false)
     }
 }
 

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::kernels::{score_templates, score_with_gluing};
 use super::modes::Mode;
 use super::weighed::Observation;
-use super::{Contact, Matching};
+use super::{Contact, Load, Matching};
 use crate::inference::map::LANES;
 use crate::inference::region::Region;
 
@@ -21,14 +21,15 @@ impl Matching {
     pub(super) fn score(&mut self, observed: &Observation) {
         let weights: Vec<f32> = observed.w.iter().map(|w| (w * 1e-12) as f32).collect();
         let most = self.most_force as f32;
-        if let Some(gluing_deviation) = &self.errors.gluing_deviation {
+        // To begin with, each channel may be off for itself by what all of them feel together.
+        if let Some(deviations) = &self.errors.deviations {
             let reading: Vec<f32> = observed
                 .reading()
                 .iter()
                 .map(|x| (x * 1e6) as f32)
                 .collect();
             score_with_gluing(
-                [&self.map.templates, &gluing_deviation.templates],
+                [&self.map.templates, &deviations.all.templates],
                 &reading,
                 &weights,
                 (observed.drift * 1e12) as f32,
@@ -41,12 +42,12 @@ impl Matching {
         let scaled: Vec<f32> = (observed.reading().iter().zip(&observed.w))
             .map(|(x, w)| (w * x * 1e-6) as f32)
             .collect();
-        let unglued = observed.unglued();
+        let [taken, sum] = observed.drifted();
         score_templates(
             &self.map.templates,
             &scaled,
             &weights,
-            [(unglued.taken * 1e12) as f32, (unglued.sum * 1e-6) as f32],
+            [(taken * 1e12) as f32, (sum * 1e-6) as f32],
             most,
             &mut self.scores,
             &mut self.highest,
@@ -97,16 +98,21 @@ impl Matching {
         let force = force / total;
         let variance = (squares / total - force * force).max(0.0);
         let region = Region::of_places(&places, map.mesh.point(at), map.mesh.normal(at));
-        self.contact(observed, at, (force, variance), region, best.cost, false)
+        let load = Load {
+            force,
+            variance,
+            drag: DVec3::ZERO,
+            drag_deviation: self.errors.usual_drag() * force,
+        };
+        self.contact(observed, at, load, region, best.cost, false)
     }
 
     /// Mean and variance of the force at a place, and the log-likelihood with the force integrated out.
     fn force_at(&self, observed: &Observation, node: usize) -> (f64, f64, f64) {
         let g = self.map.node(node);
-        let gluing_deviation = self.errors.gluing_deviation.as_ref().map(|s| s.node(node));
-        let force =
-            gluing_deviation.map_or(0.0, |_| self.fitting_force(observed, g, gluing_deviation));
-        let weighed = observed.weighed(gluing_deviation, force);
+        let deviation = self.errors.deviations.as_ref().map(|d| d.all.node(node));
+        let force = deviation.map_or(0.0, |_| self.fitting_force(observed, g, deviation, &[]));
+        let weighed = observed.weighed(deviation, &[], force);
         let measured = observed.measured(&weighed);
         let (_, d) = measured.products(g);
         let (force, cost) = measured.fit(g, self.most_force);
@@ -138,19 +144,16 @@ mod tests {
     use super::super::Errors;
     use super::super::tests::{CHANNELS, maps};
     use super::*;
-    use crate::inference::ResponseMap;
+    use crate::inference::{Deviations, ResponseMap};
     use crate::mesh::TriMesh;
 
     /// What a touch at a template explains, in double precision and one by one.
     fn explained(matching: &Matching, observed: &Observation, node: usize) -> f64 {
         let g = matching.map.node(node);
-        let gluing_deviation = matching
-            .errors
-            .gluing_deviation
-            .as_ref()
-            .map(|s| s.node(node));
-        let force = matching.fitting_force(observed, g, gluing_deviation);
-        let weighed = observed.weighed(gluing_deviation, force);
+        let deviations = matching.errors.deviations.as_ref();
+        let deviation = deviations.map(|d| d.all.node(node));
+        let force = matching.fitting_force(observed, g, deviation, &[]);
+        let weighed = observed.weighed(deviation, &[], force);
         let measured = observed.measured(&weighed);
         let (s, d) = measured.products(g);
         let left = measured.squares - force * (2.0 * s - force * d);
@@ -191,7 +194,7 @@ mod tests {
         for drift in [0.0, 1e-6, 20e-6] {
             for gluing_deviation in [None, Some(Arc::clone(&gluing_deviation))] {
                 let errors = Errors {
-                    gluing_deviation,
+                    deviations: gluing_deviation.map(Deviations::of_gluing),
                     drift,
                     ..Errors::of_noise(1e-6, CHANNELS)
                 };

@@ -52,8 +52,9 @@ fn full() -> Project {
     p.calibration = crate::project::CalibrationKeys {
         place_mm: 0.0,
         force_percent: 7.5,
+        friction_percent: 2.5,
     };
-    p.live.stiffness_percent = 12.5;
+    (p.live.stiffness_percent, p.live.friction_percent) = (12.5, 35.0);
     p.selection.sites.push(ChosenSite {
         position_mm: [0.1, 1.0 / 3.0, -7e-17],
         direction: [0.0, 0.0, 1.0],

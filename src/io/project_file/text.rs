@@ -391,6 +391,11 @@ fn gauge(t: &mut Text, project: &Project) {
         "how far off known presses are made, in any direction (standard deviations)",
     );
     t.key("force_percent", float(hand.force_percent), "of the force");
+    t.key(
+        "friction_percent",
+        float(hand.friction_percent),
+        "of the force along the surface, over what presses",
+    );
 }
 
 fn selection(t: &mut Text, project: &Project) {
@@ -532,6 +537,11 @@ fn live(t: &mut Text, project: &Project) {
         "stiffness_percent",
         float(live.stiffness_percent),
         "how far off the part's stiffness is (standard deviation): forces are off by it, no places",
+    );
+    t.key(
+        "friction_percent",
+        float(live.friction_percent),
+        "how much of the force may push aside (rms, any direction): found with place and force; 0: touches press straight in",
     );
     t.key(
         "largest_force_n",

@@ -40,7 +40,7 @@ pub(super) fn plot(project: &Project, points: &[Point]) -> String {
     grid(&mut svg, &x, &y);
     let _ = write!(
         svg,
-        "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">processor seconds up to the judged answer</text><text transform=\"translate(16 {}) rotate(-90)\" text-anchor=\"middle\">mean error (mm)</text>",
+        "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">CPU time up to the judged answer (s)</text><text transform=\"translate(16 {}) rotate(-90)\" text-anchor=\"middle\">mean error (mm)</text>",
         WIDTH / 2.0,
         HEIGHT - 8.0,
         HEIGHT / 2.0

@@ -25,6 +25,7 @@ impl Listener {
             Command::Tare => {
                 self.pipeline.tare();
                 self.record(|r| r.own("tare"));
+                tell(SessionEvent::Message("the rest is taken again"));
             }
             Command::Rate(hertz) => {
                 self.rate = Some(hertz);

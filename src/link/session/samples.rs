@@ -42,6 +42,9 @@ impl Listener {
         }
         self.compare_channels(sample.counts.len(), tell);
         let update = self.pipeline.push(sample);
+        if let Some(news) = self.pipeline.news() {
+            tell(SessionEvent::Message(news.in_words()));
+        }
         // What nobody touches is soon computed, and would hide the rest.
         if update.contact.is_some() {
             self.timing.push(arrived.elapsed().as_secs_f32() * 1e6);

@@ -13,6 +13,7 @@ pub struct Unfolded {
 }
 
 impl Unfolded {
+    /// Lays the triangle of three points in space (m) flat.
     #[must_use]
     pub fn new(a: DVec3, b: DVec3, target: DVec3) -> Self {
         let c = a.distance(b);
@@ -73,11 +74,13 @@ impl Unfolded {
 /// A vertex that another one helps to reach.
 #[derive(Clone, Copy, Debug)]
 pub struct Help {
+    /// Number of the vertex that is reached.
     pub target: u32,
     /// From the helping vertex straight to the target (m).
     pub straight: f64,
     /// The second vertex of a triangle with both, which the wave may cross between the two.
     pub other: u32,
+    /// That triangle laid flat, the helping vertex at its origin.
     pub triangle: Unfolded,
 }
 

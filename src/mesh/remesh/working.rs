@@ -13,17 +13,23 @@ const GONE: [u32; 3] = [u32::MAX; 3];
 /// A vertex on its way.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertex {
+    /// Where it is (m).
     pub position: DVec3,
     /// Where on the surface.
     pub at: SurfacePoint,
+    /// Whether it may leave its feature line, or its place.
     pub mobility: Mobility,
     /// Edge length wanted here (m).
     pub size: f64,
 }
 
+/// The mesh while it is edited, on the surface that it must keep to.
 pub struct Working<'s> {
+    /// What vertices are projected onto.
     pub surface: &'s Surface,
+    /// Those that were collapsed keep their numbers, without triangles.
     pub vertices: Vec<Vertex>,
+    /// Corners of each triangle; see [`Working::is_gone`].
     pub triangles: Vec<[u32; 3]>,
     /// Triangles round each vertex.
     pub around: Vec<Vec<u32>>,
@@ -31,11 +37,13 @@ pub struct Working<'s> {
     pub lines: HashSet<(u32, u32)>,
 }
 
+/// An edge by its vertices, the smaller number first.
 pub fn key(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
 impl<'s> Working<'s> {
+    /// Begins with the surface's own triangles; `size` is the edge length wanted at a place (both m).
     pub fn new(surface: &'s Surface, size: &dyn Fn(DVec3) -> f64) -> Self {
         let mesh = &surface.mesh;
         let vertices = (0..mesh.positions().len() as u32)
@@ -68,10 +76,12 @@ impl<'s> Working<'s> {
         }
     }
 
+    /// Where a vertex is (m).
     pub fn position(&self, v: u32) -> DVec3 {
         self.vertices[v as usize].position
     }
 
+    /// Distance of two vertices (m).
     pub fn length(&self, a: u32, b: u32) -> f64 {
         self.position(a).distance(self.position(b))
     }
@@ -84,6 +94,7 @@ impl<'s> Working<'s> {
         )
     }
 
+    /// Whether an edge lies on a feature line.
     pub fn is_line(&self, a: u32, b: u32) -> bool {
         self.lines.contains(&key(a, b))
     }
@@ -117,10 +128,12 @@ impl<'s> Working<'s> {
         (b - a).cross(c - a)
     }
 
+    /// Unit normal times twice the area (m²) of a triangle.
     pub fn normal(&self, t: u32) -> DVec3 {
         self.normal_with(t, u32::MAX, DVec3::ZERO)
     }
 
+    /// Vertices that share an edge with this one, by rising number.
     pub fn neighbours(&self, v: u32) -> Vec<u32> {
         let mut near: Vec<u32> = self.around[v as usize]
             .iter()
@@ -207,10 +220,12 @@ impl<'s> Working<'s> {
         common == self.on_edge(gone, kept).len()
     }
 
+    /// Whether a triangle was taken out; the others keep their numbers.
     pub fn is_gone(&self, t: u32) -> bool {
         Self::is_nothing(self.triangles[t as usize])
     }
 
+    /// Whether these corners stand for a triangle that was taken out.
     pub fn is_nothing(triangle: [u32; 3]) -> bool {
         triangle == GONE
     }

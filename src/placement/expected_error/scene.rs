@@ -106,6 +106,7 @@ impl Reports {
         &mut self.values[site * length..][..length]
     }
 
+    /// What one site reports.
     pub fn of(&self, site: usize) -> Report<'_> {
         let all = &self.values[site * Self::ROWS * self.count..][..Self::ROWS * self.count];
         let row = |k: usize| &all[k * self.count..][..self.count];

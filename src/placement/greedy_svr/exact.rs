@@ -17,9 +17,13 @@ const RELATIVE: f64 = 2e-3;
 
 /// What all exact fits of one search share; touches in the order of the folds.
 pub struct Judge<'a> {
+    /// Coordinates of the touches (mm), an axis each.
     pub targets: [Vec<f64>; 3],
+    /// What the criterion is cross-validated over.
     pub folds: &'a Folds,
+    /// C, ε and γ of every fit.
     pub hyper: Hyper,
+    /// Tolerance and most steps of every fit.
     pub effort: Effort,
 }
 
@@ -28,6 +32,7 @@ pub struct Judged {
     /// The criterion (mm).
     pub error: f64,
     fits: Vec<Fit>,
+    /// Whether all fits reached their tolerance.
     pub converged: bool,
 }
 

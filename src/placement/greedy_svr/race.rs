@@ -6,7 +6,9 @@ use crate::statistics::median;
 /// A candidate with its score (mm, smaller is better).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scored {
+    /// Which candidate.
     pub place: usize,
+    /// Its score (mm).
     pub error: f64,
 }
 
@@ -65,6 +67,7 @@ pub struct Raced {
     pub scored: Vec<Scored>,
     /// Those left behind, by the cheaper score.
     pub rest: Vec<Scored>,
+    /// How the two scores relate over all that were scored twice.
     pub relation: Relation,
 }
 

@@ -18,8 +18,11 @@ pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 /// What one screen spends on a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
+    /// Most touches that it fits.
     pub touches: usize,
+    /// Landmarks of the low-rank kernel, to begin with.
     pub landmarks: usize,
+    /// Iterations of the fit.
     pub iterations: usize,
     /// When the score departs from the next by more than this share, more landmarks are taken …
     pub aim: f64,
@@ -74,6 +77,7 @@ pub const LEVELS: [Level; 4] = [
 
 /// The touches, landmarks and targets of one level.
 pub struct Sieve {
+    /// What it spends.
     pub level: Level,
     /// Standardized signals, sites × this level's touches.
     features: SignalMatrix,
@@ -161,8 +165,9 @@ impl Sieve {
 pub struct Base {
     /// Kernel between touches and landmarks over the set, a level.
     crosses: Vec<Mat<f64>>,
-    /// Residuals and dual coefficients of its fits, touches × (3 × folds), in the order of the folds.
+    /// Residuals of its fits, touches × (3 × folds), in the order of the folds (mm).
     pub residuals: Mat<f64>,
+    /// Their dual coefficients, likewise.
     pub beta: Mat<f64>,
     /// Its criterion (mm).
     pub error: f64,

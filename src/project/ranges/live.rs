@@ -35,6 +35,12 @@ impl Project {
             live.stiffness_percent,
             (0.0..=50.0).contains(&live.stiffness_percent),
         )?;
+        check(
+            "live.friction_percent",
+            "between 0 and 100",
+            live.friction_percent,
+            (0.0..=100.0).contains(&live.friction_percent),
+        )?;
         let error = live.model_error;
         check(
             "live.model_error",

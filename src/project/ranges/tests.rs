@@ -24,7 +24,7 @@ fn project() -> Project {
 type Place = fn(&mut Project) -> &mut f64;
 
 /// Every number of a project that may not be just any.
-const NUMBERS: [(&str, Place); 40] = [
+const NUMBERS: [(&str, Place); 42] = [
     ("part.thickness_mm", |p| &mut p.part.thickness_mm),
     ("part.weld_mm", |p| &mut p.part.weld_mm),
     ("part.fill_holes_mm", |p| &mut p.part.fill_holes_mm),
@@ -48,7 +48,11 @@ const NUMBERS: [(&str, Place); 40] = [
     ("calibration.force_percent", |p| {
         &mut p.calibration.force_percent
     }),
+    ("calibration.friction_percent", |p| {
+        &mut p.calibration.friction_percent
+    }),
     ("live.stiffness_percent", |p| &mut p.live.stiffness_percent),
+    ("live.friction_percent", |p| &mut p.live.friction_percent),
     ("sites.spacing_mm", |p| &mut p.sites.spacing_mm),
     ("gauge.noise_microstrain", |p| {
         &mut p.gauge.noise_microstrain
@@ -193,6 +197,8 @@ fn what_is_off_is_what_the_keys_say() {
     project.touch.friction_percent = 15.0;
     project.calibration.place_mm = 2.0;
     project.calibration.force_percent = 10.0;
+    project.calibration.friction_percent = 5.0;
+    project.live.friction_percent = 30.0;
     project.live.stiffness_percent = 20.0;
     assert_eq!(project.check(), Ok(()));
     let off = project.uncertainty();
@@ -204,6 +210,8 @@ fn what_is_off_is_what_the_keys_say() {
     close(off.making.friction, 0.15);
     close(off.pressing.place, 2e-3);
     close(off.pressing.force, 0.1);
+    close(off.making_of_presses().friction, 0.05);
+    close(off.making_allowed().friction, 0.3);
     close(off.stiffness, 0.2);
 }
 

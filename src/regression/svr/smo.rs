@@ -19,9 +19,11 @@ const LANES: usize = 8;
 pub struct Block<'a> {
     kernel: Cow<'a, [f64]>,
     diagonal: Vec<f64>,
+    /// C, ε and when to stop.
     pub params: SvrParams,
     /// Bound of each coefficient: C, or zero for a point that is held out.
     bound: Vec<f64>,
+    /// Coefficient of each point.
     pub beta: Vec<f64>,
     /// Kβ - y.
     pub f: Vec<f64>,
@@ -92,10 +94,12 @@ impl<'a> Block<'a> {
         }
     }
 
+    /// Number of points.
     pub fn len(&self) -> usize {
         self.f.len()
     }
 
+    /// The kernel between a point and all of the block.
     pub fn row(&self, i: usize) -> &[f64] {
         &self.kernel[i * self.len()..][..self.len()]
     }

@@ -11,7 +11,7 @@ use super::super::words::live_in_words;
 use crate::board::Illness;
 use crate::link::{PortInfo, ports};
 use crate::live::Estimator;
-use crate::project::{CalibrationKeys, FORCE_OFF, LiveKeys, PLACE_OFF};
+use crate::project::{CalibrationKeys, FORCE_OFF, FRICTION, LiveKeys, PLACE_OFF};
 use crate::session::{Desk, LEAST_KNOWN, Mishap, WANTED_KNOWN};
 
 /// What is typed at the live stage.
@@ -256,6 +256,15 @@ fn pressing(ui: &mut Ui, hand: &mut CalibrationKeys) {
         " %",
         "How much too hard or too soft a known touch is pressed (standard deviation)",
     );
+    number(
+        ui,
+        "Aside",
+        &mut hand.friction_percent,
+        FRICTION,
+        0.5,
+        " %",
+        "How much of a known touch's force pushes along the surface (rms, in any direction)",
+    );
 }
 
 /// To take a known touch, and to make use of all of them.
@@ -352,6 +361,15 @@ fn measurement(ui: &mut Ui, live: &mut LiveKeys) {
         0.1,
         " %",
         "How far off the part's stiffness is (standard deviation): forces are off by it, no places",
+    );
+    number(
+        ui,
+        "Pushed aside",
+        &mut live.friction_percent,
+        FRICTION,
+        0.5,
+        " %",
+        "How much of a touch's force may act along the surface (rms, in any direction): it is found with place and force; 0: touches press straight in",
     );
     number(
         ui,

@@ -79,7 +79,7 @@ fn paint_heard(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
     }
 }
 
-/// The press as an arrow against the surface, with how hard and how sure.
+/// The press as an arrow that it comes along, with how hard and how sure.
 fn paint_press(
     look: Look<'_>,
     painter: &Painter,
@@ -92,23 +92,27 @@ fn paint_press(
     const FULL: f64 = 30.0;
     const LENGTH: f64 = 0.22;
     let (on, _) = look.scene.index.nearest(place);
-    let normal = look.session.document.part.normal(on);
+    let contact = contact.filter(|_| look.session.desk.estimator == Estimator::Matching);
+    // Against the whole force, where it is known.
+    let whole = contact.and_then(|c| (-c.on_part()).try_normalize());
+    let from = whole.unwrap_or_else(|| look.session.document.part.normal(on));
     let share = 0.25 + 0.75 * (force / FULL).clamp(0.0, 1.0);
     let length = LENGTH * share * look.view.camera.distance;
-    let ends = [place, place + normal * length].map(|p| look.view.place(p));
+    let ends = [place, place + from * length].map(|p| look.view.place(p));
     let [Some(tip), Some(tail)] = ends else {
         return;
     };
     painter.arrow(tail, tip - tail, Stroke::new(4.0, Color32::BLACK));
     painter.arrow(tail, tip - tail, Stroke::new(2.5, colour));
     let mut text = format!("{force:.1} N");
-    if let Some(c) = contact.filter(|_| look.session.desk.estimator == Estimator::Matching) {
-        let _ = write!(
-            text,
-            " ± {:.1} · ± {:.1} mm",
-            c.force_deviation,
-            c.region.radius * 1e3
-        );
+    if let Some(c) = contact {
+        let _ = write!(text, " ± {:.1}", c.force_deviation);
+        // Only what is clearly there.
+        let aside = c.drag.length();
+        if aside > 2.0 * c.drag_deviation && c.drag_deviation > 0.0 {
+            let _ = write!(text, " · {aside:.1} N aside");
+        }
+        let _ = write!(text, " · ± {:.1} mm", c.region.radius * 1e3);
     }
     // Above the hint and within the view.
     let room = look.view.rect.shrink2(vec2(90.0, 44.0));

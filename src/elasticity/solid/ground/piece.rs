@@ -12,6 +12,7 @@ const TETRAHEDRA: usize = 2500;
 
 /// Some of a mesh's tetrahedra.
 pub struct Piece {
+    /// These tetrahedra as a mesh of their own (m).
     pub mesh: Arc<VolumeMesh>,
     /// The faces it was cut along, by their corners in rising order.
     pub cut: HashSet<[u32; 3]>,

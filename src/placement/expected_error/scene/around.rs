@@ -35,6 +35,7 @@ pub(super) struct Surroundings {
 }
 
 impl<'a> Around<'a> {
+    /// Sorts places (mm) along the longest side of their bounds; `groups` has the group of each.
     pub fn new(positions: &'a [DVec3], groups: &'a [usize]) -> Self {
         let axis = longest(Bounds::around(positions.iter().copied()).size());
         let mut order: Vec<usize> = (0..positions.len()).collect();

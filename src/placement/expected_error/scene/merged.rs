@@ -20,6 +20,7 @@ pub(super) struct Merged {
 }
 
 impl Merged {
+    /// Merges touches by their places (mm), weighted by their forces (N) where these are known.
     pub fn new(targets: &[[f64; 3]], forces: Option<&[f64]>) -> Self {
         let along_the_skin = Grouping::Place.of(targets);
         let places = if forces.is_some() {
@@ -46,6 +47,7 @@ impl Merged {
         }
     }
 
+    /// Number of places.
     pub fn len(&self) -> usize {
         self.positions.len()
     }
