@@ -9,6 +9,7 @@ pub mod evaluate;
 pub mod limb;
 pub mod listen;
 pub mod out;
+pub mod predict;
 pub mod progress;
 pub mod ranges;
 pub mod render;
@@ -16,6 +17,7 @@ pub mod select;
 pub mod simulate;
 pub mod spared;
 pub mod trade;
+pub mod train;
 
 use std::path::PathBuf;
 
@@ -60,6 +62,10 @@ pub enum Command {
     Select(select::SelectArgs),
     /// How well given sites find touches, from a dataset alone.
     Evaluate(evaluate::EvaluateArgs),
+    /// An estimator of place and force, learned from measured touches alone, as a file.
+    Train(train::TrainArgs),
+    /// What a trained estimator makes of readings, and how far that is off.
+    Predict(predict::PredictArgs),
     /// A picture of the limb with its gauges.
     Render(render::RenderArgs),
     /// A simulated board, at a pseudo-terminal or a socket.

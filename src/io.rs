@@ -18,6 +18,7 @@ pub mod source;
 pub mod svg;
 pub mod table;
 pub mod together;
+pub mod touch_file;
 pub mod trade_file;
 pub mod vtu;
 

@@ -75,6 +75,7 @@ pub mod io;
 #[allow(missing_docs)]
 pub mod job;
 mod lanes;
+pub mod learning;
 pub mod limb;
 #[allow(missing_docs)]
 pub mod link;

@@ -49,6 +49,8 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Some(Command::Trade(args)) => cli::trade::run(args),
         Some(Command::Select(args)) => cli::select::run(args),
         Some(Command::Evaluate(args)) => cli::evaluate::run(args),
+        Some(Command::Train(args)) => cli::train::run(args),
+        Some(Command::Predict(args)) => cli::predict::run(args),
         Some(Command::Render(args)) => render(args),
         Some(Command::Board(args)) => cli::board::run(args),
         Some(Command::Listen(args)) => cli::listen::run(args),

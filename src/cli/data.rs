@@ -53,6 +53,55 @@ impl DataArgs {
     }
 }
 
+/// What is never divided between learning and judging, as `--groups` says.
+pub enum Kept {
+    /// Repeats of a place, or what other flags say.
+    Usual,
+    /// Each touch by itself.
+    Touch,
+    /// What the user gave.
+    Given(Groups),
+}
+
+/// Groups of touches that the user gave.
+pub struct Groups {
+    /// Numbered from zero without gaps.
+    pub of_touches: Vec<usize>,
+    /// The array or file that they are from.
+    pub source: String,
+}
+
+impl DataArgs {
+    /// What `--groups` names: `place`, `none`, an array in the NPZ, or a CSV with a column `group`. Where it is left out
+    /// and nothing else is `said`, an array `groups` in the NPZ is taken by itself.
+    ///
+    /// # Errors
+    /// A message for a name of nothing, and as [`dataset_file::groups`].
+    pub fn kept(&self, groups: Option<&str>, said: bool, touches: usize) -> anyhow::Result<Kept> {
+        /// Taken where nothing else is said.
+        const USUAL: &str = "groups";
+        let read = |name: &str| -> anyhow::Result<Option<Groups>> {
+            let found = dataset_file::groups(&self.data, name, touches)?;
+            Ok(found.map(|of_touches| Groups {
+                of_touches,
+                source: name.to_owned(),
+            }))
+        };
+        let given = match groups {
+            Some("place") => None,
+            Some("none") => return Ok(Kept::Touch),
+            Some(name) => Some(read(name)?.ok_or_else(|| {
+                misuse(
+                    "--groups takes place, none, an array in an NPZ, or a CSV with a column group",
+                )
+            })?),
+            None if said || !dataset_file::holds(&self.data, USUAL)? => None,
+            None => read(USUAL)?,
+        };
+        Ok(given.map_or(Kept::Usual, Kept::Given))
+    }
+}
+
 /// Unit of the targets that C, ε and the tolerance are meant in.
 #[derive(ValueEnum, Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum TargetUnit {

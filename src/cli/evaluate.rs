@@ -3,11 +3,11 @@
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::data::{CriterionArgs, DataArgs, SplitArg, criterion_json, site_json};
+use super::data::{CriterionArgs, DataArgs, Groups, Kept, SplitArg, criterion_json, site_json};
 use super::out;
 use super::progress::Bar;
 use super::ranges::{between, misuse, whole};
-use crate::io::{cpu_seconds, dataset_file};
+use crate::io::cpu_seconds;
 use crate::placement::greedy_svr::GreedySvr;
 use crate::plain;
 use crate::regression::Grouping;
@@ -126,14 +126,6 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     print_table(&verdict)
 }
 
-/// Groups of touches that the user gave.
-struct Groups {
-    /// Numbered from zero without gaps.
-    of_touches: Vec<usize>,
-    /// The array or file that they are from.
-    source: String,
-}
-
 impl EvaluateArgs {
     /// That no flag is given in vain.
     fn check(&self) -> anyhow::Result<()> {
@@ -185,30 +177,16 @@ impl EvaluateArgs {
 
     /// The regression with what it keeps together, and the groups that the user gave instead.
     fn divided(&self, data: &Data) -> anyhow::Result<(GreedySvr, Option<Groups>)> {
-        /// Taken where nothing else is said.
-        const USUAL: &str = "groups";
         let mut svr = self.criterion.criterion(&data.targets)?;
         let said = self.criterion.split == SplitArg::Touch || self.criterion.place_mm.is_some();
-        let read = |name: &str| -> anyhow::Result<Option<Groups>> {
-            let found = dataset_file::groups(&self.data.data, name, data.targets.len())?;
-            Ok(found.map(|of_touches| Groups {
-                of_touches,
-                source: name.to_owned(),
-            }))
-        };
-        let groups = match self.groups.as_deref() {
-            Some("place") => None,
-            Some("none") => {
+        let kept = (self.data).kept(self.groups.as_deref(), said, data.targets.len())?;
+        let groups = match kept {
+            Kept::Usual => None,
+            Kept::Touch => {
                 svr.grouping = Grouping::Touch;
                 None
             }
-            Some(name) => Some(read(name)?.ok_or_else(|| {
-                misuse(
-                    "--groups takes place, none, an array in an NPZ, or a CSV with a column group",
-                )
-            })?),
-            None if said || !dataset_file::holds(&self.data.data, USUAL)? => None,
-            None => read(USUAL)?,
+            Kept::Given(groups) => Some(groups),
         };
         Ok((svr, groups))
     }

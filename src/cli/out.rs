@@ -16,7 +16,7 @@ pub fn line(text: &str) -> anyhow::Result<()> {
 /// What came of printing something on stdout.
 ///
 /// # Errors
-/// As [`line`].
+/// As [`line()`].
 pub fn printed(outcome: io::Result<()>) -> anyhow::Result<()> {
     outcome
         .and_then(|()| io::stdout().flush())

@@ -24,6 +24,12 @@ impl Spared {
         Self(files)
     }
 
+    /// The files of a dataset.
+    #[must_use]
+    pub fn of_data(data: &Path, touches: Option<&Path>) -> Self {
+        Self(vec![("the dataset", data.to_owned())]).and("the table of the touches", touches)
+    }
+
     /// And a file of the command, where it was given.
     #[must_use]
     pub fn and(mut self, what: &'static str, path: Option<&Path>) -> Self {

@@ -13,7 +13,7 @@ use crate::placement::SensorSet;
 /// the settings of that set's regression. Its name in the rows is `name`.
 ///
 /// # Errors
-/// As [`reference`].
+/// As [`reference()`].
 pub fn judge_set(
     inputs: &Inputs,
     design: &Design,

@@ -29,7 +29,7 @@ pub use crate::placement::expected_error::BLIND;
 /// with a seed of their own, so that they lie off any node and are nobody's training touches.
 ///
 /// # Errors
-/// [`DesignError`] as for [`simulate`].
+/// [`DesignError`] as for [`super::simulate()`].
 pub fn reference(
     inputs: &Inputs,
     simulated: &Simulated,

@@ -140,7 +140,7 @@ impl System {
         }
     }
 
-    /// Solutions by degree of freedom, at most [`BLOCK`], as the first columns of a solved block.
+    /// Solutions by degree of freedom, at most `BLOCK`, as the first columns of a solved block.
     pub fn widened(&self, solutions: &[impl AsRef<[f64]>]) -> Vec<f64> {
         let mut rows = vec![0.0; self.dimension() * BLOCK];
         for (column, displacement) in solutions.iter().enumerate() {

@@ -85,10 +85,10 @@ fn fill(file: &mut File, bytes: &[u8]) -> std::io::Result<()> {
     Ok(())
 }
 
-/// As [`write`], keeping what was there before as `NAME.bak`.
+/// As [`write()`], keeping what was there before as `NAME.bak`.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_with_backup(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     if path.exists() {
         let backup = beside(path, "bak");

@@ -36,6 +36,13 @@ impl Fingerprint {
         }
     }
 
+    /// Numbers to the last bit.
+    pub fn add_numbers<'a>(&mut self, numbers: impl IntoIterator<Item = &'a f64>) {
+        for number in numbers {
+            self.add(number.to_le_bytes());
+        }
+    }
+
     /// As it is shown and kept.
     #[must_use]
     pub fn hex(&self) -> String {

@@ -62,7 +62,7 @@ impl Record {
         self.version == env!("CARGO_PKG_VERSION") && self.inputs == inputs_key(inputs)
     }
 
-    /// From what [`to_json`] wrote.
+    /// From what [`Record::to_json`] wrote.
     ///
     /// # Errors
     /// What is wrong with the text.
@@ -142,7 +142,7 @@ fn beside_defaults(value: Value, defaults: &Value) -> Option<Value> {
     Some(Value::Object(others.collect()))
 }
 
-/// Reads what [`write`] left in a folder; nothing where there is nothing.
+/// Reads what [`write()`] left in a folder; nothing where there is nothing.
 ///
 /// # Errors
 /// [`FileError`] for a file that is there and is no trade.

@@ -300,7 +300,7 @@ impl VolumeMesh {
         self.boundary().into_iter().flat_map(split).collect()
     }
 
-    /// For every triangle of [`Self::surface_triangles`] its tetrahedron and the places of its corners in that.
+    /// For every triangle of `surface_triangles` its tetrahedron and the places of its corners in that.
     #[must_use]
     pub fn surface_places(&self) -> (Vec<[u32; 3]>, Vec<FacePlace>) {
         let mut places = Vec::new();

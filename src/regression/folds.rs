@@ -95,8 +95,9 @@ pub fn number_of(groups: &[usize]) -> usize {
     groups.iter().max().map_or(0, |g| g + 1)
 }
 
-/// The touches of each group.
-fn members(groups: &[usize]) -> Vec<Vec<usize>> {
+/// The touches of each group, by its number; none of a number that no touch has.
+#[must_use]
+pub fn members(groups: &[usize]) -> Vec<Vec<usize>> {
     let mut members = vec![Vec::new(); number_of(groups)];
     for (touch, &group) in groups.iter().enumerate() {
         members[group].push(touch);

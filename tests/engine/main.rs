@@ -25,6 +25,7 @@ mod fuzz;
 mod given_tetrahedra;
 mod inference;
 mod judge;
+mod learning;
 mod libsvm;
 mod making;
 mod mesh_files;

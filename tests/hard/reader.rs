@@ -9,9 +9,10 @@ use std::sync::mpsc::channel;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
+use hapdef::dataset::SignalMatrix;
 use hapdef::inference::ResponseMap;
 use hapdef::io::mesh_file::parse_mesh;
-use hapdef::io::{dataset_file, npz, points, project_file, trade_file};
+use hapdef::io::{dataset_file, npz, points, project_file, touch_file, trade_file};
 use hapdef::limb::LimbSpec;
 use hapdef::link::{Address, Listener, Pace, SessionEvent};
 use hapdef::live::{Pipeline, Receiver, Settings};
@@ -55,6 +56,8 @@ pub enum Reader {
     Presses,
     /// A trade that was measured.
     Trade,
+    /// A trained estimator.
+    Trained,
     /// What a board sends.
     Wire,
     /// What frames hold: a length and so many bytes, again and again; check sums and frames are sound.
@@ -81,7 +84,7 @@ pub const TABLE: &str =
 pub const PLACES: &str = "x_mm,y_mm,z_mm\n0,0,1\n10,0,1\n20.5,-3,1e1\n";
 
 impl Reader {
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Stl,
         Self::Obj,
         Self::Ply,
@@ -101,6 +104,7 @@ impl Reader {
         Self::Sites,
         Self::Presses,
         Self::Trade,
+        Self::Trained,
         Self::Wire,
         Self::Frames,
         Self::Recording,
@@ -127,6 +131,7 @@ impl Reader {
             Self::Sites => "sites",
             Self::Presses => "presses",
             Self::Trade => "trade",
+            Self::Trained => "trained",
             Self::Wire => "wire",
             Self::Frames => "frames",
             Self::Recording => "recording",
@@ -143,6 +148,7 @@ impl Reader {
             Self::Trade => "json",
             Self::Wire | Self::Frames => "bin",
             Self::Recording => "hapdrec",
+            Self::Trained => "hapdtouch",
             mesh_or_data => mesh_or_data.name(),
         }
     }
@@ -189,6 +195,7 @@ impl Reader {
             Self::Sites => sites(&put(folder, "sites.csv", bytes)?),
             Self::Presses => presses(&put(folder, "presses.csv", bytes)?),
             Self::Trade => trade(bytes),
+            Self::Trained => Ok(trained(&put(folder, "m.hapdtouch", bytes)?)),
             Self::Wire => wire(bytes),
             Self::Frames => wire(&framed(bytes)),
             Self::Recording => recording(&put(folder, "r.hapdrec", bytes)?),
@@ -321,6 +328,16 @@ fn presses(path: &Path) -> Result<Outcome, String> {
         }
     }
     Ok(Outcome::Taken)
+}
+
+/// What is read has an answer, whatever it learned.
+fn trained(path: &Path) -> Outcome {
+    let estimator = match touch_file::read(path) {
+        Ok(file) => file.estimator,
+        Err(error) => return refused(error),
+    };
+    let _ = estimator.find(&SignalMatrix::new(2, vec![0.5; 2 * estimator.channels()]));
+    Outcome::Taken
 }
 
 fn trade(bytes: &[u8]) -> Result<Outcome, String> {

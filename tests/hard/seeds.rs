@@ -6,9 +6,13 @@
 
 use std::path::Path;
 
+use hapdef::budget::unwatched;
 use hapdef::cli::examples::Example;
+use hapdef::dataset::SignalMatrix;
 use hapdef::io::glb::write_glb;
+use hapdef::io::touch_file::{self, Origin};
 use hapdef::io::trade_file::Record;
+use hapdef::learning::{Asked, Family, Lessons, train};
 use hapdef::mesh::TriMesh;
 use hapdef::wire::{Hello, Message, encode};
 
@@ -46,6 +50,7 @@ pub fn of(reader: Reader) -> Vec<Vec<u8>> {
         Reader::Sites => vec![SITES.into()],
         Reader::Presses => vec![PRESSES.into()],
         Reader::Trade => vec![trade()],
+        Reader::Trained => [Family::Nearest, Family::KernelRidge].map(trained).to_vec(),
         Reader::Wire => vec![frames(true), lines()],
         Reader::Frames => vec![contents(&frames(false))],
         Reader::Recording => vec![frames(true), recorded_lines()],
@@ -422,6 +427,44 @@ fn trade() -> Vec<u8> {
     let mut record = Record::parse(MEASURED).expect("the bundled trade");
     record.points.truncate(POINTS);
     record.to_json().into_bytes()
+}
+
+/// What three channels learned of touches along a line, and how hard they were.
+fn trained(family: Family) -> Vec<u8> {
+    const TOUCHES: usize = 24;
+    let at = |t: usize| (t * 7 % TOUCHES) as f64;
+    let value = |k: usize| (0.2 * at(k % TOUCHES) + (k / TOUCHES) as f64).sin();
+    let x = SignalMatrix::new(TOUCHES, (0..3 * TOUCHES).map(value).collect());
+    let places: Vec<[f64; 3]> = (0..TOUCHES).map(|t| [at(t), 0.0, 1.0]).collect();
+    let forces: Vec<f64> = (0..TOUCHES).map(|t| 1.0 + at(t)).collect();
+    let lessons = Lessons {
+        x: &x,
+        places_mm: &places,
+        forces: &forces,
+        groups: &(0..TOUCHES).collect::<Vec<_>>(),
+    };
+    let asked = Asked {
+        family: Some(family),
+        ..Asked::default()
+    };
+    let learned = train(&lessons, &asked, &unwatched).expect("enough to learn from");
+    let origin = Origin {
+        data: "d.npz".into(),
+        fingerprint: "0".into(),
+        touches: TOUCHES,
+        train_touches: learned.division.train.len(),
+        seed: 0,
+        estimator: learned.family,
+        validation_mm: learned.validation_mm,
+        tried: learned.tried,
+        test: learned.scores,
+        limb: None,
+        board: None,
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("m.hapdtouch");
+    touch_file::write(&path, origin, &learned.estimator).expect("it can be written");
+    std::fs::read(&path).expect("it was written")
 }
 
 /// A board that greets, rests, is touched and says something, as it goes over the wire; with what the studio

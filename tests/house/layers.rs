@@ -26,7 +26,7 @@ const ORDER: [&[&str]; 14] = [
     &["limb", "elasticity"],
     &["dataset"],
     &["feasible", "regression"],
-    &["pca"],
+    &["learning", "pca"],
     &["gaussian_process"],
     &["placement", "evaluation"],
     &["inference"],

@@ -199,7 +199,7 @@ impl SolidGround {
         Some(foreseen)
     }
 
-    /// What [`Self::raise`] would come to for `count` touches like these, from the first two orders, those that are
+    /// What `raise` would come to for `count` touches like these, from the first two orders, those that are
     /// quick, and the pattern of the others; nothing for a part without tetrahedra.
     ///
     /// # Errors

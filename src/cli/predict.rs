@@ -1,0 +1,80 @@
+//! `hapdef predict`: what a trained estimator makes of readings, and how far that is off.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::data::DataArgs;
+use super::spared::Spared;
+use super::{out, train};
+use crate::io::table::Writing;
+use crate::io::{atomic, touch_file};
+use crate::learning::{Answer, Scores};
+
+#[derive(Args, Debug, Clone)]
+pub struct PredictArgs {
+    /// The estimator (.hapdtouch), as `hapdef train` writes it.
+    #[arg(long)]
+    pub model: PathBuf,
+    #[command(flatten)]
+    pub data: DataArgs,
+    /// Answers as a CSV, a row a touch: `x_mm,y_mm,z_mm,radius_mm` and, where forces were learned, `force_n`.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn run(args: &PredictArgs) -> anyhow::Result<()> {
+    Spared::of_data(&args.data.data, args.data.touches.as_deref())
+        .and("the estimator", Some(&args.model))
+        .check("--out", args.out.as_deref())?;
+    let file = touch_file::read(&args.model)?;
+    let (data, mut notes) = args.data.load()?;
+    let fits = file.check_channels(data.x.rows());
+    args.data.named(fits.map_err(anyhow::Error::msg))?;
+    if file.header.origin.fingerprint == train::fingerprint(&data) {
+        let note = "The estimator was trained on these touches: most of them are no test of it.";
+        out::say(&format!("note: {note}"));
+        notes.push(note.to_owned());
+    }
+    let answers = file.estimator.find(&data.x);
+    let scores = Scores::of(&answers, &data.targets, &data.forces);
+    if let Some(path) = &args.out {
+        atomic::write(path, table(&answers).as_bytes())?;
+    }
+    if args.json {
+        let summary = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "estimator": file.header.origin.estimator,
+            "touches": answers.len(),
+            "test_mm": scores.mean_mm,
+            "median_mm": scores.median_mm,
+            "p95_mm": scores.p95_mm,
+            "coverage": scores.coverage,
+            "force_error_n": scores.force_error_n,
+            "by_force": scores.by_force,
+            "notes": notes,
+        });
+        return out::line(&summary.to_string());
+    }
+    train::print_scores(&scores, answers.len())
+}
+
+fn table(answers: &[Answer]) -> String {
+    let forces = answers.iter().any(|a| a.force_n.is_some());
+    let names = ["x_mm", "y_mm", "z_mm", "radius_mm", "force_n"];
+    let mut table = Writing::new(names.into_iter().take(if forces { 5 } else { 4 }));
+    for answer in answers {
+        let numbers = answer.place_mm.into_iter().chain([answer.radius_mm]);
+        let all = numbers.chain(answer.force_n);
+        table.row(all.map(|v| format!("{v:.4}")));
+    }
+    table.text()
+}

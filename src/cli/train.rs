@@ -1,0 +1,257 @@
+//! `hapdef train`: an estimator of place and force from measured touches alone, as a file.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+
+use super::common::Common;
+use super::data::{DataArgs, Kept};
+use super::out;
+use super::progress::Bar;
+use super::ranges::whole;
+use super::spared::Spared;
+use crate::io::fingerprint::Fingerprint;
+use crate::io::{cpu_seconds, touch_file};
+use crate::learning::score::ForceRow;
+use crate::learning::{Asked, Family, Lessons, Scores, Trained, train};
+use crate::plain;
+use crate::regression::Grouping;
+use crate::study::Data;
+
+/// What turns readings into places.
+#[derive(ValueEnum, Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum FamilyArg {
+    /// The one that does best on touches that it has not learned from.
+    #[default]
+    Auto,
+    /// ε-support-vector regression, as in the paper.
+    Svr,
+    /// The mean of the nearest known touches.
+    Nearest,
+    /// Kernel ridge regression.
+    KernelRidge,
+    /// A Gaussian process with a length a channel.
+    GaussianProcess,
+}
+
+impl FamilyArg {
+    fn family(self) -> Option<Family> {
+        match self {
+            Self::Auto => None,
+            Self::Svr => Some(Family::Svr),
+            Self::Nearest => Some(Family::Nearest),
+            Self::KernelRidge => Some(Family::KernelRidge),
+            Self::GaussianProcess => Some(Family::GaussianProcess),
+        }
+    }
+}
+
+#[derive(Args, Debug, Clone)]
+pub struct TrainArgs {
+    #[command(flatten)]
+    pub data: DataArgs,
+    /// The estimator (.hapdtouch).
+    #[arg(long)]
+    pub out: PathBuf,
+    /// What turns readings into places.
+    #[arg(long, value_enum, default_value_t)]
+    pub estimator: FamilyArg,
+    /// Touches to learn from, drawn by the seed: a point of a learning curve. Eight tenths of the places when left out.
+    #[arg(long, value_parser = whole(10, 1_000_000))]
+    pub train_touches: Option<usize>,
+    /// Touches that are never divided between learning and judging: `place` (repeats of one place), `none` (each
+    /// touch by itself), the name of an array of whole numbers in the NPZ, one a touch, or a CSV with a column
+    /// `group` and a row a touch. An array `groups` in the NPZ is taken by itself.
+    #[arg(long, value_name = "place|none|ARRAY|CSV")]
+    pub groups: Option<String>,
+    /// Seed of the places that are learned from, chosen by and judged on.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Worker threads; all cores when left out. The result does not depend on it.
+    #[arg(long, value_parser = super::common::threads)]
+    pub threads: Option<usize>,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
+    Spared::of_data(&args.data.data, args.data.touches.as_deref())
+        .check("--out", Some(&args.out))?;
+    let (data, mut notes) = args.data.load()?;
+    let groups = args.groups(&data)?;
+    let asked = Asked {
+        family: args.estimator.family(),
+        seed: args.seed,
+        train_touches: args.train_touches,
+    };
+    let bar = Bar::default();
+    let before = cpu_seconds();
+    let trained = in_pool(args.threads, || {
+        let lessons = Lessons {
+            x: &data.x,
+            places_mm: &data.targets,
+            forces: &data.forces,
+            groups: &groups,
+        };
+        let watch = |p| bar.show(p);
+        args.data.named(train(&lessons, &asked, &watch))
+    });
+    bar.finish();
+    let trained = trained?;
+    let cpu = cpu_seconds() - before;
+    for note in &trained.notes {
+        out::say(&format!("note: {note}"));
+    }
+    notes.extend(trained.notes.iter().cloned());
+    touch_file::write(&args.out, args.origin(&data, &trained), &trained.estimator)?;
+    if args.json {
+        return out::line(&json_of(&trained, &notes, cpu).to_string());
+    }
+    print(&trained, cpu)
+}
+
+/// Runs `work` on as many threads as were asked for.
+pub(super) fn in_pool<T: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce() -> anyhow::Result<T> + Send,
+) -> anyhow::Result<T> {
+    Common {
+        threads,
+        ..Common::default()
+    }
+    .in_pool(work)
+}
+
+/// Which data something was learned from.
+pub(super) fn fingerprint(data: &Data) -> String {
+    let mut key = Fingerprint::default();
+    key.add_numbers(data.x.values());
+    key.add_numbers(data.targets.iter().flatten());
+    key.hex()
+}
+
+impl TrainArgs {
+    /// The group of each touch.
+    fn groups(&self, data: &Data) -> anyhow::Result<Vec<usize>> {
+        let kept = (self.data).kept(self.groups.as_deref(), false, data.targets.len())?;
+        Ok(match kept {
+            Kept::Usual => Grouping::Place.of(&data.targets),
+            Kept::Touch => Grouping::Touch.of(&data.targets),
+            Kept::Given(groups) => groups.of_touches,
+        })
+    }
+
+    fn origin(&self, data: &Data, trained: &Trained) -> touch_file::Origin {
+        let name = self.data.data.file_name().unwrap_or_default();
+        touch_file::Origin {
+            data: name.to_string_lossy().into_owned(),
+            fingerprint: fingerprint(data),
+            touches: data.targets.len(),
+            train_touches: trained.division.train.len(),
+            seed: self.seed,
+            estimator: trained.family,
+            validation_mm: trained.validation_mm,
+            tried: trained.tried.clone(),
+            test: trained.scores.clone(),
+            limb: None,
+            board: None,
+        }
+    }
+}
+
+fn json_of(trained: &Trained, notes: &[String], cpu_seconds: f64) -> serde_json::Value {
+    let Scores {
+        mean_mm,
+        median_mm,
+        p95_mm,
+        coverage,
+        force_error_n,
+        by_force,
+    } = &trained.scores;
+    let force = trained.estimator.force.as_ref();
+    json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "estimator": trained.family,
+        "force_estimator": force.map(|f| f.family),
+        "validation_mm": trained.validation_mm,
+        "test_mm": mean_mm,
+        "median_mm": median_mm,
+        "p95_mm": p95_mm,
+        "force_error_n": force_error_n,
+        "coverage": coverage,
+        "train_touches": trained.division.train.len(),
+        "validation_touches": trained.division.validation.len(),
+        "test_touches": trained.division.test.len(),
+        "channels": trained.estimator.channels(),
+        "by_force": by_force,
+        "tried": trained.tried,
+        "cpu_seconds": cpu_seconds,
+        "notes": notes,
+    })
+}
+
+fn print(trained: &Trained, cpu_seconds: f64) -> anyhow::Result<()> {
+    for trial in &trained.tried {
+        out::line(&format!(
+            "{:<17} {:>8.3} mm on the validation touches",
+            trial.estimator.name(),
+            trial.validation_mm
+        ))?;
+    }
+    out::line(&format!(
+        "{} is taken: learned from {}, {cpu_seconds:.0} s of processor time",
+        trained.family.name(),
+        plain::count(trained.division.train.len(), "touch")
+    ))?;
+    print_scores(&trained.scores, trained.division.test.len())
+}
+
+/// Errors, and a table of them by force.
+pub(super) fn print_scores(scores: &Scores, touches: usize) -> anyhow::Result<()> {
+    out::line(&format!(
+        "on {touches} test touches: mean {:.3} mm, median {:.3}, 95 % {:.3}; {:.0} % within their radius (made for 90 %)",
+        scores.mean_mm,
+        scores.median_mm,
+        scores.p95_mm,
+        100.0 * scores.coverage
+    ))?;
+    if scores.by_force.is_empty() {
+        return Ok(());
+    }
+    out::line("force (N)     touches  place (mm)  force (N)   the paper's")?;
+    for row in &scores.by_force {
+        out::line(&force_line(row))?;
+    }
+    Ok(())
+}
+
+/// The paper's mean errors of place (mm) and amplitude (N), by the least force of the interval (N).
+const PAPER: [(f64, f64, f64); 4] = [
+    (0.5, 25.43, 1.05),
+    (4.9, 11.95, 1.19),
+    (9.8, 5.90, 1.42),
+    (19.6, 4.48, 1.54),
+];
+
+fn force_line(row: &ForceRow) -> String {
+    let to = row
+        .to_n
+        .map_or_else(|| "…".to_owned(), |to| format!("{to}"));
+    let force = row
+        .force_error_n
+        .map_or_else(|| "–".to_owned(), |f| format!("{f:.3}"));
+    let paper = PAPER.iter().find(|p| p.0 == row.from_n);
+    let paper = paper.map_or_else(String::new, |(_, mm, n)| format!("{mm} mm, {n} N"));
+    format!(
+        "{:<12} {:>8} {:>11.3} {force:>10}   {paper}",
+        format!("{}–{to}", row.from_n),
+        row.touches,
+        row.mean_mm
+    )
+}

@@ -1,0 +1,91 @@
+//! Trained estimators as files (`.hapdtouch`): an NPZ whose array `header` is JSON, byte by byte.
+//!
+//! In `NumPy`: `f = np.load("m.hapdtouch"); json.loads(bytes(f["header"]))`. Version 1 holds, in units of their own (see
+//! the frame in the header):
+//!
+//! | array | shape | is |
+//! |---|---|---|
+//! | `header` | bytes | [`Header`] |
+//! | `channel_middle`, `channel_spread` | channels | asinh((reading - middle) / spread); spread 0: left out |
+//! | `channel_mean`, `channel_deviation` | channels | what that is standardized by; 0: left out |
+//! | `place_lengths` | features | what each feature is divided by |
+//! | `place_points` | touches × features | known touches, over the lengths |
+//! | `place_weights`, `place_bias` | touches × outputs, outputs | of kernels |
+//! | `place_outputs` | touches × outputs | of the nearest |
+//! | `place_off` | touches | squared error where the touch was left out |
+//! | `force_…` | | the same, with one output |
+
+mod arrays;
+mod header;
+
+use std::path::Path;
+
+use super::FileError;
+use super::npz::{Arrays, NpzFile};
+use crate::learning::TouchEstimator;
+
+pub use self::header::{Header, Origin};
+
+/// An estimator with what is known of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TouchFile {
+    /// Where it comes from and how well it does.
+    pub header: Header,
+    /// What answers.
+    pub estimator: TouchEstimator,
+}
+
+/// Writes an estimator.
+///
+/// # Errors
+/// [`FileError`] naming the file.
+pub fn write(path: &Path, origin: Origin, estimator: &TouchEstimator) -> Result<(), FileError> {
+    let header = Header::new(origin, estimator);
+    let text = serde_json::to_string(&header)
+        .map_err(|e| FileError::broken(path, format!("the header cannot be written: {e}")))?;
+    let build = || -> std::io::Result<NpzFile> {
+        let mut file = NpzFile::default();
+        file.add("header", &[text.len()], text.as_bytes())?;
+        arrays::add(&mut file, estimator)?;
+        Ok(file)
+    };
+    build().map_err(|e| FileError::of(path, &e))?.save(path)
+}
+
+/// Reads an estimator.
+///
+/// # Errors
+/// [`FileError`] naming the file, what is wrong with it and what to do.
+pub fn read(path: &Path) -> Result<TouchFile, FileError> {
+    let mut found = Arrays::open(path)?;
+    if !found.holds("header") {
+        return Err(FileError::broken(
+            path,
+            "this is no trained estimator: it has no header. Make one with hapdef train",
+        ));
+    }
+    let header = Header::read(path, &found.numbers("header")?.values)?;
+    let estimator = arrays::read(path, &mut found, &header)?;
+    Ok(TouchFile { header, estimator })
+}
+
+impl TouchFile {
+    /// That readings of so many channels are what it learned from.
+    ///
+    /// # Errors
+    /// A message that says both numbers.
+    pub fn check_channels(&self, channels: usize) -> Result<(), String> {
+        let own = self.estimator.channels();
+        if channels == own {
+            return Ok(());
+        }
+        Err(format!(
+            "the estimator was trained on {} ({}), and there are {channels} here: train one on this board",
+            crate::plain::count(own, "channel"),
+            crate::plain::quote(&self.header.origin.data)
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,214 @@
+//! What a trained estimator's file says of itself.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::io::FileError;
+use crate::learning::machine::{By, Machine};
+use crate::learning::targets::{Frame, Scale};
+use crate::learning::train::Trial;
+use crate::learning::{Family, Scores, TouchEstimator, kernel::Kernel};
+use crate::plain::quote;
+
+const FORMAT: &str = "hapdtouch";
+/// Of files that are written, and the only one that is read.
+const VERSION: u32 = 1;
+/// The longest header that can be meant (bytes).
+const LONGEST: usize = 1 << 20;
+
+/// What stands in the header.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    format: String,
+    version: u32,
+    /// Of the program that wrote it.
+    program: String,
+    /// What it was trained on, and how well it does.
+    pub origin: Origin,
+    /// How many channels a reading has.
+    pub channels: usize,
+    pub(super) frame: FrameEntry,
+    pub(super) place: MachineEntry,
+    pub(super) doubt: DoubtEntry,
+    pub(super) force: Option<ForceEntry>,
+}
+
+/// What an estimator was trained on, and how well it does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// The name of the file of the data.
+    pub data: String,
+    /// Key of readings and places.
+    pub fingerprint: String,
+    /// Touches in the data.
+    pub touches: usize,
+    /// Touches that it learned from.
+    pub train_touches: usize,
+    /// Of the division of the touches.
+    pub seed: u64,
+    /// Its family.
+    pub estimator: Family,
+    /// Mean error on the touches that it was chosen by (mm).
+    pub validation_mm: f64,
+    /// What else was tried.
+    pub tried: Vec<Trial>,
+    /// On touches that nobody learned from.
+    pub test: Scores,
+    /// The limb, where it is known.
+    pub limb: Option<String>,
+    /// The board, where it is known.
+    pub board: Option<String>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct FrameEntry {
+    pub(super) middle_mm: [f64; 3],
+    pub(super) axes: Vec<[f64; 3]>,
+    pub(super) size_mm: f64,
+}
+
+/// How known touches answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum MachineEntry {
+    Kernel(Kernel),
+    Nearest(usize),
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct DoubtEntry {
+    pub(super) usual: f64,
+    pub(super) factor: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct ForceEntry {
+    pub(super) estimator: Family,
+    pub(super) middle_n: f64,
+    pub(super) size_n: f64,
+    pub(super) machine: MachineEntry,
+}
+
+/// What every version says first.
+#[derive(Deserialize)]
+struct First {
+    format: String,
+    version: u32,
+}
+
+impl Header {
+    pub(super) fn new(origin: Origin, estimator: &TouchEstimator) -> Self {
+        let Frame { middle, axes, size } = &estimator.frame;
+        Self {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            origin,
+            channels: estimator.channels(),
+            frame: FrameEntry {
+                middle_mm: *middle,
+                axes: axes.clone(),
+                size_mm: *size,
+            },
+            place: entry(&estimator.place),
+            doubt: DoubtEntry {
+                usual: estimator.doubt.usual,
+                factor: estimator.doubt.factor,
+            },
+            force: estimator.force.as_ref().map(|force| ForceEntry {
+                estimator: force.family,
+                middle_n: force.scale.middle,
+                size_n: force.scale.size,
+                machine: entry(&force.machine),
+            }),
+        }
+    }
+
+    /// From the numbers of its array.
+    pub(super) fn read(path: &Path, values: &[f64]) -> Result<Self, FileError> {
+        let broken = |what: &str| FileError::broken(path, what);
+        if values.len() > LONGEST {
+            return Err(broken("its header is too long to be one. Train it again"));
+        }
+        let bytes: Option<Vec<u8>> = values
+            .iter()
+            .map(|&v| (v.fract() == 0.0 && (0.0..256.0).contains(&v)).then_some(v as u8))
+            .collect();
+        let text = bytes.and_then(|bytes| String::from_utf8(bytes).ok());
+        let text = text.ok_or_else(|| broken("its header is no text. Train it again"))?;
+        let first: First = parse(path, &text)?;
+        if first.format != FORMAT {
+            return Err(broken(&format!(
+                "this is no trained estimator, but {}. Make one with hapdef train",
+                quote(&first.format)
+            )));
+        }
+        if first.version != VERSION {
+            return Err(broken(&format!(
+                "it is of version {} of the format, and this program reads version {VERSION}. Train it again, or use the program that wrote it",
+                first.version
+            )));
+        }
+        let header: Self = parse(path, &text)?;
+        header
+            .check()
+            .map_err(|what| broken(&format!("its header says that {what}. Train it again")))?;
+        Ok(header)
+    }
+
+    /// That frames are frames.
+    fn check(&self) -> Result<(), String> {
+        let axes = &self.frame.axes;
+        if !(1..=3).contains(&axes.len()) {
+            return Err(format!("places spread in {} directions", axes.len()));
+        }
+        let positive = |what: &str, value: f64| {
+            if value.is_finite() && value >= 0.0 {
+                return Ok(());
+            }
+            Err(format!("{what} is {value:e}"))
+        };
+        positive("the size of the skin", self.frame.size_mm)?;
+        positive("the usual distance", self.doubt.usual)?;
+        positive("the factor of the radius", self.doubt.factor)?;
+        if let Some(force) = &self.force {
+            positive("the size of forces", force.size_n)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn frame(&self) -> Frame {
+        Frame {
+            middle: self.frame.middle_mm,
+            axes: self.frame.axes.clone(),
+            size: self.frame.size_mm,
+        }
+    }
+}
+
+impl ForceEntry {
+    pub(super) fn scale(&self) -> Scale {
+        Scale {
+            middle: self.middle_n,
+            size: self.size_n,
+        }
+    }
+}
+
+fn entry(machine: &Machine) -> MachineEntry {
+    match &machine.by {
+        By::Kernel { kernel, .. } => MachineEntry::Kernel(*kernel),
+        By::Nearest { count, .. } => MachineEntry::Nearest(*count),
+    }
+}
+
+fn parse<'a, T: Deserialize<'a>>(path: &Path, text: &'a str) -> Result<T, FileError> {
+    serde_json::from_str(text).map_err(|e| {
+        let what = crate::plain::ends(&e.to_string());
+        FileError::broken(
+            path,
+            format!("its header is damaged: {what}. Train it again"),
+        )
+    })
+}

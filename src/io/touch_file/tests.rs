@@ -1,0 +1,126 @@
+use std::path::Path;
+
+use super::{Origin, TouchFile, read, write};
+use crate::budget::unwatched;
+use crate::dataset::SignalMatrix;
+use crate::io::npz::NpzFile;
+use crate::learning::{Asked, Family, Lessons, Trained, train};
+
+/// Four channels that feel what is near them, on a flat skin, pressed at random.
+fn touched() -> (SignalMatrix, Vec<[f64; 3]>, Vec<f64>) {
+    let draw = |k: usize, by: f64| (k as f64 * by).fract();
+    let places: Vec<[f64; 3]> = (1..=120)
+        .map(|k| [40.0 * draw(k, 0.754_877), 30.0 * draw(k, 0.569_840), 2.0])
+        .collect();
+    let forces: Vec<f64> = (1..=120).map(|k| 1.0 + 9.0 * draw(k, 0.618_034)).collect();
+    let corners = [[0.0, 0.0], [40.0, 0.0], [0.0, 30.0], [40.0, 30.0]];
+    let values = corners.iter().flat_map(|c| {
+        (places.iter().zip(&forces)).map(|(p, force)| {
+            let squared = (p[0] - c[0]).powi(2) + (p[1] - c[1]).powi(2);
+            force * (-squared / 900.0).exp()
+        })
+    });
+    (SignalMatrix::new(120, values.collect()), places, forces)
+}
+
+fn trained(family: Family) -> Trained {
+    let (x, places_mm, forces) = touched();
+    let groups: Vec<usize> = (0..120).collect();
+    let lessons = Lessons {
+        x: &x,
+        places_mm: &places_mm,
+        forces: &forces,
+        groups: &groups,
+    };
+    let asked = Asked {
+        family: Some(family),
+        ..Asked::default()
+    };
+    train(&lessons, &asked, &unwatched).unwrap()
+}
+
+fn origin(trained: &Trained) -> Origin {
+    Origin {
+        data: "d.npz".into(),
+        fingerprint: "00".into(),
+        touches: 120,
+        train_touches: trained.division.train.len(),
+        seed: 0,
+        estimator: trained.family,
+        validation_mm: trained.validation_mm,
+        tried: trained.tried.clone(),
+        test: trained.scores.clone(),
+        limb: Some("finger".into()),
+        board: None,
+    }
+}
+
+/// The message of a file that is refused.
+fn refused(path: &Path) -> String {
+    read(path).expect_err("it is no estimator").to_string()
+}
+
+#[test]
+fn an_estimator_comes_back_to_the_last_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.hapdtouch");
+    for family in [Family::Nearest, Family::KernelRidge] {
+        let trained = trained(family);
+        write(&path, origin(&trained), &trained.estimator).unwrap();
+        let TouchFile { header, estimator } = read(&path).unwrap();
+        assert_eq!(estimator, trained.estimator);
+        assert_eq!(header.origin, origin(&trained));
+        let (x, ..) = touched();
+        assert_eq!(estimator.find(&x), trained.estimator.find(&x));
+        assert!(estimator.find(&x)[0].force_n.is_some());
+    }
+}
+
+#[test]
+fn other_boards_are_refused_with_both_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.hapdtouch");
+    let trained = trained(Family::Nearest);
+    write(&path, origin(&trained), &trained.estimator).unwrap();
+    let file = read(&path).unwrap();
+    assert_eq!(file.check_channels(4), Ok(()));
+    let said = file.check_channels(6).unwrap_err();
+    assert!(
+        said.contains("4 channels") && said.contains("6 here"),
+        "{said}"
+    );
+}
+
+#[test]
+fn wrong_versions_cut_files_and_other_archives_are_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.hapdtouch");
+    let header = |text: &str| {
+        let mut file = NpzFile::default();
+        file.add("header", &[text.len()], text.as_bytes()).unwrap();
+        std::fs::write(&path, file.finish().unwrap()).unwrap();
+        refused(&path)
+    };
+    let said = header(r#"{"format": "hapdtouch", "version": 9}"#);
+    assert!(
+        said.contains("version 9") && said.contains("version 1"),
+        "{said}"
+    );
+    let said = header(r#"{"format": "hapdrec", "version": 1}"#);
+    assert!(said.contains("“hapdrec”"), "{said}");
+    let said = header("{");
+    assert!(said.contains("damaged"), "{said}");
+
+    let mut other = NpzFile::default();
+    other.add("X", &[1], &[1.0]).unwrap();
+    std::fs::write(&path, other.finish().unwrap()).unwrap();
+    assert!(refused(&path).contains("no header"));
+
+    let trained = trained(Family::Nearest);
+    write(&path, origin(&trained), &trained.estimator).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    for length in [0, 10, whole.len() / 2, whole.len() - 1] {
+        std::fs::write(&path, &whole[..length]).unwrap();
+        assert!(refused(&path).contains("m.hapdtouch"));
+    }
+}
