@@ -142,7 +142,7 @@ impl Reader {
                     command.line,
                     &format!(
                         "{} stands in a loop or under a condition, which is not followed: write the deck with CDWRITE, where all stands as it is",
-                        command.name
+                        command.title()
                     ),
                 ));
             }
@@ -160,7 +160,7 @@ impl Reader {
     fn not_read(&mut self, command: &Command) {
         self.in_unread = true;
         if !SILENT.contains(&command.key()) {
-            self.unread.add(&command.name, command.line);
+            self.unread.add(&command.title(), command.line);
         }
     }
 
@@ -474,7 +474,7 @@ fn changing(command: &Command) -> String {
         command.line,
         &format!(
             "{} makes, moves or removes nodes or elements, or reads another file, which is not carried out: write the deck with CDWRITE, where all stands as it is",
-            command.name
+            command.title()
         ),
     )
 }

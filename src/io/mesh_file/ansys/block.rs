@@ -30,14 +30,16 @@ impl Tally {
                 command.line,
                 &format!(
                     "{} announces {count} {what}, and {} are there: the file was cut, or the count is wrong",
-                    command.name, self.read
+                    command.title(),
+                    self.read
                 ),
             )),
             None if !self.ended => Err(at(
                 command.line,
                 &format!(
                     "{} does not end (with -1) after {} {what}: the file was cut",
-                    command.name, self.read
+                    command.title(),
+                    self.read
                 ),
             )),
             _ => Ok(()),
@@ -48,7 +50,7 @@ impl Tally {
 /// The format that follows a command.
 fn format_of(command: &Command, lines: &mut Lines) -> Result<Format, String> {
     let (line, text) = lines.next().ok_or_else(|| {
-        let what = format!("the file was cut after {}", command.name);
+        let what = format!("the file was cut after {}", command.title());
         at(command.line, &what)
     })?;
     Format::of(text, line)
@@ -198,7 +200,7 @@ impl Reader {
             let Some((line, text)) = lines.next_of_block() else {
                 let what = format!(
                     "{} announces {count} numbers, and {} are there: the file was cut",
-                    command.name,
+                    command.title(),
                     items.len()
                 );
                 return Err(at(command.line, &what));
@@ -209,7 +211,7 @@ impl Reader {
             entity if entity.starts_with("NODE") => &mut self.node_sets,
             entity if entity.starts_with("ELEM") => &mut self.element_sets,
             _ => {
-                self.unread.add(&command.name, command.line);
+                self.unread.add(&command.title(), command.line);
                 return Ok(());
             }
         };
@@ -242,7 +244,7 @@ impl Reader {
             let Some((line, text)) = lines.next_of_block() else {
                 let what = format!(
                     "{} announces {count} layers: the file was cut",
-                    command.name
+                    command.title()
                 );
                 return Err(at(command.line, &what));
             };

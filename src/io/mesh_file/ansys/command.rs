@@ -25,6 +25,17 @@ pub struct Command<'t> {
 }
 
 impl<'t> Command<'t> {
+    /// Its name, to stand in a message: bytes behind the letters that tell it from others may be anything.
+    #[must_use]
+    pub fn title(&self) -> String {
+        let usual = |c: char| c.is_ascii_alphanumeric() || "/*_%".contains(c);
+        if self.name.chars().all(usual) && self.name.len() <= 32 {
+            self.name.clone()
+        } else {
+            quote(&self.name)
+        }
+    }
+
     /// What tells it from others: Ansys reads four letters, after a slash or a star.
     #[must_use]
     pub fn key(&self) -> &str {
@@ -207,6 +218,14 @@ mod tests {
         assert_eq!((command.name.as_str(), command.key()), ("NBLOCK", "NBLO"));
         assert_eq!((command.field(0), command.field(1)), ("3", ""));
         assert_eq!((command.field(2), command.field(7)), ("24512", ""));
+        assert_eq!(command.title(), "NBLOCK");
+        let odd = one("nblock\u{fffd}\u{1b}[2J,3");
+        assert_eq!(odd.key(), "NBLO");
+        assert!(
+            odd.title().starts_with('“') && !odd.title().contains('\u{1b}'),
+            "{}",
+            odd.title()
+        );
         assert_eq!(one("*get, _X, node").key(), "*GET");
         assert_eq!(one("/PREP7").key(), "/PREP");
         assert_eq!(one("/com, costs $5 ! or so").text, " costs $5 ! or so");
