@@ -1,6 +1,12 @@
 //! Live touch, without any port: from a board's bytes to a place on the part.
 
+mod checking;
+mod counting;
+mod drift;
+mod feeling;
+mod ground;
 pub mod health;
+mod hum;
 mod news;
 pub mod pipeline;
 pub mod receiver;

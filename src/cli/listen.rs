@@ -1,5 +1,6 @@
 //! `hapdef listen`: live touch without a window.
 
+mod line;
 mod orders;
 
 use std::io::{BufWriter, Write};
@@ -254,7 +255,7 @@ impl Output {
             return Ok(());
         }
         self.last_us = Some(update.time_us);
-        let line = line(update);
+        let line = line::of(update);
         if let Some((listener, clients)) = &mut self.served {
             while let Ok((client, _)) = listener.accept() {
                 clients.extend(Client::new(client).ok());
@@ -288,28 +289,4 @@ fn serve(address: &str) -> anyhow::Result<(TcpListener, Vec<Client>)> {
     })?;
     listener.set_nonblocking(true)?;
     Ok((listener, Vec::new()))
-}
-
-/// One sample as JSON: nulls where nothing touches. `uncertainty_mm` is the radius within which the touch lies
-/// with a probability of 90 %; `force_n` presses straight in, and `fx_n`, `fy_n` and `fz_n` are all of the force. Written by hand, because a thousand of them come in a second.
-fn line(update: &Update) -> String {
-    let time = update.time_us;
-    let good = update.good;
-    let Some(c) = update.contact else {
-        return format!(
-            "{{\"t_us\":{time},\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":null,\"fx_n\":null,\"fy_n\":null,\"fz_n\":null,\"uncertainty_mm\":null,\"channels_ok\":{good}}}"
-        );
-    };
-    let (p, f) = (c.position * 1e3, c.on_part());
-    format!(
-        "{{\"t_us\":{time},\"x_mm\":{:.3},\"y_mm\":{:.3},\"z_mm\":{:.3},\"force_n\":{:.4},\"fx_n\":{:.4},\"fy_n\":{:.4},\"fz_n\":{:.4},\"uncertainty_mm\":{:.3},\"channels_ok\":{good}}}",
-        p.x,
-        p.y,
-        p.z,
-        c.force,
-        f.x,
-        f.y,
-        f.z,
-        c.region.radius * 1e3
-    )
 }

@@ -19,9 +19,10 @@
 mod errors;
 mod find;
 mod kernels;
-mod modes;
+mod leeway;
+pub(super) mod modes;
 mod templates;
-mod weighed;
+pub(super) mod weighed;
 
 use std::sync::Arc;
 
@@ -64,7 +65,7 @@ pub struct Contact {
 
 impl Contact {
     /// What is known of it beside its place and how hard it presses. What was found of the tip is found again.
-    fn about(&self) -> About {
+    pub(super) fn about(&self) -> About {
         if self.force > 0.0 {
             About {
                 aside: self.drag / self.force,
@@ -84,13 +85,13 @@ impl Contact {
 
 /// How hard a touch at one place is.
 #[derive(Clone, Copy)]
-struct Load {
+pub(super) struct Load {
     /// N, and the variance of that (N²).
-    force: f64,
-    variance: f64,
+    pub force: f64,
+    pub variance: f64,
     /// As in [`Contact`].
-    drag: DVec3,
-    drag_deviation: f64,
+    pub drag: DVec3,
+    pub drag_deviation: f64,
 }
 
 /// The estimator, with its own working memory.
@@ -156,7 +157,7 @@ impl Matching {
         })
     }
 
-    fn contact(
+    pub(super) fn contact(
         &self,
         measured: &Observation,
         at: SurfacePoint,

@@ -124,7 +124,8 @@ impl Recorder {
     /// Where the rest lay when the recording began, so that it can be replayed from there.
     pub fn rest(&mut self, rest: &Rest) {
         for (k, (level, noise)) in rest.level.iter().zip(&rest.noise).enumerate() {
-            self.own(&format!("rest {k} {level} {noise}"));
+            let drift = rest.drift.get(k).copied().unwrap_or(0.0);
+            self.own(&format!("rest {k} {level} {noise} {drift}"));
         }
     }
 

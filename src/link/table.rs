@@ -9,6 +9,7 @@ use std::sync::mpsc::channel;
 use anyhow::Context as _;
 
 use super::{Address, Listener, Pace, SessionEvent};
+use crate::inference::Touches;
 use crate::live::{Pipeline, Sample, Update};
 
 /// A table of samples, with the truth where a simulated board has told it. Each file has as many columns in every
@@ -102,7 +103,7 @@ impl Table {
         }
         writeln!(
             self.file,
-            ",x_mm,y_mm,z_mm,force_n,fx_n,fy_n,fz_n,uncertainty_mm,channels_ok,true_x_mm,true_y_mm,true_z_mm,true_force_n"
+            ",x_mm,y_mm,z_mm,force_n,fx_n,fy_n,fz_n,uncertainty_mm,channels_ok,touches,true_x_mm,true_y_mm,true_z_mm,true_force_n"
         )
     }
 
@@ -129,7 +130,10 @@ impl Table {
             }
             None => write!(self.file, ",,,,,,,,")?,
         }
-        write!(self.file, ",{}", update.good)?;
+        // How many touch; empty where that is not clear.
+        let touching = update.touches.as_ref().map_or(Some(0), Touches::count);
+        let touching = touching.map_or(String::new(), |count| count.to_string());
+        write!(self.file, ",{},{touching}", update.good)?;
         match self.truth {
             Some((p, force)) => {
                 let p = p * 1e3;
@@ -205,13 +209,7 @@ mod tests {
 
     fn sample(time_us: u64, channels: usize) -> (Sample, Update) {
         let counts = vec![7.0; channels];
-        let update = Update {
-            time_us,
-            strain: None,
-            contact: None,
-            guesses: [None; 2],
-            good: 0,
-        };
+        let update = Update::nothing(time_us);
         (Sample { time_us, counts }, update)
     }
 

@@ -78,7 +78,7 @@ const STUCK_S: f64 = 0.4;
 const HOLD_S: f64 = 0.3;
 const TREMBLE_S: f64 = 0.25;
 /// Median of the absolute value of a normal variable over its deviation.
-const MEDIAN_OF_NORMAL: f64 = 0.6745;
+pub(super) const MEDIAN_OF_NORMAL: f64 = 0.6745;
 /// Noise at rest (counts) from which a channel cannot stay at one value.
 const TREMBLES: f64 = 0.35;
 /// Times the usual noise.

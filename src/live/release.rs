@@ -9,18 +9,28 @@ const CLEAR: f64 = 100.0;
 /// as long as a touch will do.
 const EXPLAINED: f64 = 0.25;
 const WORSE: f64 = 40.0;
-/// Looks in a row that make it sure.
+/// Looks in a row that make it sure, and seconds: of a rest to which nobody has come back so far none; but where a touch has
+/// come and gone it is rather a gauge that says nothing.
 const LOOKS: u32 = 3;
+const PROVED_S: f64 = 1.0;
 
 /// Looks for a release.
 #[derive(Clone, Debug, Default)]
 pub struct Release {
     looks: u32,
+    /// When it was first and last seen (µs).
+    seen: [u64; 2],
 }
 
 impl Release {
-    /// Whether a reading (strain) is rather of something that lets go than of the touch that explains it best.
-    pub fn is_seen(&mut self, matching: &mut Matching, strain: &[f64], touch: &Contact) -> bool {
+    /// Whether a reading (strain, at a time in µs) is rather of something that lets go than of the touch that explains it
+    /// best.
+    pub fn is_seen(
+        &mut self,
+        matching: &mut Matching,
+        (time_us, strain): (u64, &[f64]),
+        touch: &Contact,
+    ) -> bool {
         // A pull would have to leave less than nothing.
         if touch.unexplained < WORSE {
             self.looks = 0;
@@ -30,14 +40,26 @@ impl Release {
         let pull = matching.find(&turned);
         let explained = pull.unexplained < EXPLAINED * pull.strength;
         let seen = pull.strength > CLEAR && explained && touch.strength < pull.strength - WORSE;
-        self.looks = if seen { self.looks + 1 } else { 0 };
+        if seen {
+            let first = if self.looks == 0 {
+                time_us
+            } else {
+                self.seen[0]
+            };
+            self.seen = [first, time_us];
+            self.looks += 1;
+        } else {
+            self.looks = 0;
+        }
         seen
     }
 
-    /// Whether it was seen often enough to be believed.
+    /// Whether it was seen often enough to be believed, of a rest that was proved or not.
     #[must_use]
-    pub fn is_sure(&self) -> bool {
-        self.looks >= LOOKS
+    pub fn is_sure(&self, proved: bool) -> bool {
+        let [first, last] = self.seen;
+        let lasted = last.saturating_sub(first) as f64 * 1e-6;
+        self.looks >= LOOKS && (!proved || lasted >= PROVED_S)
     }
 
     /// Begins anew.

@@ -1,5 +1,7 @@
 //! What channels read at rest, how much they tremble, and how that drifts.
 
+use super::health::MEDIAN_OF_NORMAL;
+use super::hum::{Hum, Rows};
 use crate::statistics::{mean, median};
 
 /// Rest of every channel: counts and the standard deviation of their noise.
@@ -9,6 +11,8 @@ pub struct Rest {
     pub level: Vec<f64>,
     /// Standard deviation of each channel (counts).
     pub noise: Vec<f64>,
+    /// What each channel drifts by (counts a second); empty where that is not known.
+    pub drift: Vec<f64>,
 }
 
 /// Gathers samples until they are quiet for a while.
@@ -20,6 +24,8 @@ pub struct Taring {
     begun_us: Option<u64>,
     rows: Vec<(u64, Vec<f64>)>,
     waiting: bool,
+    /// What hummed while the rest was taken.
+    pub(super) hum: Hum,
 }
 
 /// Fewer samples say nothing of the noise, and more are not needed.
@@ -29,6 +35,8 @@ const MOST: usize = 100_000;
 /// differ.
 const PARTS: usize = 4;
 const QUIET: f64 = 5.0;
+/// Times the slack that a steady drift may be.
+const CLIMBS: f64 = 3.0;
 /// Seconds of unrest after which it is taken for rest: a limb that is never still has to do with what it has.
 const PATIENCE_S: f64 = 8.0;
 
@@ -42,6 +50,7 @@ impl Taring {
             begun_us: None,
             rows: Vec::new(),
             waiting: false,
+            hum: Hum::default(),
         }
     }
 
@@ -60,9 +69,12 @@ impl Taring {
         if !lasted && self.rows.len() < MOST {
             return None;
         }
-        let rows: Vec<&[f64]> = self.rows.iter().map(|(_, counts)| &counts[..]).collect();
-        if is_quiet(&rows, self.slack) || since(begun) > PATIENCE_S + self.seconds {
-            return Some(rest(&rows));
+        let first = self.rows[0].0;
+        let timed = |(at, row): &(u64, Vec<f64>)| (at.abs_diff(first) as f64 * 1e-6, row.clone());
+        let left = self.hum.begin(&self.rows.iter().map(timed).collect());
+        if is_quiet(&left, self.slack) || since(begun) > PATIENCE_S + self.seconds {
+            self.rows.clear();
+            return Some(rest(&left));
         }
         self.waiting = true;
         self.rows.drain(..self.rows.len().div_ceil(PARTS));
@@ -70,28 +82,46 @@ impl Taring {
     }
 }
 
-/// Whether all channels stay where they are: each part of some samples has the same level, but for what noise and a drift
-/// make of it.
-fn is_quiet(rows: &[&[f64]], slack: f64) -> bool {
-    let parts: Vec<&[&[f64]]> = rows.chunks(rows.len().div_ceil(PARTS)).collect();
-    (0..rows[0].len()).all(|c| {
+/// Whether all channels stay where they are, or drift steadily: each part of some samples lies on one line with the
+/// others, but for what noise makes of it, and the line is no steeper than a few times `slack` within them.
+fn is_quiet(rows: &Rows, slack: f64) -> bool {
+    let counts: Vec<&[f64]> = rows.iter().map(|r| &r.1[..]).collect();
+    let parts: Vec<&[&[f64]]> = counts.chunks(counts.len().div_ceil(PARTS)).collect();
+    (0..counts[0].len()).all(|c| {
         let levels: Vec<f64> = parts.iter().map(|part| level(part, c)).collect();
         let deviations: Vec<f64> = parts.iter().map(|part| noise_deviation(part, c)).collect();
         let of_mean = mean(&deviations) * (2.0 / parts[0].len() as f64).sqrt();
-        let highest = levels.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let lowest = levels.iter().copied().fold(f64::INFINITY, f64::min);
-        highest - lowest <= QUIET * of_mean + slack
+        let steps = (levels.len() - 1).max(1) as f64;
+        let climbs = levels[levels.len() - 1] - levels[0];
+        let along = |(k, v): (usize, &f64)| v - climbs * k as f64 / steps;
+        let left: Vec<f64> = levels.iter().enumerate().map(along).collect();
+        let highest = left.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let lowest = left.iter().copied().fold(f64::INFINITY, f64::min);
+        let noise = QUIET * of_mean;
+        highest - lowest <= noise + slack / 2.0 && climbs.abs() <= noise + CLIMBS * slack
     })
 }
 
-/// Medians, so that a few wild samples count for nothing, and noise from differences of neighbours, so that a
-/// drift counts for nothing.
-fn rest(rows: &[&[f64]]) -> Rest {
-    let channels = rows[0].len();
-    Rest {
-        level: (0..channels).map(|c| level(rows, c)).collect(),
-        noise: (0..channels).map(|c| noise_deviation(rows, c)).collect(),
+/// As it is at the last of some samples (s, counts). Medians, so that a few wild samples count for nothing; noise from
+/// differences of neighbours, so that a drift counts for nothing, or where that is more from what they scatter by around it.
+fn rest(rows: &Rows) -> Rest {
+    let lasted = rows.back().map_or(0.0, |r| r.0) - rows.front().map_or(0.0, |r| r.0);
+    let counts: Vec<&[f64]> = rows.iter().map(|r| &r.1[..]).collect();
+    let mut rest = Rest::default();
+    for c in 0..counts[0].len() {
+        let quarter = counts.len().div_ceil(4);
+        let ends = [&counts[..quarter], &counts[counts.len() - quarter..]];
+        let [before, after] = ends.map(|part| level(part, c));
+        let drift = (after - before) / (0.75 * lasted).max(f64::MIN_POSITIVE);
+        let level = level(&counts, c);
+        let off =
+            |(at, row): &(f64, Vec<f64>)| (row[c] - level - drift * (at - lasted / 2.0)).abs();
+        let scatter = median(rows.iter().map(off)).unwrap_or(0.0) / MEDIAN_OF_NORMAL;
+        rest.level.push(level + drift * lasted / 2.0);
+        rest.noise.push(noise_deviation(&counts, c).max(scatter));
+        rest.drift.push(drift);
     }
+    rest
 }
 
 /// Finer than a count: the mean of what lies near the median.
@@ -113,16 +143,12 @@ fn noise_deviation(rows: &[&[f64]], channel: usize) -> f64 {
 }
 
 impl Rest {
-    /// Follows a slow drift by a share of what channels are off, and takes what they wander for noise by
-    /// another share: what has drifted lately will go on drifting. Channels that are not `trusted` stay.
-    pub fn follow(&mut self, counts: &[f64], shares: [f64; 2], trusted: &[bool]) {
-        for (k, count) in counts.iter().enumerate().filter(|(k, _)| trusted[*k]) {
-            let off = count - self.level[k];
-            let variance = self.noise[k] * self.noise[k];
-            self.noise[k] = (variance + shares[1] * (off * off - variance))
-                .max(0.0)
-                .sqrt();
-            self.level[k] += shares[0] * off;
+    /// Takes what channels are off at rest (counts) for noise, by a share. Channels that are not `trusted` stay.
+    pub fn tremble(&mut self, off: &[f64], share: f64, trusted: &[bool]) {
+        let pairs = self.noise.iter_mut().zip(off).zip(trusted);
+        for ((noise, off), _) in pairs.filter(|(_, trusted)| **trusted) {
+            let variance = *noise * *noise;
+            *noise = (variance + share * (off * off - variance)).max(0.0).sqrt();
         }
     }
 }
@@ -145,7 +171,7 @@ mod tests {
         }
         let rest = rest.unwrap();
         assert!((rest.level[0] - 100.0).abs() < 0.2, "{rest:?}");
-        assert!((rest.noise[0] - 3.74).abs() < 0.6, "{rest:?}");
+        assert!((rest.noise[0] - 3.74).abs() < 0.8, "{rest:?}");
         assert!(rest.noise[1] < 0.1);
         assert!((rest.level[2] - 7.0).abs() < 1e-9);
         assert!(!taring.is_waiting());
@@ -164,7 +190,7 @@ mod tests {
                 taring.push(1000 * u64::from(k), &counts)
             });
             let level = taken.unwrap().level[0];
-            assert!((level - 2001.0).abs() < 1.5, "{from}: {level}");
+            assert!((level - 2001.0).abs() < 2.0, "{from}: {level}");
             assert!(taring.is_waiting(), "{from}");
         }
     }

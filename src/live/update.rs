@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::inference::{Chain, Contact, Deviations, Errors, Matching, ResponseMap};
+use crate::inference::{Chain, Contact, Deviations, Errors, Matching, ResponseMap, Touches};
 use crate::uncertainty::{UNESTIMATED, Uncertainty};
 
 /// Which estimator is shown.
@@ -86,8 +86,10 @@ pub struct Update {
     pub time_us: u64,
     /// Strain of each gauge since the tare; nothing before it.
     pub strain: Option<Vec<f64>>,
-    /// By matching, while there is a touch.
+    /// By matching, while there is a touch: of several the hardest.
     pub contact: Option<Contact>,
+    /// All that touch; absent where nothing does, and without a contact where nothing that is known does.
+    pub touches: Option<Touches>,
     /// By the trained estimators, where they are trained and there is a touch: normalized, raw.
     pub guesses: [Option<Guess>; 2],
     /// Gauges that are trusted.
@@ -95,6 +97,19 @@ pub struct Update {
 }
 
 impl Update {
+    /// Before there is a rest, or of a board with too few channels.
+    #[must_use]
+    pub fn nothing(time_us: u64) -> Self {
+        Self {
+            time_us,
+            strain: None,
+            contact: None,
+            touches: None,
+            guesses: [None; 2],
+            good: 0,
+        }
+    }
+
     /// Where and how hard, by one of the estimators.
     #[must_use]
     pub fn by(&self, estimator: Estimator) -> Option<Guess> {

@@ -20,12 +20,12 @@ use rand_chacha::ChaCha8Rng;
 
 const NOISE: f64 = 1e-6;
 
-struct Lab {
-    inputs: Inputs,
-    sensing: Sensing,
+pub struct Lab {
+    pub inputs: Inputs,
+    pub sensing: Sensing,
 }
 
-fn lab() -> &'static Lab {
+pub fn lab() -> &'static Lab {
     static LAB: LazyLock<Lab> = LazyLock::new(|| {
         let inputs = hapdef::cli::bundled().unwrap().inputs;
         let sensing = design::sensing(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
@@ -34,13 +34,13 @@ fn lab() -> &'static Lab {
     &LAB
 }
 
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
+pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }
 
 /// Touches away from the held ends.
-fn touches(count: usize, seed: u64, force: f64) -> Vec<Touch> {
+pub fn touches(count: usize, seed: u64, force: f64) -> Vec<Touch> {
     let lab = lab();
     let all = lab
         .sensing
@@ -246,7 +246,7 @@ impl Bench {
                 .push(&bytes, self.now_us, |input| match input {
                     Input::Hello(hello) => {
                         pipeline.hello(&hello);
-                        if pipeline.rest.is_none() {
+                        if pipeline.rest().is_none() {
                             pipeline.tare();
                         }
                     }

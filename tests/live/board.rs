@@ -172,13 +172,19 @@ fn touches_are_found_where_they_are() {
         assert_eq!(
             keys,
             [
+                "area_radius_mm",
                 "channels_ok",
+                "count",
+                "count_probability",
                 "force_n",
                 "fx_n",
                 "fy_n",
                 "fz_n",
+                "kind",
                 "t_us",
+                "touches",
                 "uncertainty_mm",
+                "unexplained",
                 "x_mm",
                 "y_mm",
                 "z_mm"

@@ -50,7 +50,7 @@ impl Matching {
 impl Matching {
     /// The best templates, apart from each other, each followed to the best place near it. There is one at least: the
     /// first template where none says anything.
-    fn modes(&self, measured: &Observation) -> Vec<Mode> {
+    pub(in crate::inference) fn modes(&self, measured: &Observation) -> Vec<Mode> {
         let reach = APART * self.map.spacing();
         let mut starts: Vec<usize> = Vec::with_capacity(STARTS);
         for _ in 0..STARTS {

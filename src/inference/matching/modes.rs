@@ -21,7 +21,7 @@ const CLEAR: f64 = 0.9;
 
 /// A most likely place, and the normal distribution around it.
 #[derive(Clone, Copy)]
-pub(super) struct Mode {
+pub(in crate::inference) struct Mode {
     pub at: SurfacePoint,
     pub position: DVec3,
     pub force: f64,
@@ -86,12 +86,12 @@ impl Matching {
         }
     }
 
-    fn nuisances(&self) -> Option<&Nuisances> {
+    pub(in crate::inference) fn nuisances(&self) -> Option<&Nuisances> {
         self.errors.deviations.as_ref()?.nuisances.as_ref()
     }
 
     /// What a newton reads at a place, and how that changes, of a touch about which so much is known.
-    fn slope(&self, about: &About, at: SurfacePoint) -> Slope {
+    pub(in crate::inference) fn slope(&self, about: &About, at: SurfacePoint) -> Slope {
         let mut slope = self.map.slope(at);
         if let Some(shared) = self.nuisances().filter(|_| *about != About::default()) {
             shared.add(about, at, &mut slope);
@@ -289,7 +289,7 @@ fn stand_ins(mode: &Mode, weight: f64) -> impl Iterator<Item = (DVec3, f64)> {
 }
 
 /// The larger eigenvalue (m²).
-pub(super) fn widest(covariance: DMat2) -> f64 {
+pub(in crate::inference) fn widest(covariance: DMat2) -> f64 {
     let (a, b, c) = (
         covariance.x_axis.x,
         covariance.x_axis.y,

@@ -18,7 +18,7 @@ const LOOKED_AT: usize = 4096;
 
 impl Matching {
     /// How much better than nothing a touch at each template explains the reading.
-    pub(super) fn score(&mut self, observed: &Observation) {
+    pub(in crate::inference) fn score(&mut self, observed: &Observation) {
         let weights: Vec<f32> = observed.w.iter().map(|w| (w * 1e-12) as f32).collect();
         let most = self.most_force as f32;
         // To begin with, each channel may be off for itself by what all of them feel together.

@@ -106,7 +106,7 @@ fn whitening(inner: &Matrix4<f64>) -> (Matrix4<f64>, f64) {
 }
 
 /// A reading with its weights, ready to be compared.
-pub(super) struct Measured<'a> {
+pub(in crate::inference) struct Measured<'a> {
     x: &'a [f64],
     w: &'a [f64],
     shared: &'a Shared,
@@ -195,7 +195,7 @@ impl<'a> Measured<'a> {
 }
 
 /// A reading, and what is known of its errors wherever the touch was.
-pub(super) struct Observation<'a> {
+pub(in crate::inference) struct Observation<'a> {
     /// A channel that reads no strain is left out, and stands here as zero.
     x: Cow<'a, [f64]>,
     /// One over the variance of every channel, without gluing.
@@ -299,7 +299,7 @@ fn is_a_strain(x: f64) -> bool {
 }
 
 /// The weights of a reading for a touch at one place, of one force.
-pub(super) struct Weighed {
+pub(in crate::inference) struct Weighed {
     w: Vec<f64>,
     shared: Shared,
     /// Half the logarithm of the covariance's determinant, over that without gluing.

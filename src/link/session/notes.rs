@@ -20,18 +20,8 @@ impl Listener {
         let words: Vec<&str> = own.split_whitespace().collect();
         match words[..] {
             ["tare"] => self.pipeline.tare(),
-            ["rest", k, level, noise] => {
-                if let (Ok(k), Some(level), Some(noise)) =
-                    (k.parse::<usize>(), number(level), number(noise))
-                    && k == self.rest.level.len()
-                {
-                    self.rest.level.push(level);
-                    self.rest.noise.push(noise);
-                }
-                if self.rest.level.len() == self.pipeline.settings.channels.len() {
-                    self.pipeline.set_rest(std::mem::take(&mut self.rest));
-                }
-            }
+            ["rest", k, level, noise] => self.rest_of(k, [level, noise, "0"]),
+            ["rest", k, level, noise, drift] => self.rest_of(k, [level, noise, drift]),
             ["dead", k] => {
                 if let Ok(k) = k.parse() {
                     self.pipeline.mark_dead(&[k]);
@@ -52,6 +42,20 @@ impl Listener {
             ["line", values] => self.replay_line("0", values, time_us, arrived, tell),
             ["line", from, values] => self.replay_line(from, values, time_us, arrived, tell),
             _ => {}
+        }
+    }
+
+    /// The rest of one channel: all are taken when the last one is there.
+    fn rest_of(&mut self, channel: &str, values: [&str; 3]) {
+        if let [Some(level), Some(noise), Some(drift)] = values.map(number)
+            && channel.parse() == Ok(self.rest.level.len())
+        {
+            self.rest.level.push(level);
+            self.rest.noise.push(noise);
+            self.rest.drift.push(drift);
+        }
+        if self.rest.level.len() == self.pipeline.settings.channels.len() {
+            self.pipeline.set_rest(std::mem::take(&mut self.rest));
         }
     }
 

@@ -20,7 +20,7 @@ impl Listener {
         if let (Some(recorder), Some(hello)) = (&mut self.recorder, &self.hello) {
             recorder.hello(hello);
         }
-        if let (Some(recorder), Some(rest)) = (&mut self.recorder, &self.pipeline.rest) {
+        if let (Some(recorder), Some(rest)) = (&mut self.recorder, self.pipeline.rest()) {
             recorder.rest(rest);
         }
         let dead: Vec<usize> = self.pipeline.dead().collect();

@@ -36,7 +36,7 @@ impl Listener {
         if self.state != State::Live {
             self.enter(State::Live, tell);
         }
-        if self.pipeline.rest.is_none() && !self.pipeline.is_taring() {
+        if self.pipeline.rest().is_none() && !self.pipeline.is_taring() {
             self.pipeline.tare();
             self.record(|r| r.own("tare"));
         }

@@ -111,7 +111,7 @@ impl Feed {
             } => {
                 self.sample(update);
                 self.taring = pipeline.is_taring();
-                self.tared = pipeline.rest.is_some();
+                self.tared = pipeline.rest().is_some();
                 if self.health != pipeline.health() {
                     self.health = pipeline.health().to_vec();
                     self.used = pipeline.used();

@@ -10,7 +10,7 @@ use super::super::paint::{Look, label};
 use super::super::theme;
 use super::super::view::{Pane, Stage};
 use super::super::words::live_in_words;
-use crate::inference::Contact;
+use crate::inference::{Contact, Kind, Touches};
 use crate::live::{Estimator, Health};
 use crate::session::{Feed, STRIPS_S, Strip};
 
@@ -62,8 +62,11 @@ fn paint_heard(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
             painter.circle(at, 4.0, colour, Stroke::new(1.0, Color32::BLACK));
             continue;
         }
-        if let Some(contact) = update.contact.filter(|_| estimator == Estimator::Matching) {
-            paint_region(look, painter, pane, &contact, colour);
+        if estimator == Estimator::Matching
+            && let Some(touches) = &update.touches
+        {
+            paint_touches(look, painter, pane, touches, colour);
+            continue;
         }
         painter.circle(at, 6.0, colour, Stroke::new(1.5, Color32::BLACK));
         if pane == Pane::Limb {
@@ -75,6 +78,32 @@ fn paint_heard(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
                 update.contact.as_ref(),
                 colour,
             );
+        }
+    }
+}
+
+/// All that touch: points with where they may be, or an area.
+fn paint_touches(
+    look: Look<'_>,
+    painter: &Painter,
+    pane: Pane,
+    touches: &Touches,
+    colour: Color32,
+) {
+    for contact in &touches.contacts {
+        let Some(at) = look.place_in(pane, contact.position) else {
+            continue;
+        };
+        paint_outline(look, painter, pane, (contact, contact.region.axes), colour);
+        if let Kind::Area(radius) = touches.kind {
+            let along = contact.normal.any_orthonormal_vector() * radius;
+            let axes = [along, contact.normal.cross(along)];
+            paint_outline(look, painter, pane, (contact, axes), colour);
+        }
+        painter.circle(at, 6.0, colour, Stroke::new(1.5, Color32::BLACK));
+        if pane == Pane::Limb {
+            let (place, force) = (contact.position, contact.force);
+            paint_press(look, painter, place, force, Some(contact), colour);
         }
     }
 }
@@ -125,12 +154,17 @@ fn paint_press(
     );
 }
 
-/// The 90 % region, laid onto the surface.
-fn paint_region(look: Look<'_>, painter: &Painter, pane: Pane, contact: &Contact, colour: Color32) {
+/// An ellipse around a touch, laid onto the surface: the 90 % region, or an area.
+fn paint_outline(
+    look: Look<'_>,
+    painter: &Painter,
+    pane: Pane,
+    (contact, [a, b]): (&Contact, [DVec3; 2]),
+    colour: Color32,
+) {
     const POINTS: usize = 48;
-    let [a, b] = contact.region.axes;
     // How far the surface may fall away from the tangent plane before it is another part of it.
-    let near = 2e-3 + 0.4 * contact.region.radius.min(0.02);
+    let near = 2e-3 + 0.4 * a.length().max(b.length()).min(0.03);
     let on_surface = |k: usize| {
         let (sin, cos) = (std::f64::consts::TAU * k as f64 / POINTS as f64).sin_cos();
         let place = contact.position + a * cos + b * sin;
@@ -231,6 +265,7 @@ fn facts(ui: &mut Ui, feed: &Feed) {
         ));
     }
     if let Some(update) = &feed.update {
+        facts.extend(update.touches.as_ref().and_then(how_many));
         facts.push(format!(
             "{} of {} gauges good",
             update.good,
@@ -240,6 +275,20 @@ fn facts(ui: &mut Ui, feed: &Feed) {
     for fact in facts {
         ui.separator();
         ui.label(fact);
+    }
+}
+
+/// What touches, where that is not simply one point.
+fn how_many(touches: &Touches) -> Option<String> {
+    let sure = 100.0 * touches.probability;
+    match (touches.kind, touches.contacts.len()) {
+        (Kind::Points, 1) => None,
+        (Kind::Points, count) => Some(format!("{count} touches ({sure:.0} % sure)")),
+        (Kind::Area(radius), _) => Some(format!(
+            "an area, {:.0} mm around its middle ({sure:.0} % sure)",
+            radius * 1e3
+        )),
+        (Kind::Unclear, _) => Some("something touches that is no point".into()),
     }
 }
 

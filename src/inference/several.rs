@@ -1,0 +1,469 @@
+//! How many touches there are: none of them is known beforehand, so each number of them is weighed by its evidence, the
+//! density of the reading over all touches that there may be of so many (`MacKay`, Neural Computation 4, 1992).
+//!
+//! One point, two, three, or an area; against them stands that a gauge says something else than it feels, and that the
+//! reading is of nothing that is known. Two are searched for among all pairs of a coarse share of the map (`coarse`), and
+//! followed all together (`joint`).
+
+mod coarse;
+mod joint;
+mod spot;
+
+use glam::{DMat2, DVec3};
+
+use self::coarse::{Coarse, Whitened};
+use self::joint::Joint;
+use self::spot::{RADII, Spot};
+use super::matching::modes::widest;
+use super::matching::weighed::Observation;
+use super::matching::{Contact, Load, Matching};
+use crate::inference::deviation::About;
+use crate::inference::map::ResponseMap;
+use crate::inference::region::{DEVIATIONS, Region};
+
+/// Before anything is read.
+const ONE: f64 = 0.88;
+const TWO: f64 = 0.06;
+const THREE: f64 = 0.01;
+const AREA: f64 = 0.03;
+const ODD_GAUGE: f64 = 0.01;
+const UNCLEAR: f64 = 0.01;
+/// One touch that is as sure as this need not be held against others.
+const SURE: f64 = 0.995;
+/// Starts that are followed.
+const PAIRS: usize = 8;
+const AREAS: usize = 3;
+const THIRDS: usize = 3;
+/// With fewer gauges nothing is told but one touch.
+const LEAST_CHANNELS: usize = 6;
+/// One place with this share of the probability is the answer.
+const CLEAR: f64 = 0.9;
+
+/// What touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// As many points as there are contacts.
+    Points,
+    /// One area, with its radius (m).
+    Area(f64),
+    /// Nothing that is known.
+    Unclear,
+}
+
+/// All that touches, and how sure it is that there are so many.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Touches {
+    /// See [`Kind`].
+    pub kind: Kind,
+    /// Of there being so many, of this kind.
+    pub probability: f64,
+    /// The hardest first; one of an area, none of what is unclear.
+    pub contacts: Vec<Contact>,
+    /// Weighted squares that they do not explain.
+    pub unexplained: f64,
+    /// Probability of one point, of two, of three, of an area, and of nothing that is known.
+    pub shares: [f64; 5],
+}
+
+impl Touches {
+    /// How likely those of another answer are, by this one: that there are as many, of the same kind.
+    #[must_use]
+    pub fn share_of(&self, other: &Self) -> f64 {
+        let which = match other.kind {
+            Kind::Points => other.contacts.len().clamp(1, 3) - 1,
+            Kind::Area(_) => 3,
+            Kind::Unclear => 4,
+        };
+        self.shares[which]
+    }
+
+    /// How many they are, where that is known.
+    #[must_use]
+    pub fn count(&self) -> Option<usize> {
+        (self.kind != Kind::Unclear).then_some(self.contacts.len())
+    }
+
+    /// Whether both are as many, of the same kind.
+    #[must_use]
+    pub fn alike(&self, other: &Self) -> bool {
+        let kind = |k| std::mem::discriminant(&k);
+        kind(self.kind) == kind(other.kind) && self.count() == other.count()
+    }
+
+    /// One touch at a point, as sure as that.
+    #[must_use]
+    pub fn one(contact: Contact, probability: f64) -> Self {
+        Self {
+            kind: Kind::Points,
+            probability,
+            contacts: vec![contact],
+            unexplained: contact.unexplained,
+            shares: [probability, 1.0 - probability, 0.0, 0.0, 0.0],
+        }
+    }
+}
+
+/// Where several touches are searched for: made once for a map.
+#[derive(Clone)]
+pub struct Several {
+    coarse: std::sync::Arc<Coarse>,
+}
+
+impl Several {
+    /// For an estimator's map.
+    #[must_use]
+    pub fn new(matching: &Matching) -> Self {
+        Self {
+            coarse: Coarse::new(&matching.map, &matching.errors).into(),
+        }
+    }
+}
+
+/// Answers to one question, each with its own places, and the logarithm of their evidence together.
+#[derive(Default)]
+struct Answers(Vec<Joint>);
+
+impl Answers {
+    /// Of what was found from several starts, which may be the same again.
+    fn of(map: &ResponseMap, joints: impl Iterator<Item = Joint>) -> Self {
+        let mut found: Vec<Joint> = joints.collect();
+        found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        let mut apart: Vec<Joint> = Vec::with_capacity(found.len());
+        for joint in found {
+            if !apart.iter().any(|other| are_the_same(map, other, &joint)) {
+                apart.push(joint);
+            }
+        }
+        Self(apart)
+    }
+
+    fn best(&self) -> Option<&Joint> {
+        self.0.first()
+    }
+
+    fn log_evidence(&self) -> f64 {
+        sum_of(self.0.iter().map(|j| j.log_evidence))
+    }
+}
+
+impl Matching {
+    /// How many touches make a reading (strain, a channel each), where and how hard each is. `one` is what was found
+    /// where only one is looked for.
+    pub fn count(&mut self, several: &Several, reading: &[f64], one: &Contact) -> Touches {
+        let used = self.used.clone();
+        let observed = Observation::new(reading, &self.errors, &used);
+        let channels = observed.w.iter().filter(|w| **w > 0.0).count();
+        let alone = self.alone(&observed, one);
+        let first = ONE.ln() + alone.log_evidence();
+        let Some(best) = alone.best() else {
+            return Touches::one(*one, 1.0);
+        };
+        let sure = surely_one(best);
+        if channels < LEAST_CHANNELS || sure >= SURE {
+            return Touches::one(*one, sure);
+        }
+        let coarse = &several.coarse;
+        let Some(whitened) = coarse.against(&observed, self.most_force) else {
+            return Touches::one(*one, sure);
+        };
+        let two = self.two(&observed, coarse, &whitened);
+        let three = self.three(&observed, coarse, &whitened, &two);
+        let areas = coarse.areas(&self.map, &whitened, AREAS);
+        let area = Answers::of(
+            &self.map,
+            areas
+                .iter()
+                .filter_map(|a| self.joined(&observed, &[*a], None)),
+        );
+        let several = [
+            (TWO.ln() + two.log_evidence(), two),
+            (THREE.ln() + three.log_evidence(), three),
+            (AREA.ln() + area.log_evidence(), area),
+        ];
+        let nothing = UNCLEAR.ln() + of_nothing_known(&observed);
+        let rival = several.iter().fold(nothing, |most, s| most.max(s.0));
+        let odd = if rival > first {
+            ODD_GAUGE.ln() + self.with_an_odd_gauge(reading, one)
+        } else {
+            f64::NEG_INFINITY
+        };
+        let ones = sum_of([first, odd].into_iter());
+        let [two, three, area] = &several;
+        let logs = [ones, two.0, three.0, area.0, nothing];
+        let all = sum_of(logs.into_iter());
+        let shares = logs.map(|log| (log - all).exp());
+        let which = (0..logs.len()).fold(0, |best, k| if logs[k] > logs[best] { k } else { best });
+        let answer = match which {
+            0 => Touches::one(*one, shares[0]),
+            4 => Touches {
+                kind: Kind::Unclear,
+                contacts: Vec::new(),
+                ..Touches::one(*one, shares[4])
+            },
+            k => self.touches(&observed, &several[k - 1].1.0, shares[k]),
+        };
+        Touches { shares, ..answer }
+    }
+
+    /// As [`Self::count`] for touches that go on: from where they were. Nothing where they do not explain the reading any
+    /// more.
+    #[must_use]
+    pub fn track_several(&self, reading: &[f64], last: &Touches) -> Option<Touches> {
+        /// Steps from one sample to the next.
+        const STEPS: usize = 2;
+        let observed = Observation::new(reading, &self.errors, &self.used);
+        let start = self.spots_of(last);
+        let joint = self.joined(&observed, &start, Some(STEPS))?;
+        let differs = 4.0 * (2.0 * self.used.len() as f64).sqrt();
+        let explained = 2.0 * joint.left <= last.unexplained + differs;
+        explained.then(|| Touches {
+            shares: last.shares,
+            ..self.touches(&observed, &[joint], last.probability)
+        })
+    }
+
+    /// What every channel reads of some touches (strain).
+    #[must_use]
+    pub fn reading_of_all(&self, touches: &Touches) -> Vec<f64> {
+        let mut sum = vec![0.0; self.map.channels()];
+        for spot in self.spots_of(touches) {
+            for (s, g) in sum.iter_mut().zip(self.felt(&spot).reading) {
+                *s += spot.force * g;
+            }
+        }
+        sum
+    }
+
+    /// As [`Self::leeway`], of all of them together.
+    #[must_use]
+    pub fn leeway_of_all(&self, touches: &Touches) -> Vec<Vec<f64>> {
+        if !matches!(touches.kind, Kind::Area(_)) {
+            return touches
+                .contacts
+                .iter()
+                .flat_map(|c| self.leeway(c))
+                .collect();
+        }
+        let (lower, upper) = self.map.mesh.bounds();
+        let across = (upper - lower).length();
+        let scaled = |by: f64, of: &[f64]| of.iter().map(|v| by * v).collect::<Vec<f64>>();
+        let mut ways = Vec::new();
+        for spot in self.spots_of(touches) {
+            let felt = self.felt(&spot);
+            ways.push(scaled(self.most_force, &felt.reading));
+            let sizes = [across, across, (RADII[1] / RADII[0]).ln()];
+            let changes = felt.columns.iter().zip(sizes);
+            ways.extend(changes.map(|(change, by)| scaled(by * spot.force, change)));
+            let made = self.nuisances_of(&spot);
+            ways.extend(made.iter().map(|n| scaled(2.0 * spot.force, &n.reading)));
+        }
+        ways
+    }
+
+    fn spots_of(&self, touches: &Touches) -> Vec<Spot> {
+        let radius = match touches.kind {
+            Kind::Area(radius) => Some(radius),
+            Kind::Points | Kind::Unclear => None,
+        };
+        let spot = |contact: &Contact| Spot {
+            at: self.map.mesh.index().nearest(contact.position).0,
+            force: contact.force,
+            radius,
+            about: contact.about(),
+        };
+        touches.contacts.iter().map(spot).collect()
+    }
+
+    /// One point: from the best places for one.
+    fn alone(&mut self, observed: &Observation, found: &Contact) -> Answers {
+        self.score(observed);
+        let modes = self.modes(observed);
+        let starts = modes.iter().map(|mode| (mode.at, mode.force));
+        let at = self.map.mesh.index().nearest(found.position).0;
+        let starts = starts.chain([(at, found.force)]);
+        Answers::of(
+            &self.map,
+            starts.filter_map(|(at, force)| self.joined(observed, &[point(at, force)], None)),
+        )
+    }
+
+    fn two(&self, observed: &Observation, coarse: &Coarse, whitened: &Whitened) -> Answers {
+        let pairs = coarse.pairs(whitened, PAIRS);
+        Answers::of(
+            &self.map,
+            pairs
+                .iter()
+                .filter_map(|pair| self.joined(observed, pair, None)),
+        )
+    }
+
+    /// From the best two, where these leave something over.
+    fn three(
+        &self,
+        observed: &Observation,
+        coarse: &Coarse,
+        whitened: &Whitened,
+        two: &Answers,
+    ) -> Answers {
+        let channels = observed.w.iter().filter(|w| **w > 0.0).count();
+        let over = |joint: &&Joint| 2.0 * joint.left > channels.saturating_sub(6) as f64 + 6.0;
+        let begun = two.0.iter().take(2).filter(over);
+        let starts = begun.flat_map(|j| coarse.beside(&self.map, whitened, &j.spots, THIRDS));
+        Answers::of(
+            &self.map,
+            starts.filter_map(|start| self.joined(observed, &start, None)),
+        )
+    }
+
+    /// Logarithm of the density where one gauge reads nothing, or anything, and one point touches.
+    fn with_an_odd_gauge(&mut self, reading: &[f64], found: &Contact) -> f64 {
+        /// Deviation of what a dead gauge reads, over its noise.
+        const AT_REST: f64 = 4.0;
+        let used = self.used.clone();
+        let trusted: Vec<usize> = (0..used.len()).filter(|&c| used[c]).collect();
+        let squares: f64 = trusted.iter().map(|&c| reading[c] * reading[c]).sum();
+        let rms = (squares / trusted.len() as f64).sqrt();
+        let mut logs = Vec::new();
+        for &c in &trusted {
+            self.used[c] = false;
+            let without = self.used.clone();
+            let observed = Observation::new(reading, &self.errors, &without);
+            let others = self.alone(&observed, found).log_evidence();
+            let noise = self.errors.noise[c];
+            let ways = [AT_REST * noise, rms.hypot(noise)];
+            logs.extend(ways.map(|off| others + log_density(reading[c], off)));
+            self.used[c] = true;
+        }
+        sum_of(logs.iter().copied()) - (2.0 * trusted.len() as f64).ln()
+    }
+
+    fn touches(&self, observed: &Observation, answers: &[Joint], probability: f64) -> Touches {
+        let best = &answers[0];
+        let mut contacts: Vec<Contact> = (0..best.spots.len())
+            .map(|k| self.contact_of(observed, answers, k))
+            .collect();
+        contacts.sort_by(|a, b| b.force.total_cmp(&a.force));
+        let radius = best.spots.iter().find_map(|s| s.radius);
+        Touches {
+            kind: radius.map_or(Kind::Points, Kind::Area),
+            probability,
+            contacts,
+            unexplained: 2.0 * best.left,
+            shares: [0.0; 5],
+        }
+    }
+
+    /// One of the spots of the best answer; where others are nearly as likely, with a region that holds theirs.
+    fn contact_of(&self, observed: &Observation, answers: &[Joint], k: usize) -> Contact {
+        let best = &answers[0];
+        let spot = &best.spots[k];
+        let place = self.map.mesh.point(spot.at);
+        let all = sum_of(answers.iter().map(|j| j.log_evidence));
+        let weight = |joint: &Joint| (joint.log_evidence - all).exp();
+        let flat = flat_of(best, k);
+        let region = if weight(best) >= CLEAR {
+            Region::of_normal(flat, best.planes[k])
+        } else {
+            let of_answer = |joint: &Joint| {
+                let away = |i: &usize| self.map.mesh.point(joint.spots[*i].at).distance(place);
+                let nearest = (0..joint.spots.len())
+                    .min_by(|a, b| away(a).total_cmp(&away(b)))
+                    .unwrap_or(0);
+                let centre = self.map.mesh.point(joint.spots[nearest].at);
+                stand_ins(
+                    centre,
+                    flat_of(joint, nearest),
+                    joint.planes[nearest],
+                    weight(joint),
+                )
+            };
+            let places: Vec<(DVec3, f64)> = answers.iter().flat_map(of_answer).collect();
+            Region::of_places(&places, place, self.map.mesh.normal(spot.at))
+        };
+        let of_force = best.first(k) + spot.places();
+        let load = Load {
+            force: spot.force,
+            variance: best.covariance[(of_force, of_force)],
+            drag: spot.about.aside * spot.force,
+            drag_deviation: best.drag_deviations[k],
+        };
+        let narrow = widest(flat) <= self.map.spacing().powi(2);
+        self.contact(observed, spot.at, load, region, best.left, narrow)
+    }
+}
+
+/// Whether the spots of both lie within what is known of one of them.
+fn are_the_same(map: &ResponseMap, one: &Joint, other: &Joint) -> bool {
+    /// Deviations, and metres that are no difference.
+    const WITHIN: f64 = 2.0;
+    const LEAST: f64 = 1e-3;
+    let place = |spot: &Spot| map.mesh.point(spot.at);
+    (0..one.spots.len()).all(|k| {
+        let wide = WITHIN * widest(flat_of(one, k)).sqrt() + LEAST;
+        let here = place(&one.spots[k]);
+        other.spots.iter().any(|s| place(s).distance(here) < wide)
+    })
+}
+
+fn point(at: crate::mesh::SurfacePoint, force: f64) -> Spot {
+    Spot {
+        at,
+        force,
+        radius: None,
+        about: About::default(),
+    }
+}
+
+/// Covariance of a spot's place in its plane (m²).
+fn flat_of(joint: &Joint, k: usize) -> DMat2 {
+    let first = joint.first(k);
+    let of = |i: usize, j: usize| joint.covariance[(first + i, first + j)];
+    DMat2::from_cols_array(&[of(0, 0), of(1, 0), of(0, 1), of(1, 1)])
+}
+
+/// Four places that stand for a normal distribution: one deviation of √2 along each principal direction, either way.
+fn stand_ins(
+    centre: DVec3,
+    covariance: DMat2,
+    plane: [DVec3; 2],
+    weight: f64,
+) -> Vec<(DVec3, f64)> {
+    let region = Region::of_normal(covariance, plane);
+    let scale = std::f64::consts::SQRT_2 / DEVIATIONS;
+    let both = region.axes.into_iter();
+    let places = both.flat_map(|axis| [1.0, -1.0].map(|sign| centre + axis * (sign * scale)));
+    places.map(|place| (place, weight / 4.0)).collect()
+}
+
+/// How sure one touch is at least: whatever else there is besides would have to be found in as much room as this was,
+/// and could explain no more than what this leaves over.
+fn surely_one(best: &Joint) -> f64 {
+    let log_room = best.log_evidence - best.log_likelihood();
+    let others = (1.0 - ONE) / ONE * (best.left + log_room).exp();
+    (1.0 + others).recip()
+}
+
+/// Logarithm of the density of a reading of which nothing is known but how large it is, but for 2π to the power of half
+/// the channels.
+fn of_nothing_known(observed: &Observation) -> f64 {
+    let trusted = || (observed.reading().iter().zip(&observed.w)).filter(|(_, w)| **w > 0.0);
+    let count = trusted().count().max(1) as f64;
+    let rms = (trusted().map(|(x, _)| x * x).sum::<f64>() / count).sqrt();
+    trusted()
+        .map(|(x, w)| log_density(*x, rms.hypot(w.recip().sqrt())))
+        .sum()
+}
+
+/// Logarithm of a normal density around zero, but for √2π.
+fn log_density(value: f64, deviation: f64) -> f64 {
+    -0.5 * (value / deviation).powi(2) - deviation.ln()
+}
+
+/// Logarithm of a sum of exponentials.
+fn sum_of(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    if most == f64::NEG_INFINITY {
+        return most;
+    }
+    most + logs.map(|log| (log - most).exp()).sum::<f64>().ln()
+}

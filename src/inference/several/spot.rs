@@ -1,0 +1,144 @@
+//! What is pressed at one place: a point, or an area; what every channel reads of it, and how that changes.
+
+use glam::{DVec2, DVec3};
+
+use crate::inference::deviation::{About, Nuisance};
+use crate::inference::map::ResponseMap;
+use crate::inference::matching::Matching;
+use crate::mesh::SurfacePoint;
+
+/// Radii of areas (m). What is smaller is a point: a finger's tip.
+pub(super) const RADII: [f64; 2] = [8e-3, 36e-3];
+/// How far an area is moved (m) and widened to see how its readings change: as far as its edge takes to pass templates.
+const MOVED: f64 = 1e-3;
+const WIDENED: f64 = 0.08;
+
+/// One of several.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    pub at: SurfacePoint,
+    /// N.
+    pub force: f64,
+    /// Of an area (m); absent for a point.
+    pub radius: Option<f64>,
+    pub about: About,
+}
+
+/// What is read of a newton there.
+pub(super) struct Felt {
+    pub reading: Vec<f64>,
+    /// Change a metre along the two directions of the plane and, of an area, with the logarithm of its radius.
+    pub columns: Vec<Vec<f64>>,
+    pub plane: [DVec3; 2],
+}
+
+impl Spot {
+    /// Unknowns that it has beside its force.
+    pub fn places(&self) -> usize {
+        2 + usize::from(self.radius.is_some())
+    }
+
+    /// Somewhere else: by metres along the plane's directions, and by the logarithm of the radius; no farther than `most` (m).
+    pub fn moved(&self, map: &ResponseMap, plane: [DVec3; 2], step: &[f64], most: f64) -> Self {
+        let along = DVec2::new(step[0], step[1]).clamp_length_max(most);
+        let place = map.mesh.point(self.at) + plane[0] * along.x + plane[1] * along.y;
+        let wider = |radius: f64| {
+            let by = step[2].clamp(-0.3, 0.3).exp();
+            (radius * by).clamp(RADII[0], RADII[1])
+        };
+        Self {
+            at: map.mesh.index().nearest(place).0,
+            radius: self.radius.map(wider),
+            ..*self
+        }
+    }
+}
+
+impl Matching {
+    /// What is read of a newton at a spot, and how that changes with it.
+    pub(super) fn felt(&self, spot: &Spot) -> Felt {
+        if let Some(radius) = spot.radius {
+            return self.felt_over(spot, radius);
+        }
+        let slope = self.slope(&spot.about, spot.at);
+        let column = |k: usize| slope.change.iter().map(|d| d[k]).collect();
+        Felt {
+            columns: vec![column(0), column(1)],
+            reading: slope.reading,
+            plane: slope.plane,
+        }
+    }
+
+    fn felt_over(&self, spot: &Spot, radius: f64) -> Felt {
+        let map = &self.map;
+        let (centre, normal) = (map.mesh.point(spot.at), map.mesh.normal(spot.at));
+        let first = normal.any_orthonormal_vector();
+        let plane = [first, normal.cross(first)];
+        let known = (self.nuisances()).map(|n| n.reading(&spot.about, spot.at));
+        let mut reading = pressed_over(map, centre, normal, radius);
+        if let Some(known) = known {
+            for (r, k) in reading.iter_mut().zip(known) {
+                *r += k;
+            }
+        }
+        let change = |before: Vec<f64>, after: Vec<f64>, by: f64| -> Vec<f64> {
+            let pairs = after.iter().zip(&before);
+            pairs.map(|(a, b)| (a - b) / (2.0 * by)).collect()
+        };
+        let mut columns: Vec<Vec<f64>> = (plane.iter())
+            .map(|way| {
+                let [before, after] =
+                    [-MOVED, MOVED].map(|by| pressed_over(map, centre + *way * by, normal, radius));
+                change(before, after, MOVED)
+            })
+            .collect();
+        let [before, after] =
+            [-WIDENED, WIDENED].map(|by: f64| pressed_over(map, centre, normal, radius * by.exp()));
+        columns.push(change(before, after, WIDENED));
+        Felt {
+            reading,
+            columns,
+            plane,
+        }
+    }
+
+    /// What a spot may have about it. Of an area its size is searched for.
+    pub(super) fn nuisances_of(&self, spot: &Spot) -> Vec<Nuisance> {
+        let mut all = self.nuisances().map_or_else(Vec::new, |n| n.at(spot.at));
+        if spot.radius.is_some() {
+            all.retain(|n| n.tip == 0.0);
+        }
+        all
+    }
+}
+
+/// What is read of a newton (along the normal at the centre) that presses over an area, by H. Hertz's pressure
+/// √(1 - r²/R²), everywhere against the surface.
+pub(super) fn pressed_over(
+    map: &ResponseMap,
+    centre: DVec3,
+    normal: DVec3,
+    radius: f64,
+) -> Vec<f64> {
+    let normals = map.mesh.vertex_normals();
+    let mut sum = vec![0.0; map.channels()];
+    let mut force = 0.0;
+    for (node, place) in map.places.iter().enumerate() {
+        let inside = 1.0 - place.distance_squared(centre) / (radius * radius);
+        let facing = normals[node].dot(normal);
+        if inside <= 0.0 || facing <= 0.0 {
+            continue;
+        }
+        let pressure = map.areas[node] * inside.sqrt();
+        force += pressure * facing;
+        for (s, g) in sum.iter_mut().zip(map.node(node)) {
+            *s += pressure * g;
+        }
+    }
+    if force > 0.0 {
+        for s in &mut sum {
+            *s /= force;
+        }
+    }
+    sum
+}

@@ -1,0 +1,136 @@
+//! Whether every gauge does what it should: by itself, and as the others say of a touch.
+
+use super::health::{Expected, Health, Watcher};
+use super::tare::Rest;
+use crate::inference::Matching;
+use crate::statistics::median;
+
+/// Seconds between two looks at who felt a touch.
+const LOOK_S: f64 = 0.2;
+/// With fewer gauges nothing is said of one of them.
+const FEWEST: usize = 5;
+/// A reading of less than this share of what it should be is none; one that should be less than this share of the others'
+/// rms proves nothing, nor one that is near the noise.
+const NONE: f64 = 0.2;
+const CLEAR: f64 = 0.1;
+const ABOVE_NOISE: f64 = 15.0;
+/// Deviation of what a dead gauge reads, over its noise: its rest may have moved a little.
+const AT_REST: f64 = 4.0;
+
+/// Watches every gauge.
+pub(super) struct Checking {
+    watchers: Vec<Watcher>,
+    pub health: Vec<Health>,
+    last_look: u64,
+}
+
+impl Checking {
+    /// All gauges are good until they show otherwise.
+    pub fn new(gauges: usize) -> Self {
+        Self {
+            watchers: vec![Watcher::default(); gauges],
+            health: vec![Health::Good; gauges],
+            last_look: 0,
+        }
+    }
+
+    /// Forgets all but which gauges were found dead.
+    pub fn begin_anew(&mut self) {
+        let dead: Vec<usize> = self.dead().collect();
+        *self = Self::new(self.health.len());
+        for k in dead {
+            self.mark_dead(k);
+        }
+    }
+
+    /// Gauges that were found dead.
+    pub fn dead(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.watchers.len()).filter(|&k| self.watchers[k].is_dead())
+    }
+
+    /// Takes a gauge for dead until it is felt again.
+    pub fn mark_dead(&mut self, gauge: usize) {
+        if let Some(watcher) = self.watchers.get_mut(gauge) {
+            watcher.mark_dead();
+        }
+    }
+
+    /// Whether each gauge is trusted.
+    pub fn used(&self) -> Vec<bool> {
+        self.health.iter().map(|h| h.is_good()).collect()
+    }
+
+    /// Counts of a sample at a rate (Hz), with the highest that the board can send where it has said so.
+    pub fn watch(&mut self, counts: &[f64], rest: Option<&Rest>, rate: f64, highest: Option<f64>) {
+        let noise = rest.map(|r| &r.noise);
+        // Before there is a rest, nobody knows what is noisy.
+        let usual = noise.map_or(f64::INFINITY, |n| median(n.iter().copied()).unwrap_or(0.0));
+        for (k, (watcher, &count)) in self.watchers.iter_mut().zip(counts).enumerate() {
+            let expected = Expected {
+                // Of plain lines nobody knows the range.
+                lowest: highest.map_or(f64::NEG_INFINITY, |_| 1.0),
+                highest: highest.map_or(f64::INFINITY, |h| h - 1.0),
+                own_noise: noise.map_or(0.0, |n| n[k]),
+                usual_noise: usual,
+                rate,
+            };
+            watcher.push(count, &expected);
+            self.health[k] = watcher.health(&expected);
+        }
+    }
+
+    /// Holds every gauge against what the others say of the one touch that there is.
+    pub fn look(&mut self, matching: &mut Matching, time_us: u64, strain: &[f64]) {
+        let used = matching.used.clone();
+        let count = used.iter().filter(|u| **u).count();
+        let early = (time_us.saturating_sub(self.last_look) as f64) < LOOK_S * 1e6;
+        if early || count < FEWEST {
+            return;
+        }
+        self.last_look = time_us;
+        let trusted = strain.iter().zip(&used).filter(|(_, u)| **u);
+        let rms = (trusted.map(|(x, _)| x * x).sum::<f64>() / count as f64).sqrt();
+        for k in 0..strain.len() {
+            let trusted = matches!(self.health[k], Health::Good | Health::Dead);
+            if !trusted || strain[k].abs() > 3.0 * rms {
+                continue;
+            }
+            let suspicious = strain[k].abs() < ABOVE_NOISE * matching.errors.noise[k] + CLEAR * rms;
+            // Only one that says nothing, or was found dead, is worth asking the others about.
+            if !suspicious && used[k] {
+                self.watchers[k].felt();
+                continue;
+            }
+            self.ask_the_others(k, matching, strain, rms);
+        }
+    }
+
+    fn ask_the_others(&mut self, k: usize, matching: &mut Matching, strain: &[f64], rms: f64) {
+        let was_used = matching.used[k];
+        matching.used[k] = false;
+        let (others, without) = matching.find_with_evidence(strain);
+        let count = matching.used.iter().filter(|u| **u).count() + 1;
+        matching.used[k] = true;
+        let (_, with) = matching.find_with_evidence(strain);
+        matching.used[k] = was_used;
+        let (at, _) = matching.map.mesh.index().nearest(others.position);
+        let should = matching.map.at(at)[k] * others.force;
+        let noise = matching.errors.noise[k];
+        if strain[k] / should > NONE {
+            self.watchers[k].felt();
+            return;
+        }
+        let clear = should.abs() > ABOVE_NOISE * noise && should.abs() > CLEAR * rms;
+        // Some touch may well leave it alone: only where none explains its silence is it ill.
+        let explained = others.unexplained < 2.0 * count as f64 + 10.0;
+        if clear && explained {
+            let dead = without + log_normal(strain[k], AT_REST * noise);
+            self.watchers[k].silent(dead - with);
+        }
+    }
+}
+
+/// Logarithm of the normal density of a value around zero.
+fn log_normal(value: f64, deviation: f64) -> f64 {
+    -0.5 * ((value / deviation).powi(2) + (std::f64::consts::TAU * deviation * deviation).ln())
+}

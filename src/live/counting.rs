@@ -1,0 +1,115 @@
+//! How many touches there are, over time: two looks that say the same are believed, and in between all touches are followed
+//! together.
+
+use crate::inference::{Contact, Matching, Several, Touches};
+
+/// Seconds between looks: while what is shown is what was seen, and while it is not.
+const SETTLED_S: f64 = 0.2;
+const UNSETTLED_S: f64 = 0.05;
+/// What is shown is given up when it is less likely than this in so many looks in a row.
+const DOUBTED: f64 = 0.1;
+const LOOKS: u32 = 2;
+
+/// Of the weighted squares that the last look left over: by so much more, and beyond so many deviations of χ², something
+/// else has come to touch, or has gone.
+const MORE: f64 = 1.5;
+const BEYOND: f64 = 4.0;
+
+/// What is shown, and what may have to be.
+pub(super) struct Counting {
+    several: Several,
+    /// Touches that are more than one point; absent while there is one.
+    shown: Option<Touches>,
+    /// Looks in a row that doubted it.
+    doubted: u32,
+    last_look: Option<u64>,
+    sure_of_one: f64,
+    /// Weighted squares up to which a sample is of what the last look saw.
+    usual: f64,
+}
+
+impl Counting {
+    /// One touch, until more are seen.
+    pub fn new(matching: &Matching) -> Self {
+        Self {
+            several: Several::new(matching),
+            shown: None,
+            doubted: 0,
+            last_look: None,
+            sure_of_one: 1.0,
+            usual: 0.0,
+        }
+    }
+
+    /// Nothing touches.
+    pub fn end(&mut self) {
+        (self.shown, self.last_look) = (None, None);
+        (self.doubted, self.usual) = (0, 0.0);
+    }
+
+    /// The touches that go on, where they are more than one point, and whether they explain this sample (strain).
+    pub fn track(&mut self, matching: &Matching, strain: &[f64]) -> Option<(Touches, bool)> {
+        let shown = self.shown.as_ref()?;
+        if shown.contacts.is_empty() {
+            return Some((shown.clone(), false));
+        }
+        let tracked = matching.track_several(strain, shown);
+        let explained = tracked.is_some();
+        if let Some(tracked) = tracked {
+            let unexplained = shown.unexplained;
+            // As far as the last look went: what is off little by little is off.
+            self.shown = Some(Touches {
+                unexplained,
+                ..tracked
+            });
+        }
+        Some((self.shown.clone()?, explained))
+    }
+
+    /// The touches that were seen last, where they are more than one point.
+    pub fn shown(&self) -> Option<&Touches> {
+        self.shown.as_ref()
+    }
+
+    /// One touch, as sure as the last look was of that.
+    pub fn one(&self, contact: Contact) -> Touches {
+        Touches::one(contact, self.sure_of_one)
+    }
+
+    /// Whether touches that leave so much unexplained are what the last look saw.
+    pub fn is_settled(&self, unexplained: f64) -> bool {
+        self.doubted == 0 && unexplained <= self.usual
+    }
+
+    /// Whether it is time to look again at touches that leave so much unexplained.
+    pub fn is_due(&self, time_us: u64, unexplained: f64) -> bool {
+        let wait = if self.is_settled(unexplained) {
+            SETTLED_S
+        } else {
+            UNSETTLED_S
+        };
+        let since = |last: u64| time_us.saturating_sub(last) as f64 * 1e-6;
+        self.last_look.is_none_or(|last| since(last) >= wait)
+    }
+
+    /// Looks how many there are, where `one` is what was found where only one is looked for.
+    pub fn look(&mut self, matching: &mut Matching, time_us: u64, strain: &[f64], one: &Contact) {
+        self.last_look = Some(time_us);
+        let seen = matching.count(&self.several, strain, one);
+        let channels = matching.used.iter().filter(|u| **u).count() as f64;
+        self.usual = MORE * seen.unexplained + channels + BEYOND * (2.0 * channels).sqrt();
+        let one = Touches::one(*one, 1.0);
+        let shown = self.shown.as_ref().unwrap_or(&one);
+        let share = seen.share_of(shown);
+        self.doubted = if share < DOUBTED { self.doubted + 1 } else { 0 };
+        if seen.alike(shown) || self.doubted >= LOOKS {
+            self.doubted = 0;
+            self.sure_of_one = seen.probability;
+            self.shown = (!seen.alike(&one)).then_some(seen);
+        } else if let Some(shown) = &mut self.shown {
+            shown.probability = share;
+        } else {
+            self.sure_of_one = share;
+        }
+    }
+}

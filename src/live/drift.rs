@@ -1,0 +1,363 @@
+//! How the rest of the channels wanders, also while something touches: a Kalman filter over time (R. E. Kalman, J. Basic
+//! Eng. 82, 1960).
+//!
+//! The rest b of all channels walks: each for itself, by glue and amplifier, all together along a pattern s, by
+//! temperature, and of what is loaded a share, by creep. In a time Δ
+//!
+//! ```text
+//! b ← b + s v Δ + w        w ~ N(0, (diag(q² + creep) + q_s² s sᵀ) Δ)
+//! v ← (1 - Δ/τ) v + w'     w' ~ N(0, q_v² Δ)
+//! ```
+//!
+//! Untouched, b is what is read. Under a touch, x = b + r̂ + J θ + n with r̂ its reading and J the ways in which it may be
+//! another touch: with so wide a spread of θ as makes them free, S = P + R + J Jᵀ, and the rest follows only what no
+//! touch would explain. So a touch may stand as long as it likes while all channels drift.
+
+mod creep;
+mod misfit;
+mod walk;
+
+use std::collections::VecDeque;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::inference::Touches;
+
+use self::creep::Creep;
+use self::misfit::Misfit;
+use self::walk::Walk;
+
+/// Seconds that samples are gathered for before the rest is corrected by their mean.
+const BLOCK_S: f64 = 0.01;
+/// Seconds that rest has to last before it is believed: the beginning of a slow touch is none.
+const BELIEVED_S: f64 = 0.2;
+/// As long before a touch nothing of it is felt yet: what a rest that was too short to be believed says.
+const BEFORE_S: f64 = 0.05;
+/// Standard deviations, and strain, by which rest may be off from what follows it: beyond them a touch goes or comes.
+const STEADY: f64 = 5.0;
+const STEADY_BY: f64 = 1.5e-6;
+
+/// Of the variance that a touch leaves of the rest: what it hid is not to be taken for another touch.
+const CAUTION: f64 = 16.0;
+
+/// Samples at rest whose mean is to be believed.
+struct Block {
+    ends_s: f64,
+    mean: Vec<f64>,
+    samples: f64,
+}
+
+/// What is known of the rest since a tare (strain), as of a little while ago, and what that says of now.
+pub(super) struct Drift {
+    /// b.
+    level: Vec<f64>,
+    /// P of the rest of every channel and, at the end, of the speed v (strain, strain a second).
+    covariance: DMatrix<f64>,
+    walk: Walk,
+    creep: Creep,
+    misfit: Misfit,
+    /// Seconds since the tare, and as of when b and P are.
+    now_s: f64,
+    as_of_s: f64,
+    /// Samples that are being gathered since a time, and blocks that are not believed yet.
+    gathered: Vec<f64>,
+    samples: f64,
+    since_s: f64,
+    waiting: VecDeque<Block>,
+    /// Whether the last samples were of a touch, and whether any at rest were believed since the last one.
+    under_touch: bool,
+    believed: bool,
+    /// P as of now, and (P + R)⁻¹ of the channels that were used, row by row; zeros for the others. Then the same with
+    /// caution.
+    ahead: DMatrix<f64>,
+    weights: [Vec<f64>; 2],
+    weighed_for: Vec<bool>,
+}
+
+impl Drift {
+    /// After a tare with this noise of each channel (strain) and, where it showed, its drift (strain a second), where the
+    /// rest of a channel follows it within `follows_s` seconds at a rate (Hz).
+    pub fn new(noise: &[f64], drift: &[f64], follows_s: f64, rate: f64) -> Self {
+        let channels = noise.len();
+        let walk = Walk::new(noise, drift, follows_s, rate);
+        let covariance = Walk::after_tare(noise);
+        Self {
+            level: vec![0.0; channels],
+            ahead: covariance.clone(),
+            covariance,
+            walk,
+            creep: Creep::new(channels),
+            misfit: Misfit::default(),
+            now_s: 0.0,
+            as_of_s: 0.0,
+            gathered: vec![0.0; channels],
+            samples: 0.0,
+            since_s: 0.0,
+            waiting: VecDeque::new(),
+            under_touch: false,
+            believed: false,
+            weights: [Vec::new(), Vec::new()],
+            weighed_for: Vec::new(),
+        }
+    }
+
+    /// Some seconds go by.
+    pub fn pass(&mut self, seconds: f64) {
+        self.now_s += seconds;
+    }
+
+    /// The rest of every channel now (strain since the tare).
+    pub fn rest(&self) -> impl Iterator<Item = f64> + '_ {
+        let along = self.walk.moves(self.now_s - self.as_of_s);
+        let pairs = self.level.iter().zip(&self.walk.pattern);
+        pairs.map(move |(level, s)| level + s * along)
+    }
+
+    /// What every channel drifts by just now (strain a second).
+    pub fn speeds(&self) -> impl Iterator<Item = f64> + '_ {
+        self.walk.drift()
+    }
+
+    /// Weighted squares of a reading without a touch, over the channels that are used: as χ². Then the same with caution: as
+    /// far as a touch may have hidden more of the rest than is thought.
+    pub fn squares(&mut self, strain: &[f64], noise: &[f64], used: &[bool]) -> [f64; 2] {
+        if self.weighed_for != used {
+            self.weigh(noise, used);
+        }
+        self.weights.each_ref().map(|weights| {
+            let rows = weights.chunks_exact(strain.len().max(1));
+            let row = |row: &[f64]| row.iter().zip(strain).map(|(w, x)| w * x).sum::<f64>();
+            rows.zip(strain).map(|(w, x)| x * row(w)).sum()
+        })
+    }
+
+    /// Variance of each channel for itself and of all together (strain²): P ≈ diag(own) + common s sᵀ.
+    pub fn variances(&self) -> (Vec<f64>, f64) {
+        let (n, s) = (self.level.len(), &self.walk.pattern);
+        let shared = |(i, j): (usize, usize)| self.ahead[(i, j)] / (s[i] * s[j]);
+        let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
+        let count = (n * n.saturating_sub(1) / 2).max(1) as f64;
+        let common = (pairs.map(shared).sum::<f64>() / count).max(0.0);
+        let own = |i: usize| (self.ahead[(i, i)] - common * s[i] * s[i]).max(0.0);
+        ((0..n).map(own).collect(), common)
+    }
+
+    /// A sample at rest (strain since the tare): whether more is known of the rest now.
+    pub fn rested(&mut self, strain: &[f64], noise: &[f64], used: &[bool]) -> bool {
+        if std::mem::replace(&mut self.under_touch, false) {
+            self.interrupted();
+        }
+        let Some((mean, samples)) = self.gather(strain) else {
+            return false;
+        };
+        self.waiting.push_back(Block {
+            ends_s: self.now_s,
+            mean,
+            samples,
+        });
+        self.believe(BELIEVED_S, noise, used);
+        self.weigh(noise, used);
+        true
+    }
+
+    /// Takes what was read at rest so many seconds ago, and has been steady since.
+    fn believe(&mut self, ago_s: f64, noise: &[f64], used: &[bool]) {
+        let until = self.now_s - ago_s;
+        let old = |block: &Block| block.ends_s <= until;
+        while self.waiting.front().is_some_and(old) {
+            let steady = self.is_steady(noise, used);
+            let Some(block) = self.waiting.pop_front() else {
+                return;
+            };
+            if !steady {
+                continue;
+            }
+            self.believed = true;
+            self.go_on_to(block.ends_s, None);
+            let off = block.mean.iter().zip(&self.level).map(|(x, b)| x - b);
+            let off: Vec<f64> = off.collect();
+            let variance: Vec<f64> = noise.iter().map(|n| n * n / block.samples).collect();
+            let correction = self.correct(&off, &variance, used, &[]);
+            self.walk.learn(&correction, &self.covariance, self.as_of_s);
+        }
+    }
+
+    /// Whether the oldest block that waits is what those after it are, in the mean.
+    fn is_steady(&self, noise: &[f64], used: &[bool]) -> bool {
+        let mut blocks = self.waiting.iter();
+        let Some(first) = blocks.next() else {
+            return false;
+        };
+        let count: f64 = blocks.clone().map(|b| b.samples).sum();
+        if count == 0.0 {
+            return true;
+        }
+        (0..first.mean.len()).filter(|&c| used[c]).all(|c| {
+            let sum: f64 = blocks.clone().map(|b| b.samples * b.mean[c]).sum();
+            let deviation = noise[c] * (first.samples.recip() + count.recip()).sqrt();
+            (first.mean[c] - sum / count).abs() < STEADY * deviation + STEADY_BY
+        })
+    }
+
+    /// A sample under a touch: what that reads, and what is left of the sample beside it (strain since the tare), with the
+    /// ways in which it may be another touch (columns of J, strain). Whether more is known of the rest now.
+    pub fn touched(
+        &mut self,
+        touches: &Touches,
+        [reading, left]: [&[f64]; 2],
+        noise: &[f64],
+        used: &[bool],
+        ways: impl FnOnce() -> Vec<Vec<f64>>,
+    ) -> bool {
+        if !std::mem::replace(&mut self.under_touch, true) {
+            if !self.believed {
+                self.believe(BEFORE_S, noise, used);
+            }
+            self.interrupted();
+        }
+        let Some((mut mean, samples)) = self.gather(left) else {
+            return false;
+        };
+        self.go_on_to(self.now_s, Some(reading));
+        for (x, rest) in mean.iter_mut().zip(&self.level) {
+            *x -= rest;
+        }
+        let beyond = match &touches.contacts[..] {
+            [touch] if touch.narrow => (self.misfit).beyond(touch.position, touch.force, &mean),
+            _ => Some((mean, misfit::doubt_of(reading))),
+        };
+        if let Some((off, doubt)) = beyond {
+            let noise = noise.iter().zip(&doubt);
+            let variance: Vec<f64> = noise.map(|(n, d)| n * n / samples + d).collect();
+            self.correct(&off, &variance, used, &ways());
+        }
+        self.weigh(noise, used);
+        true
+    }
+
+    /// Nothing is known of what was gathered.
+    pub fn interrupted(&mut self) {
+        self.waiting.clear();
+        self.misfit.forget();
+        (self.samples, self.walk.rested_s, self.believed) = (0.0, None, false);
+    }
+
+    /// The mean of a block, when it is full.
+    fn gather(&mut self, values: &[f64]) -> Option<(Vec<f64>, f64)> {
+        if self.samples == 0.0 {
+            self.gathered.fill(0.0);
+        }
+        self.samples += 1.0;
+        for (sum, value) in self.gathered.iter_mut().zip(values) {
+            *sum += value;
+        }
+        if self.now_s - self.since_s < BLOCK_S {
+            return None;
+        }
+        self.since_s = self.now_s;
+        let samples = std::mem::take(&mut self.samples);
+        let mean = self.gathered.iter().map(|sum| sum / samples).collect();
+        Some((mean, samples))
+    }
+
+    /// b and P as of another time, under a load (strain) until then, or none.
+    fn go_on_to(&mut self, time_s: f64, load: Option<&[f64]>) {
+        let seconds = (time_s - self.as_of_s).max(0.0);
+        self.as_of_s = time_s;
+        let along = self.walk.moves(seconds);
+        for (level, s) in self.level.iter_mut().zip(&self.walk.pattern) {
+            *level += s * along;
+        }
+        let hidden = load.is_some();
+        self.walk.grow(&mut self.covariance, seconds, hidden);
+        self.walk.drifted(along, hidden);
+        self.creep.grow(&mut self.covariance, load, seconds);
+    }
+
+    fn weigh(&mut self, noise: &[f64], used: &[bool]) {
+        self.ahead = self.covariance.clone();
+        let ahead_s = self.now_s - self.as_of_s;
+        self.walk.grow(&mut self.ahead, ahead_s, self.under_touch);
+        // Whether anything touches is asked of what would be left if it let go now.
+        let mut after = self.ahead.clone();
+        self.creep.let_go(&mut after);
+        self.weights[0] = weights(&after, noise, used);
+        let hid = if self.creep.loaded { CAUTION } else { 1.0 };
+        self.weights[1] = weights(&(after * hid), noise, used);
+        self.weighed_for = used.to_vec();
+    }
+
+    /// Corrects the rest by what readings are off from it without a touch, with their variances (strain, strain²) and the
+    /// ways in which the touch may be another one. By how much (strain).
+    fn correct(
+        &mut self,
+        off: &[f64],
+        variance: &[f64],
+        used: &[bool],
+        ways: &[Vec<f64>],
+    ) -> Vec<f64> {
+        let n = off.len();
+        let trusted: Vec<usize> = (0..n).filter(|&k| used[k]).collect();
+        let mut inner = among(&self.covariance, &trusted);
+        for (k, &c) in trusted.iter().enumerate() {
+            inner[(k, k)] += variance[c];
+        }
+        for way in ways {
+            let way = DVector::from_iterator(trusted.len(), trusted.iter().map(|&c| way[c]));
+            inner.ger(1.0, &way, &way, 1.0);
+        }
+        let nothing = vec![0.0; n];
+        let Some(factor) = inner.cholesky() else {
+            return nothing;
+        };
+        let read = DVector::from_iterator(trusted.len(), trusted.iter().map(|&c| off[c]));
+        // Pᵀ of the channels that are read.
+        let seen = DMatrix::from_fn(trusted.len(), n + 1, |k, c| {
+            self.covariance[(trusted[k], c)]
+        });
+        let gain = factor.solve(&seen);
+        let correction = gain.tr_mul(&read);
+        if correction.iter().any(|c| !c.is_finite()) {
+            return nothing;
+        }
+        self.covariance -= seen.tr_mul(&gain);
+        // What rounding makes of it must stay a covariance.
+        for i in 0..=n {
+            for j in 0..i {
+                let mean = f64::midpoint(self.covariance[(i, j)], self.covariance[(j, i)]);
+                (self.covariance[(i, j)], self.covariance[(j, i)]) = (mean, mean);
+            }
+            self.covariance[(i, i)] = self.covariance[(i, i)].max(1e-20);
+        }
+        for (level, c) in self.level.iter_mut().zip(&correction) {
+            *level += c;
+        }
+        self.walk.speed += correction[n];
+        correction.iter().take(n).copied().collect()
+    }
+}
+
+/// P of some of the channels.
+fn among(covariance: &DMatrix<f64>, channels: &[usize]) -> DMatrix<f64> {
+    let n = channels.len();
+    DMatrix::from_fn(n, n, |i, j| covariance[(channels[i], channels[j])])
+}
+
+/// (P + R)⁻¹ of the channels that are used, row by row; zeros for the others.
+fn weights(covariance: &DMatrix<f64>, noise: &[f64], used: &[bool]) -> Vec<f64> {
+    let n = noise.len();
+    let trusted: Vec<usize> = (0..n).filter(|&k| used[k]).collect();
+    let mut inner = among(covariance, &trusted);
+    for (k, &c) in trusted.iter().enumerate() {
+        inner[(k, k)] += noise[c] * noise[c];
+    }
+    let mut weights = vec![0.0; n * n];
+    if let Some(inverse) = inner.cholesky().map(|c| c.inverse()) {
+        for (i, &a) in trusted.iter().enumerate() {
+            for (j, &b) in trusted.iter().enumerate() {
+                weights[a * n + b] = inverse[(i, j)];
+            }
+        }
+    }
+    weights
+}

@@ -1,0 +1,338 @@
+//! Mains hum: found in what channels do at rest, and taken off.
+//!
+//! A line of known frequency is a cosine and a sine of each channel. They are fitted by least squares to a second of rest;
+//! how the phase turns between its halves gives the frequency to a few millihertz. From then on they follow the signal
+//! slowly (B. Widrow et al., Proc. IEEE 63, 1692, 1975), also under a touch, whose ends are too short to move them.
+
+use std::collections::VecDeque;
+use std::f64::consts::{PI, TAU};
+
+use crate::statistics::mean;
+
+/// Mains, and how many of its harmonics are looked for (Hz).
+const MAINS: [f64; 2] = [50.0, 60.0];
+const HARMONICS: u32 = 4;
+/// A grid is off by so much at most (Hz), and what is slower is no hum.
+const OFF: f64 = 0.5;
+const SLOWEST: f64 = 5.0;
+/// Seconds of rest that are looked at, the fewest that say anything, and the most samples.
+const LOOKED_S: f64 = 1.0;
+const LEAST_S: f64 = 0.3;
+const MOST: usize = 4000;
+/// Lines at once.
+const LINES: usize = 4;
+/// Over what noise would do, in deviations: then it is a line.
+const CLEAR: f64 = 12.0;
+/// Seconds in which a line follows the signal, and in which the level it stands on does.
+const FOLLOWS_S: f64 = 0.5;
+const LEVEL_S: f64 = 0.1;
+
+/// One frequency.
+#[derive(Clone, Debug)]
+struct Line {
+    hertz: f64,
+    /// At the last sample (rad).
+    phase: f64,
+    /// Of its cosine and its sine in every channel (counts).
+    waves: Vec<[f64; 2]>,
+}
+
+/// Samples: when (s), and what every channel read.
+pub(super) type Rows = VecDeque<(f64, Vec<f64>)>;
+
+/// What hums.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Hum {
+    lines: Vec<Line>,
+    level: Vec<f64>,
+    now_s: f64,
+    rested: Rows,
+    /// When it was last looked for.
+    looked_s: f64,
+}
+
+impl Hum {
+    /// Takes the lines off a sample (counts) that came some seconds after the one before, while nothing touches or
+    /// something does.
+    pub fn take_off(&mut self, seconds: f64, counts: &mut [f64], at_rest: bool) {
+        self.now_s += seconds;
+        if self.level.is_empty() {
+            self.level = counts.to_vec();
+        }
+        if seconds <= 0.0 {
+            // Nobody knows where its waves are.
+            self.lines.clear();
+            self.level = counts.to_vec();
+            self.rested.clear();
+        }
+        if at_rest {
+            self.rested.push_back((self.now_s, counts.to_vec()));
+            self.look();
+        } else {
+            self.rested.clear();
+        }
+        let follows = (seconds / FOLLOWS_S).min(0.1);
+        for line in &mut self.lines {
+            line.phase = (line.phase + TAU * line.hertz * seconds) % TAU;
+            let (sin, cos) = line.phase.sin_cos();
+            for ((count, [a, b]), level) in counts.iter_mut().zip(&mut line.waves).zip(&self.level)
+            {
+                *count -= *a * cos + *b * sin;
+                let off = *count - level;
+                *a += 2.0 * follows * off * cos;
+                *b += 2.0 * follows * off * sin;
+            }
+        }
+        let share = (seconds / LEVEL_S).min(1.0);
+        for (level, count) in self.level.iter_mut().zip(counts) {
+            *level += share * (*count - *level);
+        }
+    }
+
+    /// Forgets all.
+    pub fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// What the lines put on readings (counts, rms) of every channel.
+    pub fn rms(&self, channel: usize) -> f64 {
+        let square = |line: &Line| {
+            let [a, b] = line.waves.get(channel).copied().unwrap_or_default();
+            f64::midpoint(a * a, b * b)
+        };
+        self.lines.iter().map(square).sum::<f64>().sqrt()
+    }
+
+    /// Looks for lines in so much rest as there is, now and then.
+    fn look(&mut self) {
+        while self.rested.len() > MOST
+            || (self.rested.front()).is_some_and(|(at, _)| self.now_s - at > LOOKED_S)
+        {
+            self.rested.pop_front();
+        }
+        let long = self
+            .rested
+            .front()
+            .is_some_and(|(at, _)| self.now_s - at > 0.95 * LOOKED_S);
+        if !long || self.now_s - self.looked_s < LOOKED_S {
+            return;
+        }
+        self.looked_s = self.now_s;
+        let (lines, _) = lines(&self.rested);
+        self.lines = lines;
+        // The sample that is just coming is the last of these.
+        let step = self
+            .rested
+            .iter()
+            .rev()
+            .take(2)
+            .map(|r| r.0)
+            .collect::<Vec<_>>();
+        if let [last, before] = step[..] {
+            for line in &mut self.lines {
+                line.phase -= TAU * line.hertz * (last - before);
+            }
+        }
+    }
+
+    /// Takes the lines of some rest (s, counts) for what hums from its last sample on, and off these.
+    pub fn begin(&mut self, rows: &Rows) -> Rows {
+        self.forget();
+        let (lines, left) = lines(rows);
+        self.lines = lines;
+        left
+    }
+}
+
+/// The lines of some samples, with their phases at the last one, and what is left of the samples without them.
+fn lines(rows: &Rows) -> (Vec<Line>, Rows) {
+    let mut left = rows.clone();
+    let mut found: Vec<Line> = Vec::new();
+    let (Some(first), Some(last)) = (rows.front(), rows.back()) else {
+        return (found, left);
+    };
+    let (lasted, channels) = (last.0 - first.0, first.1.len());
+    if lasted < LEAST_S || channels == 0 {
+        return (found, left);
+    }
+    let rate = (rows.len() - 1) as f64 / lasted;
+    while found.len() < LINES {
+        let middle = level(&left);
+        let known = |hertz: &f64| found.iter().all(|l| (l.hertz - hertz).abs() > 2.0 * OFF);
+        let best = (candidates(rate).into_iter().filter(known))
+            .map(|hertz| (strength(&left, &middle, hertz), hertz))
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((strength, hertz)) = best else {
+            break;
+        };
+        // As χ² of two a channel.
+        let free = 2.0 * channels as f64;
+        if strength < free + CLEAR * (2.0 * free).sqrt() {
+            break;
+        }
+        let line = Line::fitted(&left, &middle, hertz);
+        line.take_from(&mut left);
+        found.push(line);
+    }
+    (found, left)
+}
+
+/// Frequencies at which mains may show: what is faster than half the rate shows as a slower one.
+fn candidates(rate: f64) -> Vec<f64> {
+    let seen = |hertz: f64| (hertz - (hertz / rate).round() * rate).abs();
+    (MAINS.into_iter())
+        .flat_map(|mains| (1..=HARMONICS).map(move |k| seen(mains * f64::from(k))))
+        .filter(|&hertz| hertz > SLOWEST && hertz < 0.49 * rate)
+        .collect()
+}
+
+fn level(rows: &Rows) -> Vec<f64> {
+    let channels = rows.front().map_or(0, |r| r.1.len());
+    let of = |c: usize| mean(&rows.iter().map(|r| r.1[c]).collect::<Vec<_>>());
+    (0..channels).map(of).collect()
+}
+
+/// Cosine and sine of every channel at a frequency, in some of the samples, with phases from the last one.
+fn waves<'a>(
+    rows: impl Iterator<Item = &'a (f64, Vec<f64>)>,
+    last_s: f64,
+    level: &[f64],
+    hertz: f64,
+) -> Vec<[f64; 2]> {
+    let mut sums = vec![[0.0; 2]; level.len()];
+    let mut count = 0.0;
+    for (at, values) in rows {
+        let (sin, cos) = (TAU * hertz * (at - last_s)).sin_cos();
+        for ((sum, value), level) in sums.iter_mut().zip(values).zip(level) {
+            sum[0] += (value - level) * cos;
+            sum[1] += (value - level) * sin;
+        }
+        count += 1.0;
+    }
+    (sums.into_iter().map(|s| s.map(|v| 2.0 * v / count))).collect()
+}
+
+/// Over the scatter of each channel: as χ² where there is noise alone, the largest near a frequency.
+fn strength(rows: &Rows, level: &[f64], hertz: f64) -> f64 {
+    let last = rows.back().map_or(0.0, |r| r.0);
+    let count = rows.len() as f64;
+    let variance = |c: usize| {
+        let squares: f64 = rows.iter().map(|r| (r.1[c] - level[c]).powi(2)).sum();
+        (squares / count).max(f64::MIN_POSITIVE)
+    };
+    let variances: Vec<f64> = (0..level.len()).map(variance).collect();
+    let at = |hertz: f64| -> f64 {
+        let waves = waves(rows.iter(), last, level, hertz);
+        let squares = waves.iter().zip(&variances);
+        squares
+            .map(|([a, b], v)| count * (a * a + b * b) / (2.0 * v))
+            .sum()
+    };
+    [-OFF, 0.0, OFF]
+        .map(|off| at(hertz + off))
+        .into_iter()
+        .fold(0.0, f64::max)
+}
+
+impl Line {
+    /// The line near a frequency that fits samples best.
+    fn fitted(rows: &Rows, level: &[f64], mut hertz: f64) -> Self {
+        let (first, last) = (rows[0].0, rows[rows.len() - 1].0);
+        let half = rows.len() / 2;
+        for _ in 0..3 {
+            let halves = [(0, half), (half, 2 * half)];
+            let [a, b] = halves.map(|(from, to)| waves(rows.range(from..to), last, level, hertz));
+            // What turns from one half to the other, over all channels.
+            let (mut re, mut im) = (0.0, 0.0);
+            for ([ac, a_s], [bc, b_s]) in a.iter().zip(&b) {
+                re += ac * bc + a_s * b_s;
+                im += ac * b_s - a_s * bc;
+            }
+            let turned = im.atan2(re).clamp(-0.9 * PI, 0.9 * PI);
+            hertz -= turned / TAU / (0.5 * (last - first));
+        }
+        Self {
+            waves: waves(rows.iter(), last, level, hertz),
+            phase: 0.0,
+            hertz,
+        }
+    }
+
+    fn take_from(&self, rows: &mut Rows) {
+        let last = rows.back().map_or(0.0, |r| r.0);
+        for (at, values) in rows {
+            let (sin, cos) = (TAU * self.hertz * (*at - last)).sin_cos();
+            for (value, [a, b]) in values.iter_mut().zip(&self.waves) {
+                *value -= a * cos + b * sin;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two channels that hum, over a level, with something like noise.
+    fn read(k: u32, rate: f64, hertz: f64, size: f64) -> (f64, [f64; 2]) {
+        let now = f64::from(k) / rate;
+        let k64 = u64::from(k);
+        let noise = |of: u64| ((k64 * 7919 + k64 * k64 * of) % 7) as f64 - 3.0;
+        let hum = |turned: f64| size * (TAU * hertz * now + turned).sin();
+        (
+            now,
+            [
+                2000.0 + hum(0.3) + noise(31),
+                900.0 - 0.5 * hum(1.9) + noise(17),
+            ],
+        )
+    }
+
+    #[test]
+    fn hum_is_found_at_its_frequency_and_taken_off() {
+        for (rate, hertz) in [
+            (1000.0, 49.93),
+            (1000.0, 60.05),
+            (400.0, 100.1),
+            (4000.0, 50.0),
+            (90.0, 50.02),
+        ] {
+            let mut hum = Hum::default();
+            let mut left = Vec::new();
+            for k in 0..(4.0 * rate) as u32 {
+                let (now, mut counts) = read(k, rate, hertz, 20.0);
+                hum.take_off(if k == 0 { 0.0 } else { rate.recip() }, &mut counts, true);
+                if now > 2.0 {
+                    left.push(counts[0] - 2000.0);
+                }
+            }
+            let rms = (left.iter().map(|x| x * x).sum::<f64>() / left.len() as f64).sqrt();
+            assert!(rms < 2.4, "{rate} {hertz}: {rms}, {:?}", hum.lines);
+            let shown = (hertz - (hertz / rate).round() * rate).abs();
+            assert!((hum.lines[0].hertz - shown).abs() < 0.02, "{:?}", hum.lines);
+            assert!((hum.rms(0) - 14.14).abs() < 0.5);
+        }
+    }
+
+    #[test]
+    fn a_touch_is_no_hum_and_does_not_move_what_hums() {
+        let mut hum = Hum::default();
+        let mut worst = 0.0_f64;
+        for k in 0..6000 {
+            let (now, mut counts) = read(k, 1000.0, 50.0, 20.0);
+            let pressed = if now > 3.0 { 400.0 } else { 0.0 };
+            counts[0] += pressed;
+            hum.take_off(0.001, &mut counts, now < 3.0);
+            if now > 3.0 {
+                worst = worst.max((counts[0] - 2000.0 - pressed).abs());
+            }
+        }
+        assert!(worst < 8.0, "{worst}");
+        let mut calm = Hum::default();
+        for k in 0..3000 {
+            let (_, mut counts) = read(k, 1000.0, 50.0, 0.0);
+            calm.take_off(0.001, &mut counts, true);
+        }
+        assert!(calm.lines.is_empty(), "{:?}", calm.lines);
+    }
+}

@@ -1,0 +1,335 @@
+//! Live touch while channels drift, creep and hum: an independent board, made sample by sample.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use hapdef::elasticity::Touch;
+use hapdef::inference::Chain;
+use hapdef::live::{Pipeline, Sample, Update};
+use hapdef::wire::{Hello, VERSION};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::inference::{lab, normal, touches};
+
+/// What a workshop does to a board (strain, seconds, Hz).
+#[derive(Clone, Copy)]
+pub struct World {
+    pub rate: f64,
+    bits: u8,
+    noise: f64,
+    /// A second, of all channels, and how much it differs among them.
+    drift: f64,
+    uneven: f64,
+    /// A second's walk of each channel.
+    walk: f64,
+    hum: f64,
+    hum_hz: f64,
+    /// Share of a load that is read in addition after a long while.
+    creep: f64,
+}
+
+pub const CALM: World = World {
+    rate: 1000.0,
+    bits: 16,
+    noise: 1e-6,
+    drift: 0.0,
+    uneven: 0.0,
+    walk: 0.1e-6,
+    hum: 0.0,
+    hum_hz: 50.0,
+    creep: 0.0,
+};
+
+/// From, for how long (s), rising within (s).
+pub struct Press {
+    pub touch: Touch,
+    pub from: f64,
+    pub lasts: f64,
+    pub ramp: f64,
+}
+
+impl Press {
+    pub fn share(&self, now: f64) -> f64 {
+        let since = now - self.from;
+        (since / self.ramp)
+            .min((self.lasts - since) / self.ramp)
+            .clamp(0.0, 1.0)
+    }
+}
+
+/// Runs a board for so many seconds; tells of every sample what touched, of several touches the first.
+pub fn run(
+    world: World,
+    presses: &[Press],
+    seconds: f64,
+    mut tell: impl FnMut(f64, &Update, Option<&Press>),
+) {
+    /// Seconds in which creep comes.
+    const CREEPS_S: f64 = 6.0;
+    let lab = lab();
+    let gauges = lab.sensing.gauges.len();
+    let chain = Chain {
+        gain: 100.0,
+        bits: world.bits,
+        ..Chain::default()
+    };
+    let mut settings = lab.inputs.project.live.settings(gauges);
+    settings.relative = 0.02;
+    let mut pipeline = Pipeline::new(Arc::clone(&lab.sensing.drawn.map), settings);
+    pipeline.hello(&Hello {
+        version: VERSION,
+        board: 7,
+        channels: gauges as u8,
+        bits: chain.bits,
+        reference_mv: 3300,
+        supply_mv: 5000,
+        gain_milli: 100_000,
+        rate_hz: world.rate as u16,
+        name: "a board".into(),
+    });
+    pipeline.tare();
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    let read: Vec<Vec<f64>> = (presses.iter())
+        .map(|p| lab.sensing.sensitivity.read(&p.touch))
+        .collect();
+    let uneven: Vec<f64> = (0..gauges)
+        .map(|_| 1.0 + world.uneven * normal(&mut rng))
+        .collect();
+    let phases: Vec<f64> = (0..gauges).map(|_| rng.random::<f64>()).collect();
+    let (mut walked, mut crept) = (vec![0.0; gauges], vec![0.0; gauges]);
+    let highest = f64::from(chain.highest_count());
+    for k in 0..(seconds * world.rate) as u64 {
+        let now = k as f64 / world.rate;
+        let on = presses.iter().position(|p| p.share(now) > 0.0);
+        let load = |c: usize| -> f64 {
+            let all = presses.iter().zip(&read);
+            all.map(|(p, read)| p.share(now) * read[c]).sum()
+        };
+        let counts = (0..gauges)
+            .map(|c| {
+                walked[c] += world.walk / world.rate.sqrt() * normal(&mut rng);
+                crept[c] += (world.creep * load(c) - crept[c]) / (CREEPS_S * world.rate);
+                let hum = world.hum * (TAU * (world.hum_hz * now + phases[c])).sin();
+                let strain = load(c)
+                    + crept[c]
+                    + walked[c]
+                    + world.drift * uneven[c] * now
+                    + hum
+                    + world.noise * normal(&mut rng);
+                let count = 0.4 * highest + strain * chain.counts_per_strain();
+                count.round().clamp(0.0, highest)
+            })
+            .collect();
+        let sample = Sample {
+            time_us: (now * 1e6) as u64,
+            counts,
+        };
+        let update = pipeline.push(&sample);
+        tell(now, &update, on.map(|p| &presses[p]));
+    }
+}
+
+/// What became of touches.
+#[derive(Debug, Default)]
+struct Seen {
+    /// Samples, and those with the touch shown, while something pressed with all its force.
+    pressed: f64,
+    shown: f64,
+    /// Sum of errors (mm, N).
+    off: f64,
+    off_n: f64,
+    /// Samples shown 0.3 s after a press and later, and how often that began.
+    ghosts: f64,
+    ghost_events: u32,
+    rested: f64,
+}
+
+impl Seen {
+    fn of(world: World, presses: &[Press], seconds: f64) -> Self {
+        let mut seen = Self::default();
+        let (mut released, mut ghost) = (0.0, false);
+        run(world, presses, seconds, |now, update, press| {
+            if let Some(press) = press {
+                released = now;
+                if press.share(now) < 1.0 || now < press.from + press.ramp + 0.1 {
+                    return;
+                }
+                seen.pressed += 1.0;
+                if let Some(contact) = update.contact {
+                    seen.shown += 1.0;
+                    seen.off += contact.position.distance(press.touch.position) * 1e3;
+                    seen.off_n += (contact.force - press.touch.force).abs();
+                }
+            } else if now > released + 0.3 {
+                seen.rested += 1.0;
+                let shown = update.contact.is_some();
+                seen.ghosts += f64::from(u8::from(shown));
+                seen.ghost_events += u32::from(shown && !ghost);
+                ghost = shown;
+            }
+        });
+        println!(
+            "shown {:.4} of {}, {:.2} mm, {:.2} N off; ghosts {} ({} times) of {}",
+            seen.shown / seen.pressed,
+            seen.pressed,
+            seen.off / seen.shown,
+            seen.off_n / seen.shown,
+            seen.ghosts,
+            seen.ghost_events,
+            seen.rested
+        );
+        seen
+    }
+}
+
+pub fn press(number: usize, force: f64, from: f64, lasts: f64) -> Press {
+    Press {
+        touch: touches(40, 11, force)[number],
+        from,
+        lasts,
+        ramp: 0.08,
+    }
+}
+
+#[test]
+fn a_standing_touch_outlives_a_drift() {
+    let mut all = Vec::new();
+    for (drift, uneven) in [(0.0, 0.0), (2e-6, 0.0), (2e-6, 0.1)] {
+        let world = World {
+            drift,
+            uneven,
+            ..CALM
+        };
+        for number in [0, 3, 5, 9] {
+            print!("{drift:e} {uneven} press {number}: ");
+            all.push(Seen::of(world, &[press(number, 1.0, 20.0, 120.0)], 146.0));
+        }
+    }
+    for seen in all {
+        assert!(
+            seen.shown > 0.99 * seen.pressed && seen.ghosts == 0.0,
+            "{seen:?}"
+        );
+    }
+}
+
+#[test]
+fn light_touches_are_felt_under_any_drift() {
+    let mut all = Vec::new();
+    for (drift, uneven) in [
+        (0.0, 0.0),
+        (2e-6, 0.0),
+        (5e-6, 0.0),
+        (5e-6, 0.1),
+        (-5e-6, 0.3),
+    ] {
+        let world = World {
+            drift,
+            uneven,
+            ..CALM
+        };
+        let at = |k: usize| 4.0 + 2.0 * k as f64;
+        let presses: Vec<Press> = (0..20).map(|k| press(k, 1.5, at(k), 0.7)).collect();
+        print!("{drift:e} {uneven}: ");
+        all.push(Seen::of(world, &presses, 45.0));
+    }
+    for seen in all {
+        assert!(
+            seen.shown > 0.9 * seen.pressed && seen.ghosts == 0.0,
+            "{seen:?}"
+        );
+    }
+}
+
+#[test]
+fn nothing_is_left_of_a_touch_that_crept() {
+    let mut all = Vec::new();
+    for (creep, force) in [(0.0, 15.0), (0.0, 45.0), (0.01, 15.0), (0.03, 15.0)] {
+        let world = World { creep, ..CALM };
+        let at = |k: usize| 4.0 + 15.0 * k as f64;
+        let presses: Vec<Press> = (0..4).map(|k| press(k, force, at(k), 10.0)).collect();
+        print!("{creep} {force} N: ");
+        all.push(Seen::of(world, &presses, 64.0));
+    }
+    for seen in all {
+        assert!(
+            seen.shown > 0.99 * seen.pressed && seen.ghosts == 0.0,
+            "{seen:?}"
+        );
+    }
+}
+
+#[test]
+fn rest_is_quiet() {
+    let mut all = Vec::new();
+    for (noise, bits) in [(0.1e-6, 24), (1e-6, 12), (4e-6, 16)] {
+        for drift in [0.0, 2e-6, 5e-6] {
+            let world = World {
+                noise,
+                bits,
+                drift,
+                uneven: 0.1,
+                ..CALM
+            };
+            print!("{noise:e} {bits} {drift:e}: ");
+            all.push(Seen::of(world, &[], 120.0));
+        }
+    }
+    assert!(all.iter().all(|seen| seen.ghosts == 0.0), "{all:?}");
+}
+
+#[test]
+fn mains_hum_is_no_touch() {
+    let mut all = Vec::new();
+    for (hum, hum_hz) in [(5e-6, 50.03), (20e-6, 49.95), (20e-6, 60.02)] {
+        let world = World {
+            hum,
+            hum_hz,
+            ..CALM
+        };
+        let at = |k: usize| 4.0 + 2.0 * k as f64;
+        let presses: Vec<Press> = (0..20).map(|k| press(k, 1.5, at(k), 0.7)).collect();
+        print!("{hum:e} {hum_hz}: ");
+        all.push(Seen::of(world, &presses, 45.0));
+        print!("untouched: ");
+        all.push(Seen::of(world, &[], 60.0));
+    }
+    for seen in all {
+        assert!(
+            seen.shown >= 0.99 * seen.pressed && seen.ghosts == 0.0,
+            "{seen:?}"
+        );
+    }
+}
+
+/// However steep, a touch is no noise of a gauge, and no gauge that says nothing.
+#[test]
+fn taps_lose_no_gauge() {
+    for (noise, bits) in [(0.1e-6, 24), (1e-6, 16), (8e-6, 16)] {
+        let world = World {
+            bits,
+            noise,
+            ..CALM
+        };
+        let tap = |k: usize| Press {
+            ramp: 0.002,
+            ..press(k % 40, 8.0, 3.0 + 0.5 * k as f64, 0.25)
+        };
+        let taps: Vec<Press> = (0..60).map(tap).collect();
+        let (mut lost, mut found, mut off) = (0, 0.0, 0.0);
+        run(world, &taps, 34.0, |now, update, tap| {
+            lost += usize::from(update.strain.is_some() && update.good < 10);
+            let settled = tap.filter(|tap| now > tap.from + 0.05 && tap.share(now) == 1.0);
+            if let (Some(tap), Some(contact)) = (settled, update.contact) {
+                found += 1.0;
+                off += contact.position.distance(tap.touch.position) * 1e3;
+            }
+        });
+        println!(
+            "{noise:e}: {lost} lost, {:.2} mm off in {found}",
+            off / found
+        );
+        assert!(lost == 0 && found > 60.0 * 190.0 && off / found < 2.0);
+    }
+}
