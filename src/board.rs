@@ -5,6 +5,7 @@
 mod fault;
 mod script;
 
+use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -45,6 +46,14 @@ pub struct Truth {
     pub time_us: u64,
     /// The touch at that moment; absent where nothing touches.
     pub touch: Option<Touch>,
+}
+
+impl Truth {
+    /// Where and how hard (m, N).
+    #[must_use]
+    pub fn place(&self) -> Option<(DVec3, f64)> {
+        self.touch.map(|t| (t.position, t.force))
+    }
 }
 
 /// The board between two calls.

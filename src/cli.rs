@@ -2,6 +2,7 @@
 
 pub mod advise;
 pub mod board;
+pub mod calibrate;
 mod common;
 pub mod data;
 pub mod design;
@@ -72,6 +73,8 @@ pub enum Command {
     Board(board::BoardArgs),
     /// Where a board's part is touched, one JSON object a line.
     Listen(listen::ListenArgs),
+    /// How the gauges are really glued, from presses at known places.
+    Calibrate(calibrate::CalibrateArgs),
     /// Writes a bundled limb, or another of its family.
     Limb(limb::LimbArgs),
 }

@@ -10,6 +10,7 @@ mod serial;
 mod session;
 mod socket;
 mod table;
+mod truths;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -21,6 +22,7 @@ pub use recorded::{check_length, record};
 pub use recording::{Recorder, old_note};
 pub use session::{Command, Connection, Listener, SessionEvent, State, Timing};
 pub use table::{Table, write_table};
+pub use truths::Truths;
 
 /// Where a board is found.
 #[derive(Clone, Debug, PartialEq, Eq)]

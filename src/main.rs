@@ -54,6 +54,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Some(Command::Render(args)) => render(args),
         Some(Command::Board(args)) => cli::board::run(args),
         Some(Command::Listen(args)) => cli::listen::run(args),
+        Some(Command::Calibrate(args)) => cli::calibrate::run(args),
         Some(Command::Limb(args)) => cli::limb::run(args),
         None => open_studio(cli),
     }

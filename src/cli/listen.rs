@@ -17,7 +17,7 @@ use super::common::Common;
 use super::ranges::between;
 use super::spared::Spared;
 use super::{out, progress::Bar};
-use crate::design;
+use crate::design::{self, Sensing};
 use crate::io::project_file::LoadedProject;
 use crate::link::{Address, BAUD, Command, Listener, Pace, Recorder, SessionEvent, State, Table};
 use crate::live::{Pipeline, Sample, Update};
@@ -111,7 +111,7 @@ fn load(args: &ListenArgs) -> anyhow::Result<LoadedProject> {
     let loaded = common.load()?;
     let project = &loaded.inputs.project;
     project.check()?;
-    project.live.check_gauges(project.selection.sites.len())?;
+    project.live.check_gauges(&project.selection.sites)?;
     Ok(loaded)
 }
 
@@ -124,19 +124,29 @@ fn spared(loaded: &LoadedProject, address: &Address) -> Spared {
     Spared::of(loaded).and("the recording itself", recording)
 }
 
-fn pipeline(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Pipeline> {
-    let project = &loaded.inputs.project;
+/// The model of a project's gauges, with its progress on stderr.
+///
+/// # Errors
+/// As [`design::sensing`].
+pub(super) fn sensing_for(common: &Common, loaded: &LoadedProject) -> anyhow::Result<Sensing> {
     let bar = Bar::default();
-    let sensing = args.common.in_pool(|| {
+    let sensing = common.in_pool(|| {
         let watch = |p| bar.show(p);
-        Ok(design::sensing(
-            &loaded.inputs,
-            &project.budget.budget(),
-            &watch,
-        )?)
+        let budget = loaded.inputs.project.budget.budget();
+        Ok(design::sensing(&loaded.inputs, &budget, &watch)?)
     });
     bar.finish();
-    let sensing = sensing?;
+    sensing
+}
+
+/// Takes orders from standard input.
+pub(super) fn obey_stdin(commands: Sender<Command>) {
+    from_stdin(commands, say);
+}
+
+fn pipeline(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Pipeline> {
+    let project = &loaded.inputs.project;
+    let sensing = sensing_for(&args.common, loaded)?;
     let gauges = sensing.gauges.len();
     Ok(Pipeline::new(
         sensing.map_for(&project.live),

@@ -17,13 +17,15 @@ use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::elasticity::{Model, Touch};
 use crate::inference::{AsDrawn, Deviations};
 use crate::live::GaugeModel;
-use crate::project::{LiveKeys, Project};
+use crate::project::{ChosenSite, LiveKeys, Project};
 use crate::uncertainty::{Gluing, Uncertainty};
 
 /// A model of the chosen gauges, without the stiffness it came from.
 pub struct Sensing {
     /// The gauges, a channel each.
     pub gauges: Vec<Gauge>,
+    /// Where the project says that they lie.
+    pub sites: Vec<ChosenSite>,
     /// What nodal forces make them read.
     pub sensitivity: Arc<Sensitivity>,
     /// Readings everywhere, as drawn and as they change with the way gauges are glued.
@@ -103,6 +105,7 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
     let drawn = drawn_on(&*graded.model, &gauges, &mesh, tip, watch)?;
     let proposed = proposed(&drawn.map.mesh, inputs)?;
     Ok(Sensing {
+        sites: project.selection.sites.clone(),
         gauges,
         sensitivity: Arc::new(sensitivity),
         deviations: drawn.deviations(&off),
@@ -216,20 +219,19 @@ impl Sensing {
     /// What gauges read as the project knows them to be glued.
     #[must_use]
     pub fn map_for(&self, live: &LiveKeys) -> GaugeModel {
-        let gauges = self.gauges.len();
         let off = Uncertainty {
             stiffness: live.stiffness_percent / 100.0,
             allowed: live.friction_percent / 100.0,
             ..self.off
         };
-        let Some(glued) = live.glued(gauges) else {
+        let Some(glued) = live.glued(&self.sites) else {
             return GaugeModel {
                 map: Arc::clone(&self.drawn.map),
                 deviations: Some(self.deviations.clone()),
                 off,
             };
         };
-        let doubts = live.doubts(gauges);
+        let doubts = live.doubts(&self.sites);
         let deviations = doubts.map(|doubts| self.drawn.deviations_of(&doubts, &off));
         GaugeModel {
             map: Arc::new(self.drawn.glued(&glued)),

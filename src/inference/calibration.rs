@@ -27,6 +27,10 @@
 //! as some readings more, because a few presses say little of it. What is not known afterwards is the inverse of the normal
 //! matrix: never more than before, so that presses that say nothing leave everything as it was.
 
+mod judged;
+
+pub use judged::{Outlook, misfits, outlook};
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +47,7 @@ pub struct Known {
     pub at: SurfacePoint,
     /// N.
     pub force: f64,
-    /// Strain, a channel each: the mean of [`SAMPLES`].
+    /// Strain, a channel each: the mean of [`SAMPLES`]. No number of a channel that could not be trusted then.
     pub reading: Vec<f64>,
 }
 
@@ -75,13 +79,17 @@ pub fn noise_of_mean(noise: &[f64]) -> Vec<f64> {
 
 /// Model and gauges are never trusted better than this.
 const LEAST: f64 = 0.002;
+/// Channels that a touch must have been read by: place and force are three numbers.
+const FEWEST: usize = 3;
+/// Variance of a channel that was not read (strain²): it says nothing.
+const UNREAD: f64 = 1.0;
 /// Times that the slopes are taken at what was found.
 const TURNS: usize = 3;
 /// Readings that the estimate of the elements' error counts for.
 const BEFORE: f64 = 10.0;
 
 /// Fits all channels to known touches with this noise of a sample (strain, a channel each); `off` is what is known of everything
-/// else that is off. Touches that read no numbers are left out.
+/// else that is off. Channels that read no numbers say nothing, nor do touches of which hardly any channel does.
 #[must_use]
 pub fn calibrate(
     drawn: &AsDrawn,
@@ -90,29 +98,15 @@ pub fn calibrate(
     off: &Uncertainty,
 ) -> Calibration {
     let noise = &noise_of_mean(noise);
-    let read = |k: &&Known| k.reading.iter().all(|x| x.is_finite());
+    let read = |k: &&Known| k.reading.iter().filter(|x| x.is_finite()).count() >= FEWEST;
     let known: Vec<&Known> = known.iter().filter(read).collect();
+    let Fitted {
+        glued,
+        relative,
+        fit,
+    } = fitted(drawn, &known, noise, off);
     let channels = noise.len();
-    let mut glued = vec![[1.0, 0.0, 0.0, 0.0]; channels];
-    let mut relative = off.elements.max(LEAST);
-    let mut found = None;
-    for _ in 0..TURNS {
-        let presses: Vec<Press> = (known.iter())
-            .map(|k| Press::new(drawn, k, &glued, off))
-            .collect();
-        let least = Least {
-            presses: &presses,
-            noise,
-            off,
-        };
-        relative = least.share_left();
-        let Some(fit) = least.fit(relative) else {
-            break;
-        };
-        glued = fit.glued();
-        found = Some(fit);
-    }
-    let doubts = found.map_or_else(
+    let doubts = fit.map_or_else(
         || vec![doubt(&off.gluing); channels],
         |fit| fit.doubts(channels),
     );
@@ -125,12 +119,48 @@ pub fn calibrate(
     }
 }
 
+/// What was fitted, with the share of the readings that the model leaves.
+struct Fitted {
+    glued: Vec<[f64; 4]>,
+    relative: f64,
+    /// Nothing where numbers overflow.
+    fit: Option<Fit>,
+}
+
+/// By the noise of each press (strain, a channel each).
+fn fitted(drawn: &AsDrawn, known: &[&Known], noise: &[f64], off: &Uncertainty) -> Fitted {
+    let mut fitted = Fitted {
+        glued: vec![[1.0, 0.0, 0.0, 0.0]; noise.len()],
+        relative: off.elements.max(LEAST),
+        fit: None,
+    };
+    for _ in 0..TURNS {
+        let presses: Vec<Press> = (known.iter())
+            .map(|k| Press::new(drawn, k, &fitted.glued, off))
+            .collect();
+        let least = Least {
+            presses: &presses,
+            noise,
+            off,
+        };
+        fitted.relative = least.share_left();
+        let Some(fit) = least.fit(fitted.relative) else {
+            break;
+        };
+        fitted.glued = fit.glued();
+        fitted.fit = Some(fit);
+    }
+    fitted
+}
+
 /// Unknowns of one gauge: gain, along, across, turned.
 const PER_GAUGE: usize = 4;
 
 /// One press, ready to be compared.
-struct Press<'a> {
-    reading: &'a [f64],
+struct Press {
+    /// What is expected, of channels that were not read.
+    reading: Vec<f64>,
+    read: Vec<bool>,
     /// What each of θ says of each channel.
     basis: Vec<Vector4<f64>>,
     /// Slopes over the place and the share of the force, and over all else that is off with the way it was made, each
@@ -138,9 +168,18 @@ struct Press<'a> {
     moved: DMatrix<f64>,
 }
 
-impl<'a> Press<'a> {
-    fn new(drawn: &AsDrawn, known: &'a Known, glued: &[[f64; 4]], off: &Uncertainty) -> Self {
+impl Press {
+    fn new(drawn: &AsDrawn, known: &Known, glued: &[[f64; 4]], off: &Uncertainty) -> Self {
         let basis = drawn.basis(known.at);
+        let pairs = known.reading.iter().zip(&basis);
+        let or_expected = |(x, b): (&f64, &Vector4<f64>)| {
+            if x.is_finite() {
+                *x
+            } else {
+                known.force * b[0]
+            }
+        };
+        let read_or_expected = pairs.map(or_expected).collect();
         let Slope {
             reading, change, ..
         } = drawn.slope(known.at, glued);
@@ -149,7 +188,8 @@ impl<'a> Press<'a> {
         let force = off.pressing.force * known.force;
         let made = drawn.nuisances(off.making_of_presses()).at(known.at);
         Self {
-            reading: &known.reading,
+            reading: read_or_expected,
+            read: known.reading.iter().map(|x| x.is_finite()).collect(),
             basis: basis.into_iter().map(|b| b * known.force).collect(),
             moved: DMatrix::from_fn(reading.len(), 3 + made.len(), |c, k| match k {
                 0 => place * change[c].x,
@@ -167,11 +207,11 @@ impl<'a> Press<'a> {
 
     /// Covariance of its residuals, factored.
     fn covariance(&self, errors: &Errors, drift: f64) -> Option<Cholesky<f64, Dyn>> {
-        let weights = errors.weights(self.reading, &vec![true; self.reading.len()]);
+        let weights = errors.weights(&self.reading, &self.read);
         let mut covariance = &self.moved * self.moved.transpose();
         covariance.add_scalar_mut(drift * drift);
         for (c, w) in weights.iter().enumerate() {
-            covariance[(c, c)] += w.recip();
+            covariance[(c, c)] += if self.read[c] { w.recip() } else { UNREAD };
         }
         covariance.cholesky()
     }
@@ -195,7 +235,7 @@ impl<'a> Press<'a> {
         right: &mut DVector<f64>,
         inverse: &DMatrix<f64>,
     ) -> f64 {
-        let left = DVector::from_column_slice(self.reading) - self.expected();
+        let left = DVector::from_column_slice(&self.reading) - self.expected();
         let weighed = inverse * &left;
         let rows: Vec<_> = (0..self.basis.len()).map(|c| self.unknowns(c)).collect();
         for (a, row) in rows.iter().enumerate() {
@@ -214,7 +254,7 @@ impl<'a> Press<'a> {
 
 /// The least squares of all presses.
 struct Least<'a> {
-    presses: &'a [Press<'a>],
+    presses: &'a [Press],
     noise: &'a [f64],
     off: &'a Uncertainty,
 }
@@ -274,7 +314,8 @@ impl Least<'_> {
 
     /// The share of the readings that the model leaves: where residuals are as large as they ought to be.
     fn share_left(&self) -> f64 {
-        let readings = (self.presses.len() * self.noise.len()) as f64;
+        let read = self.presses.iter().flat_map(|p| &p.read);
+        let readings = read.filter(|r| **r).count() as f64;
         let estimated = self.off.elements.max(LEAST);
         let excess = |relative: f64| {
             let squares = self.fit(relative).map_or(readings, |fit| fit.squares);

@@ -89,6 +89,63 @@ pub fn read_presses(path: &Path) -> Result<Vec<GivenPress>, FileError> {
     })
 }
 
+/// Where somebody is asked to press.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AskedPoint {
+    /// m.
+    pub position: DVec3,
+    /// N, where it is known.
+    pub force: Option<f64>,
+    /// From when to when (s), in a recording whose presses were made at known times.
+    pub during_s: Option<[f64; 2]>,
+}
+
+impl AskedPoint {
+    /// A place (m), of which nothing else is known.
+    #[must_use]
+    pub fn at(position: DVec3) -> Self {
+        Self {
+            position,
+            force: None,
+            during_s: None,
+        }
+    }
+}
+
+/// Reads where to press: `x_mm,y_mm,z_mm`, and where they are known `force_n`, `start_s` and `duration_s`. Further columns
+/// are ignored.
+///
+/// # Errors
+/// [`FileError`] naming the file, the line and the column.
+pub fn read_points(path: &Path) -> Result<Vec<AskedPoint>, FileError> {
+    let table = Table::read(path)?;
+    let more = [
+        table.column("force_n")?,
+        table.column("start_s")?,
+        table.column("duration_s")?,
+    ];
+    let take = |row: &Row, [x, y, z]: [f64; 3]| {
+        let number = |column: Option<usize>| column.map(|c| row.number(c)).transpose();
+        let [force, start, duration] = [number(more[0])?, number(more[1])?, number(more[2])?];
+        let force = force.map(|f| ranged(row, "force_n", f, &PRESSES, "above zero"));
+        let during = start.zip(duration).map(|(start, duration)| {
+            let start = ranged(row, "start_s", start, &STARTS, "zero or more")?;
+            let lasts = ranged(row, "duration_s", duration, &DURATIONS, "above zero")?;
+            Ok::<_, FileError>([start, start + lasts])
+        });
+        Ok(AskedPoint {
+            position: DVec3::new(x, y, z) * 1e-3,
+            force: force.transpose()?,
+            during_s: during.transpose()?,
+        })
+    };
+    let points = taken(&table, &["x_mm", "y_mm", "z_mm"], take)?;
+    if points.is_empty() {
+        return Err(table.wrong("there is no row below the first line"));
+    }
+    Ok(points)
+}
+
 /// The line of such a table that a touch, gauge or press stands in, counted as they were read, from 0.
 #[must_use]
 pub fn line(path: &Path, number: usize) -> Option<u64> {

@@ -1,7 +1,6 @@
 //! A simulated board that is recorded instead of listened to: in its own time, as fast as it can be computed.
 
-use std::collections::VecDeque;
-
+use super::truths::Truths;
 use super::{Recorder, replay};
 use crate::board::{SimulatedBoard, Truth};
 use crate::live::{Input, Receiver, Sample};
@@ -62,7 +61,7 @@ pub fn record(
             }
             board.say(now_us, &mut bytes, |truth| {
                 tell(truth);
-                scribe.truths.push_back(truth);
+                scribe.truths.push(truth);
             });
             scribe.take(&bytes, now_us);
         }
@@ -89,10 +88,7 @@ struct Scribe {
     receiver: Receiver,
     /// Whether the board has said what it is, without which nothing else is understood.
     greeted: bool,
-    /// Of samples that have not come through yet.
-    truths: VecDeque<Truth>,
-    /// As it was written last.
-    noted: Option<Truth>,
+    truths: Truths,
 }
 
 impl Scribe {
@@ -101,8 +97,7 @@ impl Scribe {
             recorder,
             receiver: Receiver::default(),
             greeted: false,
-            truths: VecDeque::new(),
-            noted: None,
+            truths: Truths::default(),
         }
     }
 
@@ -128,20 +123,10 @@ impl Scribe {
         }
     }
 
-    /// A sample behind what was true when it was taken. Samples before it that were lost on the way leave nothing.
+    /// A sample behind what was true when it was taken.
     fn sample(&mut self, sample: &Sample) {
-        let mut truth = None;
-        while let Some(next) = self.truths.front()
-            && next.time_us <= sample.time_us
-        {
-            truth = self.truths.pop_front();
-        }
-        if let Some(truth) = truth {
-            if self.noted.is_none_or(|noted| noted.touch != truth.touch) {
-                let touch = truth.touch.map(|t| (t.position, t.force));
-                self.recorder.truth(touch);
-            }
-            self.noted = Some(truth);
+        if let Some(truth) = self.truths.at(sample.time_us) {
+            self.recorder.truth(truth.place());
         }
         self.recorder.sample(sample);
     }
@@ -197,7 +182,7 @@ mod tests {
         let path = folder.path().join("board.hapdrec");
         let mut scribe = scribe(&path);
         for (k, force) in [None, None, Some(5.0), Some(5.0), None].iter().enumerate() {
-            scribe.truths.push_back(truth(1000 * k as u64, *force));
+            scribe.truths.push(truth(1000 * k as u64, *force));
         }
         // The fourth is lost on the way, and the last comes twice.
         for k in [0, 1, 2, 4, 4] {

@@ -42,6 +42,7 @@ impl Listener {
         mut tell: impl FnMut(SessionEvent),
     ) -> Result<(), String> {
         let mut port = self.address.open()?;
+        self.remember_device();
         if self.recorder.is_some() {
             self.begin_recording();
         }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::selection::ChosenSite;
 use super::value::BadValue;
 use crate::inference::{Calibration, Chain, Doubt};
 use crate::live::Settings;
@@ -74,6 +75,23 @@ pub struct GluedKeys {
     /// What is not known of these four: the upper triangle of their covariance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance: Option<Doubt>,
+    /// Where the gauge was chosen to be (mm) and its direction, when it was found: of one that lies elsewhere this says
+    /// nothing. Absent where nobody knows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub site: Option<[f64; 6]>,
+}
+
+impl GluedKeys {
+    /// Whether it may be of a gauge that is chosen to be there.
+    fn is_of(&self, site: &ChosenSite) -> bool {
+        self.site.is_none_or(|known| known == numbers(site))
+    }
+}
+
+fn numbers(site: &ChosenSite) -> [f64; 6] {
+    let [x, y, z] = site.position_mm;
+    let [u, v, w] = site.direction;
+    [x, y, z, u, v, w]
 }
 
 impl Default for LiveKeys {
@@ -94,9 +112,9 @@ impl Default for LiveKeys {
 }
 
 impl LiveKeys {
-    /// Takes over what known touches have shown.
-    pub fn take(&mut self, calibration: &Calibration) {
-        let keys = |(glued, doubt): (&[f64; 4], &Doubt)| {
+    /// Takes over what known touches have shown of the gauges at these sites.
+    pub fn take(&mut self, calibration: &Calibration, sites: &[ChosenSite]) {
+        let keys = |((glued, doubt), site): ((&[f64; 4], &Doubt), &ChosenSite)| {
             let [gain, along_mm, across_mm, turned_degrees] = *glued;
             GluedKeys {
                 gain,
@@ -104,10 +122,11 @@ impl LiveKeys {
                 across_mm,
                 turned_degrees,
                 covariance: Some(*doubt),
+                site: Some(numbers(site)),
             }
         };
         let glued = calibration.glued.iter().zip(&calibration.doubts);
-        self.glued = glued.map(keys).collect();
+        self.glued = glued.zip(sites).map(keys).collect();
         self.model_error = calibration.relative;
     }
 
@@ -117,21 +136,27 @@ impl LiveKeys {
         self.model_error = Self::default().model_error;
     }
 
-    /// For each gauge its gain, millimetres along and across, and degrees; nothing without a calibration of
-    /// as many gauges.
+    /// For each gauge its gain, millimetres along and across, and degrees; nothing without a calibration of the gauges at
+    /// these very sites.
     #[must_use]
-    pub fn glued(&self, gauges: usize) -> Option<Vec<[f64; 4]>> {
+    pub fn glued(&self, sites: &[ChosenSite]) -> Option<Vec<[f64; 4]>> {
         let values = |g: &GluedKeys| [g.gain, g.along_mm, g.across_mm, g.turned_degrees];
-        (self.glued.len() == gauges && gauges > 0).then(|| self.glued.iter().map(values).collect())
+        (self.is_of(sites)).then(|| self.glued.iter().map(values).collect())
     }
 
-    /// What is not known of each gauge; nothing without a calibration of as many gauges that says so of all of them.
+    /// What is not known of each gauge; nothing without a calibration of these gauges that says so of all of them.
     #[must_use]
-    pub fn doubts(&self, gauges: usize) -> Option<Vec<Doubt>> {
-        if self.glued.len() != gauges || gauges == 0 {
+    pub fn doubts(&self, sites: &[ChosenSite]) -> Option<Vec<Doubt>> {
+        if !self.is_of(sites) {
             return None;
         }
         self.glued.iter().map(|g| g.covariance).collect()
+    }
+
+    /// Whether there is a calibration, and of the gauges at these sites.
+    fn is_of(&self, sites: &[ChosenSite]) -> bool {
+        let mut pairs = self.glued.iter().zip(sites);
+        self.glued.len() == sites.len() && !sites.is_empty() && pairs.all(|(g, s)| g.is_of(s))
     }
 
     /// The first two gauges (from 0) that are on one channel, and that channel.
@@ -143,11 +168,12 @@ impl LiveKeys {
         })
     }
 
-    /// Whether channels and calibration are of so many gauges; where they are not, they hold for none.
+    /// Whether channels and calibration are of the gauges at these sites; where they are not, they hold for none.
     ///
     /// # Errors
     /// [`BadValue`] naming the key.
-    pub fn check_gauges(&self, gauges: usize) -> Result<(), BadValue> {
+    pub fn check_gauges(&self, sites: &[ChosenSite]) -> Result<(), BadValue> {
+        let gauges = sites.len();
         for (key, count) in [
             ("live.channels", self.channels.len()),
             ("live.glued", self.glued.len()),
@@ -160,7 +186,17 @@ impl LiveKeys {
                 });
             }
         }
-        Ok(())
+        let pairs = self.glued.iter().zip(sites);
+        let other = pairs
+            .enumerate()
+            .find(|(_, (glued, site))| !glued.is_of(site));
+        other.map_or(Ok(()), |(k, _)| {
+            Err(BadValue {
+                key: "live.glued.site".to_owned(),
+                rule: "where its gauge is chosen to be: calibrate again, or take the tables [[live.glued]] out".into(),
+                value: format!("another place or direction for gauge {}", k + 1),
+            })
+        })
     }
 
     /// Settings of the pipeline for so many gauges.

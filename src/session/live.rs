@@ -9,7 +9,7 @@ pub use feed::{Feed, Recording, STRIPS_S, Strip};
 pub use known::{LEAST as LEAST_KNOWN, WANTED as WANTED_KNOWN};
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use super::desk::Desk;
 use super::jobs::{Task, stop};
@@ -23,7 +23,7 @@ use crate::design::{self, Inputs, Sensing, Workshop};
 use crate::document::SensingInputs;
 use crate::job::{Reporter, Stop};
 use crate::link::{
-    Address, BAUD, Command, Connection, Doorway, ENDING, Listener, Pace, host, write_table,
+    Address, BAUD, Command, Connection, Doorway, ENDING, Listener, Pace, Truths, host, write_table,
 };
 use crate::live::{Estimator, Pipeline};
 use feed::Shared;
@@ -123,7 +123,7 @@ impl Session {
         match (target, self.sensing().map(Arc::clone)) {
             (Target::Board(address), Some(sensing)) => {
                 self.live.target = None;
-                self.listen(&sensing, address);
+                self.listen(&sensing, address, None);
             }
             (Target::Board(_), None) => self.make_sensing(),
             (Target::Simulated, known) => self.make_board(known),
@@ -165,23 +165,29 @@ impl Session {
     }
 
     fn host(&mut self, sensing: &Arc<Sensing>, board: SimulatedBoard) {
-        let feed = Arc::clone(&self.live.feed);
+        let truths = Arc::new(Mutex::new(Truths::default()));
+        let known = Arc::clone(&truths);
         let told = move |truth: Truth| {
-            if let Ok(mut feed) = feed.lock() {
-                feed.take_truth(&truth);
+            if let Ok(mut known) = known.lock() {
+                known.push(truth);
             }
         };
         match doorway().open().and_then(|door| host(board, door, told)) {
             Ok(hosted) => {
                 let address = Address::parse(&hosted.port, BAUD, Pace::Real);
                 self.live.hosted = Some(hosted);
-                self.listen(sensing, address);
+                self.listen(sensing, address, Some(truths));
             }
             Err(message) => self.complain(message),
         }
     }
 
-    fn listen(&mut self, sensing: &Arc<Sensing>, address: Address) {
+    fn listen(
+        &mut self,
+        sensing: &Arc<Sensing>,
+        address: Address,
+        truths: Option<Arc<Mutex<Truths>>>,
+    ) {
         let live = self.document.state.project.live.clone();
         let mut pipeline =
             Pipeline::new(sensing.map_for(&live), live.settings(sensing.gauges.len()));
@@ -193,7 +199,7 @@ impl Session {
         let (told, over) = (Arc::clone(&feed), feed);
         let (wake, last) = (self.wake.clone(), self.wake.clone());
         let started = Connection::start(
-            Listener::new(address, pipeline),
+            Listener::new(address, pipeline).knowing(truths),
             move |heard| feed::hear(&told, &heard, &|| wake.now()),
             move |ended| {
                 if let Ok(mut feed) = over.lock() {

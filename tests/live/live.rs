@@ -70,8 +70,7 @@ fn a_simulated_board_from_start_to_replay() {
     // As drawn, the gauges are known as well as a workshop glues; known touches show how they really are.
     w.session_mut().calibrate_from_board();
     w.wait("known touches", 90, |s| {
-        s.session.live.known_touches() >= 12
-            && !s.session.document.state.project.live.glued.is_empty()
+        s.session.known_touches() >= 12 && !s.session.document.state.project.live.glued.is_empty()
     });
     let off = w.session().document.state.project.live.model_error;
     assert!(off < 0.1, "still off by {off}");

@@ -7,6 +7,7 @@
 mod window;
 
 mod board;
+mod calibrate;
 mod display;
 mod ends;
 mod firmware;

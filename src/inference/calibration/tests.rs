@@ -260,3 +260,28 @@ fn what_all_gauges_feel_of_a_tip_is_not_taken_for_gluing() {
     }
     assert!(apart[0] < 0.8 * apart[1], "{apart:?}");
 }
+
+/// A gauge that was dead while somebody pressed stays as it was drawn, with all doubt, and takes nothing from the others.
+#[test]
+fn a_channel_that_was_not_read_learns_nothing() {
+    let (drawn, off) = (drawn(), off());
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let real = drawn.glued(&built(&off.gluing, &mut rng));
+    let mut known: Vec<Known> = (0..12)
+        .map(|_| press(&real, &off.pressing, &mut rng))
+        .collect();
+    let all = calibrate(&drawn, &known, &NOISE, &off);
+    for k in &mut known {
+        k.reading[1] = f64::NAN;
+    }
+    let found = calibrate(&drawn, &known, &NOISE, &off);
+    assert_eq!(found.touches, 12);
+    let [gain, along, across, turned] = found.glued[1];
+    assert!((gain - 1.0).abs() < 0.02 && along.hypot(across).hypot(turned) < 0.02);
+    let prior = doubt(&off.gluing);
+    assert!((found.doubts[1][0] / prior[0] - 1.0).abs() < 0.05);
+    for c in (0..CHANNELS).filter(|c| *c != 1) {
+        assert!((found.glued[c][0] - all.glued[c][0]).abs() < 0.02, "{c}");
+        assert!(found.doubts[c][0] < 0.7 * prior[0], "{c}");
+    }
+}

@@ -93,13 +93,7 @@ fn full() -> Project {
         }],
     });
     p.live.channels = vec![3, 1, 2];
-    p.live.glued.push(crate::project::GluedKeys {
-        gain: 1.03,
-        along_mm: -0.25,
-        across_mm: 1.5,
-        turned_degrees: -3.25,
-        covariance: Some([1e-9, -0.5, 0.0, 1.0 / 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]),
-    });
+    p.live.glued.push(glued());
     p.evaluation.estimator = crate::evaluation::EstimatorKind::Matching;
     p.evaluation.forces_n = vec![0.5, 1.0 / 3.0 + 1.0];
     p.evaluation.regions.push(RegionKeys {
@@ -108,6 +102,17 @@ fn full() -> Project {
         box_axis: Some([0.0, 1.0, -0.25]),
     });
     p
+}
+
+fn glued() -> crate::project::GluedKeys {
+    crate::project::GluedKeys {
+        gain: 1.03,
+        along_mm: -0.25,
+        across_mm: 1.5,
+        turned_degrees: -3.25,
+        covariance: Some([1e-9, -0.5, 0.0, 1.0 / 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]),
+        site: Some([1.0, -2.5, 1.0 / 3.0, 0.0, 0.6, 0.8]),
+    }
 }
 
 #[test]

@@ -568,6 +568,11 @@ fn live(t: &mut Text, project: &Project) {
             glued.covariance.map(|c| floats(&c)),
             "of these four, what is not known: its upper triangle",
         );
+        t.maybe(
+            "site",
+            glued.site.map(|s| floats(&s)),
+            "where its gauge was chosen to be (mm), and its direction: of one elsewhere this says nothing",
+        );
     }
 }
 

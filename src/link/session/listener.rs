@@ -1,12 +1,13 @@
 //! Who listens: the commands that it takes, and the events that it reports.
 
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use glam::DVec3;
 
 use super::timing::Timing;
-use crate::link::{Address, Port, Recorder};
+use crate::link::{Address, Port, Recorder, Truths};
 use crate::live::{Doubt, Pipeline, Receiver, Rest, Sample, Traffic, Update};
 use crate::wire::{Hello, Message, encode};
 
@@ -33,7 +34,7 @@ pub enum SessionEvent<'a> {
         update: &'a Update,
         pipeline: &'a Pipeline,
     },
-    /// From a recording of a simulated board: where it is really touched (m, N).
+    /// Where a simulated board is really touched (m, N).
     Truth(Option<(DVec3, f64)>),
     /// What the board says, or how a recording was; safe to show.
     Message(&'a str),
@@ -57,8 +58,6 @@ pub enum Command {
     Rate(u16),
     Record(PathBuf),
     StopRecording,
-    /// Where a simulated board is really touched, for the recording.
-    Truth(Option<(DVec3, f64)>),
     Do(Box<dyn FnOnce(&mut Pipeline) + Send>),
 }
 
@@ -68,8 +67,12 @@ pub struct Listener {
     pub(super) pipeline: Pipeline,
     pub(super) receiver: Receiver,
     pub(super) recorder: Option<Recorder>,
+    /// Of a simulated board of our own.
+    pub(super) truths: Option<Arc<Mutex<Truths>>>,
     pub(super) timing: Timing,
     pub(super) hello: Option<Hello>,
+    /// The USB device at the port, as [`crate::link::PortInfo::identity`].
+    pub(super) device: Option<String>,
     pub(super) rate: Option<u16>,
     pub(super) state: State,
     /// When the last sample came, or the port was opened.
@@ -96,8 +99,10 @@ impl Listener {
             pipeline,
             receiver: Receiver::default(),
             recorder: None,
+            truths: None,
             timing: Timing::default(),
             hello: None,
+            device: None,
             rate: None,
             state: State::Waiting,
             last_arrival: Instant::now(),
@@ -123,6 +128,13 @@ impl Listener {
     #[must_use]
     pub fn recording(mut self, recorder: Option<Recorder>) -> Self {
         self.recorder = recorder;
+        self
+    }
+
+    /// To a simulated board that says what really touches it.
+    #[must_use]
+    pub fn knowing(mut self, truths: Option<Arc<Mutex<Truths>>>) -> Self {
+        self.truths = truths;
         self
     }
 

@@ -42,7 +42,6 @@ impl Listener {
                 self.flush_recording(tell);
                 self.recorder = None;
             }
-            Command::Truth(touch) => self.record(|r| r.truth(touch)),
             Command::Do(work) => {
                 work(&mut self.pipeline);
                 // The gauges may be on other channels now.

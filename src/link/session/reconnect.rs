@@ -1,11 +1,12 @@
-//! A board that was unplugged is looked for again, at its port and at the others.
+//! A board that was unplugged is looked for again: at its port, and where the same USB device comes back at another one. No
+//! other device of the machine is opened: that may reset it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver as Inbox;
 use std::time::{Duration, Instant};
 
 use super::listener::{Command, Listener, SessionEvent};
-use crate::link::{Address, Got, Port, ports};
+use crate::link::{Address, Got, Port, PortInfo, ports};
 use crate::live::{Input, Receiver};
 use crate::wire::Message;
 
@@ -24,6 +25,7 @@ impl Listener {
     ) -> Option<Box<dyn Port>> {
         while !stop.load(Ordering::Relaxed) {
             if let Ok(port) = self.address.open() {
+                self.remember_device();
                 return Some(port);
             }
             if let Some(port) = self.at_another_port() {
@@ -38,14 +40,27 @@ impl Listener {
         None
     }
 
+    /// Which USB device is at the port.
+    pub(super) fn remember_device(&mut self) {
+        let Address::Serial { path, .. } = &self.address else {
+            return;
+        };
+        // A name below /dev/serial/by-id stands for another one.
+        let own = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
+        let here = |p: &PortInfo| p.path == *path || own == std::path::Path::new(&p.path);
+        let port = ports().into_iter().find(here);
+        self.device = port.and_then(|p| p.identity);
+    }
+
     fn at_another_port(&mut self) -> Option<Box<dyn Port>> {
         let (Address::Serial { path, baud }, Some(board)) =
             (&self.address, self.hello.as_ref().map(|h| h.board))
         else {
             return None;
         };
-        let (path, baud) = (path.clone(), *baud);
-        for other in ports().into_iter().filter(|p| p.likely && p.path != path) {
+        let (path, baud, device) = (path.clone(), *baud, self.device.clone()?);
+        let same = |p: &PortInfo| p.path != path && p.identity.as_ref() == Some(&device);
+        for other in ports().into_iter().filter(same) {
             let address = Address::Serial {
                 path: other.path,
                 baud,

@@ -13,6 +13,9 @@ impl Listener {
     /// A recording can be replayed on its own: it begins with the board and its rest.
     pub(super) fn begin_recording(&mut self) {
         self.pipeline.begin_anew();
+        if let Some(mut truths) = self.truths.as_ref().and_then(|t| t.lock().ok()) {
+            truths.begin_anew();
+        }
         let taring = self.pipeline.is_taring();
         if taring {
             self.pipeline.tare();

@@ -49,6 +49,12 @@ impl Listener {
         if update.contact.is_some() {
             self.timing.push(arrived.elapsed().as_secs_f32() * 1e6);
         }
+        let truths = self.truths.as_ref().and_then(|t| t.lock().ok());
+        let truth = truths.and_then(|mut truths| truths.at(sample.time_us));
+        if let Some(touch) = truth.map(|truth| truth.place()) {
+            self.record(|r| r.truth(touch));
+            tell(SessionEvent::Truth(touch));
+        }
         self.record(|r| r.sample(sample));
         tell(SessionEvent::Sample {
             sample,

@@ -83,6 +83,10 @@ impl Project {
                 glued.gain,
                 glued.gain > 0.0 && sound.iter().all(|v| v.is_finite()),
             )?;
+            for &value in glued.site.iter().flatten() {
+                let rule = "three millimetres and three parts of a direction, all of them numbers";
+                check("live.glued.site", rule, value, value.is_finite())?;
+            }
             for &value in glued.covariance.iter().flatten() {
                 let known = value.abs() <= MOST_DOUBT;
                 check(
@@ -103,6 +107,7 @@ const MOST_DOUBT: f64 = 1e6;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::project::ChosenSite;
 
     #[test]
     fn a_channel_belongs_to_one_gauge() {
@@ -114,8 +119,16 @@ mod tests {
         assert_eq!(said, expected);
         project.live.channels = vec![4, 2, 0, 1];
         project.check_live().unwrap();
-        project.live.check_gauges(4).unwrap();
-        let said = project.live.check_gauges(5).unwrap_err().to_string();
+        let site = ChosenSite {
+            position_mm: [1.0, 2.0, 3.0],
+            direction: [0.0, 0.0, 1.0],
+        };
+        project.live.check_gauges(&vec![site.clone(); 4]).unwrap();
+        let said = project
+            .live
+            .check_gauges(&vec![site; 5])
+            .unwrap_err()
+            .to_string();
         assert!(
             said.contains("live.channels") && said.contains("4 for 5 gauges"),
             "{said}"

@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use crate::board::Truth;
 use crate::link::{SessionEvent, State};
 use crate::live::{Estimator, Health, Traffic, Update};
 use crate::wire::Hello;
@@ -215,11 +214,6 @@ impl Feed {
                 }
             }
         }
-    }
-
-    /// What really happens at a simulated board of our own.
-    pub fn take_truth(&mut self, truth: &Truth) {
-        self.truth = truth.touch.map(|t| (t.position, t.force));
     }
 }
 

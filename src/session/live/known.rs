@@ -9,6 +9,7 @@ use crate::inference::calibration::SAMPLES;
 use crate::inference::{Calibration, Known, calibrate};
 use crate::job::Reporter;
 use crate::session::jobs::Task;
+use crate::session::slot::{Slot, current};
 use crate::session::state::Session;
 use crate::uncertainty::{Pressing, Uncertainty};
 
@@ -23,7 +24,7 @@ impl Session {
     #[must_use]
     pub fn proposed_touch(&self) -> Option<DVec3> {
         let places = &self.sensing()?.proposed;
-        let touch = places.get(self.live.known.len() % places.len().max(1))?;
+        let touch = places.get(self.known_touches() % places.len().max(1))?;
         Some(touch.position)
     }
 
@@ -43,10 +44,17 @@ impl Session {
         self.live.gathering.truth = None;
     }
 
-    /// How many known touches there are.
+    /// How many known touches there are of these gauges.
     #[must_use]
     pub fn known_touches(&self) -> usize {
-        self.live.known.len()
+        self.known_presses().count()
+    }
+
+    /// Those that these gauges have read.
+    fn known_presses(&self) -> impl Iterator<Item = &Known> {
+        let inputs = self.document.sensing_inputs();
+        let all = self.live.known.iter();
+        all.filter_map(move |slot| current(Some(slot), &inputs))
     }
 
     /// Takes in what is read meanwhile.
@@ -102,7 +110,7 @@ impl Session {
         }
         gathering.read = Some(place);
         self.keep_known(sensing, place, force);
-        if self.live.known.len() >= WANTED {
+        if self.known_touches() >= WANTED {
             self.live.gathering.from_board = false;
             self.start_calibration();
         }
@@ -112,9 +120,15 @@ impl Session {
         let rows = std::mem::take(&mut self.live.gathering.rows);
         let mean =
             |c: usize| rows.iter().skip(1).map(|r| r[c]).sum::<f64>() / (rows.len() - 1) as f64;
-        let reading = (0..sensing.gauges.len()).map(mean).collect();
+        // What was not trusted says nothing of how it is glued.
+        let used = self.live.look(|f| f.used.clone()).unwrap_or_default();
+        let trusted = |c: usize| used.get(c).copied().unwrap_or(true);
+        let read = |c: usize| if trusted(c) { mean(c) } else { f64::NAN };
+        let reading = (0..sensing.gauges.len()).map(read).collect();
         let at = sensing.drawn.map.mesh.index().nearest(place).0;
-        self.live.known.push(Known { at, force, reading });
+        let inputs = self.document.sensing_inputs();
+        let value = Known { at, force, reading };
+        self.live.known.push(Slot { inputs, value });
     }
 
     /// Fits how the gauges are glued.
@@ -122,7 +136,7 @@ impl Session {
         let Some(sensing) = self.sensing().map(Arc::clone) else {
             return;
         };
-        let known = self.live.known.clone();
+        let known: Vec<Known> = self.known_presses().cloned().collect();
         let noise = self.live.look(|f| f.noise.clone()).unwrap_or_default();
         if known.len() < LEAST || noise.len() != sensing.gauges.len() {
             return self.complain(format!(
@@ -143,7 +157,8 @@ impl Session {
     }
 
     fn take_calibration(&mut self, found: &Calibration) {
-        self.document.state.project.live.take(found);
+        let project = &mut self.document.state.project;
+        project.live.take(found, &project.selection.sites);
         self.tell(format!(
             "Calibrated with {} known touches; what is still off is about {:.1} % of a reading",
             found.touches,

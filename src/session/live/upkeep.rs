@@ -37,11 +37,6 @@ impl Session {
         self.apply_settings();
         self.keep_trained();
         self.gather_known();
-        if let (Some(_), Some(truth)) = (&self.live.hosted, self.live.look(|f| f.truth))
-            && self.live.look(|f| f.recording.is_some()) == Some(true)
-        {
-            self.live.send(Command::Truth(truth));
-        }
     }
 
     /// Settings that were changed, or brought back by undo, reach the pipeline.

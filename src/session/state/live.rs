@@ -51,7 +51,8 @@ pub struct Live {
     pub(in crate::session) hosted: Option<Hosted>,
     pub(in crate::session) feed: Shared,
     pub(in crate::session) target: Option<Target>,
-    pub(in crate::session) known: Vec<Known>,
+    /// Known presses, with the gauges that read them: of others they say nothing.
+    pub(in crate::session) known: Vec<Slot<SensingInputs, Known>>,
     pub(in crate::session) gathering: Gathering,
     pub(in crate::session) trained: Option<Slot<SensingInputs, TrainedFor>>,
     /// For which gauges training was begun.
@@ -102,12 +103,6 @@ impl Live {
     #[must_use]
     pub fn truth(&self) -> Option<(DVec3, f64)> {
         self.look(|feed| feed.truth).flatten()
-    }
-
-    /// How many known touches there are.
-    #[must_use]
-    pub fn known_touches(&self) -> usize {
-        self.known.len()
     }
 
     /// Whether a known touch is being read, and whether off a simulated board.

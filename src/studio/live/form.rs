@@ -269,10 +269,7 @@ fn pressing(ui: &mut Ui, hand: &mut CalibrationKeys) {
 
 /// To take a known touch, and to make use of all of them.
 fn known_buttons(ask: &mut Ask<'_>, ui: &mut Ui) {
-    let (count, connected) = (
-        ask.session.live.known_touches(),
-        ask.session.live.is_connected(),
-    );
+    let (count, connected) = (ask.session.known_touches(), ask.session.live.is_connected());
     ui.label(format!("{count} known touches of {WANTED_KNOWN}"));
     ui.horizontal(|ui| {
         let (waiting, _) = ask.session.live.is_gathering();

@@ -1,0 +1,272 @@
+//! `hapdef calibrate`: how the gauges are really glued, from presses at known places.
+
+mod asked;
+mod summary;
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
+
+use anyhow::Context as _;
+use clap::Args;
+
+use super::common::Common;
+use super::listen::sensing_for;
+use super::ranges::between;
+use super::spared::Spared;
+use super::{listen, out};
+use crate::design::Sensing;
+use crate::elasticity::Touch;
+use crate::inference::calibration::{Outlook, misfits, outlook};
+use crate::inference::{Calibration, Known, calibrate};
+use crate::io::points::{AskedPoint, read_points};
+use crate::io::project_file::{self, LoadedProject};
+use crate::link::{Address, BAUD, Listener, Pace, SessionEvent};
+use crate::live::Pipeline;
+use crate::mesh::SurfacePoint;
+use crate::uncertainty::{Pressing, Uncertainty};
+
+use asked::Asked;
+use summary::{Row, Summary};
+
+/// A calibration needs as many presses at least.
+const LEAST: usize = 4;
+/// Weighted squares a channel beyond which a press does not fit the others.
+const MISFIT: f64 = 4.0;
+
+#[derive(Args, Debug, Clone)]
+pub struct CalibrateArgs {
+    /// A serial port, HOST:PORT, or a recording (.hapdrec).
+    #[arg(required_unless_present = "recording")]
+    pub port: Option<String>,
+    /// A recording of the presses (.hapdrec), in place of a port.
+    #[arg(long, conflicts_with = "port")]
+    pub recording: Option<PathBuf>,
+    /// Project with the chosen gauges; the bundled limb when left out.
+    #[arg(long = "project")]
+    pub from: Option<PathBuf>,
+    #[command(flatten)]
+    pub common: Common,
+    /// Where to press, in this order (.csv): `x_mm,y_mm,z_mm`, and where they are known `force_n`, `start_s` and
+    /// `duration_s`; twelve places that are spread over the part when left out.
+    #[arg(long, alias = "presses")]
+    pub points: Option<PathBuf>,
+    /// How hard each press is, where the points do not say it (N).
+    #[arg(long, default_value_t = 10.0, value_parser = between(0.01, 1e4))]
+    pub force: f64,
+    /// A machine presses: places and forces are exact.
+    #[arg(long)]
+    pub machine: bool,
+    /// Use presses that do not fit the others too.
+    #[arg(long)]
+    pub keep_all: bool,
+    /// Rate of a serial port (baud); native USB does not care.
+    #[arg(long, default_value_t = BAUD, value_parser = clap::value_parser!(u32).range(50..=20_000_000))]
+    pub baud: u32,
+    /// Where the calibrated project is written; over the project itself when left out.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Write the presses with their readings here too (.csv).
+    #[arg(long)]
+    pub table: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
+    let mut common = args.common.clone();
+    common.project = args.from.clone().or(common.project);
+    let loaded = common.load()?;
+    loaded.inputs.project.check()?;
+    let target = target(args, &loaded)?;
+    let points = (args.points.as_deref()).map_or(Ok(Vec::new()), read_points)?;
+    let source = match (&args.port, &args.recording) {
+        (Some(port), _) => port.clone(),
+        (None, recording) => recording.clone().unwrap_or_default().display().to_string(),
+    };
+    let address = Address::parse(&source, args.baud, Pace::Fast);
+    let recording = match &address {
+        Address::Recording { path, .. } => Some(path.as_path()),
+        _ => None,
+    };
+    let spared = Spared::of(&loaded).and("the recording itself", recording);
+    let spared = spared.and("the points", args.points.as_deref());
+    spared.check("--table", args.table.as_deref())?;
+    address.check().map_err(anyhow::Error::msg)?;
+    let sensing = sensing_for(&common, &loaded)?;
+    let points = on_part(points, &sensing, args.force);
+    let off = off_with(&loaded, &sensing, args.machine);
+    let read = read(address, &loaded, &sensing, points)?;
+    let found = fit((&sensing, &loaded), read, &off, args)?;
+    if let Some(path) = &args.table {
+        summary::write_table(path, &found.rows)?;
+    }
+    save(&loaded, &target, &found.calibration)?;
+    found.print(&sensing, &target, args.common.json)
+}
+
+/// Which file the calibrated project goes to.
+fn target(args: &CalibrateArgs, loaded: &LoadedProject) -> anyhow::Result<PathBuf> {
+    if let Some(out) = &args.out {
+        return Ok(project_file::with_ending(out));
+    }
+    let own = !loaded.bundled && loaded.path.is_file();
+    anyhow::ensure!(
+        own,
+        "the calibration goes into a project file, and there is none yet: name one with --out"
+    );
+    Ok(loaded.path.clone())
+}
+
+/// What is known of the presses and of all else.
+fn off_with(loaded: &LoadedProject, sensing: &Sensing, machine: bool) -> Uncertainty {
+    let mut off = Uncertainty {
+        elements: sensing.off.elements,
+        ..loaded.inputs.project.uncertainty()
+    };
+    if machine {
+        off.pressing = Pressing::EXACT;
+    }
+    off
+}
+
+/// The points on the part's surface, with a force each; those that are proposed where none are given.
+fn on_part(points: Vec<AskedPoint>, sensing: &Sensing, force: f64) -> Vec<AskedPoint> {
+    let map = &sensing.drawn.map;
+    let mut points = points;
+    if points.is_empty() {
+        let proposed = sensing.proposed.iter();
+        points.extend(proposed.map(|touch| AskedPoint::at(touch.position)));
+    }
+    for point in &mut points {
+        let (at, _) = map.mesh.index().nearest(point.position);
+        point.position = map.mesh.point(at);
+        point.force.get_or_insert(force);
+    }
+    points
+}
+
+/// One press after another, as they are made.
+fn read(
+    address: Address,
+    loaded: &LoadedProject,
+    sensing: &Sensing,
+    points: Vec<AskedPoint>,
+) -> anyhow::Result<Asked> {
+    let project = &loaded.inputs.project;
+    let settings = project.live.settings(sensing.gauges.len());
+    let mut plain = project.live.clone();
+    // What an earlier calibration found is not to be taken for how they were drawn.
+    plain.forget();
+    let pipeline = Pipeline::new(sensing.map_for(&plain), settings);
+    let (commands, inbox) = channel();
+    let prompts = !matches!(address, Address::Recording { .. });
+    if prompts {
+        listen::obey_stdin(commands);
+    }
+    let mut asked = Asked::new(points, prompts);
+    let stop = AtomicBool::new(false);
+    let ended = Listener::new(address, pipeline).run(&stop, &inbox, |event| {
+        if let SessionEvent::Message(text) | SessionEvent::Trouble(text) = &event {
+            out::say(&format!("hapdef: {text}"));
+        }
+        if let SessionEvent::Sample {
+            update, pipeline, ..
+        } = event
+        {
+            asked.take(update, pipeline);
+        }
+        if asked.is_done() {
+            stop.store(true, Ordering::Relaxed);
+        }
+    });
+    ended.map_err(anyhow::Error::msg)?;
+    Ok(asked)
+}
+
+/// Fits the gauges to the presses that fit each other.
+fn fit(
+    (sensing, loaded): (&Sensing, &LoadedProject),
+    read: Asked,
+    off: &Uncertainty,
+    args: &CalibrateArgs,
+) -> anyhow::Result<Summary> {
+    let noise = read.noise.clone();
+    let mut rows = read.rows(&sensing.drawn.map.mesh);
+    let count = |rows: &[Row]| rows.iter().filter(|r| r.used).count();
+    let read = count(&rows);
+    anyhow::ensure!(
+        read >= LEAST,
+        "a calibration takes {LEAST} presses that were read, and there are {read}: press for a second at each place, and let go between"
+    );
+    loop {
+        let used: Vec<usize> = (0..rows.len()).filter(|&k| rows[k].used).collect();
+        let known: Vec<Known> = (used.iter())
+            .filter_map(|&k| rows[k].known.clone())
+            .collect();
+        for (&k, misfit) in used
+            .iter()
+            .zip(misfits(&sensing.drawn, &known, &noise, off))
+        {
+            rows[k].misfit = Some(misfit);
+        }
+        let worst = (used.iter().copied()).max_by(|&a, &b| {
+            rows[a]
+                .misfit
+                .unwrap_or(0.0)
+                .total_cmp(&rows[b].misfit.unwrap_or(0.0))
+        });
+        match worst.filter(|&k| rows[k].misfit > Some(MISFIT)) {
+            Some(k) if !args.keep_all && used.len() > LEAST => rows[k].leave_out(
+                "it does not fit the others: pressed elsewhere, or not as hard as it says".into(),
+            ),
+            _ => {
+                let calibration = calibrate(&sensing.drawn, &known, &noise, off);
+                let (found, uncertain) = ((&known[..], &calibration), (&noise[..], off));
+                let outlook = next((sensing, loaded), found, uncertain, args.force)?;
+                return Ok(Summary {
+                    rows,
+                    calibration,
+                    outlook,
+                });
+            }
+        }
+    }
+}
+
+/// Where to press next, among places that a finger reaches.
+fn next(
+    (sensing, loaded): (&Sensing, &LoadedProject),
+    found: (&[Known], &Calibration),
+    uncertain: (&[f64], &Uncertainty),
+    force: f64,
+) -> anyhow::Result<Outlook> {
+    const PLACES: usize = 96;
+    let mesh = &sensing.drawn.map.mesh;
+    let touches = sensing.touches(&loaded.inputs, PLACES, 0, true)?;
+    let at = |touch: &Touch| mesh.index().nearest(touch.position).0;
+    let places: Vec<SurfacePoint> = touches.iter().map(at).collect();
+    Ok(outlook(&sensing.drawn, found, uncertain, &places, force))
+}
+
+/// Writes the project with what was found, and nothing else changed.
+fn save(loaded: &LoadedProject, target: &Path, found: &Calibration) -> anyhow::Result<()> {
+    let own = !loaded.bundled && loaded.path.is_file();
+    let fresh = own.then(|| project_file::load(&loaded.path)).transpose()?;
+    let mut project = fresh.map_or_else(|| loaded.inputs.project.clone(), |l| l.inputs.project);
+    project
+        .live
+        .take(found, &loaded.inputs.project.selection.sites);
+    let folder = target.parent().unwrap_or(Path::new("."));
+    let mesh = if loaded.bundled {
+        crate::io::examples::write_bundled_mesh(folder, &loaded.mesh_path)?
+    } else {
+        loaded.mesh_path.clone()
+    };
+    project.part.mesh = project_file::relative_to(target, &mesh);
+    let painted = loaded.inputs.painted.as_ref().map(|p| &p[..]);
+    project_file::save(target, &project, painted, &loaded.inputs.masks)
+        .with_context(|| "the calibration could not be saved".to_owned())
+}

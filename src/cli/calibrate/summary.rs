@@ -1,0 +1,136 @@
+//! What a calibration found, for people, for programs, and as a table of its presses.
+
+use std::path::Path;
+
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use crate::cli::out;
+use crate::design::Sensing;
+use crate::inference::calibration::Outlook;
+use crate::inference::{Calibration, Known};
+use crate::io::atomic;
+use crate::io::table::Writing;
+
+/// One press.
+pub struct Row {
+    /// mm.
+    pub place: DVec3,
+    /// N.
+    pub force: f64,
+    pub used: bool,
+    /// Absent where nothing was read.
+    pub known: Option<Known>,
+    /// Weighted squares a channel, by what the others foresee.
+    pub misfit: Option<f64>,
+    /// Why it is not used.
+    pub why: Option<String>,
+}
+
+impl Row {
+    /// Leaves it out.
+    pub fn leave_out(&mut self, why: String) {
+        (self.used, self.why) = (false, Some(why));
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "x_mm": rounded(self.place.x),
+            "y_mm": rounded(self.place.y),
+            "z_mm": rounded(self.place.z),
+            "force_n": self.force,
+            "used": self.used,
+            "misfit": self.misfit.map(rounded),
+            "why": self.why,
+        })
+    }
+}
+
+/// What was found.
+pub struct Summary {
+    pub rows: Vec<Row>,
+    pub calibration: Calibration,
+    pub outlook: Outlook,
+}
+
+impl Summary {
+    /// Says it.
+    ///
+    /// # Errors
+    /// When it cannot be printed.
+    pub fn print(&self, sensing: &Sensing, target: &Path, as_json: bool) -> anyhow::Result<()> {
+        let percent: Vec<f64> = (self.outlook.doubts.iter())
+            .map(|share| rounded(100.0 * share))
+            .collect();
+        let worth = self.outlook.worth();
+        let mesh = &sensing.drawn.map.mesh;
+        let places: Vec<DVec3> = (self.outlook.places.iter().take(worth))
+            .map(|&at| mesh.point(at) * 1e3)
+            .collect();
+        if as_json {
+            let next: Vec<Value> = (places.iter())
+                .map(|p| json!([rounded(p.x), rounded(p.y), rounded(p.z)]))
+                .collect();
+            let summary = json!({
+                "version": env!("CARGO_PKG_VERSION"),
+                "project": target.display().to_string(),
+                "presses": self.rows.iter().map(Row::json).collect::<Vec<_>>(),
+                "used": self.calibration.touches,
+                "model_error_percent": rounded(100.0 * self.calibration.relative),
+                "unknown_percent": percent,
+                "worth_more": worth,
+                "next_mm": next,
+            });
+            return out::line(&summary.to_string());
+        }
+        for (k, row) in self.rows.iter().enumerate() {
+            if let Some(why) = &row.why {
+                out::line(&format!("press {} was left out: {why}", k + 1))?;
+            }
+        }
+        out::line(&format!(
+            "calibrated with {} presses: of a reading, {:.2} % is not known of the gauges, and {:.2} % is left by the model",
+            self.calibration.touches,
+            percent[0],
+            100.0 * self.calibration.relative
+        ))?;
+        if worth > 0 {
+            let after = percent[worth.min(percent.len() - 1)];
+            let p = places[0];
+            out::line(&format!(
+                "{worth} presses more would leave {after:.2} % instead; the next one best at ({:.1}, {:.1}, {:.1}) mm",
+                p.x, p.y, p.z
+            ))?;
+        }
+        out::line(&format!("saved in {}", target.display()))
+    }
+}
+
+fn rounded(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
+
+/// The presses with what each gauge read.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_table(path: &Path, rows: &[Row]) -> anyhow::Result<()> {
+    let gauges = (rows.iter())
+        .find_map(|r| Some(r.known.as_ref()?.reading.len()))
+        .unwrap_or(0);
+    let head = ["x_mm", "y_mm", "z_mm", "force_n", "used", "misfit"].map(str::to_owned);
+    let strains = (1..=gauges).map(|k| format!("gauge_{k}_microstrain"));
+    let mut table = Writing::new(head.into_iter().chain(strains));
+    for row in rows {
+        let place = row.place.to_array().map(|v| format!("{v:.4}"));
+        let misfit = row.misfit.map_or(String::new(), |m| format!("{m:.3}"));
+        let about = [format!("{}", row.force), row.used.to_string(), misfit];
+        let reading = (0..gauges).map(|k| {
+            let strain = row.known.as_ref().map(|known| known.reading[k]);
+            let strain = strain.filter(|s| s.is_finite());
+            strain.map_or(String::new(), |s| format!("{:.4}", s * 1e6))
+        });
+        table.row(place.into_iter().chain(about).chain(reading));
+    }
+    Ok(atomic::write(path, table.text().as_bytes())?)
+}
