@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
 use anyhow::Context as _;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::common::Common;
@@ -20,8 +20,9 @@ use super::{out, progress::Bar};
 use crate::design::{self, Sensing};
 use crate::io::project_file::LoadedProject;
 use crate::link::{Address, BAUD, Command, Listener, Pace, Recorder, SessionEvent, State, Table};
-use crate::live::{Pipeline, Sample, Update};
+use crate::live::{Estimator, Pipeline, Sample, Update};
 use crate::plain;
+use crate::session::{train, training_touches};
 use crate::wire::Hello;
 
 use orders::{Client, from_stdin, order};
@@ -41,6 +42,10 @@ pub struct ListenArgs {
     /// Samples a second that the board is asked for.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     pub rate: Option<u16>,
+    /// What finds the touch: model matching, or a regression that is trained on touches of the model first. Of how many
+    /// touch, and of all of them, matching speaks anyway.
+    #[arg(long, default_value = "matching")]
+    pub estimator: EstimatorArg,
     /// At most so many lines a second; all samples when left out.
     #[arg(long, value_parser = between(0.001, 1e6))]
     pub every: Option<f64>,
@@ -60,6 +65,27 @@ pub struct ListenArgs {
     /// End after so many seconds.
     #[arg(long, value_parser = between(0.0, 1e9))]
     pub seconds: Option<f64>,
+}
+
+/// What finds the touch.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EstimatorArg {
+    /// Model matching.
+    Matching,
+    /// The paper's regression, on the readings as they are.
+    Svr,
+    /// Regression on the readings over their norm.
+    Normalized,
+}
+
+impl From<EstimatorArg> for Estimator {
+    fn from(value: EstimatorArg) -> Self {
+        match value {
+            EstimatorArg::Matching => Self::Matching,
+            EstimatorArg::Svr => Self::Raw,
+            EstimatorArg::Normalized => Self::Normalized,
+        }
+    }
 }
 
 /// Runs the command.
@@ -148,10 +174,21 @@ fn pipeline(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Pipelin
     let project = &loaded.inputs.project;
     let sensing = sensing_for(&args.common, loaded)?;
     let gauges = sensing.gauges.len();
-    Ok(Pipeline::new(
-        sensing.map_for(&project.live),
-        project.live.settings(gauges),
-    ))
+    let settings = project.live.settings(gauges);
+    let mut pipeline = Pipeline::new(sensing.map_for(&project.live), settings);
+    if args.estimator != EstimatorArg::Matching {
+        let bar = Bar::default();
+        let used = vec![true; gauges];
+        let trained = args.common.in_pool(|| {
+            let (quality, noise) = (project.budget.quality, sensing.off.of_channel());
+            let touches = training_touches(quality);
+            let inputs = (&sensing, &loaded.inputs);
+            Ok(train(inputs, &used, noise, touches, &|p| bar.show(p))?)
+        });
+        bar.finish();
+        pipeline.set_trained(trained?, used);
+    }
+    Ok(pipeline)
 }
 
 /// A line for people.
@@ -166,6 +203,7 @@ struct Output {
     served: Option<(TcpListener, Vec<Client>)>,
     /// For whoever is served.
     commands: Sender<Command>,
+    estimator: Estimator,
     period_us: u64,
     last_us: Option<u64>,
     /// As it was told last.
@@ -179,6 +217,7 @@ impl Output {
             served: args.serve.as_deref().map(serve).transpose()?,
             csv: args.csv.as_deref().map(Table::create).transpose()?,
             stdout: BufWriter::new(std::io::stdout()),
+            estimator: args.estimator.into(),
             period_us: args.every.map_or(0, |r| (1e6 / r) as u64),
             last_us: None,
             board: None,
@@ -265,7 +304,7 @@ impl Output {
             return Ok(());
         }
         self.last_us = Some(update.time_us);
-        let line = line::of(update);
+        let line = line::of(update, self.estimator);
         if let Some((listener, clients)) = &mut self.served {
             while let Ok((client, _)) = listener.accept() {
                 clients.extend(Client::new(client).ok());

@@ -3,22 +3,36 @@
 use std::fmt::Write as _;
 
 use crate::inference::{Contact, Kind};
-use crate::live::Update;
+use crate::live::{Estimator, Guess, Update};
 
-/// Nulls where nothing touches. `uncertainty_mm` is the radius within which a touch lies with a probability of 90 %;
+/// Of the touch by one of the estimators. Nulls where nothing touches. `uncertainty_mm` is the radius within which a touch lies with a probability of 90 %;
 /// `force_n` presses straight in, and `fx_n`, `fy_n` and `fz_n` are all of the force. Of several touches, the hardest stands
 /// first and by itself; `count` is null where it is not clear what touches.
-pub(super) fn of(update: &Update) -> String {
+pub(super) fn of(update: &Update, estimator: Estimator) -> String {
     let mut line = format!("{{\"t_us\":{},", update.time_us);
-    match &update.contact {
-        Some(contact) => touch(&mut line, contact),
-        None => line.push_str(
+    let guess = update
+        .by(estimator)
+        .filter(|_| estimator != Estimator::Matching);
+    match (&update.contact, guess) {
+        (Some(contact), _) if estimator == Estimator::Matching => touch(&mut line, contact),
+        (_, Some(guess)) => guessed(&mut line, &guess),
+        _ => line.push_str(
             "\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":null,\"fx_n\":null,\"fy_n\":null,\"fz_n\":null,\"uncertainty_mm\":null",
         ),
     }
     several(&mut line, update);
     let _ = write!(line, ",\"channels_ok\":{}}}", update.good);
     line
+}
+
+/// By a regression, which says no more.
+fn guessed(line: &mut String, guess: &Guess) {
+    let p = guess.position * 1e3;
+    let _ = write!(
+        line,
+        "\"x_mm\":{:.3},\"y_mm\":{:.3},\"z_mm\":{:.3},\"force_n\":{:.4},\"fx_n\":null,\"fy_n\":null,\"fz_n\":null,\"uncertainty_mm\":null",
+        p.x, p.y, p.z, guess.force
+    );
 }
 
 fn touch(line: &mut String, contact: &Contact) {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::budget::{Watch, report};
+use crate::budget::{Quality, Watch, report};
 use crate::design::{DesignError, Inputs, Sensing};
 use crate::inference::{Features, Lessons, Trained};
 use crate::regression::Hyper;
@@ -10,11 +10,19 @@ use crate::regression::Hyper;
 /// The trained estimators: normalized, raw.
 pub type Pair = [Option<Arc<Trained>>; 2];
 
+/// How many touches they learn from.
+#[must_use]
+pub fn training_touches(quality: Quality) -> usize {
+    if quality == Quality::Draft { 800 } else { 3200 }
+}
+
 /// Both trained estimators (normalized, raw) on touches of the model, evenly spread, with forces from half a
 /// newton to the hardest of the paper.
+///
+/// # Errors
+/// [`DesignError`] where no touch lands on the part, or the watch asks to end.
 pub fn train(
-    sensing: &Sensing,
-    inputs: &Inputs,
+    (sensing, inputs): (&Sensing, &Inputs),
     used: &[bool],
     noise: f64,
     count: usize,

@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::budget::Quality;
 use crate::design::Sensing;
 use crate::job::Reporter;
 use crate::link::Command;
 use crate::live::Estimator;
 use crate::session::jobs::{Task, stop};
-use crate::session::live::training::train;
+use crate::session::live::training::{train, training_touches};
 use crate::session::slot::{Slot, current};
 use crate::session::state::Session;
 
@@ -80,14 +79,10 @@ impl Session {
         let inputs = self.document.inputs();
         let noise = self.live.look(|f| f.noise.first().copied()).flatten();
         let noise = noise.unwrap_or(1e-6);
-        let count = if self.quality() == Quality::Draft {
-            800
-        } else {
-            3200
-        };
+        let count = training_touches(self.quality());
         let work = move |r: &Reporter| {
             let watch = |p| r.report(p);
-            let trained = train(&sensing, &inputs, &used, noise, count, &watch);
+            let trained = train((&sensing, &inputs), &used, noise, count, &watch);
             Ok((used, trained.map_err(|e| stop(&e))?))
         };
         self.start_sensing(Task::Train, work, |s, inputs, (used, trained)| {
