@@ -143,7 +143,7 @@ fn no_presses_leave_everything_as_it_was() {
     // Nor does one that reads no numbers.
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut odd = press(&drawn.map, &off.pressing, &mut rng);
-    odd.reading[2] = f64::NAN;
+    odd.reading.fill(f64::NAN);
     assert_eq!(calibrate(&drawn, &[odd], &NOISE, &off), found);
 }
 
@@ -281,7 +281,11 @@ fn a_channel_that_was_not_read_learns_nothing() {
     let prior = doubt(&off.gluing);
     assert!((found.doubts[1][0] / prior[0] - 1.0).abs() < 0.05);
     for c in (0..CHANNELS).filter(|c| *c != 1) {
-        assert!((found.glued[c][0] - all.glued[c][0]).abs() < 0.02, "{c}");
+        let doubt = found.doubts[c][0].sqrt();
+        assert!(
+            (found.glued[c][0] - all.glued[c][0]).abs() < 2.0 * doubt,
+            "{c}"
+        );
         assert!(found.doubts[c][0] < 0.7 * prior[0], "{c}");
     }
 }
