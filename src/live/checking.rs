@@ -22,7 +22,13 @@ pub(super) struct Checking {
     watchers: Vec<Watcher>,
     pub health: Vec<Health>,
     last_look: u64,
+    /// Noise of most channels (counts), asked for anew after so many samples.
+    usual: Option<f64>,
+    until: u32,
 }
+
+/// Samples in which nobody's noise changes by much.
+const SOME: u32 = 64;
 
 impl Checking {
     /// All gauges are good until they show otherwise.
@@ -31,6 +37,8 @@ impl Checking {
             watchers: vec![Watcher::default(); gauges],
             health: vec![Health::Good; gauges],
             last_look: 0,
+            usual: None,
+            until: 0,
         }
     }
 
@@ -63,8 +71,13 @@ impl Checking {
     /// Counts of a sample at a rate (Hz), with the highest that the board can send where it has said so.
     pub fn watch(&mut self, counts: &[f64], rest: Option<&Rest>, rate: f64, highest: Option<f64>) {
         let noise = rest.map(|r| &r.noise);
+        self.until = self.until.saturating_sub(1);
+        if self.until == 0 || self.usual.is_none() || noise.is_none() {
+            self.usual = noise.map(|n| median(n.iter().copied()).unwrap_or(0.0));
+            self.until = SOME;
+        }
         // Before there is a rest, nobody knows what is noisy.
-        let usual = noise.map_or(f64::INFINITY, |n| median(n.iter().copied()).unwrap_or(0.0));
+        let usual = self.usual.unwrap_or(f64::INFINITY);
         for (k, (watcher, &count)) in self.watchers.iter_mut().zip(counts).enumerate() {
             let expected = Expected {
                 // Of plain lines nobody knows the range.

@@ -9,6 +9,8 @@ use crate::uncertainty::rounding;
 
 /// Seconds after which what no touch explains is the rest, that has moved.
 const STRANGE_S: f64 = 5.0;
+/// Under touches, so many samples a second say all that there is to know of the rest.
+const ENOUGH_HZ: f64 = 1000.0;
 /// Seconds over which noise is told.
 const NOISE_S: f64 = 8.0;
 
@@ -23,6 +25,8 @@ pub(super) struct Ground {
     pub noise: Vec<f64>,
     /// Seconds since a touch explained what is felt.
     strange_s: f64,
+    /// Seconds since a sample under touches was looked at.
+    passed_s: f64,
 }
 
 /// What a sample is of.
@@ -46,6 +50,7 @@ impl Ground {
             drift: None,
             noise,
             strange_s: 0.0,
+            passed_s: 0.0,
         }
     }
 
@@ -131,6 +136,14 @@ impl Ground {
         } else {
             0.0
         };
+        self.passed_s += step_s;
+        if matches!(under, Under::Touches(_)) {
+            // Boards keep no time to the microsecond.
+            if self.passed_s < 0.9 / ENOUGH_HZ {
+                return false;
+            }
+            self.passed_s = 0.0;
+        }
         let Some(mut drift) = self.drift.take() else {
             return false;
         };

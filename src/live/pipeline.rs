@@ -18,8 +18,9 @@ use super::update::{GaugeModel, Guess, Settings, Update};
 use crate::inference::{Contact, Matching, Touches, Trained};
 use crate::wire::Hello;
 
-/// Samples between two searches everywhere.
+/// Samples, and seconds, between two searches everywhere: whichever is more.
 const SEARCH_EVERY: u32 = 20;
+const SEARCH_EVERY_S: f64 = 0.02;
 /// A touch of which so much is left unexplained, over what it explains, is none.
 const DOUBTFUL: f64 = 0.5;
 /// What channels may move by during a tare (strain).
@@ -392,9 +393,9 @@ impl Pipeline {
 
     /// The touch, if there is one.
     fn find_one(&mut self, time_us: u64, strain: &[f64]) -> Option<Contact> {
-        let last = self
-            .last
-            .filter(|_| self.searched > 0 && self.searched < SEARCH_EVERY);
+        let often = f64::from(SEARCH_EVERY).max(SEARCH_EVERY_S * self.rate);
+        let recently = self.searched > 0 && f64::from(self.searched) < often;
+        let last = self.last.filter(|_| recently);
         let known = last.and_then(|last| {
             if last.narrow {
                 self.matching.track(strain, &last)

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::joint::APART;
-use super::spot::{RADII, Spot, pressed_over};
+use super::spot::{RADII, Spot, nodes_near, pressed_over};
 use crate::inference::deviation::About;
 use crate::inference::map::{LANES, ResponseMap};
 use crate::inference::matching::Errors;
@@ -61,8 +61,9 @@ impl Coarse {
             .par_iter()
             .flat_map_iter(|&at| {
                 let (centre, normal) = (map.mesh.point(at), map.mesh.normal(at));
-                let sized =
-                    move |&radius: &f64| (at, radius, pressed_over(map, centre, normal, radius));
+                let nodes = nodes_near(map, centre, RADII[1]);
+                let pressed = |radius| pressed_over(map, &nodes, (centre, normal), radius);
+                let sized = |&radius: &f64| (at, radius, pressed(radius));
                 sizes.iter().map(sized).collect::<Vec<_>>()
             })
             .collect();

@@ -75,7 +75,9 @@ impl Matching {
         let first = normal.any_orthonormal_vector();
         let plane = [first, normal.cross(first)];
         let known = (self.nuisances()).map(|n| n.reading(&spot.about, spot.at));
-        let mut reading = pressed_over(map, centre, normal, radius);
+        let nodes = nodes_near(map, centre, radius * WIDENED.exp() + MOVED);
+        let pressed = |centre, radius| pressed_over(map, &nodes, (centre, normal), radius);
+        let mut reading = pressed(centre, radius);
         if let Some(known) = known {
             for (r, k) in reading.iter_mut().zip(known) {
                 *r += k;
@@ -87,13 +89,11 @@ impl Matching {
         };
         let mut columns: Vec<Vec<f64>> = (plane.iter())
             .map(|way| {
-                let [before, after] =
-                    [-MOVED, MOVED].map(|by| pressed_over(map, centre + *way * by, normal, radius));
+                let [before, after] = [-MOVED, MOVED].map(|by| pressed(centre + *way * by, radius));
                 change(before, after, MOVED)
             })
             .collect();
-        let [before, after] =
-            [-WIDENED, WIDENED].map(|by: f64| pressed_over(map, centre, normal, radius * by.exp()));
+        let [before, after] = [-WIDENED, WIDENED].map(|by: f64| pressed(centre, radius * by.exp()));
         columns.push(change(before, after, WIDENED));
         Felt {
             reading,
@@ -112,19 +112,25 @@ impl Matching {
     }
 }
 
+/// Nodes within a distance of a place (m).
+pub(super) fn nodes_near(map: &ResponseMap, place: DVec3, within: f64) -> Vec<usize> {
+    let near = |node: &usize| map.places[*node].distance_squared(place) < within * within;
+    (0..map.places.len()).filter(near).collect()
+}
+
 /// What is read of a newton (along the normal at the centre) that presses over an area, by H. Hertz's pressure
-/// √(1 - r²/R²), everywhere against the surface.
+/// √(1 - r²/R²), everywhere against the surface: at these nodes, beyond which it does not reach.
 pub(super) fn pressed_over(
     map: &ResponseMap,
-    centre: DVec3,
-    normal: DVec3,
+    nodes: &[usize],
+    (centre, normal): (DVec3, DVec3),
     radius: f64,
 ) -> Vec<f64> {
     let normals = map.mesh.vertex_normals();
     let mut sum = vec![0.0; map.channels()];
     let mut force = 0.0;
-    for (node, place) in map.places.iter().enumerate() {
-        let inside = 1.0 - place.distance_squared(centre) / (radius * radius);
+    for &node in nodes {
+        let inside = 1.0 - map.places[node].distance_squared(centre) / (radius * radius);
         let facing = normals[node].dot(normal);
         if inside <= 0.0 || facing <= 0.0 {
             continue;
