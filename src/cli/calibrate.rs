@@ -17,7 +17,7 @@ use super::spared::Spared;
 use super::{listen, out};
 use crate::design::Sensing;
 use crate::elasticity::Touch;
-use crate::inference::calibration::{Outlook, misfits, outlook};
+use crate::inference::calibration::judged::{Outlook, misfits, outlook};
 use crate::inference::{Calibration, Known, calibrate};
 use crate::io::points::{AskedPoint, read_points};
 use crate::io::project_file::{self, LoadedProject};

@@ -27,9 +27,7 @@
 //! as some readings more, because a few presses say little of it. What is not known afterwards is the inverse of the normal
 //! matrix: never more than before, so that presses that say nothing leave everything as it was.
 
-mod judged;
-
-pub use judged::{Outlook, misfits, outlook};
+pub mod judged;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 use serde::{Deserialize, Serialize};

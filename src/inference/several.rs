@@ -14,12 +14,12 @@ use glam::{DMat2, DVec3};
 use self::coarse::{Coarse, Whitened};
 use self::joint::Joint;
 use self::spot::{RADII, Spot};
-use super::matching::modes::widest;
+use super::matching::modes::{stand_ins, widest};
 use super::matching::weighed::Observation;
 use super::matching::{Contact, Load, Matching};
 use crate::inference::deviation::About;
 use crate::inference::map::ResponseMap;
-use crate::inference::region::{DEVIATIONS, Region};
+use crate::inference::region::Region;
 
 /// Before anything is read.
 const ONE: f64 = 0.88;
@@ -419,20 +419,6 @@ fn flat_of(joint: &Joint, k: usize) -> DMat2 {
     let first = joint.first(k);
     let of = |i: usize, j: usize| joint.covariance[(first + i, first + j)];
     DMat2::from_cols_array(&[of(0, 0), of(1, 0), of(0, 1), of(1, 1)])
-}
-
-/// Four places that stand for a normal distribution: one deviation of √2 along each principal direction, either way.
-fn stand_ins(
-    centre: DVec3,
-    covariance: DMat2,
-    plane: [DVec3; 2],
-    weight: f64,
-) -> Vec<(DVec3, f64)> {
-    let region = Region::of_normal(covariance, plane);
-    let scale = std::f64::consts::SQRT_2 / DEVIATIONS;
-    let both = region.axes.into_iter();
-    let places = both.flat_map(|axis| [1.0, -1.0].map(|sign| centre + axis * (sign * scale)));
-    places.map(|place| (place, weight / 4.0)).collect()
 }
 
 /// How sure one touch is at least: whatever else there is besides would have to be found in as much room as this was,

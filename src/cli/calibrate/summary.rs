@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::cli::out;
 use crate::design::Sensing;
-use crate::inference::calibration::Outlook;
+use crate::inference::calibration::judged::Outlook;
 use crate::inference::{Calibration, Known};
 use crate::io::atomic;
 use crate::io::table::Writing;

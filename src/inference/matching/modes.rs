@@ -271,20 +271,25 @@ impl Matching {
             drag,
             drag_deviation: mean(&apart).sqrt(),
         };
-        let places: Vec<(DVec3, f64)> =
-            modes.iter().flat_map(|m| stand_ins(m, weight(m))).collect();
+        let stand_in = |m: &Mode| stand_ins(m.position, m.covariance, m.plane, weight(m));
+        let places: Vec<(DVec3, f64)> = modes.iter().flat_map(stand_in).collect();
         let region = Region::of_places(&places, self.map.mesh.point(at), self.map.mesh.normal(at));
         self.contact(measured, at, load, region, best.cost, false)
     }
 }
 
-/// Four places that stand for a mode: one deviation of √2 along each principal direction, either way.
-fn stand_ins(mode: &Mode, weight: f64) -> impl Iterator<Item = (DVec3, f64)> {
-    let region = Region::of_normal(mode.covariance, mode.plane);
+/// Four places (m) that stand for a normal distribution around one, with a covariance (m²) in a plane: one deviation of √2
+/// along each principal direction, either way.
+pub(in crate::inference) fn stand_ins(
+    centre: DVec3,
+    covariance: DMat2,
+    plane: [DVec3; 2],
+    weight: f64,
+) -> impl Iterator<Item = (DVec3, f64)> {
+    let region = Region::of_normal(covariance, plane);
     let scale = std::f64::consts::SQRT_2 / DEVIATIONS;
-    let position = mode.position;
     region.axes.into_iter().flat_map(move |axis| {
-        [1.0, -1.0].map(|sign| (position + axis * (sign * scale), weight / 4.0))
+        [1.0, -1.0].map(|sign| (centre + axis * (sign * scale), weight / 4.0))
     })
 }
 
