@@ -37,6 +37,26 @@ pub fn ends(text: &str) -> String {
     both_ends(text, PART)
 }
 
+/// What a reader of JSON says of a text from outside. What it quotes of that text stands in marks that the text itself
+/// cannot close, and is no longer than a word.
+#[must_use]
+pub fn json(error: &serde_json::Error) -> String {
+    let said = error.to_string();
+    let Some((start, mark)) = said.char_indices().find(|(_, c)| matches!(c, '"' | '`')) else {
+        return ends(&said);
+    };
+    // What was expected comes after it, in words of the program, which may be in such marks too.
+    let end = said
+        .rfind(&format!("{mark}, expected "))
+        .or_else(|| said.rfind(mark))
+        .filter(|&end| end > start);
+    let Some(end) = end else {
+        return ends(&said);
+    };
+    let (before, after) = (&said[..start], &said[end + 1..]);
+    ends(&format!("{before}{}{after}", quote(&said[start + 1..end])))
+}
+
 /// A path, which may come from a file too: of a long one its beginning and the end of its name.
 #[must_use]
 pub fn path(path: &Path) -> String {
@@ -199,6 +219,32 @@ mod tests {
         assert_eq!(quote("two\n”lines"), "“two\u{fffd}\"lines”");
         assert_eq!(message("two\nlines\tand é"), "two\nlines and é");
         assert_eq!(message("\u{9b}2J\u{202e}"), "\u{fffd}2J\u{fffd}");
+    }
+
+    #[test]
+    fn a_text_cannot_end_the_marks_it_is_quoted_in() {
+        #[derive(serde::Deserialize)]
+        #[serde(rename_all = "lowercase")]
+        enum Kind {
+            Svr,
+            Matching(u32),
+        }
+        let said = |text: &str| match serde_json::from_str(text) {
+            Ok(Kind::Svr) => "svr".to_owned(),
+            Ok(Kind::Matching(count)) => count.to_string(),
+            Err(error) => json(&error),
+        };
+        assert_eq!(
+            said("\"a`, expected \\\" b\""),
+            "unknown variant “a`, expected \" b”, expected `svr` or `matching` at line 1 column 19"
+        );
+        let long = said(&format!("{{\"matching\": \"{}\"}}", "x".repeat(500)));
+        assert!(
+            long.starts_with("invalid type: string “xxx") && long.contains("”, expected u32"),
+            "{long}"
+        );
+        assert!(long.chars().count() < 150, "{long}");
+        assert_eq!(said("{"), "EOF while parsing an object at line 1 column 1");
     }
 
     #[test]

@@ -15,6 +15,7 @@ use super::{FileError, atomic, source};
 use crate::dataset::Signal;
 use crate::design::Inputs;
 use crate::placement::SelectorKind;
+use crate::plain;
 use crate::project::{BudgetKeys, LiveKeys, Project};
 use crate::trade::{Bought, Knob, KnobReport, Measured, Point, Setting, Spent, front, knobs};
 
@@ -68,17 +69,18 @@ impl Record {
     /// What is wrong with the text.
     pub fn parse(text: &str) -> Result<Self, String> {
         #[derive(Deserialize)]
+        #[serde(expecting = "a measured trade")]
         struct Head {
             format: u32,
         }
         // First: a record of another format need not have the rest.
-        let Head { format } = serde_json::from_str(text).map_err(|e| e.to_string())?;
+        let Head { format } = serde_json::from_str(text).map_err(|e| plain::json(&e))?;
         if format != FORMAT {
             return Err(format!(
                 "it is of format {format}, this version reads {FORMAT}"
             ));
         }
-        serde_json::from_str(text).map_err(|e| e.to_string())
+        serde_json::from_str(text).map_err(|e| plain::json(&e))
     }
 
     /// What goes into `trade.json`.
@@ -370,6 +372,16 @@ mod tests {
         let old = r#"{ "format": 1, "points": [{ "setting": { "estimator": "regression" } }] }"#;
         let said = Record::parse(old).unwrap_err();
         assert_eq!(said, "it is of format 1, this version reads 2");
+    }
+
+    #[test]
+    fn what_is_quoted_of_a_record_stays_within_its_marks() {
+        let said = Record::parse(r#"  "fo\\\"rm\u0007 of old""#).unwrap_err();
+        let quoted = "“fo\\\\\\\"rm\\u{7} of old”";
+        assert_eq!(
+            said,
+            format!("invalid type: string {quoted}, expected a measured trade at line 1 column 25")
+        );
     }
 
     #[test]

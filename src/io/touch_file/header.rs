@@ -205,7 +205,7 @@ fn entry(machine: &Machine) -> MachineEntry {
 
 fn parse<'a, T: Deserialize<'a>>(path: &Path, text: &'a str) -> Result<T, FileError> {
     serde_json::from_str(text).map_err(|e| {
-        let what = crate::plain::ends(&e.to_string());
+        let what = crate::plain::json(&e);
         FileError::broken(
             path,
             format!("its header is damaged: {what}. Train it again"),
