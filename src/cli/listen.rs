@@ -55,8 +55,8 @@ pub struct ListenArgs {
     /// Replay a recording as fast as it can be read.
     #[arg(long)]
     pub fast: bool,
-    /// Write a table of counts and touches here too (.csv), with the truth where a recording has it. Where the
-    /// number of channels changes it goes on in a file beside it.
+    /// Write a table of counts and touches here too (.csv), with the truth where a recording has it; never over an
+    /// older file. Where the number of channels changes it goes on in a file beside it.
     #[arg(long)]
     pub csv: Option<PathBuf>,
     /// Serve the same lines to whoever connects to HOST:PORT, and obey what they write: `tare`.

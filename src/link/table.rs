@@ -24,11 +24,23 @@ pub struct Table {
 }
 
 impl Table {
-    /// Begins a table.
+    /// Begins a table; never over an older one.
     ///
     /// # Errors
-    /// When it cannot be written there.
+    /// When there is one already, or it cannot be written there.
     pub fn create(path: &Path) -> anyhow::Result<Self> {
+        // An empty file holds nothing that could be lost, and a pipe or a device is no table.
+        let old = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() > 0);
+        anyhow::ensure!(
+            !old,
+            "{}: there is a file of this name already. Choose another, or remove it",
+            path.display()
+        );
+        Self::replace(path)
+    }
+
+    /// Begins a table in place of what may stand there.
+    fn replace(path: &Path) -> anyhow::Result<Self> {
         let file = File::create(path)
             .with_context(|| format!("{}: the table cannot be written there", path.display()))?;
         Ok(Self {
@@ -171,7 +183,7 @@ fn numbered(first: &Path, number: usize) -> PathBuf {
     first.with_file_name(name)
 }
 
-/// Replays a recording into a table; the files that it takes, more than one where the number of channels changes.
+/// Replays a recording into a table, in place of an older one; the files that it takes, more than one where the number of channels changes.
 ///
 /// # Errors
 /// When the one cannot be read or the other not written.
@@ -184,7 +196,7 @@ pub fn write_table(
         path: recording.to_owned(),
         pace: Pace::Fast,
     };
-    let mut rows = Table::create(table)?;
+    let mut rows = Table::replace(table)?;
     let (_commands, inbox) = channel();
     let stop = AtomicBool::new(false);
     let mut written: anyhow::Result<Option<PathBuf>> = Ok(None);
@@ -235,6 +247,18 @@ mod tests {
             assert!(columns.iter().all(|c| *c == columns[0]), "{text}");
         }
         assert_eq!(std::fs::read_to_string(at("a-2.csv")).unwrap(), "older");
+    }
+
+    #[test]
+    fn a_table_is_never_begun_over_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        std::fs::write(&path, "").unwrap();
+        drop(Table::create(&path).unwrap());
+        std::fs::write(&path, "older").unwrap();
+        let said = Table::create(&path).err().unwrap().to_string();
+        assert!(said.contains("a.csv") && said.contains("already"), "{said}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "older");
     }
 
     #[cfg(target_os = "linux")]
