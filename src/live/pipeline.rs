@@ -313,7 +313,7 @@ impl Pipeline {
             Turn::Same => {}
             Turn::Begins => self.searched = 0,
             Turn::Ends => {
-                self.proved |= self.last.is_some();
+                self.proved |= self.last.is_some() || self.counting.shown().is_some();
                 self.end_touch();
             }
         }
