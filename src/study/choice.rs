@@ -256,6 +256,9 @@ fn by_expected_error(
     if noise <= 0.0 {
         selection.achieved.notes.push(NO_NOISE.to_owned());
     }
+    if settings.forces.is_none() {
+        selection.achieved.notes.extend(drowned(pool.x, noise));
+    }
     let chosen = selection.sets.last().map_or(&[][..], |set| &set.sites[..]);
     let rows = chosen
         .iter()
@@ -268,6 +271,23 @@ fn by_expected_error(
         repeats: scatter.repeats(),
     };
     Ok((selection, weighed))
+}
+
+/// What is said where noise hides all that the signals tell: most often it was given in another unit.
+fn drowned(x: &SignalMatrix, noise: f64) -> Option<String> {
+    let range = |row: &[f64]| {
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        let (low, high) = row
+            .iter()
+            .fold(ends, |(low, high), &v| (low.min(v), high.max(v)));
+        high - low
+    };
+    let widest = (0..x.rows()).map(|r| range(x.row(r))).fold(0.0, f64::max);
+    (noise > widest).then(|| {
+        format!(
+            "The noise given ({noise:.3e}) is more than any site's signal changes by over all touches ({widest:.3e}): there is next to nothing to choose by. --noise is in the unit of the signals."
+        )
+    })
 }
 
 const NO_FORCES: &str = "The data do not say how hard touches were (force_n): readings are compared as they are, and what differs with the force counts as scatter.";

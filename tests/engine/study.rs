@@ -712,6 +712,14 @@ fn expected_error_knows_noise_and_forces() {
         quiet.iter().zip(&loud).all(|(q, l)| q < l),
         "{quiet:?} {loud:?}"
     );
+    let deaf = ["--selector", "expected-error", "--sensors", "2", "--noise"];
+    let deaf = |noise: &str| {
+        notes(&json(
+            &[&["select", "--data", data][..], &deaf, &[noise]].concat(),
+        ))
+    };
+    assert!(deaf("1e6").contains("--noise is in the unit of the signals"));
+    assert!(!deaf("0.1").contains("--noise is in the unit"));
     let flags = [
         "select",
         "--data",
