@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::{Checks, Design, Simulated};
+use crate::evaluation::{EVERYWHERE, MatchedRow};
 
 /// A number beyond its limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -27,6 +28,8 @@ const MESH_PERCENT: f64 = 15.0;
 const GAP: f64 = 0.05;
 /// Share of the covariance's spectrum that was negative.
 const CLIPPED: f64 = 0.01;
+/// Share of the touches that may move no gauge above its noise.
+const BLIND: f64 = 0.05;
 
 impl Checks {
     /// What makes the solution untrustworthy.
@@ -111,6 +114,7 @@ impl Design {
                 ),
             });
         }
+        doubts.extend(blind(&self.evaluation.matched));
         doubts
     }
 
@@ -145,9 +149,73 @@ impl Design {
     }
 }
 
+/// What the best of the largest sets does not feel of the lightest touches.
+fn blind(rows: &[MatchedRow]) -> Option<Doubt> {
+    let everywhere = rows.iter().filter(|r| r.region == EVERYWHERE);
+    let best = everywhere.min_by(|a, b| {
+        let largest = b.sensors.cmp(&a.sensors);
+        let lightest = largest.then(a.force_n.total_cmp(&b.force_n));
+        lightest.then(a.blind.total_cmp(&b.blind))
+    })?;
+    (best.blind > BLIND).then(|| Doubt {
+        number: "blind",
+        value: best.blind,
+        limit: BLIND,
+        words: format!(
+            "{:.0} % of the touches of {} N move none of {} above its noise: nothing is felt there. See where (what is blind is marked on the part), add gauges near by or take quieter ones, or paint where touches come (touch.region).",
+            100.0 * best.blind,
+            crate::plain::digits(best.force_n),
+            crate::plain::count(best.sensors, "gauge"),
+        ),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::EstimatorKind;
+
+    fn row(sensors: usize, force_n: f64, blind: f64) -> MatchedRow {
+        MatchedRow {
+            estimator: EstimatorKind::Matching,
+            force_n,
+            selector: "expected-error".into(),
+            sensors,
+            region: EVERYWHERE.into(),
+            error_mm: 1.0,
+            median_mm: 1.0,
+            p95_mm: 2.0,
+            as_built_mm: 2.0,
+            calibrated_mm: None,
+            sighted_mm: None,
+            touches: 100,
+            blind,
+        }
+    }
+
+    #[test]
+    fn what_is_not_felt_is_said_of_the_largest_set_and_the_lightest_touches() {
+        let half = MatchedRow {
+            region: "half".into(),
+            ..row(10, 1.0, 0.9)
+        };
+        let rows = [
+            row(5, 3.0, 0.5),
+            row(10, 25.0, 0.0),
+            row(10, 3.0, 0.04),
+            half,
+        ];
+        assert_eq!(blind(&rows), None);
+        let said = blind(&[row(10, 3.0, 0.3), row(10, 25.0, 0.0), row(10, 3.0, 0.12)]).unwrap();
+        assert_eq!((said.number, said.value), ("blind", 0.12));
+        assert!(
+            said.words
+                .starts_with("12 % of the touches of 3 N move none of 10 gauges"),
+            "{}",
+            said.words
+        );
+        assert_eq!(blind(&[]), None);
+    }
 
     #[test]
     fn what_is_beyond_its_limit_is_named_with_what_to_do() {
