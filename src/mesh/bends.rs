@@ -9,7 +9,7 @@ use glam::DVec3;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::TriMesh;
+use super::{Edge, TriMesh};
 
 /// A neighbourhood reaches over at least so many heights of the triangles in it: fewer columns of a coarse
 /// cylinder would be counted, not measured.
@@ -18,6 +18,9 @@ const COLUMNS: f64 = 3.0;
 const FARTHEST: f64 = 0.05;
 /// Places that are looked at; of fewer facets it is each of them.
 const PLACES: usize = 4001;
+/// Of more facets than this fewer places do, but no fewer than these: each neighbourhood holds the more of them.
+const MANY: usize = 200_000;
+const FEWEST: usize = 501;
 
 /// A place's share of the area looked at (m²), and its largest curvature (1/m).
 #[derive(Clone, Copy, Debug)]
@@ -40,14 +43,44 @@ pub fn bends(
     let (lower, upper) = mesh.bounds();
     // `min` leaves out a reach that is not known.
     let reach = reach.min(FARTHEST * (upper - lower).length());
+    let angles = dihedrals(mesh);
     let measured = |near: &mut Near, (facet, area): (u32, f64)| Bend {
         area,
         curvature: near.curvature(mesh, facet, reach, &sharp),
     };
     places(mesh, facets)
         .into_par_iter()
-        .map_init(|| Near::over(mesh), measured)
+        .map_init(|| Near::over(mesh, &angles), measured)
         .collect()
+}
+
+/// By how much the surface turns at each edge between two facets (rad): neighbourhoods overlap, and ask for it many times.
+fn dihedrals(mesh: &TriMesh) -> Vec<f64> {
+    let p = mesh.positions();
+    let between = |edge: &Edge| {
+        let [here, there] = edge.triangles[..] else {
+            return 0.0;
+        };
+        let ends = [edge.a, edge.b];
+        let ahead = |t: u32| {
+            let corners = mesh.triangles()[t as usize];
+            (0..3).any(|i| [corners[i], corners[(i + 1) % 3]] == ends)
+        };
+        // Where one facet lies inside out, neither tells which way the surface turns.
+        if ahead(here) == ahead(there) {
+            return 0.0;
+        }
+        let ends = ends.map(|v| p[v as usize]);
+        let [from, to] = if ahead(here) {
+            ends
+        } else {
+            [ends[1], ends[0]]
+        };
+        let along = (to - from).normalize_or_zero();
+        let (here, there) = (mesh.facet_normal(here), mesh.facet_normal(there));
+        here.cross(there).dot(along).atan2(here.dot(there))
+    };
+    mesh.edges().par_iter().map(between).collect()
 }
 
 /// Facets to look at, each with the area that it stands for (m²).
@@ -56,7 +89,8 @@ fn places(mesh: &TriMesh, facets: &[u32]) -> Vec<(u32, f64)> {
     if facets.len() <= PLACES {
         return areas.collect();
     }
-    let step = areas.clone().map(|a| a.1).sum::<f64>() / PLACES as f64;
+    let places = (PLACES * MANY / facets.len()).clamp(FEWEST, PLACES);
+    let step = areas.clone().map(|a| a.1).sum::<f64>() / places as f64;
     let mut sum = 0.0;
     let stands_for = |(facet, area): (u32, f64)| {
         let before = (sum / step).round();
@@ -68,19 +102,25 @@ fn places(mesh: &TriMesh, facets: &[u32]) -> Vec<(u32, f64)> {
 }
 
 /// The facets around a place, and room to find them in.
-struct Near {
+struct Near<'a> {
+    /// By how much the surface turns at each edge (rad).
+    angles: &'a [f64],
     /// The number of the search that met each facet last.
     met: Vec<u32>,
     search: u32,
     facets: Vec<u32>,
+    /// What the ball weighs on each of them (m⁴).
+    weights: Vec<f64>,
 }
 
-impl Near {
-    fn over(mesh: &TriMesh) -> Self {
+impl<'a> Near<'a> {
+    fn over(mesh: &TriMesh, angles: &'a [f64]) -> Self {
         Self {
+            angles,
             met: vec![0; mesh.triangles().len()],
             search: 0,
             facets: Vec::new(),
+            weights: Vec::new(),
         }
     }
 
@@ -98,12 +138,12 @@ impl Near {
             radius: reach,
         };
         self.find(mesh, facet, &ball, sharp);
-        let enough = COLUMNS * self.height(mesh, &ball);
+        let enough = COLUMNS * self.height(mesh);
         if enough > ball.radius {
             ball.radius = enough;
             self.find(mesh, facet, &ball, sharp);
         }
-        let weight = Matrix3::from_diagonal_element(self.weight(mesh, &ball));
+        let weight = Matrix3::from_diagonal_element(self.weights.iter().sum());
         let turned = weight - self.unturned(mesh, &ball, sharp);
         largest(self.turns(mesh, &ball, sharp), turned)
     }
@@ -117,22 +157,25 @@ impl Near {
         let mut next = 0;
         while let Some(&t) = self.facets.get(next) {
             next += 1;
-            for (_, other) in smooth_sides(mesh, t, ball, sharp) {
-                if self.met[other as usize] != self.search {
-                    self.met[other as usize] = self.search;
-                    self.facets.push(other);
+            for side in smooth_sides(mesh, t, ball, sharp) {
+                if self.met[side.beyond as usize] != self.search {
+                    self.met[side.beyond as usize] = self.search;
+                    self.facets.push(side.beyond);
                 }
             }
         }
+        self.weights.clear();
+        let of = |&t: &u32| ball.of_facet(mesh.corners(t));
+        self.weights.extend(self.facets.iter().map(of));
     }
 
     /// The height that half of what is in the ball is lower than (m).
-    fn height(&self, mesh: &TriMesh, ball: &Ball) -> f64 {
-        let of = |&t: &u32| {
+    fn height(&self, mesh: &TriMesh) -> f64 {
+        let of = |(&t, &weight): (&u32, &f64)| {
             let height = mesh.thinness(t) * mesh.longest_side(t);
-            (height, ball.of_facet(mesh.corners(t)))
+            (height, weight)
         };
-        let mut heights: Vec<(f64, f64)> = self.facets.iter().map(of).collect();
+        let mut heights: Vec<(f64, f64)> = self.facets.iter().zip(&self.weights).map(of).collect();
         heights.sort_by(|a, b| a.0.total_cmp(&b.0));
         let half = heights.iter().map(|h| h.1).sum::<f64>() / 2.0;
         let mut sum = 0.0;
@@ -147,13 +190,13 @@ impl Near {
     fn turns(&self, mesh: &TriMesh, ball: &Ball, sharp: &impl Fn(usize) -> bool) -> Matrix3<f64> {
         let mut turns = Matrix3::zeros();
         for &t in &self.facets {
-            for (corner, other) in smooth_sides(mesh, t, ball, sharp) {
-                let (from, to) = side(mesh, t, corner);
-                let along = (to - from).normalize_or_zero();
-                let (here, there) = (mesh.facet_normal(t), mesh.facet_normal(other));
-                let angle = here.cross(there).dot(along).atan2(here.dot(there));
+            for Side {
+                edge, ends, weight, ..
+            } in smooth_sides(mesh, t, ball, sharp)
+            {
+                let along = (ends[1] - ends[0]).normalize_or_zero();
                 // Either facet of an edge has half of it.
-                turns += onto(along) * (0.5 * angle * ball.of_edge(from, to));
+                turns += onto(along) * (0.5 * self.angles[edge] * weight);
             }
         }
         turns
@@ -182,11 +225,6 @@ impl Near {
         }
         strips
     }
-
-    fn weight(&self, mesh: &TriMesh, ball: &Ball) -> f64 {
-        let of = |&t: &u32| ball.of_facet(mesh.corners(t));
-        self.facets.iter().map(of).sum()
-    }
 }
 
 /// The projection onto a direction.
@@ -201,22 +239,41 @@ fn side(mesh: &TriMesh, facet: u32, corner: usize) -> (DVec3, DVec3) {
     (p[(corner + 1) % 3], p[(corner + 2) % 3])
 }
 
-/// The sides of a facet that reach into the ball and are not sharp, by the corner opposite, and what lies beyond.
+/// A side of a facet that reaches into a ball and is not sharp.
+struct Side {
+    edge: usize,
+    /// As the facet goes round (m).
+    ends: [DVec3; 2],
+    /// The facet beyond it.
+    beyond: u32,
+    /// What the ball weighs along it (m³).
+    weight: f64,
+}
+
+/// Those sides of a facet.
 fn smooth_sides(
     mesh: &TriMesh,
     facet: u32,
     ball: &Ball,
     sharp: &impl Fn(usize) -> bool,
-) -> impl Iterator<Item = (usize, u32)> {
+) -> impl Iterator<Item = Side> {
     let edges = mesh.triangle_edges()[facet as usize];
     (0..3).filter_map(move |corner| {
         let edge = edges[corner] as usize;
         let [s, t] = mesh.edges()[edge].triangles[..] else {
             return None;
         };
+        if sharp(edge) {
+            return None;
+        }
         let (from, to) = side(mesh, facet, corner);
-        let inside = !sharp(edge) && ball.of_edge(from, to) > 0.0;
-        inside.then_some((corner, if s == facet { t } else { s }))
+        let weight = ball.of_edge(from, to);
+        (weight > 0.0).then_some(Side {
+            edge,
+            ends: [from, to],
+            beyond: if s == facet { t } else { s },
+            weight,
+        })
     })
 }
 
@@ -275,9 +332,13 @@ fn sector(from: DVec3, to: DVec3, normal: DVec3, square: f64) -> f64 {
     let chord = (square - height * height).max(0.0).sqrt();
     let [start, end] = [from, to].map(|p| p.dot(along));
     let [first, last] = [start, end].map(|s| s.clamp(-chord, chord));
-    let angle = |s: f64| height.signum() * s.atan2(height.abs());
     let within =
         |s: f64| square * height * s / 2.0 - (height.powi(3) * s + height * s.powi(3) / 3.0) / 4.0;
+    // Most sides of a fine mesh lie within the ball as a whole.
+    if [first, last] == [start, end] {
+        return within(last) - within(first);
+    }
+    let angle = |s: f64| height.signum() * s.atan2(height.abs());
     let beyond = (angle(end) - angle(last)) - (angle(start) - angle(first));
     within(last) - within(first) + square * square / 4.0 * beyond
 }
