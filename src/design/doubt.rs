@@ -29,7 +29,7 @@ const GAP: f64 = 0.05;
 /// Share of the covariance's spectrum that was negative.
 const CLIPPED: f64 = 0.01;
 /// Share of the touches that may move no gauge above its noise.
-const BLIND: f64 = 0.05;
+const BLIND: f64 = 0.1;
 
 impl Checks {
     /// What makes the solution untrustworthy.

@@ -211,7 +211,9 @@ impl Designed {
 
     /// The mean error (mm) of what is found in a recording with a project, at each force.
     fn achieved(&self, recording: &Path, project: &Path) -> [f64; 3] {
-        let table = recording.with_extension("csv");
+        // One recording is read with several projects.
+        let folder = tempfile::tempdir().unwrap();
+        let table = folder.path().join("found.csv");
         hapdef(&[
             "listen",
             text(recording),
