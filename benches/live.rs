@@ -12,7 +12,7 @@ use std::sync::mpsc::channel;
 use std::time::Instant;
 
 use glam::DVec3;
-use hapdef::board::{Faults, Script};
+use hapdef::board::{Drawn, Faults, Script};
 use hapdef::budget::{Quality, unwatched};
 use hapdef::design::simulated_board as board;
 use hapdef::design::{self, Inputs, Sensing, Workshop};
@@ -399,7 +399,7 @@ impl Lab {
     /// A board that is unplugged three times, and how soon that is noticed and mended.
     fn unplug(&mut self, text: &mut String) {
         let places = board::places(&self.inputs, &self.sensing, SEED).expect("places");
-        let script = Script::random(places, [2.0, 15.0], 1);
+        let script = Script::random(places, Drawn::straight([2.0, 15.0]), 1);
         let mut faults = Faults::default();
         let plugs = [(4.0, 5.0), (8.0, 8.5), (12.0, 14.0)];
         faults.unplugged = plugs.to_vec();

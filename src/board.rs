@@ -2,6 +2,7 @@
 //!
 //! It has no clock and no port of its own: whoever runs it says what time it is and carries its bytes.
 
+mod disturbance;
 mod fault;
 mod script;
 
@@ -10,13 +11,16 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::draw::normal;
-use crate::elasticity::Touch;
 use crate::elasticity::sensitivity::Sensitivity;
+use crate::elasticity::{Push, Touch};
 use crate::inference::Chain;
 use crate::wire::{Decoder, Event, Hello, Message, VERSION, encode};
 
+use disturbance::Disturbed;
+
+pub use disturbance::Disturbances;
 pub use fault::{ChannelFault, Fault, Faults, Illness};
-pub use script::{GivenPress, PRESSES, Press, Script};
+pub use script::{Drawn, GivenPress, PRESSES, Press, RAMP_S, Script, aside};
 
 /// How the board measures.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +39,8 @@ pub struct Options {
     pub drift: f64,
     /// Standard deviation of what bridges are off balance by (strain).
     pub offset: f64,
+    /// What else there is in the readings beside touches.
+    pub disturbances: Disturbances,
     /// What the board calls itself in its HELLO.
     pub name: String,
 }
@@ -44,11 +50,27 @@ pub struct Options {
 pub struct Truth {
     /// On the board's clock (µs).
     pub time_us: u64,
-    /// The touch at that moment; absent where nothing touches.
+    /// The touch at that moment, the hardest of several; absent where nothing touches.
     pub touch: Option<Touch>,
+    /// How many there are.
+    pub touches: usize,
+    /// The force of all of them on the part (N), with what pushes along the surface.
+    pub force: DVec3,
 }
 
 impl Truth {
+    /// What touches at a time.
+    #[must_use]
+    pub fn of(time_us: u64, pushes: &[Push]) -> Self {
+        let touches = pushes.iter().map(|push| push.touch);
+        Self {
+            time_us,
+            touch: touches.max_by(|a, b| a.force.total_cmp(&b.force)),
+            touches: pushes.len(),
+            force: pushes.iter().map(|push| push.force).sum(),
+        }
+    }
+
     /// Where and how hard (m, N).
     #[must_use]
     pub fn place(&self) -> Option<(DVec3, f64)> {
@@ -73,8 +95,11 @@ pub struct SimulatedBoard {
     rate_hz: u16,
     next_us: u64,
     next_hello_us: u64,
-    /// Readings a newton under the press that is on.
-    pressed: Option<(usize, Vec<f64>)>,
+    disturbed: Disturbed,
+    /// When it was read last (s).
+    read_s: f64,
+    /// Readings a newton of what presses, under each press that is on.
+    pressed: Vec<(usize, Vec<f64>)>,
     /// Frames that nobody took.
     pub overruns: u32,
 }
@@ -84,6 +109,8 @@ const HELLO_EVERY: u64 = 1_000_000;
 const STATUS_EVERY: u64 = 5_000_000;
 /// Seconds after the first START of a listener in which random presses leave it alone: it takes its rest.
 const REST_S: f64 = 2.0;
+/// Beside the seed of what disturbs.
+const DISTURBED: u64 = 0xd157;
 /// The fastest that is simulated (Hz).
 const FASTEST: u16 = 10_000;
 
@@ -101,7 +128,12 @@ impl SimulatedBoard {
         let offsets = (0..options.channels)
             .map(|_| options.offset * normal(&mut rng))
             .collect();
+        // From a stream of their own: what else is drawn is as without them.
+        let mut apart = ChaCha8Rng::seed_from_u64(options.seed ^ DISTURBED);
+        let disturbed = Disturbed::new(options.disturbances, options.channels, &mut apart);
         Self {
+            disturbed,
+            read_s: 0.0,
             drift: vec![0.0; options.channels],
             held: vec![0; options.channels],
             rate_hz: options.rate_hz.clamp(1, FASTEST),
@@ -117,7 +149,7 @@ impl SimulatedBoard {
             streaming: false,
             next_us: 0,
             next_hello_us: 0,
-            pressed: None,
+            pressed: Vec::new(),
             overruns: 0,
         }
     }
@@ -201,9 +233,9 @@ impl SimulatedBoard {
         }
         while self.next_us <= now_us {
             let time_us = self.next_us;
-            let (counts, touch) = self.sample(time_us);
+            let (counts, pushes) = self.sample(time_us);
             self.send(&Message::Data(counts), time_us, out);
-            tell(Truth { time_us, touch });
+            tell(Truth::of(time_us, &pushes));
             self.next_us += 1_000_000 / u64::from(self.rate_hz);
             if time_us / STATUS_EVERY != self.next_us / STATUS_EVERY {
                 let status = Message::Status {
@@ -229,65 +261,80 @@ impl SimulatedBoard {
         self.faults.spoil(&frame, data, &mut self.rng, out);
     }
 
-    /// All channels at a time: strain, gain, noise, drift, offset, quantization, clipping.
-    fn sample(&mut self, time_us: u64) -> (Vec<u32>, Option<Touch>) {
+    /// All channels at a time: strain, gain, what disturbs, noise, drift, offset, quantization, clipping.
+    fn sample(&mut self, time_us: u64) -> (Vec<u32>, Vec<Push>) {
         let seconds = time_us as f64 * 1e-6;
-        let touch = self.script.at(seconds);
-        let strain = self.strain(touch);
-        let touch = touch.map(|(_, touch)| touch);
-        let step = f64::from(self.rate_hz).sqrt().recip();
-        let middle = f64::from(self.options.chain.highest_count()) / 2.0;
+        let pushes = self.script.at(seconds);
+        let strains = self.felt(&pushes, seconds);
         let counts = (0..self.options.channels)
+            .map(|c| self.count(c, strains[c], seconds))
+            .collect();
+        (counts, pushes.into_iter().map(|(_, push)| push).collect())
+    }
+
+    /// What each channel feels (strain), before noise and converter.
+    fn felt(&mut self, pushes: &[(usize, Push)], seconds: f64) -> Vec<f64> {
+        let strain = self.strain(pushes);
+        let step = (seconds - self.read_s).max(0.0);
+        self.read_s = seconds;
+        let mut felt: Vec<f64> = (0..self.options.channels)
             .map(|c| {
-                self.drift[c] += self.options.drift * step * normal(&mut self.rng);
-                let illness = self.faults.illness(c, seconds);
+                let dead = self.faults.illness(c, seconds) == Some(Illness::Dead);
                 let felt = strain.get(c).map_or(0.0, |s| s * self.gains[c]);
-                let felt = if illness == Some(Illness::Dead) {
-                    0.0
-                } else {
-                    felt
-                };
-                let louder = if illness == Some(Illness::Noisy) {
-                    40.0
-                } else {
-                    1.0
-                };
-                let noise = louder * self.options.noise * normal(&mut self.rng);
-                let read = felt + self.offsets[c] + self.drift[c] + noise;
-                let count = middle + read * self.options.chain.counts_per_strain();
-                let count = match illness {
-                    Some(Illness::Stuck) => self.held[c],
-                    Some(Illness::Saturated) => self.options.chain.highest_count(),
-                    _ => count
-                        .round()
-                        .clamp(0.0, f64::from(self.options.chain.highest_count()))
-                        as u32,
-                };
-                self.held[c] = count;
-                count
+                let felt = if dead { 0.0 } else { felt };
+                self.disturbed.felt(c, felt, seconds, step)
             })
             .collect();
-        (counts, touch)
+        self.disturbed.mix(&mut felt);
+        felt
+    }
+
+    /// What the converter makes of what a channel feels (strain).
+    fn count(&mut self, c: usize, felt: f64, seconds: f64) -> u32 {
+        /// Of an illness.
+        const LOUDER: f64 = 40.0;
+        let step = f64::from(self.rate_hz).sqrt().recip();
+        self.drift[c] += self.options.drift * step * normal(&mut self.rng);
+        let illness = self.faults.illness(c, seconds);
+        let louder = if illness == Some(Illness::Noisy) {
+            LOUDER
+        } else {
+            1.0
+        };
+        let noise = louder * self.options.noise * normal(&mut self.rng);
+        let read = felt + self.offsets[c] + self.drift[c] + noise;
+        let highest = self.options.chain.highest_count();
+        let count = f64::from(highest) / 2.0 + read * self.options.chain.counts_per_strain();
+        self.held[c] = match illness {
+            Some(Illness::Stuck) => self.held[c],
+            Some(Illness::Saturated) => highest,
+            _ => count.round().clamp(0.0, f64::from(highest)) as u32,
+        };
+        self.held[c]
     }
 
     /// Strains of the gauges; the readings a newton are worked out once a press.
-    fn strain(&mut self, touch: Option<(usize, Touch)>) -> Vec<f64> {
-        let Some((press, touch)) = touch else {
-            return Vec::new();
-        };
-        if self
-            .pressed
-            .as_ref()
-            .is_none_or(|(known, _)| *known != press)
-        {
-            let unit = Touch {
-                force: 1.0,
-                ..touch
-            };
-            self.pressed = Some((press, self.sensitivity.read(&unit)));
+    fn strain(&mut self, pushes: &[(usize, Push)]) -> Vec<f64> {
+        self.pressed
+            .retain(|(known, _)| pushes.iter().any(|(press, _)| press == known));
+        let mut strains = vec![0.0; self.sensitivity.gauges()];
+        for (press, push) in pushes {
+            let force = push.touch.force;
+            let known = self.pressed.iter().position(|(known, _)| known == press);
+            let k = known.unwrap_or_else(|| {
+                let of_one = Push {
+                    force: push.force / force,
+                    ..*push
+                };
+                let read = self.sensitivity.read_push(&of_one);
+                self.pressed.push((*press, read));
+                self.pressed.len() - 1
+            });
+            for (strain, per_newton) in strains.iter_mut().zip(&self.pressed[k].1) {
+                *strain += per_newton * force;
+            }
         }
-        let per_newton = self.pressed.as_ref().map_or(&[][..], |p| &p.1);
-        per_newton.iter().map(|g| g * touch.force).collect()
+        strains
     }
 }
 

@@ -7,6 +7,7 @@ mod common;
 pub mod data;
 pub mod design;
 pub mod evaluate;
+pub mod keys;
 pub mod limb;
 pub mod listen;
 pub mod out;
@@ -77,6 +78,8 @@ pub enum Command {
     Calibrate(calibrate::CalibrateArgs),
     /// Writes a bundled limb, or another of its family.
     Limb(limb::LimbArgs),
+    /// What a project file may hold: every key with its unit, range, default and meaning.
+    Keys(keys::KeysArgs),
 }
 
 /// Gigabytes that can be meant.

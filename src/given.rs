@@ -103,8 +103,10 @@ pub fn answer_sifted(
         model,
         estimate,
         linearity,
+        is_short,
         ..
     } = built;
+    notes.extend(design::short_of_memory(is_short));
     notes.extend(design::open_solid(&inputs));
     notes.extend(checks.distrust());
     notes.extend(design::cautions(

@@ -10,6 +10,7 @@ pub mod mesh_file;
 pub mod npy;
 pub mod npz;
 pub mod opening;
+pub mod outlet;
 pub mod points;
 pub mod project_file;
 pub mod report;

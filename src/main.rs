@@ -35,8 +35,17 @@ fn main() -> ExitCode {
 
 /// Says what is wrong with the arguments.
 fn misused(wrong: &clap::Error) -> ExitCode {
+    /// Characters of a screen, and of its beginning: what was typed may be of any length.
+    const SCREEN: usize = 4000;
+    const BEGINNING: usize = 400;
+    let said = wrong.render().to_string();
     // With stderr closed the exit code alone says it.
-    let _ = wrong.print();
+    if said.chars().count() <= SCREEN {
+        let _ = wrong.print();
+    } else {
+        let beginning: String = said.chars().take(BEGINNING).collect();
+        out::say(&format!("{}…", hapdef::plain::message(&beginning)));
+    }
     ExitCode::from(2)
 }
 
@@ -56,6 +65,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Some(Command::Listen(args)) => cli::listen::run(args),
         Some(Command::Calibrate(args)) => cli::calibrate::run(args),
         Some(Command::Limb(args)) => cli::limb::run(args),
+        Some(Command::Keys(args)) => cli::keys::run(args),
         None => open_studio(cli),
     }
 }
@@ -85,8 +95,17 @@ fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
         },
         transparent: args.transparent,
     };
+    let is_png = args
+        .out
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    anyhow::ensure!(
+        is_png,
+        "--out {}: pictures are written as PNG. Choose a name that ends in .png",
+        hapdef::plain::path(&args.out)
+    );
     let loaded = args.common().load()?;
-    cli::spared::Spared::of(&loaded).check("--out", Some(&args.out))?;
+    cli::spared::Spared::of(&loaded).check_result("--out", Some(&args.out))?;
     let png = png(loaded, &picture).map_err(anyhow::Error::msg)?;
     hapdef::io::atomic::write(&args.out, &png).context("the picture could not be written")
 }

@@ -150,13 +150,23 @@ pub struct SensorSet {
     /// How far the set is at most from the best of as many gauges; only of the last set of a choice by expected error.
     #[serde(flatten)]
     pub certificate: Option<Certificate>,
+    /// The error (mm) that is expected over presses and noise that the set was not chosen by: those that it was chosen by
+    /// flatter it. Of the set that is shown; absent where nobody has looked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_mm: Option<f64>,
 }
 
 impl SensorSet {
     /// How far the set is at most from the best one, in words; absent where nothing is known of that.
     #[must_use]
     pub fn certified(&self) -> Option<String> {
-        Some(self.certificate?.words(self.criterion_mm?))
+        Some(self.certificate?.words(self.promised_mm()?))
+    }
+
+    /// The error (mm) that can be promised of it: over presses that it was not chosen by, where that is known.
+    #[must_use]
+    pub fn promised_mm(&self) -> Option<f64> {
+        self.expected_mm.or(self.criterion_mm)
     }
 }
 

@@ -14,8 +14,10 @@ use crate::gaussian_process::GpKernel;
 use crate::placement::expected_error::{Detail, Forces, Knowledge, Variance};
 use crate::placement::greedy_svr::GreedySvr;
 use crate::placement::{Constraints, PlacementError, Pool, Selection, SelectorKind};
-use crate::regression::Standardizer;
+use crate::plain;
 use crate::regression::folds::{Folds, number_of};
+use crate::regression::places::clumps;
+use crate::regression::{Grouping, Standardizer};
 use crate::statistics::median;
 
 pub use self::choice::{Choice, ChoiceSeconds, Weighed, audit, select};
@@ -156,7 +158,20 @@ pub fn places(svr: &GreedySvr, targets: &[[f64; 3]]) -> usize {
 /// A word on touches that repeat places, where some do.
 #[must_use]
 pub fn place_note(svr: &GreedySvr, targets: &[[f64; 3]]) -> Option<String> {
-    repeat_note(places(svr, targets), targets.len(), None)
+    repeat_note(places(svr, targets), targets.len(), None).or_else(|| clump_note(svr, targets))
+}
+
+/// A word on touches that seem to repeat places less exactly than a machine does, and are divided all the same.
+fn clump_note(svr: &GreedySvr, targets: &[[f64; 3]]) -> Option<String> {
+    if svr.grouping != Grouping::Place {
+        return None;
+    }
+    let clumps = clumps(targets)?;
+    let mm = plain::digits(clumps.apart_mm);
+    Some(format!(
+        "The touches lie in {} clumps, far apart for their size. If each is one place that was pressed again and again, say so with --place-mm {mm}: otherwise a model is judged at places that it has learned from, and the errors are too small.",
+        clumps.count
+    ))
 }
 
 /// A word on each of the sites whose signal never changes.

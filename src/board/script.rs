@@ -6,7 +6,7 @@ use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::elasticity::Touch;
+use crate::elasticity::{Push, Touch};
 
 /// One press: the force rises, stays and falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +17,10 @@ pub struct Press {
     pub duration_s: f64,
     /// With its largest force.
     pub touch: Touch,
+    /// Of rising and of falling (s).
+    pub ramp_s: f64,
+    /// What pushes along the surface, over what presses: a vector along it, as long as the tangent of the tilt.
+    pub aside: DVec3,
 }
 
 /// How hard a press may be (N): what a finger hardly feels, and more than any robot bears.
@@ -33,6 +37,15 @@ pub struct GivenPress {
     pub position: DVec3,
     /// The largest one (N).
     pub force: f64,
+    /// Of rising and of falling (s).
+    pub ramp_s: f64,
+    /// How far off the upright it pushes, and towards where: from the part's up, over its left as one looks at it from
+    /// outside (degrees).
+    pub tilt_deg: f64,
+    /// Towards where (degrees).
+    pub towards_deg: f64,
+    /// Of the tip or palm that spreads it (m); the project's where nothing is said.
+    pub radius: Option<f64>,
 }
 
 /// Presses in the order of their time.
@@ -48,21 +61,44 @@ pub enum Script {
 #[derive(Clone, Debug)]
 pub struct Random {
     places: Vec<Touch>,
-    forces: [f64; 2],
+    drawn: Drawn,
     rng: ChaCha8Rng,
     number: usize,
     press: Press,
 }
 
-/// Of rising and of falling.
-const RAMP_S: f64 = 0.08;
+/// What random presses are like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drawn {
+    /// The smallest and the largest force (N).
+    pub forces: [f64; 2],
+    /// The shortest and the longest ramp (s), drawn evenly over the logarithm.
+    pub ramps: [f64; 2],
+    /// How far they may push aside (degrees), in any direction.
+    pub tilt_deg: f64,
+}
+
+impl Drawn {
+    /// Straight presses with forces between two (N).
+    #[must_use]
+    pub fn straight(forces: [f64; 2]) -> Self {
+        Self {
+            forces,
+            ramps: [RAMP_S; 2],
+            tilt_deg: 0.0,
+        }
+    }
+}
+
+/// Of rising and of falling (s), where nothing else is said.
+pub const RAMP_S: f64 = 0.08;
 /// Seconds before anything is touched, so that there is time for a tare.
 const FIRST_S: f64 = 3.0;
 
 impl Script {
-    /// Presses at these places with forces between two (N).
+    /// Presses at these places, one after the other.
     #[must_use]
-    pub fn random(places: Vec<Touch>, forces: [f64; 2], seed: u64) -> Self {
+    pub fn random(places: Vec<Touch>, drawn: Drawn, seed: u64) -> Self {
         if places.is_empty() {
             return Self::Given(Vec::new());
         }
@@ -71,9 +107,11 @@ impl Script {
                 start_s: 0.0,
                 duration_s: 0.0,
                 touch: places[0],
+                ramp_s: RAMP_S,
+                aside: DVec3::ZERO,
             },
             places,
-            forces,
+            drawn,
             rng: ChaCha8Rng::seed_from_u64(seed),
             number: 0,
         };
@@ -91,13 +129,13 @@ impl Script {
         }
     }
 
-    /// The press that is on at a time, by its number, with its force at that moment. Times must not fall.
-    pub fn at(&mut self, seconds: f64) -> Option<(usize, Touch)> {
-        let (number, press) = match self {
+    /// The presses that are on at a time, by their numbers, with their forces at that moment. Times must not fall.
+    pub fn at(&mut self, seconds: f64) -> Vec<(usize, Push)> {
+        match self {
             Self::Given(presses) => {
-                let on = |p: &Press| p.contains(seconds);
-                let number = presses.iter().position(on)?;
-                (number, presses[number])
+                let all = presses.iter().enumerate();
+                all.filter_map(|(number, press)| Some((number, press.at(seconds)?)))
+                    .collect()
             }
             Self::Random(random) => {
                 while seconds >= random.press.start_s + random.press.duration_s {
@@ -105,14 +143,10 @@ impl Script {
                     let pause = 0.4 + 0.6 * random.rng.random::<f64>();
                     random.draw(end + pause);
                 }
-                (random.number, random.press)
+                let push = random.press.at(seconds);
+                push.map(|push| (random.number, push)).into_iter().collect()
             }
-        };
-        let touch = Touch {
-            force: press.touch.force * press.share(seconds),
-            ..press.touch
-        };
-        (touch.force > 0.0).then_some((number, touch))
+        }
     }
 }
 
@@ -120,28 +154,145 @@ impl Random {
     fn draw(&mut self, start_s: f64) {
         let place = self.places[self.number % self.places.len()];
         self.number += 1;
-        let [low, high] = self.forces;
+        let [low, high] = self.drawn.forces;
         let force = low + (high - low) * self.rng.random::<f64>();
         let duration_s = 0.6 + 0.8 * self.rng.random::<f64>();
         self.press = Press {
             start_s,
             duration_s,
             touch: Touch { force, ..place },
+            ramp_s: RAMP_S,
+            aside: DVec3::ZERO,
         };
+        let [quick, slow] = self.drawn.ramps;
+        if quick < slow {
+            self.press.ramp_s = quick * (slow / quick).powf(self.rng.random::<f64>());
+        } else {
+            self.press.ramp_s = quick;
+        }
+        if self.drawn.tilt_deg > 0.0 {
+            let tilt = self.drawn.tilt_deg * self.rng.random::<f64>();
+            let towards = 360.0 * self.rng.random::<f64>();
+            self.press.aside = aside(place.normal, DVec3::Z, tilt, towards);
+        }
     }
 }
 
+/// What pushes along a surface with this outward normal, over what presses, where somebody pushes so far off the upright
+/// (degrees) towards a direction (degrees, from `up` over the left).
+#[must_use]
+pub fn aside(normal: DVec3, up: DVec3, tilt_deg: f64, towards_deg: f64) -> DVec3 {
+    let along = up.reject_from_normalized(normal);
+    // Where the part's up stands on the surface any direction along it is as good.
+    let up = along
+        .try_normalize()
+        .unwrap_or_else(|| normal.any_orthonormal_vector());
+    let left = normal.cross(up);
+    let (sine, cosine) = towards_deg.to_radians().sin_cos();
+    (up * cosine + left * sine) * tilt_deg.to_radians().tan()
+}
+
 impl Press {
-    fn contains(&self, seconds: f64) -> bool {
-        seconds >= self.start_s && seconds < self.start_s + self.duration_s
+    /// Its push at a time; nothing before and after it.
+    fn at(&self, seconds: f64) -> Option<Push> {
+        let force = self.touch.force * self.share(seconds);
+        let touch = Touch {
+            force,
+            ..self.touch
+        };
+        (force > 0.0).then(|| Push {
+            force: (self.aside - self.touch.normal) * force,
+            touch,
+        })
     }
 
     /// Of the largest force at a time.
     fn share(&self, seconds: f64) -> f64 {
         let since = seconds - self.start_s;
-        let ramp = RAMP_S.min(self.duration_s / 2.0).max(1e-9);
+        if !(0.0..self.duration_s).contains(&since) {
+            return 0.0;
+        }
+        let ramp = self.ramp_s.min(self.duration_s / 2.0).max(1e-9);
         let near = since.min(self.duration_s - since) / ramp;
         let t = near.clamp(0.0, 1.0);
         t * t * (3.0 - 2.0 * t)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn touch(force: f64) -> Touch {
+        Touch {
+            position: DVec3::ZERO,
+            normal: DVec3::X,
+            force,
+            tip_radius: 5e-3,
+        }
+    }
+
+    fn press(start_s: f64, aside: DVec3) -> Press {
+        Press {
+            start_s,
+            duration_s: 1.0,
+            touch: touch(10.0),
+            ramp_s: 0.002,
+            aside,
+        }
+    }
+
+    #[test]
+    fn presses_that_overlap_are_on_together_with_their_own_ramps() {
+        let mut script = Script::Given(vec![press(0.0, DVec3::ZERO), press(0.5, DVec3::ZERO)]);
+        let on = |at: f64, script: &mut Script| -> Vec<usize> {
+            script.at(at).iter().map(|(number, _)| *number).collect()
+        };
+        assert_eq!(on(0.25, &mut script), [0]);
+        assert_eq!(on(0.75, &mut script), [0, 1]);
+        assert_eq!(on(1.25, &mut script), [1]);
+        assert!(script.at(1.5).is_empty());
+        let rising = script.at(0.001)[0].1.touch.force;
+        assert!((rising - 5.0).abs() < 1e-9, "{rising}");
+    }
+
+    #[test]
+    fn a_push_leans_as_far_as_it_is_tilted_and_where_to() {
+        // Outward is x, up is z: left, as one looks at the part, is -y.
+        for (towards, direction) in [(0.0, DVec3::Z), (90.0, DVec3::NEG_Y), (180.0, DVec3::NEG_Z)] {
+            let aside = aside(DVec3::X, DVec3::Z, 20.0, towards);
+            let wanted = direction * 20.0_f64.to_radians().tan();
+            assert!((aside - wanted).length() < 1e-12, "{aside}");
+            let mut script = Script::Given(vec![press(0.0, aside)]);
+            let push = script.at(0.5)[0].1;
+            let off = push.force.angle_between(DVec3::NEG_X).to_degrees();
+            assert!((off - 20.0).abs() < 1e-9, "{off}");
+            assert_eq!(push.touch.force, 10.0);
+        }
+        // On top of the part, where up is no direction along the surface.
+        let aside = aside(DVec3::Z, DVec3::Z, 45.0, 30.0);
+        assert!((aside.length() - 1.0).abs() < 1e-12 && aside.z.abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_drawn_stays_within_what_was_asked() {
+        let drawn = Drawn {
+            forces: [2.0, 3.0],
+            ramps: [0.002, 0.08],
+            tilt_deg: 20.0,
+        };
+        let mut script = Script::random(vec![touch(1.0)], drawn, 7);
+        let (mut most, mut seen) = (0.0_f64, 0);
+        for k in 0..100_000 {
+            for (_, push) in script.at(1e-3 * f64::from(k)) {
+                most = most.max(push.force.angle_between(DVec3::NEG_X).to_degrees());
+                assert!(push.touch.force <= 3.0);
+                seen += 1;
+            }
+        }
+        assert!(
+            seen > 10_000 && (15.0..20.0).contains(&most),
+            "{seen} {most}"
+        );
     }
 }

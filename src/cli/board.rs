@@ -16,8 +16,8 @@ use super::simulate::in_file;
 use super::spared::Spared;
 use super::{out, progress::Bar};
 use crate::board::{
-    ChannelFault, Fault, Faults, GivenPress, Options, PRESSES, Press, Script, SimulatedBoard,
-    Truth, script_seed,
+    ChannelFault, Disturbances, Drawn, Fault, Faults, GivenPress, Options, PRESSES, Press, Script,
+    SimulatedBoard, Truth, aside, script_seed,
 };
 use crate::budget::Watch;
 use crate::design::simulated_board::{options, places, simulated};
@@ -65,10 +65,20 @@ pub struct BoardArgs {
     /// Smallest and largest force of random touches (N).
     #[arg(long, num_args = 2, default_values_t = [2.0, 15.0], value_parser = between(*PRESSES.start(), *PRESSES.end()))]
     pub force: Vec<f64>,
-    /// Touches instead of random ones (.csv): `start_s,duration_s,x_mm,y_mm,z_mm,force_n`.
+    /// Shortest and longest time in which random touches rise and fall (ms).
+    #[arg(long, num_args = 2, default_values_t = [80.0, 80.0], value_parser = between(0.1, 1e4))]
+    pub ramp: Vec<f64>,
+    /// How far random touches may push aside (degrees off the upright, in any direction).
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 80.0))]
+    pub tilt: f64,
+    #[command(flatten)]
+    pub disturbed: DisturbanceArgs,
+    /// Touches instead of random ones (.csv): `start_s,duration_s,x_mm,y_mm,z_mm,force_n`, and if wanted
+    /// `ramp_ms,tilt_deg,towards_deg,radius_mm`; they may overlap.
     #[arg(long)]
     pub script: Option<PathBuf>,
-    /// Where the truth is written (.csv): `t_us,x_mm,y_mm,z_mm,force_n`, empty where nothing touches.
+    /// Where the truth is written (.csv): `t_us,x_mm,y_mm,z_mm,force_n`, empty where nothing touches. Where touches
+    /// overlap or push aside, these are of the hardest, and `fx_n,fy_n,fz_n,touches` of all follow.
     #[arg(long)]
     pub truth: Option<PathBuf>,
     /// A channel (from 0) that fails, or an unplug: `dead:7@5`, `stuck:2@3+4`, `saturated:1`, `noisy:0`, `unplug@10+1`.
@@ -89,6 +99,65 @@ pub struct BoardArgs {
     /// Seconds after which it ends by itself; a recording ends a second after the last touch of a script.
     #[arg(long, value_parser = between(0.0, 1e9))]
     pub seconds: Option<f64>,
+}
+
+/// What there is in the readings beside touches.
+#[derive(Args, Debug, Clone)]
+pub struct DisturbanceArgs {
+    /// Mains hum in every channel: amplitude (microstrain) and frequency (Hz; 50 when left out), as 20 or 20@60.
+    #[arg(long, value_parser = hum)]
+    pub hum: Option<(f64, f64)>,
+    /// What all channels drift by together (microstrain a second), as a part that is warmed.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-MOST_MICROSTRAIN, MOST_MICROSTRAIN))]
+    pub warming: f64,
+    /// What each channel drifts by alone (microstrain a second, standard deviation over the channels).
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, MOST_MICROSTRAIN))]
+    pub warming_apart: f64,
+    /// Creep of the plastic: share of a strain that follows later (%) and the time in which it does (s; 6 when left
+    /// out), as 3 or 3@20.
+    #[arg(long, value_parser = creep)]
+    pub creep: Option<(f64, f64)>,
+    /// Share of a reading that is of the channel before it (%).
+    #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 100.0))]
+    pub crosstalk: f64,
+}
+
+impl DisturbanceArgs {
+    /// In SI units.
+    fn disturbances(&self) -> Disturbances {
+        Disturbances {
+            hum: self.hum.map(|(amplitude, hertz)| (amplitude * 1e-6, hertz)),
+            warming: self.warming * 1e-6,
+            warming_apart: self.warming_apart * 1e-6,
+            creep: self.creep.map(|(percent, time)| (percent / 100.0, time)),
+            crosstalk: self.crosstalk / 100.0,
+        }
+    }
+}
+
+fn hum(text: &str) -> Result<(f64, f64), String> {
+    let wanted = "write MICROSTRAIN or MICROSTRAIN@HERTZ, as 20@50, up to 100000 and 5000";
+    pair(text, 50.0, MOST_MICROSTRAIN, 0.01..=5000.0).ok_or_else(|| wanted.into())
+}
+
+fn creep(text: &str) -> Result<(f64, f64), String> {
+    let wanted = "write PERCENT or PERCENT@SECONDS, as 3@6, up to 100 and 1000000";
+    pair(text, 6.0, 100.0, 1e-3..=1e6).ok_or_else(|| wanted.into())
+}
+
+/// An amount up to `most` and what stands behind the @, or what is usual.
+fn pair(
+    text: &str,
+    usual: f64,
+    most: f64,
+    range: std::ops::RangeInclusive<f64>,
+) -> Option<(f64, f64)> {
+    let (amount, rest) = match text.split_once('@') {
+        Some((amount, rest)) => (amount, rest.parse().ok()?),
+        None => (text, usual),
+    };
+    let amount = amount.parse().ok().filter(|a| (0.0..=most).contains(a))?;
+    range.contains(&rest).then_some((amount, rest))
 }
 
 /// More than any gauge bears.
@@ -120,7 +189,7 @@ pub fn run(args: &BoardArgs) -> anyhow::Result<()> {
     let plan = Plan::new(args, &loaded.inputs)?;
     let (failed, failures) = channel();
     let mut truth = match &args.truth {
-        Some(path) => Some(TruthFile::create(path, failed)?),
+        Some(path) => Some(TruthFile::create(path, plan.says_more(args), failed)?),
         None => None,
     };
     let outlet = Outlet::open(args, &plan)?;
@@ -267,6 +336,12 @@ impl Plan {
             args.force[0],
             args.force[1]
         );
+        anyhow::ensure!(
+            args.ramp[0] <= args.ramp[1],
+            "--ramp {} {}: the shorter one first",
+            args.ramp[0],
+            args.ramp[1]
+        );
         let script = args.script.as_deref();
         Ok(Self {
             channels,
@@ -275,6 +350,19 @@ impl Plan {
                 .map(|path| read_script(path, &inputs.part))
                 .transpose()?,
         })
+    }
+}
+
+impl Plan {
+    /// Whether touches overlap or push aside.
+    fn says_more(&self, args: &BoardArgs) -> bool {
+        let presses = self.presses.as_deref().unwrap_or_default();
+        let mut spans: Vec<[f64; 2]> = (presses.iter())
+            .map(|p| [p.start_s, p.start_s + p.duration_s])
+            .collect();
+        spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let overlap = spans.windows(2).any(|pair| pair[1][0] < pair[0][1]);
+        overlap || args.tilt > 0.0 || presses.iter().any(|p| p.tilt_deg > 0.0)
     }
 }
 
@@ -310,7 +398,11 @@ fn build(
         Some(presses) => on_surface(presses, inputs, &sensing),
         None => Script::random(
             places(inputs, &sensing, seed)?,
-            [args.force[0], args.force[1]],
+            Drawn {
+                forces: [args.force[0], args.force[1]],
+                ramps: [args.ramp[0] * 1e-3, args.ramp[1] * 1e-3],
+                tilt_deg: args.tilt,
+            },
             script_seed(seed),
         ),
     };
@@ -319,6 +411,7 @@ fn build(
         rate_hz: args.rate,
         noise: args.noise.unwrap_or(inputs.project.gauge.noise_microstrain) * 1e-6,
         drift: args.drift * 1e-6,
+        disturbances: args.disturbed.disturbances(),
         chain: Chain {
             bits: args.bits,
             ..Chain::default()
@@ -355,33 +448,47 @@ fn read_script(path: &Path, part: &TriMesh) -> anyhow::Result<Vec<GivenPress>> {
 /// Presses put onto the part's surface.
 fn on_surface(presses: &[GivenPress], inputs: &Inputs, sensing: &Sensing) -> Script {
     let map = &sensing.drawn.map;
+    let up = inputs.project.part.axis.stance(&inputs.part).up();
     let press = |asked: &GivenPress| {
         let (at, _) = map.mesh.index().nearest(asked.position);
+        let normal = map.mesh.normal(at);
         Press {
             start_s: asked.start_s,
             duration_s: asked.duration_s,
             touch: Touch {
                 position: map.mesh.point(at),
-                normal: map.mesh.normal(at),
+                normal,
                 force: asked.force,
-                tip_radius: inputs.project.tip().1,
+                tip_radius: asked.radius.unwrap_or(inputs.project.tip().1),
             },
+            ramp_s: asked.ramp_s,
+            aside: aside(normal, up, asked.tilt_deg, asked.towards_deg),
         }
     };
     Script::Given(presses.iter().map(press).collect())
 }
 
+/// Columns of a truth of several touches, or of some that push aside.
+const MORE: &str = ",fx_n,fy_n,fz_n,touches";
+
 /// What really happens, as a table. What goes wrong with it is told to `failed`, once.
 struct TruthFile {
     file: BufWriter<File>,
+    /// Whether there is more to say than one touch that presses straight in.
+    says_more: bool,
     failed: Option<Sender<std::io::Error>>,
 }
 
 impl TruthFile {
-    fn create(path: &Path, failed: Sender<std::io::Error>) -> anyhow::Result<Self> {
+    fn create(
+        path: &Path,
+        says_more: bool,
+        failed: Sender<std::io::Error>,
+    ) -> anyhow::Result<Self> {
+        let more = if says_more { MORE } else { "" };
         let begin = || {
             let mut file = BufWriter::new(File::create(path)?);
-            writeln!(file, "t_us,x_mm,y_mm,z_mm,force_n")?;
+            writeln!(file, "t_us,x_mm,y_mm,z_mm,force_n{more}")?;
             file.flush()?;
             Ok::<_, std::io::Error>(file)
         };
@@ -389,12 +496,13 @@ impl TruthFile {
             .with_context(|| format!("{}: the truth cannot be written there", path.display()))?;
         Ok(Self {
             file,
+            says_more,
             failed: Some(failed),
         })
     }
 
     fn write(&mut self, truth: &Truth) {
-        let line = match truth.touch {
+        let mut line = match truth.touch {
             Some(Touch {
                 position, force, ..
             }) => {
@@ -406,6 +514,13 @@ impl TruthFile {
             }
             None => format!("{},,,,", truth.time_us),
         };
+        if self.says_more {
+            let all = truth.force;
+            line += &match truth.touches {
+                0 => ",,,,0".to_owned(),
+                touches => format!(",{:.5},{:.5},{:.5},{touches}", all.x, all.y, all.z),
+            };
+        }
         let written = writeln!(self.file, "{line}");
         self.note(written);
         if truth.time_us % 100_000 < 1000 {
@@ -437,6 +552,18 @@ impl Drop for TruthFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_disturbs_is_an_amount_and_if_wanted_more() {
+        assert_eq!(hum("20"), Ok((20.0, 50.0)));
+        assert_eq!(hum("5@60.02"), Ok((5.0, 60.02)));
+        assert_eq!(creep("3@20"), Ok((3.0, 20.0)));
+        for wrong in [
+            "", "@50", "nan", "20@", "20@0", "20@nan", "1e9", "-1", "20@50@60",
+        ] {
+            assert!(hum(wrong).is_err() && creep(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn presses_far_from_the_part_are_refused_with_their_line() {

@@ -93,7 +93,7 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     };
     let spared = Spared::of(&loaded).and("the recording itself", recording);
     let spared = spared.and("the points", args.points.as_deref());
-    spared.check("--table", args.table.as_deref())?;
+    spared.check_result("--table", args.table.as_deref())?;
     address.check().map_err(anyhow::Error::msg)?;
     let sensing = sensing_for(&common, &loaded)?;
     let points = on_part(points, &sensing, args.force);
@@ -110,7 +110,9 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
 /// Which file the calibrated project goes to.
 fn target(args: &CalibrateArgs, loaded: &LoadedProject) -> anyhow::Result<PathBuf> {
     if let Some(out) = &args.out {
-        return Ok(project_file::with_ending(out));
+        let out = project_file::with_ending(out);
+        crate::io::outlet::file(&out).context("--out")?;
+        return Ok(out);
     }
     let own = !loaded.bundled && loaded.path.is_file();
     anyhow::ensure!(

@@ -10,6 +10,7 @@ use crate::budget::Quality;
 use crate::dataset::Signal;
 use crate::io::examples::write_bundled_mesh;
 use crate::io::opening::{bundled, open};
+use crate::io::outlet;
 use crate::io::project_file::LoadedProject;
 use crate::placement::SelectorKind;
 use crate::plain;
@@ -126,6 +127,7 @@ pub fn prepare_folder(loaded: &mut LoadedProject, folder: &Path) -> anyhow::Resu
             folder.display()
         )
     })?;
+    outlet::folder(folder)?;
     if loaded.bundled {
         loaded.mesh_path = write_bundled_mesh(folder, &loaded.mesh_path)?;
     }

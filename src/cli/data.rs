@@ -206,7 +206,7 @@ impl CriterionArgs {
         let spread = size * scale::USUAL_SPREAD_MM;
         if hyper.c > LARGEST_C * spread {
             return Err(misuse(&format!(
-                "--c is {} mm for touches that spread over {spread:.3} mm: nothing above {:e} mm can be computed",
+                "--c is {} mm for touches that spread over {spread:.3} mm: nothing above {:.2e} mm can be computed",
                 hyper.c,
                 LARGEST_C * spread
             )));
@@ -222,6 +222,16 @@ impl CriterionArgs {
             },
             tolerance: TOLERANCE,
             landmarks: 1.0,
+        })
+    }
+
+    /// A word on settings that do not grow with the part, where they are taken because nothing else is said.
+    #[must_use]
+    pub fn paper_note(&self) -> Option<String> {
+        let given = [self.c, self.epsilon, self.gamma];
+        let is_usual = self.target_unit == TargetUnit::M && given.iter().any(Option::is_none);
+        is_usual.then(|| {
+            "With --target-unit m, what is left out of --c, --epsilon and --gamma is as in the paper (20, 1e-6, 2e-3), which suits its limb: it does not grow with the part, as the settings in mm do.".into()
         })
     }
 

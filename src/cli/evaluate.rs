@@ -100,6 +100,13 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     });
     bar.finish();
     let verdict: Verdict = result?;
+    let usual = (args.estimator == EstimatorArg::Svr && !args.tune)
+        .then(|| args.criterion.paper_note())
+        .flatten();
+    if let Some(note) = &usual {
+        out::say(&format!("note: {note}"));
+    }
+    notes.extend(usual);
     for note in &verdict.notes {
         out::say(&format!("note: {note}"));
     }

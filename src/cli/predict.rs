@@ -34,7 +34,7 @@ pub struct PredictArgs {
 pub fn run(args: &PredictArgs) -> anyhow::Result<()> {
     Spared::of_data(&args.data.data, args.data.touches.as_deref())
         .and("the estimator", Some(&args.model))
-        .check("--out", args.out.as_deref())?;
+        .check_result("--out", args.out.as_deref())?;
     let file = touch_file::read(&args.model)?;
     let (data, mut notes) = args.data.load()?;
     let fits = file.check_channels(data.x.rows());

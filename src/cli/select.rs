@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::common::SelectorArg;
 use super::data::{CriterionArgs, DataArgs, criterion_json, site_json};
 use super::ranges::{between, misuse, whole};
+use super::spared::Spared;
 use super::{out, progress::Bar};
 use crate::bounds::Bounds;
 use crate::budget::Watch;
@@ -150,6 +151,7 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
         .then(|| study::place_note(&settings.svr, &data.targets))
         .flatten()
         .into_iter()
+        .chain(divided.then(|| args.criterion.paper_note()).flatten())
         .chain(choice.selection.achieved.words().cloned())
         .collect();
     for note in &said {
@@ -216,7 +218,8 @@ impl SelectArgs {
             self.out.is_none() || !data.positions.is_empty(),
             "--out writes the positions of the sites (site_m), and the dataset has none"
         );
-        Ok(())
+        Spared::of_data(&self.data.data, self.data.touches.as_deref())
+            .check_result("--out", self.out.as_deref())
     }
 
     fn audited(

@@ -61,8 +61,8 @@ pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     let spared = Spared::of(&loaded)
         .and("the table of touches", args.touches.as_deref())
         .and("the table of gauges", args.sites.as_deref());
-    spared.check("--out", Some(&args.out))?;
-    spared.check("--vtu", args.vtu.as_deref())?;
+    spared.check_result("--out", Some(&args.out))?;
+    spared.check_result("--vtu", args.vtu.as_deref())?;
     match given {
         Some((touches, sites)) => at_points(args, &loaded, touches, sites),
         None => everywhere(args, &loaded),

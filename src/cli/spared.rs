@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::ensure;
+use anyhow::{Context as _, ensure};
 
+use crate::io::outlet;
 use crate::io::project_file::{LoadedProject, arrays_path};
 
 /// What a command reads, in words and by path.
@@ -51,6 +52,17 @@ impl Spared {
             there.map_or("a file that is read", |(what, _)| what)
         );
         Ok(())
+    }
+}
+
+impl Spared {
+    /// As [`Self::check`], of a file that is written when all is computed: refuses too what could not be written then.
+    ///
+    /// # Errors
+    /// A message naming the flag, the path and what to do.
+    pub fn check_result(&self, flag: &str, output: Option<&Path>) -> anyhow::Result<()> {
+        self.check(flag, output)?;
+        output.map_or(Ok(()), outlet::file).context(flag.to_owned())
     }
 }
 

@@ -12,6 +12,7 @@ use super::out;
 use super::progress::Bar;
 use crate::budget::Quality;
 use crate::design::Finest;
+use crate::io::outlet;
 use crate::io::project_file::LoadedProject;
 use crate::io::together::Together;
 use crate::io::trade_file::{self, Judge, Record};
@@ -56,6 +57,7 @@ pub fn run(args: &TradeArgs) -> anyhow::Result<()> {
             args.out.display()
         )
     })?;
+    outlet::folder(&args.out)?;
     let threads = args.common.in_pool(|| Ok(rayon::current_num_threads()))?;
     let asked = match (args.within_s, args.of_the_best_mm) {
         (Some(seconds), _) => Some(Asked::Within(seconds)),

@@ -82,7 +82,7 @@ pub struct TrainArgs {
 /// A message in the user's terms.
 pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     Spared::of_data(&args.data.data, args.data.touches.as_deref())
-        .check("--out", Some(&args.out))?;
+        .check_result("--out", Some(&args.out))?;
     let (data, mut notes) = args.data.load()?;
     let groups = args.groups(&data)?;
     let asked = Asked {
@@ -207,7 +207,7 @@ fn print(trained: &Trained, cpu_seconds: f64) -> anyhow::Result<()> {
     out::line(&format!(
         "{} is taken: learned from {}, {cpu_seconds:.0} s of processor time",
         trained.family.name(),
-        plain::count(trained.division.train.len(), "touch")
+        plain::either(trained.division.train.len(), "touch", "touches")
     ))?;
     print_scores(&trained.scores, trained.division.test.len())
 }

@@ -332,7 +332,8 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround, watch: Watch) -> Result<Advic
     };
     let mut words = vec![
         format!(
-            "The mesh is closed, with walls {} mm thick (a tenth thinner than {} mm, a tenth thicker than {} mm){} on a part {} mm across.",
+            "The mesh is closed{}, with walls {} mm thick (a tenth thinner than {} mm, a tenth thicker than {} mm){} on a part {} mm across.",
+            open_edges(&inputs.part),
             digits(wall_mm[1]),
             digits(wall_mm[0]),
             digits(wall_mm[2]),
@@ -431,6 +432,17 @@ fn meant_closed(part: &TriMesh) -> Option<String> {
     Some(format!(
         "If it is meant to be closed: it is when vertices within {mm} mm are joined (part.weld_mm = {mm})."
     ))
+}
+
+/// What keeps a mesh that is taken for a closed one from being it.
+fn open_edges(part: &TriMesh) -> String {
+    match part.boundary_edges().count() {
+        0 => String::new(),
+        open => format!(
+            " but for {}: what lies behind its holes and seams is a guess (part.fill_holes_mm and part.weld_mm close some)",
+            plain::either(open, "open edge", "open edges")
+        ),
+    }
 }
 
 fn bent(radius: [f64; 2]) -> String {

@@ -73,6 +73,7 @@ impl Design {
                     gap: None,
                     margin: None,
                     certificate: None,
+                    expected_mm: None,
                 };
             }
         }

@@ -39,6 +39,8 @@ pub struct Built {
     pub estimate: Discretization,
     /// Of a shell; a solid's is not estimated.
     pub linearity: Option<Linearity>,
+    /// Whether memory did not hold as many elements as the budget would have allowed.
+    pub is_short: bool,
     /// The worst balance of forces and energies over a sample of the loads.
     pub balance: LoadCheck,
     /// Assemblies and factorizations, and loads solved on the way here.
@@ -90,6 +92,14 @@ pub(super) fn solid_ground(inputs: &Inputs, watch: Watch) -> Result<SolidGround,
         watch,
     )?;
     Ok(solid)
+}
+
+/// What has to be known of a model that memory did not hold as it was asked for.
+#[must_use]
+pub fn short_of_memory(is_short: bool) -> Option<String> {
+    is_short.then(|| {
+        "Memory did not hold as many elements as this quality asks for: there are fewer. Allow more with --memory-gb, or choose a lower quality.".into()
+    })
 }
 
 /// What has to be known of a tip (its radius, m) that is larger than the part: nobody means that, but it can be computed.
@@ -245,7 +255,7 @@ impl Ground {
     }
 
     /// Elements for these touches, finer until the error is small enough or the budget spent. Few touches may have
-    /// more elements than many: where memory does not hold those, half as many, down to what any number has.
+    /// more elements than many: where memory does not hold those, half as many, and so on, which [`Built::is_short`] says.
     ///
     /// # Errors
     /// [`DesignError`] for what cannot be computed.
@@ -256,14 +266,19 @@ impl Ground {
         aim: &Elements,
         watch: Watch,
     ) -> Result<Built, DesignError> {
+        /// Vertices of a model that says anything at all.
+        const LEAST: usize = 400;
         let mut aim = *aim;
+        let mut is_short = false;
         loop {
             let most = aim.most_for(touches.len());
             match self.build_within(touches, places, &aim, watch) {
-                Err(DesignError::Elastic(error)) if error.is_memory() && most > aim.vertices => {
-                    aim.most_vertices = (most / 2).max(aim.vertices);
+                Err(DesignError::Elastic(error)) if error.is_memory() && most > LEAST => {
+                    aim.most_vertices = (most / 2).max(LEAST);
+                    aim.vertices = aim.vertices.min(aim.most_vertices);
+                    is_short = true;
                 }
-                built => return built,
+                built => return built.map(|built| Built { is_short, ..built }),
             }
         }
     }
@@ -292,6 +307,7 @@ impl Ground {
                     model: Box::new(model),
                     estimate,
                     linearity: Some(linearity),
+                    is_short: false,
                     balance,
                     models,
                     solves,
@@ -304,6 +320,7 @@ impl Ground {
                     model: Box::new(graded.model),
                     estimate: graded.estimate,
                     linearity: None,
+                    is_short: false,
                     balance: graded.balance,
                     models: graded.models,
                     solves: graded.solves,

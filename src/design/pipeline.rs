@@ -6,8 +6,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    DesignError, Found, Inputs, Reduced, Reference, Simulated, evaluate, filter, reduce_sites,
-    reference, refine, select_step_by_step, simulate, sites_to_judge,
+    DesignError, Found, Inputs, Reduced, Reference, Simulated, evaluate, expected_errors, filter,
+    reduce_sites, reference, refine, select_step_by_step, simulate, sites_to_judge,
 };
 use crate::budget::{Budget, Watch, Work};
 use crate::evaluation::{Evaluation, EvaluationRow};
@@ -306,7 +306,7 @@ pub fn run_step_by_step(
         let mut chosen = select_all(
             inputs, &simulated, &reduced, kinds, budget, &mut times, hooks,
         )?;
-        let refined = refine_chosen(inputs, simulated, &reduced, &mut chosen, budget, hooks)?;
+        let refined = finish_chosen(inputs, simulated, &reduced, &mut chosen, budget, hooks)?;
         if inputs.project.selection.refine {
             times.lap("refine places");
         }
@@ -401,8 +401,9 @@ fn select_all(
     Ok(selections)
 }
 
-/// Moves the gauges chosen by expected error off the lattice, where that is asked for; the simulation with them.
-fn refine_chosen(
+/// Moves the gauges chosen by expected error off the lattice, where that is asked for, and says what is expected of them over
+/// presses that they were not chosen by; the simulation with them.
+fn finish_chosen(
     inputs: &Inputs,
     simulated: Arc<Simulated>,
     reduced: &Reduced,
@@ -413,14 +414,23 @@ fn refine_chosen(
     let kind = SelectorKind::ExpectedError;
     let mut chosen = chosen.iter_mut().filter(|s| s.selector == kind);
     let asked = inputs.project.selection.refine;
-    let Some(selection) = chosen.next().filter(|_| asked) else {
+    let Some(selection) = chosen.next() else {
         return Ok(simulated);
     };
-    let refined = refine(inputs, simulated, reduced, selection, budget, hooks.watch)?;
-    if let Some(last) = selection.sets.last() {
-        (hooks.found)(kind, last, &refined.dataset.sites);
+    let simulated = if asked {
+        refine(inputs, simulated, reduced, selection, budget, hooks.watch)?
+    } else {
+        simulated
+    };
+    if let Some(last) = selection.sets.last_mut() {
+        let sets = [last.sites.clone()];
+        let expected = expected_errors(inputs, &simulated, &sets, hooks.watch)?;
+        last.expected_mm = expected.first().copied();
+        if asked {
+            (hooks.found)(kind, last, &simulated.dataset.sites);
+        }
     }
-    Ok(refined)
+    Ok(simulated)
 }
 
 struct Stopwatch<'a> {

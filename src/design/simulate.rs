@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::ground::{Built, Ground, ground, open_solid, wide_tip};
-use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches};
+use super::ground::{Built, Ground, ground, open_solid, short_of_memory, wide_tip};
+use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches, size_mm};
 use super::{DesignError, Inputs, Meshed, SLOPE_TOUCHES};
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset, Surveyed};
@@ -128,6 +128,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     Project::mask("feasible.keep_out", kept_out, &inputs.masks)?;
     let ground = ground(inputs, watch)?;
     ground.check(project)?;
+    check_required(inputs)?;
     check_foreseen(inputs, budget)?;
     let layout = ground.site_layout(&inputs.part);
     let sites = lay_out_sites(&layout, inputs)?;
@@ -142,6 +143,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         model,
         estimate,
         linearity,
+        is_short,
         models,
         solves,
         ..
@@ -159,9 +161,62 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         solves,
         ..Work::default()
     };
-    read(
+    let mut simulated = read(
         inputs, budget, known, &*model, touches, &places, before, watch,
-    )
+    )?;
+    (simulated.achieved.cautions).extend(short_of_memory(is_short));
+    Ok(simulated)
+}
+
+/// How far (mm) each required gauge was placed from the part. Of what is far out the box around the part is asked: its
+/// squares are no numbers any more.
+fn required_distances(inputs: &Inputs) -> Vec<f64> {
+    let part = &inputs.part;
+    let (lower, upper) = part.bounds();
+    let distance = |at: &[f64; 3]| {
+        let at = DVec3::from_array(*at) * 1e-3;
+        let of_box = at.distance(at.clamp(lower, upper));
+        if of_box > (upper - lower).length() {
+            return of_box * 1e3;
+        }
+        let nearest = part.index().nearest(at).0;
+        part.point(nearest).distance(at) * 1e3
+    };
+    (inputs.project.selection.required_mm.iter())
+        .map(distance)
+        .collect()
+}
+
+/// Refuses gauges that are required farther from the part than it is large.
+fn check_required(inputs: &Inputs) -> Result<(), DesignError> {
+    let size_mm = size_mm(&inputs.part);
+    let distances = required_distances(inputs).into_iter().enumerate();
+    let mut far = distances.filter(|&(_, distance_mm)| distance_mm > size_mm);
+    far.next().map_or(Ok(()), |(number, distance_mm)| {
+        Err(DesignError::OffThePart {
+            what: "place of selection.required_mm",
+            number,
+            distance_mm,
+            size_mm,
+        })
+    })
+}
+
+/// What has to be known of required gauges that are nowhere near the part.
+fn required_off(inputs: &Inputs) -> Option<String> {
+    /// In spacings of the sites.
+    const OFF: f64 = 3.0;
+    let most = OFF * inputs.project.sites.spacing_mm;
+    let off: Vec<String> = (required_distances(inputs).into_iter().enumerate())
+        .filter(|&(_, distance)| distance > most)
+        .map(|(number, distance)| format!("place {number} by {} mm", digits(distance)))
+        .collect();
+    (!off.is_empty()).then(|| {
+        format!(
+            "Gauges are required (selection.required_mm, from 0) off the part: {}. The nearest sites are taken.",
+            off.join(", ")
+        )
+    })
 }
 
 /// As [`simulate`] where only what gauges report has changed (`gauge.signal`, `gauge.directions`) since `last`: on
@@ -251,6 +306,7 @@ fn read(
     cautious.extend(meshed.cautions(project.tip().1));
     cautious.extend(wide_tip(&inputs.part, project.tip().1));
     cautious.extend(open_solid(inputs));
+    cautious.extend(required_off(inputs));
     cautious.extend(on_supports(inputs, &dataset.touches)?);
     let (mesh, held) = meshed.gauge_surface();
     let index = mesh.index();

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::as_made::as_made;
 use super::presses::{self, Press};
 use super::{DesignError, Inputs, PRESS_SEED, Sensing, Workshop};
-use crate::board::{Faults, Options, Script, SimulatedBoard, fitting_gain};
+use crate::board::{Disturbances, Faults, Options, Script, SimulatedBoard, fitting_gain};
 use crate::budget::Watch;
 use crate::draw::normal;
 use crate::elasticity::sensitivity::Sensitivity;
@@ -25,6 +25,7 @@ pub fn options(inputs: &Inputs, channels: usize) -> Options {
         noise: inputs.project.gauge.noise_microstrain * 1e-6,
         drift: 0.1e-6,
         offset: 100e-6,
+        disturbances: Disturbances::default(),
         name: "Simulated board".into(),
     }
 }

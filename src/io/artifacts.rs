@@ -286,7 +286,7 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
 /// How far the chosen set is at most from the best one; nothing where its selector cannot say.
 fn certificate(design: &Design) -> Option<Value> {
     let set = design.chosen_set()?;
-    let (certificate, expected) = (set.certificate?, set.criterion_mm?);
+    let (certificate, expected) = (set.certificate?, set.promised_mm()?);
     Some(json!({
         "sensors": set.sites.len(),
         "expected_mm": expected,

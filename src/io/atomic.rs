@@ -4,13 +4,14 @@ use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::FileError;
+use super::{FileError, outlet};
 
 /// Writes aside, syncs, and renames over the target. Two that write the same file do it one after the other.
 ///
 /// # Errors
 /// [`FileError`] naming the target; the old file is then untouched.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    outlet::ordinary(path)?;
     attempt(path, bytes).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => FileError::broken(
             path,

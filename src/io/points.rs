@@ -8,10 +8,10 @@ use glam::DVec3;
 use super::npz::NpzFile;
 use super::table::{Row, Table, Writing};
 use super::{FileError, atomic};
-use crate::board::{GivenPress, PRESSES};
+use crate::board::{GivenPress, PRESSES, RAMP_S};
 use crate::elasticity::Touch;
 use crate::given::{self, Answer, GivenSite};
-use crate::project::LENGTH;
+use crate::project::TouchKeys;
 
 const TOUCHES: [&str; 8] = [
     "x_mm",
@@ -51,7 +51,14 @@ pub fn read_touches(path: &Path) -> Result<Vec<Touch>, FileError> {
                 &FORCES,
                 "above zero, as it presses along -n",
             )?,
-            tip_radius: 1e-3 * ranged(row, "tip_radius_mm", tip, &LENGTH, "above zero")?,
+            tip_radius: 1e-3
+                * ranged(
+                    row,
+                    "tip_radius_mm",
+                    tip,
+                    &TouchKeys::tip_radius_mm().numbers(),
+                    "above zero",
+                )?,
         })
     })
 }
@@ -72,21 +79,58 @@ pub fn read_sites(path: &Path) -> Result<Vec<GivenSite>, FileError> {
     })
 }
 
-/// Reads who presses a simulated board and when: `start_s,duration_s,x_mm,y_mm,z_mm,force_n`. Further columns are
-/// ignored. Without a row nobody presses.
+/// What a press may be like besides, where a column says so.
+const BESIDE: [(&str, RangeInclusive<f64>); 4] = [
+    ("ramp_ms", 0.1..=1e6),
+    ("tilt_deg", 0.0..=80.0),
+    ("towards_deg", -360.0..=360.0),
+    ("radius_mm", 0.01..=1e4),
+];
+
+/// Reads who presses a simulated board and when: `start_s,duration_s,x_mm,y_mm,z_mm,force_n`, and where they are known
+/// `ramp_ms`, `tilt_deg`, `towards_deg` and `radius_mm`, which may be left empty. Presses may overlap. Further columns
+/// are ignored. Without a row nobody presses.
 ///
 /// # Errors
 /// [`FileError`] naming the file, the line and the column.
 pub fn read_presses(path: &Path) -> Result<Vec<GivenPress>, FileError> {
     let table = Table::read(path)?;
+    let mut beside = [None; 4];
+    for (column, (name, _)) in beside.iter_mut().zip(&BESIDE) {
+        *column = table.column(name)?;
+    }
     taken(&table, &SCRIPT, |row, [start, duration, x, y, z, force]| {
+        let [ramp, tilt, towards, radius] = besides(row, &beside)?;
         Ok(GivenPress {
             start_s: ranged(row, "start_s", start, &STARTS, "zero or more")?,
             duration_s: ranged(row, "duration_s", duration, &DURATIONS, "above zero")?,
             position: DVec3::new(x, y, z) * 1e-3,
             force: ranged(row, "force_n", force, &PRESSES, "above zero")?,
+            ramp_s: ramp.map_or(RAMP_S, |ms| ms * 1e-3),
+            tilt_deg: tilt.unwrap_or(0.0),
+            towards_deg: towards.unwrap_or(0.0),
+            radius: radius.map(|mm| mm * 1e-3),
         })
     })
+}
+
+/// What a row says in the columns that need not be there.
+fn besides(row: &Row, columns: &[Option<usize>; 4]) -> Result<[Option<f64>; 4], FileError> {
+    let mut found = [None; 4];
+    for ((value, column), (name, range)) in found.iter_mut().zip(columns).zip(&BESIDE) {
+        let given = column.filter(|&column| !row.text(column).is_empty());
+        if let Some(column) = given {
+            let number = row.number(column)?;
+            *value = Some(ranged(
+                row,
+                name,
+                number,
+                range,
+                "a number that can be meant",
+            )?);
+        }
+    }
+    Ok(found)
 }
 
 /// Where somebody is asked to press.
@@ -356,6 +400,10 @@ mod tests {
             duration_s: 2.0,
             position: DVec3::new(22.5, 0.0, 60.0) * 1e-3,
             force: 8.0,
+            ramp_s: RAMP_S,
+            tilt_deg: 0.0,
+            towards_deg: 0.0,
+            radius: None,
         };
         assert_eq!((presses.len(), presses[0]), (2, first));
         assert!(read("").unwrap().is_empty());
@@ -371,6 +419,20 @@ mod tests {
             let said = read(rows).unwrap_err();
             assert!(said.contains(part) && said.contains("t.csv"), "{said}");
         }
+        let wide = "start_s,duration_s,x_mm,y_mm,z_mm,force_n,tilt_deg,radius_mm,ramp_ms\n";
+        let (_keep, path) = file(&format!(
+            "{wide}1,2,22.5,0,60,8,20,,5\n1,2,22.5,0,60,8,,15,\n"
+        ));
+        let presses = read_presses(&path).unwrap();
+        let like = |p: &GivenPress| (p.tilt_deg, p.radius, p.ramp_s);
+        assert_eq!(like(&presses[0]), (20.0, None, 0.005));
+        assert_eq!(like(&presses[1]), (0.0, Some(0.015), RAMP_S));
+        let (_keep, path) = file(&format!("{wide}1,2,22.5,0,60,8,90,,5\n"));
+        let said = read_presses(&path).unwrap_err().to_string();
+        assert!(
+            said.contains("line 2") && said.contains("tilt_deg"),
+            "{said}"
+        );
         let (_keep, path) = file(&format!("\u{1b}[31m{}\n1\n", "x".repeat(200_000)));
         let said = read_presses(&path).unwrap_err().to_string();
         assert!(said.len() < 500 && !said.contains('\u{1b}'), "{said}");

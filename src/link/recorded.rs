@@ -172,7 +172,8 @@ mod tests {
             force,
             tip_radius: 5e-3,
         });
-        Truth { time_us, touch }
+        let pushes: Vec<_> = touch.iter().map(Into::into).collect();
+        Truth::of(time_us, &pushes)
     }
 
     /// The truth stands before the first sample that it holds for, and once.

@@ -13,8 +13,9 @@ use glam::DVec3;
 use super::TriMesh;
 use super::oriented_box::OrientedBox;
 
-/// Vertices of the part are rounded to its size over this power of two: far above the rounding of files and shifts, far
-/// below what any part is made to.
+/// Vertices of the part are rounded to its size over this power of two: far above the rounding of files and shifts in
+/// double precision, far below what any part is made to. Files in single precision round parts far from their origin to more
+/// than this: such a part, moved, is another one.
 const PART: i32 = 28;
 /// What is laid on it is rounded to this one: it only has to survive the way to where the part lies and back.
 const REMESHED: i32 = 40;

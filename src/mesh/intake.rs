@@ -72,7 +72,7 @@ impl TriMesh {
         let mut mesh = Self::of_body(kept.positions, kept.triangles, repair, &mut report);
         if report.boundary_edges > 0 {
             // Of the whole file: what is torn lies apart.
-            report.closes_within = repair::closing_weld(&points, &whole, mesh.mean_edge);
+            report.closes_within = repair::closing_weld(&points, &whole);
             mesh.closes_within = report.closes_within;
         }
         Ok(TakenIn {

@@ -63,13 +63,10 @@ pub(super) fn join_near(positions: &[DVec3], tolerance: f64) -> (Vec<u32>, Vec<D
 }
 
 /// The distance (m) within which vertices would have to be joined for an open surface to close: at most a thousandth
-/// of its mean edge, as torn seams are; nothing where that does not close it.
-pub(super) fn closing_weld(
-    positions: &[DVec3],
-    triangles: &[[u32; 3]],
-    mean_edge: f64,
-) -> Option<f64> {
-    let tolerance = one_digit(mean_edge / 1000.0);
+/// of its middle edge, as torn seams are; nothing where that does not close it. (The mean edge of a mesh with one vertex
+/// far away is longer than the part.)
+pub(super) fn closing_weld(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
+    let tolerance = one_digit(middle_edge(positions, triangles)? / 1000.0);
     let open = open_sides(triangles);
     let mut vertices: Vec<u32> = open.iter().flatten().copied().collect();
     vertices.sort_unstable();
@@ -87,6 +84,22 @@ pub(super) fn closing_weld(
         }
     }
     sides.values().all(|&count| count == 2).then_some(tolerance)
+}
+
+/// The median length of the triangles' sides; nothing where that is no length.
+fn middle_edge(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
+    let side = |tri: &[u32; 3], i: usize| {
+        let [a, b] = [tri[i], tri[(i + 1) % 3]].map(|v| positions[v as usize]);
+        a.distance(b)
+    };
+    let mut lengths: Vec<f64> = triangles
+        .iter()
+        .flat_map(|tri| (0..3).map(move |i| side(tri, i)))
+        .collect();
+    let middle = lengths.len() / 2;
+    (!lengths.is_empty())
+        .then(|| *lengths.select_nth_unstable_by(middle, f64::total_cmp).1)
+        .filter(|length| length.is_finite() && *length > 0.0)
 }
 
 /// A positive number with its first digit only.

@@ -217,6 +217,7 @@ impl<'f> Run<'f> {
                 gap: None,
                 margin: None,
                 certificate: None,
+                expected_mm: None,
             };
         }
         true
@@ -383,6 +384,7 @@ mod tests {
                     gap: None,
                     margin: best.margin(),
                     certificate: None,
+                    expected_mm: None,
                 });
                 found(&sets[sets.len() - 1]);
             }

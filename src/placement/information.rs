@@ -141,6 +141,7 @@ pub(super) fn grow<'f>(
             gap: None,
             margin: best.margin(),
             certificate: None,
+            expected_mm: None,
         };
         found(&set);
         sets.push(set);

@@ -118,6 +118,7 @@ mod tests {
             gap: None,
             margin: Some(0.25),
             certificate: None,
+            expected_mm: None,
         };
         let written = serde_json::to_value(&set).unwrap();
         assert_eq!(written["lead"], 0.25);

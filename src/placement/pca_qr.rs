@@ -73,6 +73,7 @@ pub fn from_components(
                 gap: None,
                 margin,
                 certificate: None,
+                expected_mm: None,
             };
             (request.found)(&set);
             sets.push(set);

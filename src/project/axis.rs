@@ -6,6 +6,8 @@ use glam::DVec3;
 use serde::de::{Error, IgnoredAny, SeqAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::key::{Key as ProjectKey, number};
+use super::value::{BadValue, Value, serialized};
 use crate::mesh::TriMesh;
 use crate::mesh::stance::Stance;
 use crate::mesh::unroll::Axis;
@@ -32,6 +34,37 @@ impl PartAxis {
             Self::Along(direction) => Stance::about(DVec3::from_array(direction)),
         }
     }
+}
+
+impl Value for PartAxis {
+    fn written(&self) -> Option<toml::Value> {
+        serialized(self)
+    }
+
+    fn obeys(&self, key: &ProjectKey) -> Result<(), BadValue> {
+        match self {
+            Self::Along(direction) => is_direction(key.path, direction),
+            Self::Auto | Self::Coordinate(_) => Ok(()),
+        }
+    }
+}
+
+/// Holds that three numbers are a direction.
+pub(super) fn is_direction(path: &str, direction: &[f64; 3]) -> Result<(), BadValue> {
+    /// Below this a direction is nobody's, and above it no place.
+    const SIZES: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
+    let size = direction.iter().fold(0.0, |most: f64, x| {
+        // What is no number is larger than any.
+        if x.abs() <= most { most } else { x.abs() }
+    });
+    if SIZES.contains(&size) && direction.iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    Err(BadValue {
+        key: path.to_owned(),
+        rule: "a direction, whose numbers are not all 0 and none of them beyond 1e9".into(),
+        value: format!("[{}]", direction.map(number).join(", ")),
+    })
 }
 
 const AUTO: &str = "auto";

@@ -2,40 +2,45 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::key::{Range, above, from};
+use super::keys::keys;
+use super::ranges::{FRICTION, PLACES};
 use super::selection::ChosenSite;
 use super::value::BadValue;
 use crate::inference::{Calibration, Chain, Doubt};
 use crate::live::Settings;
+use crate::wire::MOST_CHANNELS;
 
-/// Keys of the table `live`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LiveKeys {
-    /// The board's channel (from 0) of each gauge; in their order when empty.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub channels: Vec<usize>,
-    /// Relative change of resistance over strain.
-    pub gauge_factor: f64,
-    /// Arms of each bridge that the strain changes.
-    pub active_arms: u8,
-    /// What the model is off by beside gluing, as a share of the reading, where that is more than its elements are
-    /// estimated to leave. Of gauges that are calibrated, what known touches have shown.
-    pub model_error: f64,
-    // What is usual is not serialized, as of `touch.forces_n`.
-    /// How far off the stiffness of the part is (standard deviation): every force is off by it, and no place.
-    #[serde(skip_serializing_if = "is_usual_stiffness")]
-    pub stiffness_percent: f64,
-    /// How much of a touch's force may act along the surface, over what presses (rms, in any direction), where that is
-    /// more than touches are said to have: fingers push aside.
-    #[serde(skip_serializing_if = "is_usual_friction")]
-    pub friction_percent: f64,
-    /// The hardest press that is thought possible.
-    pub largest_force_n: f64,
-    /// Seconds in which the rest follows a drift; zero: never.
-    pub drift_s: f64,
-    /// How the gauges were found to be glued, one each, by known touches.
-    #[serde(rename = "glued", skip_serializing_if = "Vec::is_empty")]
-    pub glued: Vec<GluedKeys>,
+keys! {
+    /// Keys of the table `live`.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct LiveKeys in "live" {
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        channels: Vec<usize> = Vec::new(), "", Range::Whole(0, MOST_CHANNELS as u64 - 1),
+            "the board's channel (from 0) of each gauge, [0, 1, …]; in their order when left out";
+        gauge_factor: f64 = Chain::default().gauge_factor, "", above(0.0, 1e4),
+            "relative change of resistance over strain";
+        active_arms: u8 = Chain::default().active_arms, "", Range::Whole(1, 4),
+            "of each bridge, that the strain changes; a gauge with a dummy is 1";
+        model_error: f64 = 0.0, "", from(0.0, 1.0),
+            "what the model is off by beside gluing, as a share of the reading, where its elements leave less; a calibration finds it";
+        // What is usual is not serialized, as of `touch.forces_n`.
+        #[serde(skip_serializing_if = "is_usual_stiffness")]
+        stiffness_percent: f64 = STIFFNESS_PERCENT, "%", from(0.0, 50.0),
+            "how far off the part's stiffness is (standard deviation): forces are off by it, no places";
+        #[serde(skip_serializing_if = "is_usual_friction")]
+        friction_percent: f64 = FRICTION_PERCENT, "%", FRICTION,
+            "how much of a touch's force may push along the surface (rms, in any direction), where that is more than touches are said to have: found with place and force; 0: touches press straight in";
+        largest_force_n: f64 = 60.0, "N", above(0.0, 1e6),
+            "nobody presses harder";
+        drift_s: f64 = 3.0, "s", from(0.0, 1e6),
+            "time in which the rest follows what is read without a touch; 0: never";
+    } with {
+        /// How the gauges were found to be glued, one each, by known touches.
+        #[serde(rename = "glued", skip_serializing_if = "Vec::is_empty")]
+        glued: Vec<GluedKeys> = Vec::new();
+    }
 }
 
 /// The modulus of a plastic that was printed or moulded, and its wall.
@@ -60,25 +65,26 @@ fn is_usual_friction(percent: &f64) -> bool {
     *percent == FRICTION_PERCENT
 }
 
-/// One gauge as it was found to be glued.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GluedKeys {
-    /// What its readings are multiplied by.
-    pub gain: f64,
-    /// How far along itself it lies from where it was drawn (mm).
-    pub along_mm: f64,
-    /// How far across itself (mm).
-    pub across_mm: f64,
-    /// How far it is turned from its direction (degrees).
-    pub turned_degrees: f64,
-    /// What is not known of these four: the upper triangle of their covariance.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub covariance: Option<Doubt>,
-    /// Where the gauge was chosen to be (mm) and its direction, when it was found: of one that lies elsewhere this says
-    /// nothing. Absent where nobody knows.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub site: Option<[f64; 6]>,
+keys! {
+    /// One gauge as it was found to be glued.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct GluedKeys in "live.glued" {
+        gain: f64, "", above(0.0, 1e6),
+            "a gauge as known touches found it to be glued: what its readings are multiplied by";
+        along_mm: f64, "mm", from(-1e6, 1e6),
+            "how far along itself it lies from where it was drawn";
+        across_mm: f64, "mm", from(-1e6, 1e6),
+            "how far across itself";
+        turned_degrees: f64, "°", from(-1e6, 1e6),
+            "how far it is turned from its direction";
+        #[serde(skip_serializing_if = "Option::is_none")]
+        covariance: Option<Doubt>, "", from(-1e6, 1e6),
+            "of these four, what is not known: its upper triangle";
+        #[serde(skip_serializing_if = "Option::is_none")]
+        site: Option<[f64; 6]>, "mm", PLACES,
+            "where its gauge was chosen to be, and its direction: of one elsewhere this says nothing";
+    }
 }
 
 impl GluedKeys {
@@ -92,23 +98,6 @@ fn numbers(site: &ChosenSite) -> [f64; 6] {
     let [x, y, z] = site.position_mm;
     let [u, v, w] = site.direction;
     [x, y, z, u, v, w]
-}
-
-impl Default for LiveKeys {
-    fn default() -> Self {
-        let chain = Chain::default();
-        Self {
-            channels: Vec::new(),
-            gauge_factor: chain.gauge_factor,
-            active_arms: chain.active_arms,
-            model_error: 0.0,
-            stiffness_percent: STIFFNESS_PERCENT,
-            friction_percent: FRICTION_PERCENT,
-            largest_force_n: 60.0,
-            drift_s: 3.0,
-            glued: Vec::new(),
-        }
-    }
 }
 
 impl LiveKeys {

@@ -4,11 +4,16 @@ use serde::{Deserialize, Serialize};
 
 use super::PartAxis;
 use super::boxes;
-use super::value::MM;
+use super::key::{MASK, Range, from, within};
+use super::keys::keys;
+use super::ranges::{LENGTH, PLACES, ROOM};
+use super::value::{MM, any};
 use crate::limb::BoxMm;
 use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::repair::Repair;
 use crate::mesh::unroll::Axis;
+
+any!(Unit, Elements, PartModel, SupportKind, Axis);
 
 /// Unit of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -54,50 +59,51 @@ impl Unit {
     }
 }
 
-/// Keys of the table `part`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Part {
-    /// Path of the mesh, relative to the project file.
-    pub mesh: String,
-    /// Unit of the mesh; glTF is in metres by its specification and needs none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unit: Option<Unit>,
-    /// Which connected body of the file, 0 being the largest.
-    #[serde(default)]
-    pub body: usize,
-    /// Vertices nearer to each other than this are joined; zero joins equal ones only.
-    #[serde(default)]
-    pub weld_mm: f64,
-    /// Holes up to this far across are filled.
-    #[serde(default)]
-    pub fill_holes_mm: f64,
-    // What is usual is not serialized: the fingerprints of trades that were measured before this key still hold.
-    /// The farthest that a node of a tetrahedron is moved where its bent edge turns it inside out.
-    #[serde(
-        default = "defaults::straighten",
-        skip_serializing_if = "defaults::is_usual_straighten"
-    )]
-    pub straighten_mm: f64,
-    /// What the elastic model is computed on.
-    #[serde(default)]
-    pub elements: Elements,
-    /// Shell or solid.
-    #[serde(default)]
-    pub model: PartModel,
-    /// Thickness of the wall of a shell (mm).
-    #[serde(default = "defaults::thickness")]
-    pub thickness_mm: f64,
-    /// Of a solid: masks of the part's vertices that say where gauges can go and where touches land, where
-    /// what is found by itself is wrong.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub inside: Option<String>,
-    /// Name of a mask of what is outside, where what is found by itself is wrong.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub outside: Option<String>,
-    /// Which way the part stands.
-    #[serde(default)]
-    pub axis: PartAxis,
+keys! {
+    /// Keys of the table `part`.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct Part in "part" {
+        mesh: String, "", Range::Any("a path, relative to the project file"),
+            "the mesh: glTF/GLB, OBJ, STL, PLY, Gmsh, Abaqus or Ansys";
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        unit: Option<Unit>, "", Range::Words(&["mm", "cm", "m", "in"]),
+            "unit of the mesh file: \"mm\", \"cm\", \"m\" or \"in\"; glTF is in metres and needs none, Ansys may say its own";
+        #[serde(default)]
+        body: usize, "", Range::Whole(0, u32::MAX as u64),
+            "which connected body of the file, 0 being the one with the largest surface";
+        #[serde(default)]
+        weld_mm: f64, "mm", ROOM,
+            "vertices nearer to each other than this are joined; 0 joins equal ones only";
+        #[serde(default)]
+        fill_holes_mm: f64, "mm", ROOM,
+            "holes up to this far across are filled";
+        // What is usual is not serialized: the fingerprints of trades that were measured before this key still hold.
+        #[serde(
+            default = "defaults::straighten",
+            skip_serializing_if = "defaults::is_usual_straighten"
+        )]
+        straighten_mm: f64, "mm", ROOM,
+            "a bent edge that turns a tetrahedron inside out is straightened where its node moves no farther than this";
+        #[serde(default)]
+        elements: Elements, "", Range::Words(&["graded", "as-given"]),
+            "\"graded\": computed on a mesh of its own, finer where the strain changes; \"as-given\": on the file's triangles";
+        #[serde(default)]
+        model: PartModel, "", Range::Words(&["shell", "solid"]),
+            "\"shell\": the mesh is the middle of a wall; \"solid\": it encloses a part with walls";
+        #[serde(default = "defaults::thickness")]
+        thickness_mm: f64, "mm", LENGTH,
+            "thickness of the wall of a shell";
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        inside: Option<String>, "", MASK,
+            "where gauges can go, in place of what is found by itself (solids): a mask";
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        outside: Option<String>, "", MASK,
+            "where touches land, in place of what is found by itself (solids): a mask";
+        #[serde(default)]
+        axis: PartAxis, "", Range::Any("auto, x, y, z or a direction [x, y, z]"),
+            "which way is up for views, unrolling and new boxes: \"auto\" (by the part's shape), \"x\", \"y\", \"z\" or a direction [x, y, z]";
+    }
 }
 
 impl Part {
@@ -134,22 +140,15 @@ pub enum PartModel {
     Solid,
 }
 
-/// Keys of the table `material`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct MaterialKeys {
-    /// Young's modulus, in gigapascals.
-    pub youngs_modulus_gpa: f64,
-    /// Above -1 and below 0.5.
-    pub poissons_ratio: f64,
-}
-
-impl Default for MaterialKeys {
-    fn default() -> Self {
-        Self {
-            youngs_modulus_gpa: 1.7,
-            poissons_ratio: 0.35,
-        }
+keys! {
+    /// Keys of the table `material`.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct MaterialKeys in "material" {
+        youngs_modulus_gpa: f64 = 1.7, "GPa", from(1e-9, 1e6),
+            "Young's modulus (printed nylon: 1.7)";
+        poissons_ratio: f64 = 0.35, "", within(-1.0, 0.5),
+            "Poisson's ratio (printed nylon: 0.35)";
     }
 }
 
@@ -166,27 +165,27 @@ pub enum SupportKind {
     Symmetry,
 }
 
-/// Keys of a table `support`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SupportKeys {
-    /// What it holds.
-    #[serde(default)]
-    pub kind: SupportKind,
-    /// Every point of the part inside it is held.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub box_mm: Option<BoxMm>,
-    /// Where the box does not lie along the file's axes: the direction it stands along. Its corners are then along
-    /// the front, the right and the up of a part of that axis, from the file's origin.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub box_axis: Option<[f64; 3]>,
-    /// Instead of a box: a mask of the part's vertices, by its name in the arrays beside the project
-    /// file, or a group of the mesh file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub vertices: Option<String>,
-    /// Normal of a symmetry plane; unused otherwise.
-    #[serde(default)]
-    pub normal: Axis,
+keys! {
+    /// Keys of a table `support`.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct SupportKeys in "support" {
+        #[serde(default)]
+        kind: SupportKind, "", Range::Words(&["clamped", "pinned", "symmetry"]),
+            "what is held: \"clamped\" (no displacement, no rotation), \"pinned\" (no displacement) or \"symmetry\" (a mirror plane)";
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        box_mm: Option<BoxMm>, "mm", PLACES,
+            "every point of the part inside this box is held";
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        box_axis: Option<[f64; 3]>, "", PLACES,
+            "the box stands along this direction: its corners are along the front, the right and the up of a part of that axis";
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        vertices: Option<String>, "", MASK,
+            "instead of a box: a mask in the NPZ file beside this one, or a group of the mesh file";
+        #[serde(default)]
+        normal: Axis, "", Range::Words(&["x", "y", "z"]),
+            "of a symmetry plane; unused otherwise";
+    }
 }
 
 impl SupportKeys {

@@ -4,94 +4,75 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::boxes;
-use super::value::MM;
+use super::key::{Range, SWITCH, from};
+use super::keys::keys;
+use super::ranges::{GAUGES, LENGTH, PLACES, ROOM};
+use super::value::{MM, any};
+use crate::evaluation::failures::MOST_FAILED;
 use crate::gaussian_process::GpKernel;
 use crate::limb::BoxMm;
 use crate::placement::SelectorKind;
 use crate::placement::constraints::{Loss, LostBy, Thorough};
 use crate::regression::Hyper;
 
-/// Keys of the table `selection`.
-#[allow(
-    clippy::struct_excessive_bools,
-    reason = "keys of a file that do not depend on each other"
-)]
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SelectionKeys {
-    /// Whose sites are reported.
-    pub selector: SelectorKind,
-    /// Gauges to place.
-    pub sensors: usize,
-    /// Settings of greedy SVR's regression (targets in mm, features standardized).
-    pub c_mm: f64,
-    /// ε: half-width of the tube without loss (mm).
-    pub epsilon_mm: f64,
-    /// γ of the Gaussian kernel.
-    pub gamma: f64,
-    /// Least distance between two gauges.
-    pub spacing_mm: f64,
-    /// Places of gauges that must be there; the nearest site is taken.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub required_mm: Vec<[f64; 3]>,
-    /// Error at which greedy SVR and expected error add no more gauges.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub target_mm: Option<f64>,
-    /// What all gauges together may cost.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub cost_budget: Option<f64>,
-    /// Whether the gauge's noise is added to the signals that sites are chosen from.
-    pub with_noise: bool,
-    /// Probability that gauges are lost, how many together, and whether the mean or the worst of such losses counts.
-    pub failure: f64,
-    /// How many gauges are lost together.
-    pub lost: usize,
-    /// What counts of all such losses.
-    pub lost_by: LostBy,
-    /// Whether the paper's selectors exchange gauges after all are chosen, as expected error does in any case.
-    pub exchange: bool,
-    /// From how many first gauges a set is begun, of which the best is kept.
-    pub starts: usize,
-    /// Whether gauges chosen by expected error are moved off the sites to where and how they serve best.
-    pub refine: bool,
-    /// Whether the other selectors choose too, to be compared.
-    pub compare: bool,
-    /// Table `selection.gaussian_process`.
-    pub gaussian_process: GaussianProcessKeys,
-    /// What a gauge costs inside a box, the last box counting; 1 elsewhere.
-    #[serde(rename = "cost", skip_serializing_if = "Vec::is_empty")]
-    pub costs: Vec<CostKeys>,
-    /// The chosen sites, written by a design.
-    #[serde(rename = "site", skip_serializing_if = "Vec::is_empty")]
-    pub sites: Vec<ChosenSite>,
-}
+any!(SelectorKind, LostBy);
 
-impl Default for SelectionKeys {
-    fn default() -> Self {
-        let hyper = Hyper::default();
-        let (loss, thorough) = (Loss::default(), Thorough::default());
-        Self {
-            selector: SelectorKind::default(),
-            sensors: 10,
-            c_mm: hyper.c,
-            epsilon_mm: hyper.epsilon,
-            gamma: hyper.gamma,
-            spacing_mm: 0.0,
-            required_mm: Vec::new(),
-            target_mm: None,
-            cost_budget: None,
-            with_noise: false,
-            failure: 0.0,
-            lost: loss.gauges,
-            lost_by: loss.by,
-            exchange: thorough.exchange,
-            starts: thorough.starts,
-            refine: false,
-            compare: false,
-            gaussian_process: GaussianProcessKeys::default(),
-            costs: Vec::new(),
-            sites: Vec::new(),
-        }
+keys! {
+    /// Keys of the table `selection`.
+    #[allow(
+        clippy::struct_excessive_bools,
+        reason = "keys of a file that do not depend on each other"
+    )]
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct SelectionKeys in "selection" {
+        selector: SelectorKind = SelectorKind::default(), "",
+            Range::Words(&["expected-error", "greedy-svr", "pca-qr", "entropy", "mutual-information"]),
+            "whose sites are reported: \"expected-error\" (by matching, as live touch), or the paper's: \"greedy-svr\", \"pca-qr\", \"entropy\", \"mutual-information\"";
+        sensors: usize = 10, "", GAUGES,
+            "gauges to place";
+        c_mm: f64 = Hyper::default().c, "mm", from(1e-9, 1e12),
+            "C of greedy SVR's regression (targets in mm, features standardized): larger follows the touches more closely";
+        epsilon_mm: f64 = Hyper::default().epsilon, "mm", from(0.0, 1e9),
+            "its ε: errors below this cost nothing";
+        gamma: f64 = Hyper::default().gamma, "", from(1e-12, 1e9),
+            "its γ, of the Gaussian kernel on standardized signals";
+        spacing_mm: f64 = 0.0, "mm", ROOM,
+            "least distance between two gauges";
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        required_mm: Vec<[f64; 3]> = Vec::new(), "mm", PLACES,
+            "places of gauges that must be there, [[x, y, z], …]; the nearest site is taken";
+        #[serde(skip_serializing_if = "Option::is_none")]
+        target_mm: Option<f64> = None, "mm", from(1e-9, 1e9),
+            "error at which greedy SVR and expected error add no more gauges";
+        #[serde(skip_serializing_if = "Option::is_none")]
+        cost_budget: Option<f64> = None, "", from(1e-9, 1e15),
+            "what all gauges together may cost: 1 each, or as in [[selection.cost]]";
+        compare: bool = false, "", SWITCH,
+            "let the other selectors choose too: a curve of errors for each of them, for the time that they take (minutes)";
+        with_noise: bool = false, "", SWITCH,
+            "choose from signals with the gauge's noise added";
+        failure: f64 = 0.0, "", from(0.0, 1.0),
+            "probability that gauges are lost when they are needed: expected error and greedy SVR then choose sites that can do without each other";
+        lost: usize = Loss::default().gauges, "", Range::Whole(1, MOST_FAILED as u64),
+            "how many are lost together, any of them; greedy SVR weighs the loss of one only";
+        lost_by: LostBy = Loss::default().by, "", Range::Words(&["expected", "worst"]),
+            "of all the gauges that may be lost: the mean over them counts (\"expected\"), or those whose loss is the \"worst\"";
+        exchange: bool = Thorough::default().exchange, "", SWITCH,
+            "exchange gauges one at a time after all are chosen, while that makes the set better; expected error always does, PCA-QR never";
+        starts: usize = Thorough::default().starts, "", Range::Whole(1, 20),
+            "from how many first gauges a set is begun; the best set is kept, for the time that each of them takes";
+        refine: bool = false, "", SWITCH,
+            "move the gauges that expected error has chosen off the sites, along the surface and by their angle, while the expected error falls (strain only)";
+    } with {
+        /// Table `selection.gaussian_process`.
+        gaussian_process: GaussianProcessKeys = GaussianProcessKeys::default();
+        /// What a gauge costs inside a box, the last box counting; 1 elsewhere.
+        #[serde(rename = "cost", skip_serializing_if = "Vec::is_empty")]
+        costs: Vec<CostKeys> = Vec::new();
+        /// The chosen sites, written by a design.
+        #[serde(rename = "site", skip_serializing_if = "Vec::is_empty")]
+        sites: Vec<ChosenSite> = Vec::new();
     }
 }
 
@@ -119,27 +100,19 @@ impl SelectionKeys {
     }
 }
 
-/// The kernel of entropy and mutual information.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GaussianProcessKeys {
-    /// Length and power of the kernel; searched by cross-validation when left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub length_mm: Option<f64>,
-    /// Power of the kernel, up to 2; searched when left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub power: Option<f64>,
-    /// Variance of a measurement's noise over the field's.
-    pub noise: f64,
-}
-
-impl Default for GaussianProcessKeys {
-    fn default() -> Self {
-        Self {
-            length_mm: None,
-            power: None,
-            noise: GpKernel::default().noise,
-        }
+keys! {
+    /// The kernel of entropy and mutual information.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct GaussianProcessKeys in "selection.gaussian_process" {
+        #[serde(skip_serializing_if = "Option::is_none")]
+        length_mm: Option<f64> = None, "mm", LENGTH,
+            "length of the kernel of entropy and mutual information; searched when left out";
+        #[serde(skip_serializing_if = "Option::is_none")]
+        power: Option<f64> = None, "", from(1e-3, 2.0),
+            "its power; searched when left out";
+        noise: f64 = GpKernel::default().noise, "", from(0.0, 1e6),
+            "variance of a measurement's noise over the field's";
     }
 }
 
@@ -157,25 +130,29 @@ impl GaussianProcessKeys {
     }
 }
 
-/// Keys of a table `selection.cost`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CostKeys {
-    /// Gauges inside it (mm) …
-    pub box_mm: BoxMm,
-    /// As of a support.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub box_axis: Option<[f64; 3]>,
-    /// … cost this.
-    pub cost: f64,
+keys! {
+    /// Keys of a table `selection.cost`.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct CostKeys in "selection.cost" {
+        box_mm: BoxMm, "mm", PLACES,
+            "a gauge in this box …";
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        box_axis: Option<[f64; 3]>, "", PLACES,
+            "the box stands along this direction: its corners are along the front, the right and the up of a part of that axis";
+        cost: f64, "", from(1e-9, 1e9),
+            "… costs this";
+    }
 }
 
-/// Keys of a table `selection.site`: a chosen gauge.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ChosenSite {
-    /// Its middle (mm).
-    pub position_mm: [f64; 3],
-    /// Unit direction along which it measures.
-    pub direction: [f64; 3],
+keys! {
+    /// Keys of a table `selection.site`: a chosen gauge.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct ChosenSite in "selection.site" {
+        position_mm: [f64; 3], "mm", PLACES,
+            "the middle of a chosen gauge";
+        direction: [f64; 3], "", PLACES,
+            "along which it measures, a unit vector";
+    }
 }

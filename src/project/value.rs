@@ -1,7 +1,10 @@
-//! Values of a project that are checked, and why one cannot be used.
+//! Values of a project: how they are written, what they may be, and why one cannot be used.
 
 use std::borrow::Cow;
-use std::ops::RangeInclusive;
+
+use serde::Serialize;
+
+use super::key::{Key, Range, number};
 
 pub(super) const MM: f64 = 1e-3;
 
@@ -17,63 +20,158 @@ pub struct BadValue {
     pub value: String,
 }
 
-pub(super) fn all_bounded<const N: usize>(
-    all: [(&str, f64, RangeInclusive<f64>); N],
-) -> Result<(), BadValue> {
-    all.into_iter()
-        .try_for_each(|(key, value, range)| bounded(key, value, &range))
+/// What can stand under a key.
+pub trait Value {
+    /// As the file holds it; nothing where the key is left out.
+    fn written(&self) -> Option<toml::Value>;
+
+    /// Whether the key may have it.
+    ///
+    /// # Errors
+    /// [`BadValue`] where it may not.
+    fn obeys(&self, key: &Key) -> Result<(), BadValue> {
+        let _ = key;
+        Ok(())
+    }
 }
 
-pub(super) fn bounded(key: &str, value: f64, range: &RangeInclusive<f64>) -> Result<(), BadValue> {
-    // No number at all is in no range.
-    if range.contains(&value) {
-        return Ok(());
+/// A value by the way it is serialized.
+pub(super) fn serialized(value: &impl Serialize) -> Option<toml::Value> {
+    toml::Value::try_from(value).ok()
+}
+
+/// Values that may be any of their type: the reader of the file has refused all others.
+macro_rules! any {
+    ($($type:ty),* $(,)?) => { $(
+        impl $crate::project::value::Value for $type {
+            fn written(&self) -> Option<toml::Value> {
+                $crate::project::value::serialized(self)
+            }
+        }
+    )* };
+}
+pub(super) use any;
+
+any!(bool, String);
+
+impl Value for f64 {
+    fn written(&self) -> Option<toml::Value> {
+        serialized(self)
     }
-    Err(BadValue {
-        key: key.to_owned(),
-        rule: format!(
-            "between {} and {}",
-            number(*range.start()),
-            number(*range.end())
-        )
-        .into(),
-        value: number(value),
+
+    fn obeys(&self, key: &Key) -> Result<(), BadValue> {
+        numbers(key, "", &[*self])
+    }
+}
+
+macro_rules! whole {
+    ($($type:ty),*) => { $(
+        impl Value for $type {
+            fn written(&self) -> Option<toml::Value> {
+                serialized(self)
+            }
+
+            fn obeys(&self, key: &Key) -> Result<(), BadValue> {
+                counts(key, "", &[*self as u64])
+            }
+        }
+    )* };
+}
+whole!(u8, usize, u64);
+
+impl<T: Value> Value for Option<T> {
+    fn written(&self) -> Option<toml::Value> {
+        self.as_ref().and_then(Value::written)
+    }
+
+    fn obeys(&self, key: &Key) -> Result<(), BadValue> {
+        self.as_ref().map_or(Ok(()), |value| value.obeys(key))
+    }
+}
+
+impl<const N: usize> Value for [f64; N] {
+    fn written(&self) -> Option<toml::Value> {
+        // Arrays of ten are more than serde knows to serialize.
+        serialized(&self.as_slice())
+    }
+
+    fn obeys(&self, key: &Key) -> Result<(), BadValue> {
+        numbers(key, "made of numbers ", self)
+    }
+}
+
+impl<const N: usize, const M: usize> Value for [[f64; N]; M] {
+    fn written(&self) -> Option<toml::Value> {
+        rows(self)
+    }
+
+    fn obeys(&self, key: &Key) -> Result<(), BadValue> {
+        self.iter().try_for_each(|row| row.obeys(key))
+    }
+}
+
+impl Value for Vec<f64> {
+    fn written(&self) -> Option<toml::Value> {
+        serialized(self)
+    }
+
+    fn obeys(&self, key: &Key) -> Result<(), BadValue> {
+        numbers(key, "made of numbers ", self)
+    }
+}
+
+impl<const N: usize> Value for Vec<[f64; N]> {
+    fn written(&self) -> Option<toml::Value> {
+        (!self.is_empty()).then(|| rows(self)).flatten()
+    }
+
+    fn obeys(&self, key: &Key) -> Result<(), BadValue> {
+        self.iter().try_for_each(|row| row.obeys(key))
+    }
+}
+
+impl Value for Vec<usize> {
+    fn written(&self) -> Option<toml::Value> {
+        (!self.is_empty()).then(|| serialized(self)).flatten()
+    }
+
+    fn obeys(&self, key: &Key) -> Result<(), BadValue> {
+        let counted: Vec<u64> = self.iter().map(|&count| count as u64).collect();
+        counts(key, "made of whole numbers ", &counted)
+    }
+}
+
+fn rows<const N: usize>(all: &[[f64; N]]) -> Option<toml::Value> {
+    let rows: Option<Vec<_>> = all.iter().map(Value::written).collect();
+    rows.map(toml::Value::Array)
+}
+
+/// Holds numbers against the range of their key.
+fn numbers(key: &Key, kind: &str, values: &[f64]) -> Result<(), BadValue> {
+    let Range::Numbers(span) = key.range else {
+        return Ok(());
+    };
+    let outside = values.iter().find(|&&value| !span.contains(value));
+    outside.map_or(Ok(()), |&value| {
+        Err(BadValue {
+            key: key.path.to_owned(),
+            rule: format!("{kind}{span}").into(),
+            value: number(value),
+        })
     })
 }
 
-pub(super) fn counted(
-    key: &str,
-    count: usize,
-    range: &RangeInclusive<usize>,
-) -> Result<(), BadValue> {
-    if range.contains(&count) {
+/// Holds whole numbers against the range of their key.
+fn counts(key: &Key, kind: &str, values: &[u64]) -> Result<(), BadValue> {
+    let Range::Whole(least, most) = key.range else {
         return Ok(());
-    }
-    Err(BadValue {
-        key: key.to_owned(),
-        rule: format!("between {} and {}", range.start(), range.end()).into(),
-        value: count.to_string(),
+    };
+    let outside = values.iter().find(|count| !(least..=most).contains(count));
+    outside.map_or(Ok(()), |count| {
+        Err(BadValue {
+            key: key.path.to_owned(),
+            rule: format!("{kind}between {least} and {most}").into(),
+            value: count.to_string(),
+        })
     })
-}
-
-/// A finite number that obeys a rule of its own.
-pub(super) fn check(key: &str, rule: &'static str, value: f64, ok: bool) -> Result<(), BadValue> {
-    if ok && value.is_finite() {
-        return Ok(());
-    }
-    Err(BadValue {
-        key: key.to_owned(),
-        rule: rule.into(),
-        value: number(value),
-    })
-}
-
-/// A number as people write it: nobody reads three hundred digits.
-pub(super) fn number(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 || !size.is_finite() || (1e-4..1e7).contains(&size) {
-        value.to_string()
-    } else {
-        format!("{value:e}")
-    }
 }

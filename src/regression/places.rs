@@ -48,6 +48,74 @@ pub fn points(targets: &[[f64; 3]]) -> Vec<usize> {
     grouped(targets, SAME * largest(extents(targets)), None)
 }
 
+/// Touches that lie in clumps which are far apart for their size, as repeats of a place do that is found again to some
+/// tenths of a millimetre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clumps {
+    /// How many there are.
+    pub count: usize,
+    /// A distance (mm) between that of touches in a clump and that of the clumps.
+    pub apart_mm: f64,
+}
+
+/// Whether touches (positions in mm) lie in clumps: joined from the nearest pair on, the distances leap between those
+/// within and those between, and no clump is as large as the leap. Of more touches than can be compared with each other
+/// nothing is said.
+#[must_use]
+pub fn clumps(targets: &[[f64; 3]]) -> Option<Clumps> {
+    /// Touches that are compared with each other.
+    const MOST: usize = 8000;
+    /// By how much the distances leap.
+    const LEAP: f64 = 4.0;
+    /// Fewer clumps than this may be anything; and a quarter of the touches at least repeat a place.
+    const LEAST: usize = 4;
+    let mut apart: Vec<[f64; 3]> = Vec::new();
+    let same = points(targets);
+    for (k, &point) in same.iter().enumerate() {
+        if point == apart.len() {
+            apart.push(targets[k]);
+        }
+    }
+    let count = apart.len();
+    if !(4 * LEAST..=MOST).contains(&count) {
+        return None;
+    }
+    let joins = nearest_joins(&apart);
+    let (first, last) = (count / 4, count - 1 - LEAST);
+    let leap = |k: usize| joins[k + 1] / joins[k].max(f64::MIN_POSITIVE);
+    let at = (first..last).max_by(|&a, &b| leap(a).total_cmp(&leap(b)))?;
+    let within = (joins[at] * joins[at + 1]).sqrt();
+    let groups = places(&apart, within);
+    let clumps = groups.iter().max().map_or(0, |most| most + 1);
+    // Lines of a scan are joined by short steps too, but are long: their parts are more places than there are joins left.
+    let is_compact = clumps == count - 1 - at;
+    (leap(at) >= LEAP && is_compact).then_some(Clumps {
+        count: clumps,
+        apart_mm: within,
+    })
+}
+
+/// The lengths of the edges of the shortest tree that joins all points (Prim's algorithm), rising.
+fn nearest_joins(points: &[[f64; 3]]) -> Vec<f64> {
+    let squared =
+        |a: [f64; 3], b: [f64; 3]| -> f64 { (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum() };
+    let mut joins = Vec::with_capacity(points.len());
+    // To the tree, of those that are not in it.
+    let mut waiting: Vec<([f64; 3], f64)> = (points.iter().skip(1))
+        .map(|&p| (p, squared(p, points[0])))
+        .collect();
+    while let Some(next) = (0..waiting.len()).min_by(|&a, &b| waiting[a].1.total_cmp(&waiting[b].1))
+    {
+        let (joined, distance) = waiting.swap_remove(next);
+        joins.push(distance.sqrt());
+        for (point, nearest) in &mut waiting {
+            *nearest = nearest.min(squared(*point, joined));
+        }
+    }
+    joins.sort_by(f64::total_cmp);
+    joins
+}
+
 /// Touches nearer than this share of the extent of all lie at one place. A probing machine comes back to a place
 /// to a few millionths of its reach; thousands of touches drawn at random come no nearer by chance.
 const SAME: f64 = 1e-5;
@@ -143,7 +211,11 @@ impl Known {
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
     use super::*;
+    use crate::draw::normal;
 
     /// Touches on a grid of a round skin and of a flat one, each pressed three times.
     fn pressed(height: impl Fn(f64, f64) -> f64, depth: f64) -> Vec<[f64; 3]> {
@@ -189,5 +261,45 @@ mod tests {
         assert_eq!(Grouping::Place.of(&touches), Grouping::Touch.of(&touches));
         let same = vec![[1.0, 2.0, 3.0]; 50];
         assert_eq!(Grouping::Place.of(&same), vec![0; 50]);
+    }
+
+    /// Ten presses at each of forty places of a tube, found again to so many millimetres.
+    fn again(off: f64) -> Vec<[f64; 3]> {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let places: Vec<[f64; 3]> = (0..40)
+            .map(|k| {
+                let (a, z) = (f64::from(k) * 2.4, 100.0 * rng.random::<f64>());
+                [30.0 * a.cos(), 30.0 * a.sin(), z]
+            })
+            .collect();
+        (0..400)
+            .map(|k| places[k % 40].map(|x| x + off * normal(&mut rng)))
+            .collect()
+    }
+
+    #[test]
+    fn presses_that_find_a_place_again_to_some_tenths_are_told() {
+        for off in [0.02, 0.1] {
+            let found = clumps(&again(off)).unwrap();
+            assert_eq!(found.count, 40);
+            assert!((3.0 * off..8.0).contains(&found.apart_mm), "{found:?}");
+            let grouped = Grouping::Within(found.apart_mm).of(&again(off));
+            assert_eq!(grouped.iter().max(), Some(&39));
+        }
+    }
+
+    #[test]
+    fn touches_all_over_scans_and_exact_repeats_are_no_clumps() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let all: Vec<[f64; 3]> = (0..500)
+            .map(|_| [0, 1, 2].map(|_| 100.0 * rng.random::<f64>()))
+            .collect();
+        assert_eq!(clumps(&all), None);
+        let scan: Vec<[f64; 3]> = (0..500)
+            .map(|k| [f64::from(k % 50), 8.0 * f64::from(k / 50), 0.0])
+            .collect();
+        assert_eq!(clumps(&scan), None);
+        assert_eq!(clumps(&again(0.0)), None);
+        assert_eq!(clumps(&[[1.0; 3]; 30]), None);
     }
 }

@@ -17,7 +17,9 @@ use super::news::Event;
 use super::slot::{Slot, current};
 use super::state::Session;
 use super::state::live::{Gathering, Target};
-use crate::board::{ChannelFault, Faults, Illness, Script, SimulatedBoard, Truth, script_seed};
+use crate::board::{
+    ChannelFault, Drawn, Faults, Illness, Script, SimulatedBoard, Truth, script_seed,
+};
 use crate::design::simulated_board::{options, places, simulated};
 use crate::design::{self, Inputs, Sensing, Workshop};
 use crate::document::SensingInputs;
@@ -297,7 +299,7 @@ impl Session {
 fn board(inputs: &Inputs, sensing: &Sensing, r: &Reporter) -> Result<SimulatedBoard, Stop> {
     let seed = inputs.project.budget.seed;
     let places = places(inputs, sensing, seed).map_err(|e| stop(&e))?;
-    let script = Script::random(places, FORCES_N, script_seed(seed));
+    let script = Script::random(places, Drawn::straight(FORCES_N), script_seed(seed));
     let made = simulated(
         inputs,
         sensing,

@@ -1,6 +1,10 @@
 //! Rows of a form: a label, and a control that is known by it.
 
+use std::ops::RangeInclusive;
+
 use egui::{ComboBox, DragValue, Grid, Ui};
+
+use crate::project::Key;
 
 /// A group of rows under a heading.
 pub(super) fn rows(ui: &mut Ui, title: &str, content: impl FnOnce(&mut Ui)) {
@@ -14,14 +18,27 @@ pub(super) fn rows(ui: &mut Ui, title: &str, content: impl FnOnce(&mut Ui)) {
     ui.add_space(6.0);
 }
 
-/// One row: a label and a number.
-pub(super) fn number(
+/// One row: a label and a number that is a key of the project, which says its unit, its range and what it means.
+pub(super) fn number(ui: &mut Ui, label: &str, value: &mut f64, key: &Key, speed: f64) {
+    quantity(
+        ui,
+        label,
+        value,
+        key.numbers(),
+        speed,
+        key.unit,
+        &key.sentence(),
+    );
+}
+
+/// One row: a label and any number.
+pub(super) fn quantity(
     ui: &mut Ui,
     label: &str,
     value: &mut f64,
-    range: std::ops::RangeInclusive<f64>,
+    range: RangeInclusive<f64>,
     speed: f64,
-    suffix: &str,
+    unit: &str,
     help: &str,
 ) {
     let name = ui.label(label);
@@ -31,23 +48,27 @@ pub(super) fn number(
             .clamp_existing_to_range(false)
             .speed(speed)
             .max_decimals(4)
-            .suffix(suffix),
+            .suffix(suffix(unit)),
     )
     .labelled_by(name.id)
     .on_hover_text(help);
     ui.end_row();
 }
 
+/// A unit as it stands behind a number: with a space, but for degrees.
+fn suffix(unit: &str) -> String {
+    match unit {
+        "" | "°" => unit.to_owned(),
+        unit => format!(" {unit}"),
+    }
+}
+
 /// One row: a label and a share, shown in percent.
-pub(super) fn percentage(
-    ui: &mut Ui,
-    label: &str,
-    share: &mut f64,
-    range: std::ops::RangeInclusive<f64>,
-    help: &str,
-) {
+pub(super) fn percentage(ui: &mut Ui, label: &str, share: &mut f64, key: &Key) {
     let mut percent = 100.0 * *share;
-    number(ui, label, &mut percent, range, 0.05, " %", help);
+    let shares = key.numbers();
+    let range = 100.0 * shares.start()..=100.0 * shares.end();
+    quantity(ui, label, &mut percent, range, 0.05, "%", &key.sentence());
     // Not every frame: a hundredfold and back is not always the same number.
     if (percent - 100.0 * *share).abs() > 0.0 {
         *share = percent / 100.0;
@@ -55,11 +76,16 @@ pub(super) fn percentage(
 }
 
 /// One row: a label and a count.
-pub(super) fn count(
+pub(super) fn count(ui: &mut Ui, label: &str, value: &mut usize, key: &Key) {
+    counted(ui, label, value, key.counts(), &key.sentence());
+}
+
+/// One row: a label and a count in a range of its own.
+pub(super) fn counted(
     ui: &mut Ui,
     label: &str,
     value: &mut usize,
-    range: std::ops::RangeInclusive<usize>,
+    range: RangeInclusive<usize>,
     help: &str,
 ) {
     let name = ui.label(label);
@@ -71,6 +97,16 @@ pub(super) fn count(
     )
     .labelled_by(name.id)
     .on_hover_text(help);
+    ui.end_row();
+}
+
+/// One row: a label and a tick.
+pub(super) fn switch(ui: &mut Ui, label: &str, value: &mut bool, key: &Key) {
+    let name = ui.label(label);
+    ui.checkbox(value, "")
+        .on_hover_text(key.sentence())
+        .labelled_by(name.id)
+        .accessible_name(label);
     ui.end_row();
 }
 

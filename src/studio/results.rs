@@ -140,7 +140,7 @@ fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
     }
     let text = match ask.session.by_hand_error() {
         (_, Some(mm)) => format!("by hand: {mm:.2} mm on unseen touches"),
-        (Some(mm), None) => format!("by hand: about {mm:.2} mm, judging …"),
+        (Some(mm), None) => format!("by hand: {mm:.2} mm {}, judging …", expected_of(ask)),
         (None, None) => "by hand: …".into(),
     };
     let chosen = ask.session.results.design.as_ref().and_then(|d| {
@@ -149,10 +149,19 @@ fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
         rows.find(|r| r.selector == lead && r.sensors == count && r.region == EVERYWHERE)
     });
     let beside = chosen.map_or(String::new(), |r| {
-        format!("; as selected {:.2} mm", r.error_mm)
+        format!("; as selected judged {:.2} mm", r.error_mm)
     });
     ui.separator();
     ui.label(RichText::new(text + &beside).color(super::theme::TOUCHED));
+}
+
+/// What an estimate of gauges put by hand is of: not what a judge says, which is as drawn and at one force.
+fn expected_of(ask: &Ask<'_>) -> String {
+    if !ask.session.is_matched() {
+        return "estimated".into();
+    }
+    let [lightest, hardest] = ask.project().touch.forces_n;
+    format!("expected as built over {lightest} to {hardest} N")
 }
 
 fn regions(ask: &Ask<'_>) -> Vec<String> {

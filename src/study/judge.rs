@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::question::{Estimator, HeldOut, Judged, MOST_PLACES, Parts, Question, Verdict};
-use super::{Data, constant_notes, repeat_note, templates};
+use super::{Data, clump_note, constant_notes, repeat_note, templates};
 use crate::budget::{Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::evaluation::add_noise;
@@ -50,6 +50,9 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
     test.sort_unstable();
     let mut notes = constant_notes(&noisy, question.sites);
     notes.extend(repeat_note(places, data.targets.len(), question.groups));
+    if question.groups.is_none() && places == data.targets.len() {
+        notes.extend(clump_note(svr, &data.targets));
+    }
     Ok(Verdict {
         criteria_mm: judged.criteria_mm,
         fold_of_touch: folds.of_touches(),

@@ -63,6 +63,25 @@ fn results_shows_what_the_benchmarks_wrote() {
     );
 }
 
+#[test]
+fn the_reference_lists_every_key() {
+    const BEGIN: &str = "<!-- keys: from `hapdef keys --markdown` -->";
+    const END: &str = "<!-- end of keys -->";
+    let text = page(REFERENCE);
+    let (before, rest) = text.split_once(BEGIN).expect("the keys begin somewhere");
+    let (_, after) = rest.split_once(END).expect("they end somewhere");
+    let keys = hapdef::cli::keys::markdown();
+    let wanted = format!("{before}{BEGIN}\n\n{keys}\n\n{END}{after}");
+    if std::env::var_os("HAPDEF_REFERENCE").is_some_and(|asked| asked == "keep") {
+        std::fs::write(root().join(REFERENCE), &wanted).expect("the page can be written");
+        return;
+    }
+    assert!(
+        text == wanted,
+        "put the keys into {REFERENCE}: HAPDEF_REFERENCE=keep cargo test --test engine docs::"
+    );
+}
+
 /// Targets of links and pictures.
 fn links(text: &str) -> Vec<&str> {
     text.split("](")

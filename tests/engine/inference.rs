@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, LazyLock};
 
-use hapdef::board::{ChannelFault, Faults, Illness, Press, Script, SimulatedBoard, Truth};
+use hapdef::board::{ChannelFault, Faults, Illness, Press, RAMP_S, Script, SimulatedBoard, Truth};
 use hapdef::budget::{Quality, unwatched};
 use hapdef::design::simulated_board as board;
 use hapdef::design::{self, Inputs, Sensing, Workshop};
@@ -268,6 +268,8 @@ pub fn press(number: usize, force: f64, start_s: f64, duration_s: f64) -> Press 
         start_s,
         duration_s,
         touch: touches(40, 11, force)[number],
+        ramp_s: RAMP_S,
+        aside: glam::DVec3::ZERO,
     }
 }
 

@@ -246,7 +246,9 @@ impl<'a> Expectation<'a> {
         let Some(losses) = self.losses.as_ref().filter(|_| !set.is_empty()) else {
             return Ok(None);
         };
-        let Expected { whole, lost } = self.expected(set)?;
+        let lost = self.expected(set)?.lost;
+        // In the detail that losses are looked at in: of another one, losing gauges may seem to help.
+        let whole = left(self.scene_of(losses), seats(set, set.len()), &[]).error();
         let mean = lost.iter().sum::<f64>() / lost.len().max(1) as f64;
         let worst = lost.iter().copied().fold(0.0, f64::max);
         let counts = match constraints.loss.by {
@@ -326,6 +328,7 @@ fn set_of(pool: &Pool, chosen: &[usize], error: f64, margin: Option<f64>) -> Sen
         gap: None,
         margin,
         certificate: None,
+        expected_mm: None,
     }
 }
 

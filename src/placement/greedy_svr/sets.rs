@@ -54,6 +54,7 @@ impl Criterion for Search<'_> {
                 gap: Some(step.gap),
                 margin: step.margin,
                 certificate: None,
+                expected_mm: None,
             };
             found(&set);
             sets.push(set);

@@ -10,7 +10,7 @@ use super::corners::{corners, names_along};
 use crate::evaluation::EstimatorKind;
 use crate::limb::BoxMm;
 use crate::mesh::oriented_box::OrientedBox;
-use crate::project::{RegionKeys, boxes};
+use crate::project::{EvaluationKeys, RegionKeys, boxes};
 
 /// The settings of the evaluation.
 pub fn evaluation_form(ask: &mut Ask<'_>, ui: &mut Ui) {
@@ -26,7 +26,7 @@ pub fn evaluation_form(ask: &mut Ask<'_>, ui: &mut Ui) {
                 &mut evaluation.estimator,
                 &EstimatorKind::ALL,
                 EstimatorKind::title,
-                "What finds the touches that sets of gauges are judged by; matching (strain only) is what live touch does",
+                &EvaluationKeys::estimator().sentence(),
             );
         });
         let regions = &mut evaluation.regions;

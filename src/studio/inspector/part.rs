@@ -6,10 +6,10 @@ use glam::DVec3;
 use super::super::action::FileAction;
 use super::super::ask::Ask;
 use super::super::commands::Command;
-use super::super::form::{choice, count, number, rows};
+use super::super::form::{choice, counted, number, rows};
 use crate::io::examples::Example;
 use crate::mesh::unroll::Axis;
-use crate::project::{PartAxis, PartModel, Project};
+use crate::project::{Part, PartAxis, PartModel, Project};
 
 /// The settings of the part.
 pub fn part_form(ask: &mut Ask<'_>, ui: &mut Ui) {
@@ -40,40 +40,34 @@ pub fn part_form(ask: &mut Ask<'_>, ui: &mut Ui) {
 /// How the mesh file is taken in; whether it is to be read again.
 fn taking_in(ui: &mut Ui, project: &mut Project, bodies: usize, again: bool) -> bool {
     if bodies > 1 {
-        count(
+        counted(
             ui,
             "Body",
             &mut project.part.body,
             0..=bodies - 1,
-            "Which connected body of the file, 0 being the one with the largest surface",
+            &Part::body().sentence(),
         );
     }
     number(
         ui,
         "Weld",
         &mut project.part.weld_mm,
-        0.0..=1e3,
+        Part::weld_mm(),
         0.001,
-        " mm",
-        "Vertices nearer to each other than this are joined; 0 joins equal ones only",
     );
     number(
         ui,
         "Fill holes",
         &mut project.part.fill_holes_mm,
-        0.0..=1e4,
+        Part::fill_holes_mm(),
         0.1,
-        " mm",
-        "Holes up to this far across are filled",
     );
     number(
         ui,
         "Straighten",
         &mut project.part.straighten_mm,
-        0.0..=1e3,
+        Part::straighten_mm(),
         0.1,
-        " mm",
-        "A bent edge that turns a tetrahedron inside out is straightened where its node moves no farther than this",
     );
     if !again {
         return false;
@@ -103,17 +97,15 @@ fn part(ui: &mut Ui, project: &mut Project, up: DVec3) {
         &mut project.part.model,
         &[PartModel::Shell, PartModel::Solid],
         model_name,
-        "Shell: the mesh is the middle of a wall. Solid: the mesh encloses a part with walls",
+        &Part::model().sentence(),
     );
     if project.part.model == PartModel::Shell {
         number(
             ui,
             "Thickness",
             &mut project.part.thickness_mm,
-            1e-4..=1e4,
+            Part::thickness_mm(),
             0.01,
-            " mm",
-            "Of the shell; the mesh is its mid-surface",
         );
     }
     axis(ui, &mut project.part.axis, up);
@@ -133,14 +125,7 @@ fn axis(ui: &mut Ui, axis: &mut PartAxis, up: DVec3) {
         PartAxis::Coordinate(Axis::Z),
         PartAxis::Along(direction),
     ];
-    choice(
-        ui,
-        "Axis",
-        axis,
-        &all,
-        axis_name,
-        "What is up for the part: views, unrolling and new supports follow it",
-    );
+    choice(ui, "Axis", axis, &all, axis_name, &Part::axis().sentence());
     match axis {
         PartAxis::Coordinate(_) => {}
         PartAxis::Auto => {

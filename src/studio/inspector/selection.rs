@@ -3,10 +3,10 @@
 use egui::Ui;
 
 use super::super::ask::Ask;
-use super::super::form::{choice, count, number, percentage, rows};
+use super::super::form::{choice, count, number, percentage, rows, switch};
 use crate::placement::{LostBy, SelectorKind};
 use crate::plain;
-use crate::project::{GAUGES, LOST, Project, STARTS};
+use crate::project::{CandidateKeys, Project, SelectionKeys};
 use crate::session::NOBODY_REDUCES;
 
 /// The settings of the candidates.
@@ -28,8 +28,7 @@ fn candidates(ui: &mut Ui, project: &mut Project) {
         ui,
         "Unexplained",
         &mut project.candidates.unexplained,
-        0.01..=99.0,
-        "Share of the held-out variance that the candidates may leave unexplained",
+        CandidateKeys::unexplained(),
     );
     let mut fixed = project.candidates.count.is_some();
     let name = ui.label("Fixed number");
@@ -43,13 +42,7 @@ fn candidates(ui: &mut Ui, project: &mut Project) {
         project.candidates.count = fixed.then_some(160);
     }
     if let Some(kept) = &mut project.candidates.count {
-        count(
-            ui,
-            "Candidates",
-            kept,
-            1..=100_000,
-            "How many of the feasible sites are kept",
-        );
+        count(ui, "Candidates", kept, CandidateKeys::count());
     }
     if !project.wants_candidates(&project.selectors()) {
         ui.label("Feasible sites");
@@ -65,51 +58,47 @@ fn selection(ui: &mut Ui, project: &mut Project) {
         &mut project.selection.selector,
         &SelectorKind::ALL,
         SelectorKind::title,
-        "Whose sites are shown and reported",
+        &SelectionKeys::selector().sentence(),
     );
     count(
         ui,
         "Gauges",
         &mut project.selection.sensors,
-        GAUGES,
-        "How many gauges to place",
+        SelectionKeys::sensors(),
     );
     number(
         ui,
         "Least spacing",
         &mut project.selection.spacing_mm,
-        0.0..=1e4,
+        SelectionKeys::spacing_mm(),
         0.1,
-        " mm",
-        "Between any two gauges",
     );
     percentage(
         ui,
         "Chance of failure",
         &mut project.selection.failure,
-        0.0..=100.0,
-        "That gauges are lost when they are needed: expected error and greedy SVR then choose sites that can do without each other",
+        SelectionKeys::failure(),
     );
     losses(ui, project);
-    let name = ui.label("Compare selectors");
-    ui.checkbox(&mut project.selection.compare, "")
-        .on_hover_text("Let the other selectors choose too: a curve of errors for each of them, for the time that they take")
-        .labelled_by(name.id)
-        .accessible_name("Compare selectors");
-    ui.end_row();
+    switch(
+        ui,
+        "Compare selectors",
+        &mut project.selection.compare,
+        SelectionKeys::compare(),
+    );
     beyond_greedy(ui, project);
-    let name = ui.label("With noise");
-    ui.checkbox(&mut project.selection.with_noise, "")
-        .on_hover_text("Choose from signals with the gauge's noise added")
-        .labelled_by(name.id)
-        .accessible_name("With noise");
-    ui.end_row();
-    let name = ui.label("Refine places");
-    ui.checkbox(&mut project.selection.refine, "")
-        .on_hover_text("Move the gauges that “Expected error” has chosen off the sites, along the surface and by their angle, while the expected error falls. Strain only")
-        .labelled_by(name.id)
-        .accessible_name("Refine places");
-    ui.end_row();
+    switch(
+        ui,
+        "With noise",
+        &mut project.selection.with_noise,
+        SelectionKeys::with_noise(),
+    );
+    switch(
+        ui,
+        "Refine places",
+        &mut project.selection.refine,
+        SelectionKeys::refine(),
+    );
 }
 
 /// Which gauges may be lost, where that is weighed.
@@ -122,13 +111,7 @@ fn losses(ui: &mut Ui, project: &mut Project) {
     }
     // What a selector refuses is shown too: else nobody could take it back.
     if some(SelectorKind::weighs_losses_together) || keys.lost > 1 {
-        count(
-            ui,
-            "Gauges lost",
-            &mut keys.lost,
-            LOST,
-            "How many are lost together, any of them. Greedy SVR weighs the loss of one only",
-        );
+        count(ui, "Gauges lost", &mut keys.lost, SelectionKeys::lost());
     }
     choice(
         ui,
@@ -136,7 +119,7 @@ fn losses(ui: &mut Ui, project: &mut Project) {
         &mut keys.lost_by,
         &LostBy::ALL,
         LostBy::title,
-        "Of all the gauges that may be lost: the mean over them, or those whose loss is the worst",
+        &SelectionKeys::lost_by().sentence(),
     );
 }
 
@@ -145,20 +128,19 @@ fn beyond_greedy(ui: &mut Ui, project: &mut Project) {
     let selectors = project.selectors();
     let keys = &mut project.selection;
     if selectors.iter().any(|k| k.exchanges_if_asked()) {
-        let name = ui.label("Exchange gauges");
-        ui.checkbox(&mut keys.exchange, "")
-            .on_hover_text("Exchange gauges one at a time after all are chosen, while that makes the set better. Expected error always does, PCA-QR never")
-            .labelled_by(name.id)
-            .accessible_name("Exchange gauges");
-        ui.end_row();
+        switch(
+            ui,
+            "Exchange gauges",
+            &mut keys.exchange,
+            SelectionKeys::exchange(),
+        );
     }
     if selectors.iter().any(|k| k.has_starts()) {
         count(
             ui,
             "First gauges",
             &mut keys.starts,
-            STARTS,
-            "From how many first gauges a set is begun; the best set is kept, for the time that each of them takes",
+            SelectionKeys::starts(),
         );
     }
 }
@@ -186,27 +168,21 @@ fn regression(ui: &mut Ui, project: &mut Project) {
         ui,
         "C",
         &mut project.selection.c_mm,
-        1e-3..=1e9,
+        SelectionKeys::c_mm(),
         1.0,
-        " mm",
-        "Of greedy SVR's regression: larger follows the touches more closely",
     );
     number(
         ui,
         "ε",
         &mut project.selection.epsilon_mm,
-        0.0..=1e3,
+        SelectionKeys::epsilon_mm(),
         0.01,
-        " mm",
-        "Errors below this cost nothing",
     );
     number(
         ui,
         "γ",
         &mut project.selection.gamma,
-        1e-9..=1e6,
+        SelectionKeys::gamma(),
         0.005,
-        "",
-        "Of the Gaussian kernel on standardized signals",
     );
 }

@@ -3,11 +3,11 @@
 use egui::{RichText, Ui};
 
 use super::super::ask::Ask;
-use super::super::form::{choice, count, number, rows};
+use super::super::form::{choice, count, counted, number, quantity, rows};
 use super::super::view::Tab;
 use crate::budget::{Limits, Quality};
 use crate::dataset::Signal;
-use crate::project::{FORCES, FRICTION, Lattice, PartModel, Project, TIP_OFF, TOUCHES};
+use crate::project::{BudgetKeys, GaugeKeys, Lattice, PartModel, Project, SiteKeys, TouchKeys};
 
 /// The settings of the simulation.
 pub fn simulation_form(ask: &mut Ask<'_>, ui: &mut Ui) {
@@ -27,7 +27,7 @@ fn quality(ui: &mut Ui, project: &mut Project) {
         }
     })
     .response
-    .on_hover_text("How much time may be spent for accuracy");
+    .on_hover_text(BudgetKeys::quality().sentence());
     if !project.budget.limits.are_none() {
         ui.horizontal(|ui| {
             ui.label("Limits of its own hold")
@@ -55,87 +55,64 @@ fn quality_promises(ask: &mut Ask<'_>, ui: &mut Ui) {
 fn touch(ui: &mut Ui, project: &mut Project) {
     let solid = project.part.model == PartModel::Solid;
     let touch = &mut project.touch;
-    number(
-        ui,
-        "Force",
-        &mut touch.force_n,
-        1e-9..=1e9,
-        0.1,
-        " N",
-        "Pressed along the inward normal",
-    );
+    number(ui, "Force", &mut touch.force_n, TouchKeys::force_n(), 0.1);
     let [lightest, hardest] = &mut touch.forces_n;
     let (least, most) = (*lightest, *hardest);
-    number(
+    let forces = TouchKeys::forces_n().numbers();
+    quantity(
         ui,
         "Lightest touch",
         lightest,
-        *FORCES.start()..=most,
+        *forces.start()..=most,
         0.1,
-        " N",
+        "N",
         "How hard touches come: from here to the hardest, evenly over the logarithm",
     );
-    number(
+    quantity(
         ui,
         "Hardest touch",
         hardest,
-        least..=*FORCES.end(),
+        least..=*forces.end(),
         0.1,
-        " N",
+        "N",
         "How hard touches come: from the lightest to here, evenly over the logarithm",
     );
     number(
         ui,
         "Tip radius",
         &mut touch.tip_radius_mm,
-        1e-3..=1e3,
+        TouchKeys::tip_radius_mm(),
         0.1,
-        " mm",
-        "The tip spreads the force smoothly over this radius",
     );
     number(
         ui,
         "Tip radius off",
         &mut touch.tip_tolerance_mm,
-        TIP_OFF,
+        TouchKeys::tip_tolerance_mm(),
         0.01,
-        " mm",
-        "How much larger or smaller tips are that touch (standard deviation)",
     );
     number(
         ui,
         "Friction",
         &mut touch.friction_percent,
-        FRICTION,
+        TouchKeys::friction_percent(),
         0.5,
-        " %",
-        "How much of a touch's force drags along the surface, beside what presses (rms, in any direction)",
     );
-    count(
-        ui,
-        "Touches",
-        &mut touch.count,
-        TOUCHES,
-        "Simulated touches; lower qualities take fewer",
-    );
+    count(ui, "Touches", &mut touch.count, TouchKeys::count());
     number(
         ui,
         "Edge margin",
         &mut touch.edge_margin_mm,
-        0.0..=1e3,
+        TouchKeys::edge_margin_mm(),
         0.1,
-        " mm",
-        "Least distance of a touch from a free edge",
     );
     if solid {
         number(
             ui,
             "Fingertip",
             &mut touch.reach_mm,
-            0.0..=1e3,
+            TouchKeys::reach_mm(),
             0.5,
-            " mm",
-            "Radius of the ball that comes from outside: touches lie only where it gets to, not on what stands behind windows it does not fit through. The field “Faces” shows where",
         );
     }
 }
@@ -148,15 +125,14 @@ fn sites(ui: &mut Ui, project: &mut Project) {
         &mut gauge.signal,
         &Signal::ALL,
         signal_name,
-        "What a site reports: strain is what a gauge measures, displacement what the paper used",
+        &GaugeKeys::signal().sentence(),
     );
     if gauge.signal == Signal::Strain {
         count(
             ui,
             "Directions",
             &mut gauge.directions,
-            1..=4,
-            "That a gauge may have at one place: 1 along the largest strain, 2 also across it",
+            GaugeKeys::directions(),
         );
     } else {
         gauge.directions = 1;
@@ -165,10 +141,8 @@ fn sites(ui: &mut Ui, project: &mut Project) {
         ui,
         "Site spacing",
         &mut project.sites.spacing_mm,
-        0.01..=1e4,
+        SiteKeys::spacing_mm(),
         0.05,
-        " mm",
-        "Of the possible gauge positions on the inside",
     );
     let name = |l| match l {
         Lattice::Even => "Even",
@@ -180,16 +154,16 @@ fn sites(ui: &mut Ui, project: &mut Project) {
         &mut project.sites.lattice,
         &[Lattice::Even, Lattice::Unrolled],
         name,
-        "Even suits any surface; rows and columns suit tubes",
+        &SiteKeys::lattice().sentence(),
     );
     let mut seed = project.budget.seed as usize;
     let before = seed;
-    count(
+    counted(
         ui,
         "Seed",
         &mut seed,
-        0..=usize::MAX >> 12,
-        "Of every random draw: the same seed gives the same design",
+        BudgetKeys::seed().counts(),
+        &BudgetKeys::seed().sentence(),
     );
     if seed != before {
         project.budget.seed = seed as u64;

@@ -11,7 +11,7 @@ use super::super::view::Tool;
 use super::corners::{corners, names_along};
 use crate::document::Layer;
 use crate::mesh::oriented_box::OrientedBox;
-use crate::project::{Project, SupportKeys, SupportKind};
+use crate::project::{MaterialKeys, Project, SupportKeys, SupportKind};
 
 /// The settings of material and supports.
 pub fn supports_form(ask: &mut Ask<'_>, ui: &mut Ui) {
@@ -34,23 +34,22 @@ pub fn supports_form(ask: &mut Ask<'_>, ui: &mut Ui) {
 }
 
 fn material(ui: &mut Ui, project: &mut Project) {
+    let keys = &mut project.material;
+    let modulus = MaterialKeys::youngs_modulus_gpa();
     number(
         ui,
         "Young's modulus",
-        &mut project.material.youngs_modulus_gpa,
-        1e-6..=1e4,
+        &mut keys.youngs_modulus_gpa,
+        modulus,
         0.01,
-        " GPa",
-        "Printed nylon: 1.7 GPa",
     );
+    let ratio = MaterialKeys::poissons_ratio();
     number(
         ui,
         "Poisson's ratio",
-        &mut project.material.poissons_ratio,
-        -0.99..=0.499,
+        &mut keys.poissons_ratio,
+        ratio,
         0.005,
-        "",
-        "Printed nylon: 0.35",
     );
 }
 
@@ -71,7 +70,7 @@ fn supports(ui: &mut Ui, project: &mut Project, start: impl FnOnce() -> Oriented
             &mut support.kind,
             &kinds,
             kind_name,
-            "Clamped: no displacement, no rotation. Pinned: no displacement. Symmetry: a mirror plane",
+            &SupportKeys::kind().sentence(),
         );
         if let Some(name) = &support.vertices {
             ui.label("Vertices");

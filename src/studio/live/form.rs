@@ -5,13 +5,13 @@ use egui::{ComboBox, DragValue, RichText, TextEdit, Ui};
 use super::super::action::{BoardAction, FileAction};
 use super::super::ask::Ask;
 use super::super::commands::Command;
-use super::super::form::{choice, number, percentage, rows};
+use super::super::form::{choice, number, percentage, quantity, rows};
 use super::super::theme;
 use super::super::words::live_in_words;
 use crate::board::Illness;
 use crate::link::{PortInfo, ports};
 use crate::live::Estimator;
-use crate::project::{CalibrationKeys, FORCE_OFF, FRICTION, LiveKeys, PLACE_OFF};
+use crate::project::{CalibrationKeys, LiveKeys};
 use crate::session::{Desk, LEAST_KNOWN, Mishap, WANTED_KNOWN};
 
 /// What is typed at the live stage.
@@ -223,13 +223,13 @@ fn known_form(ask: &mut Ask<'_>, ui: &mut Ui) {
 fn next_touch(ask: &mut Ask<'_>, ui: &mut Ui) {
     rows(ui, "Next touch", |ui| {
         ask.edit_desk(|desk| {
-            number(
+            quantity(
                 ui,
                 "Force",
                 &mut desk.known_force_n,
                 0.1..=100.0,
                 0.1,
-                " N",
+                "N",
                 "That the next known touch is pressed with",
             );
         });
@@ -242,28 +242,22 @@ fn pressing(ui: &mut Ui, hand: &mut CalibrationKeys) {
         ui,
         "Place off",
         &mut hand.place_mm,
-        PLACE_OFF,
+        CalibrationKeys::place_mm(),
         0.01,
-        " mm",
-        "How far beside its place a known touch is pressed, in any direction (standard deviation)",
     );
     number(
         ui,
         "Force off",
         &mut hand.force_percent,
-        FORCE_OFF,
+        CalibrationKeys::force_percent(),
         0.05,
-        " %",
-        "How much too hard or too soft a known touch is pressed (standard deviation)",
     );
     number(
         ui,
         "Aside",
         &mut hand.friction_percent,
-        FRICTION,
+        CalibrationKeys::friction_percent(),
         0.5,
-        " %",
-        "How much of a known touch's force pushes along the surface (rms, in any direction)",
     );
 }
 
@@ -327,65 +321,40 @@ fn measurement(ui: &mut Ui, live: &mut LiveKeys) {
         ui,
         "Gauge factor",
         &mut live.gauge_factor,
-        0.1..=500.0,
+        LiveKeys::gauge_factor(),
         0.01,
-        "",
-        "Relative change of resistance over strain",
     );
     let mut arms = f64::from(live.active_arms);
-    number(
-        ui,
-        "Active arms",
-        &mut arms,
-        1.0..=4.0,
-        0.1,
-        "",
-        "Of each bridge, that the strain changes; a gauge with a dummy is 1",
-    );
+    number(ui, "Active arms", &mut arms, LiveKeys::active_arms(), 0.1);
     live.active_arms = arms.round() as u8;
     percentage(
         ui,
         "Model error",
         &mut live.model_error,
-        0.0..=100.0,
-        "What the model is off by beside gluing, over the reading, where its elements leave less; a calibration finds it",
+        LiveKeys::model_error(),
     );
     number(
         ui,
         "Stiffness off",
         &mut live.stiffness_percent,
-        0.0..=50.0,
+        LiveKeys::stiffness_percent(),
         0.1,
-        " %",
-        "How far off the part's stiffness is (standard deviation): forces are off by it, no places",
     );
     number(
         ui,
         "Pushed aside",
         &mut live.friction_percent,
-        FRICTION,
+        LiveKeys::friction_percent(),
         0.5,
-        " %",
-        "How much of a touch's force may act along the surface (rms, in any direction): it is found with place and force; 0: touches press straight in",
     );
     number(
         ui,
         "Largest force",
         &mut live.largest_force_n,
-        0.1..=1e4,
+        LiveKeys::largest_force_n(),
         0.5,
-        " N",
-        "Nobody presses harder",
     );
-    number(
-        ui,
-        "Drift",
-        &mut live.drift_s,
-        0.0..=1e4,
-        0.5,
-        " s",
-        "Time in which the rest follows what is read without a touch; 0: never",
-    );
+    number(ui, "Drift", &mut live.drift_s, LiveKeys::drift_s(), 0.5);
 }
 
 fn channels(ui: &mut Ui, live: &mut LiveKeys, gauges: usize) {
@@ -400,7 +369,7 @@ fn channels(ui: &mut Ui, live: &mut LiveKeys, gauges: usize) {
             let name = ui.label(format!("Gauge {}", k + 1));
             ui.add(
                 DragValue::new(channel)
-                    .range(0..=crate::wire::MOST_CHANNELS - 1)
+                    .range(LiveKeys::channels().counts())
                     .prefix("channel "),
             )
             .labelled_by(name.id)

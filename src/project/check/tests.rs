@@ -1,5 +1,5 @@
 use super::*;
-use crate::project::{CostKeys, RegionKeys};
+use crate::project::{ChosenSite, CostKeys, RegionKeys};
 use crate::uncertainty::{Gluing, Making, Pressing};
 
 fn project() -> Project {
@@ -222,4 +222,34 @@ fn a_seed_can_be_written_and_read() {
     assert_eq!(project.check(), Ok(()));
     project.budget.seed += 1;
     assert!(project.check().is_err());
+}
+
+#[test]
+fn a_channel_belongs_to_one_gauge() {
+    let mut project = Project::around("limb.stl", None);
+    project.live.channels = vec![4, 2, 0, 2];
+    let said = project.check().unwrap_err().to_string();
+    let expected =
+        "live.channels must be another channel for each gauge, but is 2 for gauges 2 and 4";
+    assert_eq!(said, expected);
+    project.live.channels = vec![4, 2, 0, 1];
+    project.check().unwrap();
+    let site = ChosenSite {
+        position_mm: [1.0, 2.0, 3.0],
+        direction: [0.0, 0.0, 1.0],
+    };
+    project.live.check_gauges(&vec![site.clone(); 4]).unwrap();
+    let said = project
+        .live
+        .check_gauges(&vec![site; 5])
+        .unwrap_err()
+        .to_string();
+    assert!(
+        said.contains("live.channels") && said.contains("4 for 5 gauges"),
+        "{said}"
+    );
+    for bad in [0.0, -1.0, 1e300, f64::NAN, f64::INFINITY] {
+        project.live.gauge_factor = bad;
+        assert!(project.check().is_err(), "{bad}");
+    }
 }
