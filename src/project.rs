@@ -192,6 +192,16 @@ impl Project {
         std::iter::once(first).chain(others).collect()
     }
 
+    /// Asks for the comparison of the paper: selectors beside each other, judged by regression. A selector that the paper
+    /// does not know gives way to the paper's own.
+    pub fn compare_as_in_the_paper(&mut self) {
+        self.evaluation.estimator = EstimatorKind::Svr;
+        self.selection.compare = true;
+        if !SelectorKind::PAPER.contains(&self.selection.selector) {
+            self.selection.selector = SelectorKind::GreedySvr;
+        }
+    }
+
     /// Whether the feasible sites are reduced to candidates where some selectors choose: one of them chooses among
     /// these, the judge compares sets with all of them together, or so many of them are asked for.
     #[must_use]

@@ -8,7 +8,7 @@ use clap::Args;
 use super::common::{Common, SelectorArg, prepare_folder};
 use super::{out, progress::Bar};
 use crate::design::{self, Design};
-use crate::evaluation::{BASELINE, EstimatorKind, EvaluationRow};
+use crate::evaluation::{BASELINE, EvaluationRow};
 use crate::io::artifacts::{self, Provenance};
 use crate::io::together::Together;
 use crate::placement::{SelectorKind, SensorSet};
@@ -92,15 +92,9 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Makes a project compare as the paper does, and says which selectors choose. One that the paper does not know gives
-/// way to the paper's own.
+/// Makes a project compare as the paper does, and says which selectors choose.
 fn as_in_the_paper(project: &mut Project) -> Vec<SelectorKind> {
-    project.evaluation.estimator = EstimatorKind::Svr;
-    let selection = &mut project.selection;
-    selection.compare = true;
-    if !SelectorKind::PAPER.contains(&selection.selector) {
-        selection.selector = SelectorKind::GreedySvr;
-    }
+    project.compare_as_in_the_paper();
     SelectorKind::PAPER.to_vec()
 }
 
@@ -187,6 +181,7 @@ fn tells(row: &EvaluationRow, chosen: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::EstimatorKind;
 
     #[test]
     fn the_paper_knows_four_selectors_and_one_estimator() {

@@ -105,7 +105,8 @@ fn middle_edge(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
 /// A positive number with its first digit only.
 fn one_digit(x: f64) -> f64 {
     let unit = 10f64.powf(x.log10().floor());
-    (x / unit).floor() * unit
+    // A digit that rounding has put a hair below itself is still that digit.
+    (x / unit * (1.0 + 1e-9)).floor() * unit
 }
 
 /// Sides with a triangle on one side only, as that triangle runs along them.
@@ -300,6 +301,27 @@ mod tests {
             t.extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
         }
         (p, t)
+    }
+
+    #[test]
+    fn one_vertex_far_away_asks_for_no_weld_that_would_melt_the_part() {
+        let side = |k: u32| f64::from(k) * 1e-2;
+        let mut points: Vec<DVec3> = (0..121)
+            .map(|k| DVec3::new(side(k % 11), side(k / 11), 0.0))
+            .collect();
+        let mut triangles = Vec::new();
+        for k in (0..110).filter(|k| k % 11 < 10) {
+            triangles.extend([[k, k + 1, k + 12], [k, k + 12, k + 11]]);
+        }
+        points[60] = DVec3::splat(1e4);
+        let mean = |sides: Vec<f64>| sides.iter().sum::<f64>() / sides.len() as f64;
+        let sides = triangles.iter().flat_map(|t| {
+            [0, 1, 2].map(|i| points[t[i] as usize].distance(points[t[(i + 1) % 3] as usize]))
+        });
+        assert!(mean(sides.collect()) > 100.0);
+        let middle = middle_edge(&points, &triangles).unwrap();
+        assert!((0.01..0.0142).contains(&middle), "{middle}");
+        assert_eq!(closing_weld(&points, &triangles), None);
     }
 
     #[test]

@@ -414,3 +414,39 @@ fn advice_has_digits_that_are_read() {
         );
     }
 }
+
+#[test]
+fn a_gauge_that_is_required_off_the_part_is_refused_or_said() {
+    let required = |at: [f64; 3]| {
+        let mut inputs = limb();
+        inputs.project.selection.required_mm = vec![[22.5, 22.5, 60.0], at];
+        design::simulate(&inputs, &budget(), &unwatched)
+    };
+    let said = required([900.0, 0.0, 40.0]).err().unwrap().to_string();
+    assert!(
+        said.starts_with("place of selection.required_mm 1 lies"),
+        "{said}"
+    );
+    let off = required([60.0, 0.0, 40.0]).unwrap().achieved.cautions;
+    let said = off.iter().find(|c| c.contains("selection.required_mm"));
+    assert!(said.is_some_and(|s| s.contains("place 1 by")), "{off:?}");
+    let near = required([22.5, -22.5, 60.0]).unwrap().achieved.cautions;
+    assert!(!near.iter().any(|c| c.contains("required")), "{near:?}");
+}
+
+#[test]
+fn advice_on_a_mesh_with_holes_does_not_call_it_closed_without_a_word() {
+    let mut inputs = limb();
+    let thick = inputs.part.thickened(4e-3);
+    let holes: Vec<[u32; 3]> = (thick.triangles().iter().enumerate())
+        .filter(|(k, _)| k % 200 != 7)
+        .map(|(_, t)| *t)
+        .collect();
+    let (open, _) = TriMesh::new(thick.positions(), &holes, 0).unwrap();
+    assert!(open.boundary_edges().count() > 10);
+    inputs.part = Arc::new(open);
+    inputs.project.part.model = PartModel::Solid;
+    let advice = design::advise(&inputs, &unwatched).unwrap();
+    let words = advice.words.concat();
+    assert!(!advice.closed || words.contains("open edges"), "{words}");
+}

@@ -10,7 +10,7 @@ use super::corners::{corners, names_along};
 use crate::evaluation::EstimatorKind;
 use crate::limb::BoxMm;
 use crate::mesh::oriented_box::OrientedBox;
-use crate::project::{EvaluationKeys, RegionKeys, boxes};
+use crate::project::{EvaluationKeys, Project, RegionKeys, boxes};
 
 /// The settings of the evaluation.
 pub fn evaluation_form(ask: &mut Ask<'_>, ui: &mut Ui) {
@@ -18,20 +18,35 @@ pub fn evaluation_form(ask: &mut Ask<'_>, ui: &mut Ui) {
     let stance = ask.view.camera.stance;
     let start = || boxes::keys(&OrientedBox::around(&part, stance));
     ask.edit(|project| {
-        let evaluation = &mut project.evaluation;
         rows(ui, "Judge", |ui| {
             choice(
                 ui,
                 "Estimator",
-                &mut evaluation.estimator,
+                &mut project.evaluation.estimator,
                 &EstimatorKind::ALL,
                 EstimatorKind::title,
                 &EvaluationKeys::estimator().sentence(),
             );
+            as_in_the_paper(ui, project);
         });
+        let evaluation = &mut project.evaluation;
         let regions = &mut evaluation.regions;
         rows(ui, "Regions", |ui| regions_form(ui, regions, start));
     });
+}
+
+/// One press for the comparison that the paper makes.
+fn as_in_the_paper(ui: &mut Ui, project: &mut Project) {
+    const HELP: &str = "The paper's selectors beside each other, judged by support vector regression (minutes at Standard): sets the estimator, the selector and “Compare selectors”; undo takes it back";
+    ui.label("");
+    if ui
+        .button("Compare as in the paper")
+        .on_hover_text(HELP)
+        .clicked()
+    {
+        project.compare_as_in_the_paper();
+    }
+    ui.end_row();
 }
 
 /// The regions that errors are quoted for, with a new one beginning as the box that `start` gives.
