@@ -95,6 +95,8 @@ fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
         },
         transparent: args.transparent,
     };
+    let loaded = args.common().load()?;
+    cli::spared::Spared::of(&loaded).check_result("--out", Some(&args.out))?;
     let is_png = args
         .out
         .extension()
@@ -104,8 +106,6 @@ fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
         "--out {}: pictures are written as PNG. Choose a name that ends in .png",
         hapdef::plain::path(&args.out)
     );
-    let loaded = args.common().load()?;
-    cli::spared::Spared::of(&loaded).check_result("--out", Some(&args.out))?;
     let png = png(loaded, &picture).map_err(anyhow::Error::msg)?;
     hapdef::io::atomic::write(&args.out, &png).context("the picture could not be written")
 }
