@@ -516,10 +516,11 @@ impl TruthFile {
         };
         if self.says_more {
             let all = truth.force;
-            line += &match truth.touches {
+            let more = match truth.touches {
                 0 => ",,,,0".to_owned(),
                 touches => format!(",{:.5},{:.5},{:.5},{touches}", all.x, all.y, all.z),
             };
+            line.push_str(&more);
         }
         let written = writeln!(self.file, "{line}");
         self.note(written);

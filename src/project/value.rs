@@ -65,19 +65,23 @@ impl Value for f64 {
 }
 
 macro_rules! whole {
-    ($($type:ty),*) => { $(
+    ($($type:ty: $wide:expr),*) => { $(
         impl Value for $type {
             fn written(&self) -> Option<toml::Value> {
                 serialized(self)
             }
 
             fn obeys(&self, key: &Key) -> Result<(), BadValue> {
-                counts(key, "", &[*self as u64])
+                counts(key, "", &[$wide(*self)])
             }
         }
     )* };
 }
-whole!(u8, usize, u64);
+whole!(u8: u64::from, usize: wide, u64: std::convert::identity);
+
+fn wide(count: usize) -> u64 {
+    count as u64
+}
 
 impl<T: Value> Value for Option<T> {
     fn written(&self) -> Option<toml::Value> {
