@@ -30,7 +30,7 @@ use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
 use crate::uncertainty::{Gluing, Making, Pressing, Uncertainty};
 
-use value::MM;
+use value::{MM, is_default};
 
 pub use axis::PartAxis;
 pub use gauge::{CalibrationKeys, GaugeKeys, ToleranceKeys};
@@ -100,10 +100,6 @@ pub struct Project {
     /// Selections that were kept to be compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub kept: Vec<Kept>,
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }
 
 impl Project {

@@ -2,11 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::is_default;
 use super::key::{Range, from};
 use super::keys::keys;
 use super::ranges::{FRICTION, LENGTH, OFF_MM, OFF_PERCENT, ROOM};
-use super::value::any;
+use super::value::{any, is_default};
 use crate::dataset::Signal;
 
 any!(Signal);

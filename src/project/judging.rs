@@ -2,11 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::is_default;
 use super::key::{Range, TEXT, from, within};
 use super::keys::keys;
 use super::ranges::{FORCES, PLACES};
-use super::value::any;
+use super::value::{any, is_default};
 use crate::budget::{Budget, Limits, Quality};
 use crate::evaluation::EstimatorKind;
 use crate::limb::BoxMm;

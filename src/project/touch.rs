@@ -2,11 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::is_default;
 use super::key::{MASK, Range, from};
 use super::keys::keys;
 use super::ranges::{FORCES, FRICTION, LENGTH, OFF_MM, ROOM};
-use super::value::any;
+use super::value::{any, is_default};
 use crate::mesh::reach::FINGERTIP;
 
 keys! {

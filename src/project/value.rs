@@ -35,6 +35,11 @@ pub trait Value {
     }
 }
 
+/// Whether a value is the usual one, and need not be written.
+pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 /// A value by the way it is serialized.
 pub(super) fn serialized(value: &impl Serialize) -> Option<toml::Value> {
     toml::Value::try_from(value).ok()
