@@ -14,6 +14,7 @@ use crate::elasticity::observe::{Face, Observer, SiteFrame};
 use crate::elasticity::respond::{Reading, Responses, respond};
 use crate::elasticity::{Model, Touch};
 use crate::mesh::{SurfacePoint, TriMesh};
+use crate::plain;
 
 pub use sift::{GivenSite, LeftOut, Sifted, Table, check_reach, sift};
 
@@ -122,6 +123,8 @@ pub fn answer_sifted(
     let (observer, angles) = observed(&*model, sites, &mut rows);
     rows.check()?;
     notes.extend(under_tips(&touches, sites, &rows.sites));
+    let held = design::on_what_is_held(&inputs, &touches)?;
+    notes.extend(pressed_on_supports(&held, &rows));
     let reading = Reading::GaugeAndDisplacement(&angles);
     let responses = respond(&*model, &touches, &observer, reading, watch)?;
     Ok(Answer {
@@ -220,6 +223,15 @@ fn under_tips(touches: &[Touch], sites: &[GivenSite], rows: &[usize]) -> Option<
             touches.len() * rows.len()
         )
     })
+}
+
+/// A word on touches that press on what is held.
+fn pressed_on_supports(held: &[usize], rows: &Sifted) -> Option<String> {
+    let first = rows.touches[*held.first()?];
+    Some(format!(
+        "{} (the first is touch {first}) on what a support holds: next to nothing moves there, whatever the force.",
+        plain::either(held.len(), "touch presses", "touches press")
+    ))
 }
 
 /// Touches come from outside: an open part that winds the other way is turned over.

@@ -22,6 +22,9 @@ use self::grid::Grid;
 pub use self::spec::{BoxMm, LimbError, LimbSpec, LimbSupport};
 
 /// A rule of one parameter.
+/// How long limbs may be.
+const LENGTHS: &str = "from 1 to 100000 mm";
+
 fn range(what: &'static str, rule: &'static str, value: f64, holds: bool) -> Result<(), LimbError> {
     if holds && value.is_finite() {
         Ok(())
@@ -52,13 +55,10 @@ impl LimbSpec {
 
     fn check(&self) -> Result<(), LimbError> {
         let positive = "above zero";
-        range(
-            "the circumference",
-            positive,
-            self.circumference,
-            self.circumference > 0.0,
-        )?;
-        range("the height", positive, self.height, self.height > 0.0)?;
+        let a_part =
+            |what: &'static str, mm: f64| range(what, LENGTHS, mm, (1.0..=1e5).contains(&mm));
+        a_part("the circumference", self.circumference)?;
+        a_part("the height", self.height)?;
         range(
             "the taper",
             "between 0.2 and 5",

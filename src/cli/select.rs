@@ -292,7 +292,7 @@ impl SelectArgs {
             )));
         }
         let target = [("--target-mm", self.target_mm.is_some())];
-        let mut judged = target.into_iter().chain(fit.of_regression());
+        let mut judged = (target.into_iter().chain(fit.of_regression())).chain(fit.of_split());
         match judged.find(|(_, given)| *given) {
             Some((flag, _)) if self.no_criterion => Err(misuse(&format!(
                 "{flag} is about the criterion, which --no-criterion leaves out: give one of them"

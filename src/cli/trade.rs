@@ -74,13 +74,12 @@ pub fn run(args: &TradeArgs) -> anyhow::Result<()> {
     let mut record = known(&args.out, &loaded, threads)?;
     args.common
         .in_pool(|| sweep(args, &loaded, &place, &mut record))?;
+    anyhow::ensure!(
+        !record.points.is_empty() || args.points == 0,
+        "nothing was measured: the time was over before the first setting. Give more with --seconds"
+    );
     if args.common.json {
         return out::line(&serde_json::to_string(&record)?);
-    }
-    if record.points.is_empty() {
-        out::say(
-            "hapdef: nothing was measured: the time was over before the first setting. Give more with --seconds",
-        );
     }
     out::line(trade_file::markdown(&loaded.inputs.project, &record).trim_end())?;
     for name in ["trade.json", "trade.csv", "trade.md", "trade.svg"] {

@@ -359,11 +359,26 @@ impl Simulated {
 fn on_supports(inputs: &Inputs, touches: &[Touch]) -> Result<Option<String>, DesignError> {
     /// Share of the touches from which it is worth a word.
     const WORTH: f64 = 0.05;
+    let count = on_what_is_held(inputs, touches)?.len();
+    Ok((count as f64 > WORTH * touches.len() as f64).then(|| {
+        format!(
+            "{count} of {} touches press on what a support holds: next to nothing moves there, and no gauge can tell where they are. Paint where touches come (touch.region), or go by the errors of a region ([[evaluation.region]]).",
+            touches.len()
+        )
+    }))
+}
+
+/// Which touches press on what a support holds in all directions.
+///
+/// # Errors
+/// [`DesignError::Value`] for a support that names no layer there is.
+pub fn on_what_is_held(inputs: &Inputs, touches: &[Touch]) -> Result<Vec<usize>, DesignError> {
     let supports = inputs.project.supports(&inputs.masks)?;
     let holds = |s: &&Support| (0..3).all(|i| s.held.holds(i));
     let held: Vec<&Support> = supports.iter().filter(holds).collect();
     let index = inputs.part.index();
-    let is_held = |touch: &&Touch| {
+    let is_held = |&k: &usize| {
+        let touch = &touches[k];
         held.iter().any(|support| match &support.region {
             Region::Box(held) => held.contains(touch.position, 0.0),
             Region::Vertices(mask) => {
@@ -372,13 +387,7 @@ fn on_supports(inputs: &Inputs, touches: &[Touch]) -> Result<Option<String>, Des
             }
         })
     };
-    let count = touches.iter().filter(is_held).count();
-    Ok((count as f64 > WORTH * touches.len() as f64).then(|| {
-        format!(
-            "{count} of {} touches press on what a support holds: next to nothing moves there, and no gauge can tell where they are. Paint where touches come (touch.region), or go by the errors of a region ([[evaluation.region]]).",
-            touches.len()
-        )
-    }))
+    Ok((0..touches.len()).filter(is_held).collect())
 }
 
 /// What the solution was checked for.

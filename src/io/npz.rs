@@ -109,6 +109,15 @@ impl Arrays {
     /// # Errors
     /// [`FileError`] for what is no ordinary file, is larger than memory, or is no NPZ.
     pub fn open(path: &Path) -> Result<Self, FileError> {
+        let cure = "it may be cut off, or a single array (NPY). Write it with numpy.savez";
+        Self::open_as(path, ("NPZ file", cure))
+    }
+
+    /// The same, of a file that people know by another name, with what may be wrong with it.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_as(path: &Path, (kind, cure): (&str, &str)) -> Result<Self, FileError> {
         let length = source::ordinary(path)?.len();
         if length as f64 > memory::allowed() {
             return Err(FileError::broken(
@@ -122,12 +131,7 @@ impl Arrays {
         }
         let file = File::open(path).map_err(|e| FileError::of(path, &e))?;
         let archive = ZipArchive::new(file).map_err(|e| {
-            FileError::broken(
-                path,
-                format!(
-                    "this is not a readable NPZ file ({e}): it may be cut off, or a single array (NPY). Write it with numpy.savez"
-                ),
-            )
+            FileError::broken(path, format!("this is not a readable {kind} ({e}): {cure}"))
         })?;
         Ok(Self {
             path: path.to_owned(),

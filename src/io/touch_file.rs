@@ -57,7 +57,8 @@ pub fn write(path: &Path, origin: Origin, estimator: &TouchEstimator) -> Result<
 /// # Errors
 /// [`FileError`] naming the file, what is wrong with it and what to do.
 pub fn read(path: &Path) -> Result<TouchFile, FileError> {
-    let mut found = Arrays::open(path)?;
+    let cure = "it may be cut off, or another file. Make one with hapdef train";
+    let mut found = Arrays::open_as(path, ("trained estimator", cure))?;
     if !found.holds("header") {
         return Err(FileError::broken(
             path,

@@ -8,6 +8,7 @@ use crate::budget::{Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::evaluation::add_noise;
 use crate::evaluation::failures::{FailureTrial, failures};
+use crate::pca::PcaError;
 use crate::placement::greedy_svr::GreedySvr;
 use crate::placement::{PlacementError, Pool};
 use crate::regression::folds::{Folds, evenly, hold_out, number_of};
@@ -17,7 +18,7 @@ use crate::regression::{Hyper, PositionModel, scale};
 /// Judges given sites.
 ///
 /// # Errors
-/// [`PlacementError`] for too few touches, or when the watch asks for a stop.
+/// [`PlacementError`] for too few touches, for sites of which none changes from touch to touch, or when the watch asks for a stop.
 pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdict, PlacementError> {
     let svr = question.svr;
     let groups = match question.groups {
@@ -28,6 +29,10 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
     if !question.divides(places) {
         let least = (places..=MOST_PLACES).find(|&n| question.divides(n));
         return Err(svr.too_few(&groups, least.unwrap_or(MOST_PLACES)));
+    }
+    let constant = constant_notes(&data.x, question.sites);
+    if constant.len() == question.sites.len() {
+        return Err(PcaError::Constant.into());
     }
     let noisy = add_noise(&data.x, question.noise, svr.seed);
     let folds = Folds::of_groups(&groups, svr.folds, svr.seed);
@@ -48,7 +53,7 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
         }
     };
     test.sort_unstable();
-    let mut notes = constant_notes(&noisy, question.sites);
+    let mut notes = constant;
     notes.extend(repeat_note(places, data.targets.len(), question.groups));
     if question.groups.is_none() && places == data.targets.len() {
         notes.extend(clump_note(svr, &data.targets));

@@ -8,16 +8,21 @@ use hapdef::board::Illness;
 use hapdef::budget::Quality;
 use hapdef::document::Document;
 use hapdef::io::opening::bundled;
+use hapdef::io::project_file::LoadedProject;
 use hapdef::session::{Attention, Event, Mishap, Opened, Session, Task, Wake};
 
 /// A session on a limb so coarse that a simulation ends soon.
-fn session() -> Session {
+fn limb() -> LoadedProject {
     let mut loaded = bundled().unwrap();
     loaded.inputs = coarse::limb();
     let project = &mut loaded.inputs.project;
     project.budget.quality = Quality::Draft;
     project.touch.count = 60;
-    Session::new(Document::new(loaded, None), Wake::default())
+    loaded
+}
+
+fn session() -> Session {
+    Session::new(Document::new(limb(), None), Wake::default())
 }
 
 fn advance_until(session: &mut Session, what: &str, done: impl Fn(&Session) -> bool) {
@@ -119,6 +124,9 @@ fn another_project_takes_the_place_of_all_that_was_known() {
     let mut s = session();
     s.simulate();
     until_idle(&mut s);
+    s.measure_walls();
+    until_idle(&mut s);
+    assert!(s.advice().is_some());
     let before = s.document.state.clone();
     // What still runs for the old one brings nothing to the new one.
     s.document.state.project.touch.tip_radius_mm *= 1.1;
@@ -127,13 +135,15 @@ fn another_project_takes_the_place_of_all_that_was_known() {
     assert!(said(&s, "was changed while the file was read"));
     let before = s.document.state.clone();
     s.simulate();
-    s.open(Opened::new(bundled().unwrap(), None, before));
+    // Even of the very same part: what was measured of it belongs to the session that is gone.
+    s.open(Opened::new(limb(), None, before));
     assert!(s.results.simulation.is_none() && !s.busy());
     for _ in 0..50 {
         s.advance(&Attention::default());
         std::thread::sleep(Duration::from_millis(2));
     }
     assert!(s.results.simulation.is_none());
+    assert!(s.advice().is_none());
     let opened = |e: &Event| matches!(e, Event::Opened { .. });
     assert!(s.news.take_events().iter().any(opened));
 }

@@ -567,11 +567,29 @@ fn numbers_that_cannot_be_meant_are_refused_as_they_are_read() {
 }
 
 #[test]
+fn sites_that_never_change_are_not_judged() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut file, path) = (NpzFile::default(), folder.path().join("same.npz"));
+    let places: Vec<f64> = (0..60).map(|k| f64::from(k % 20) * 1e-3).collect();
+    file.add("X", &[3, 20], &[7.5_f64; 60]).unwrap();
+    file.add("p_m", &[20, 3], &places).unwrap();
+    file.save(&path).unwrap();
+    let data = path.to_str().unwrap();
+    for estimator in ["svr", "matching", "nearest"] {
+        let how = [
+            "evaluate", "--data", data, "--sites", "0,2", "--noise", "1e-6",
+        ];
+        let arguments = [&how[..], &["--estimator", estimator]].concat();
+        refused(&arguments, "no site's signal varies");
+    }
+}
+
+#[test]
 fn flags_without_effect_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let data = dataset(folder.path(), true);
     let data = data.to_str().unwrap();
-    let idle: [(&str, &[&str]); 17] = [
+    let idle: [(&str, &[&str]); 18] = [
         ("expected-error", &["--c", "100"]),
         ("expected-error", &["--epsilon", "1"]),
         ("expected-error", &["--gamma", "0.1"]),
@@ -588,6 +606,7 @@ fn flags_without_effect_are_refused() {
         ("entropy", &["--selection-tolerance", "0.1"]),
         ("mutual-information", &["--audit", "3"]),
         ("pca-qr", &["--no-criterion", "--target-mm", "5"]),
+        ("pca-qr", &["--folds", "201", "--no-criterion"]),
         ("pca-qr", &["--split", "touch", "--place-mm", "5"]),
     ];
     for (selector, flags) in idle {

@@ -217,8 +217,13 @@ fn strip() -> Inputs {
 }
 
 fn answer(normal: DVec3, tip_radius: f64) -> Answer {
+    pressed_at(0.08, normal, tip_radius)
+}
+
+/// The strip's answer to a press so far along it (m).
+fn pressed_at(along: f64, normal: DVec3, tip_radius: f64) -> Answer {
     let touch = Touch {
-        position: DVec3::new(0.08, 0.01, 0.0),
+        position: DVec3::new(along, 0.01, 0.0),
         normal,
         force: 1.0,
         tip_radius,
@@ -257,4 +262,36 @@ fn a_touch_along_the_surface_does_not_turn_the_part_over() {
     }
     let below = answer(-DVec3::Z, 3e-3);
     assert!(says(&below, "turned over"), "{:?}", below.notes);
+}
+
+#[test]
+fn a_touch_on_what_is_held_is_said() {
+    let on_support = "1 touch presses (the first is touch 0) on what a support holds";
+    let held = pressed_at(0.002, DVec3::Z, 1e-3);
+    assert!(says(&held, on_support), "{:?}", held.notes);
+    let free = answer(DVec3::Z, 3e-3);
+    assert!(!says(&free, "a support holds"), "{:?}", free.notes);
+}
+
+#[test]
+fn a_file_that_is_no_estimator_is_not_sent_to_numpy() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.hapdtouch");
+    std::fs::write(&path, "no estimator").unwrap();
+    let said = hapdef::io::touch_file::read(&path).unwrap_err().to_string();
+    assert!(
+        said.contains("trained estimator") && said.contains("hapdef train"),
+        "{said}"
+    );
+    assert!(!said.contains("numpy"), "{said}");
+}
+
+#[test]
+fn a_limb_of_an_absurd_size_is_refused_by_the_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    for (flag, what) in [("--circumference", "circumference"), ("--height", "height")] {
+        let (code, said) = hapdef(&["limb", "--out", out, flag, "1e300", "--no-sites"]);
+        assert!(code == Some(1) && said.contains(what), "{said}");
+    }
 }
