@@ -13,6 +13,7 @@ mod presses;
 pub mod receiver;
 mod release;
 pub mod tare;
+mod tremble;
 mod update;
 
 pub use health::Health;

@@ -31,6 +31,8 @@ use self::walk::Walk;
 const BLOCK_S: f64 = 0.01;
 /// Seconds that rest has to last before it is believed: the beginning of a slow touch is none.
 const BELIEVED_S: f64 = 0.2;
+/// The same of the first rest after a load: until then nobody knows what that hid, and another touch would go unfelt.
+const SOON_S: f64 = 0.06;
 /// As long before a touch nothing of it is felt yet: what a rest that was too short to be believed says.
 const BEFORE_S: f64 = 0.05;
 /// Standard deviations, and strain, by which rest may be off from what follows it: beyond them a touch goes or comes.
@@ -145,7 +147,7 @@ impl Drift {
     /// A sample at rest (strain since the tare): whether more is known of the rest now.
     pub fn rested(&mut self, strain: &[f64], noise: &[f64], used: &[bool]) -> bool {
         if std::mem::replace(&mut self.under_touch, false) {
-            self.interrupted();
+            self.forget();
         }
         let Some((mean, samples)) = self.gather(strain) else {
             return false;
@@ -155,7 +157,12 @@ impl Drift {
             mean,
             samples,
         });
-        self.believe(BELIEVED_S, noise, used);
+        let ago_s = if self.creep.loaded {
+            SOON_S
+        } else {
+            BELIEVED_S
+        };
+        self.believe(ago_s, noise, used);
         self.weigh(noise, used);
         true
     }
@@ -210,10 +217,7 @@ impl Drift {
         ways: impl FnOnce() -> Vec<Vec<f64>>,
     ) -> bool {
         if !std::mem::replace(&mut self.under_touch, true) {
-            if !self.believed {
-                self.believe(BEFORE_S, noise, used);
-            }
-            self.interrupted();
+            self.interrupted(noise, used);
         }
         let Some((mut mean, samples)) = self.gather(left) else {
             return false;
@@ -235,8 +239,18 @@ impl Drift {
         true
     }
 
+    /// Something comes: of a rest that was too short to be believed, what was read well before says what there is to
+    /// know.
+    pub fn interrupted(&mut self, noise: &[f64], used: &[bool]) {
+        if !self.believed && !self.waiting.is_empty() {
+            self.believe(BEFORE_S, noise, used);
+            self.weigh(noise, used);
+        }
+        self.forget();
+    }
+
     /// Nothing is known of what was gathered.
-    pub fn interrupted(&mut self) {
+    fn forget(&mut self) {
         self.waiting.clear();
         self.misfit.forget();
         (self.samples, self.walk.rested_s, self.believed) = (0.0, None, false);

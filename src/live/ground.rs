@@ -3,6 +3,7 @@
 use super::drift::Drift;
 use super::hum::Hum;
 use super::tare::Rest;
+use super::tremble::Tremble;
 use super::update::Settings;
 use crate::inference::{Errors, Matching, Touches};
 use crate::uncertainty::rounding;
@@ -23,6 +24,7 @@ pub(super) struct Ground {
     drift: Option<Drift>,
     /// Noise of each channel by itself (strain).
     pub noise: Vec<f64>,
+    tremble: Tremble,
     /// Seconds since a touch explained what is felt.
     strange_s: f64,
     /// Seconds since a sample under touches was looked at.
@@ -49,6 +51,7 @@ impl Ground {
             hum: Hum::default(),
             drift: None,
             noise,
+            tremble: Tremble::default(),
             strange_s: 0.0,
             passed_s: 0.0,
         }
@@ -58,6 +61,7 @@ impl Ground {
     pub fn take(&mut self, rest: Rest, hum: Hum, settings: &Settings, rate: f64) {
         self.rest = Some(rest);
         self.hum = hum;
+        self.tremble.forget();
         self.know_noise(settings);
         self.begin_to_drift(settings, rate);
     }
@@ -72,6 +76,7 @@ impl Ground {
             }
         }
         self.hum.forget();
+        self.tremble.forget();
         self.know_noise(settings);
         self.begin_to_drift(settings, rate);
     }
@@ -148,6 +153,9 @@ impl Ground {
             return false;
         };
         let used = &matching.used;
+        if !matches!(under, Under::Nothing { at_rest: true }) && !strange {
+            self.tremble.forget();
+        }
         let more = match under {
             Under::Touches(touches) => {
                 let reading = matching.reading_of_all(touches);
@@ -166,7 +174,7 @@ impl Ground {
                 drift.rested(raw, &self.noise, used)
             }
             Under::Strange | Under::Unsure => {
-                drift.interrupted();
+                drift.interrupted(&self.noise, used);
                 false
             }
         };
@@ -180,7 +188,10 @@ impl Ground {
             return;
         };
         let per_strain = settings.chain.counts_per_strain();
-        let off: Vec<f64> = strain.iter().map(|x| x * per_strain).collect();
+        let counts: Vec<f64> = strain.iter().map(|x| x * per_strain).collect();
+        let Some(off) = self.tremble.off(&counts, &rest.noise, step_s) else {
+            return;
+        };
         rest.tremble(&off, (step_s / NOISE_S).min(0.1), used);
         self.know_noise(settings);
     }

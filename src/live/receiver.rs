@@ -72,6 +72,8 @@ pub enum Doubt {
     Neither,
     /// Frames, but no data among them.
     NoData,
+    /// Bytes that are no frames, where frames came before.
+    Changed,
 }
 
 impl Doubt {
@@ -81,7 +83,7 @@ impl Doubt {
         match self {
             Self::Refused(why) => why.is_lasting(),
             Self::Commas => true,
-            Self::Neither | Self::NoData => false,
+            Self::Neither | Self::NoData | Self::Changed => false,
         }
     }
 
@@ -99,6 +101,9 @@ impl Doubt {
             Self::NoData => {
                 "the board answers, but sends no readings: check what its firmware does after START"
             }
+            Self::Changed => {
+                "bytes still come, but no frames of the protocol any more: the board may have been restarted with another program, or at another baud rate. Connect again to take what it prints now"
+            }
         };
         Some(words.to_owned())
     }
@@ -106,6 +111,8 @@ impl Doubt {
 
 /// Rows of numbers in a row that make a board one of plain lines.
 const ROWS: usize = 4;
+/// Bytes without a frame among them that are no longer half a frame, or one that was damaged.
+const UNREAD: u64 = 256;
 /// Frames in a row, with a right sum and no row of numbers between them, that make it one of frames after all.
 const FRAMES: usize = 3;
 
@@ -120,6 +127,8 @@ pub struct Receiver {
     rows: usize,
     /// Frames with a right sum since the last row of numbers.
     sound: usize,
+    /// Bytes since the last frame with a right sum.
+    unread: u64,
     time: Timeline,
     /// Why what came since the last sample was not used.
     doubt: Option<Doubt>,
@@ -133,6 +142,7 @@ impl Receiver {
     /// Takes in bytes that arrived at `now_us` on the studio's clock.
     pub fn push(&mut self, bytes: &[u8], now_us: u64, mut tell: impl FnMut(Input)) {
         self.traffic.bytes += bytes.len() as u64;
+        self.unread += bytes.len() as u64;
         let mut events = std::mem::take(&mut self.events);
         self.frames.push(bytes, |event| events.push(event));
         for event in events.drain(..) {
@@ -238,7 +248,7 @@ impl Receiver {
     /// A frame had a right sum: after some of them, or at once after one that cannot be chance, the board is one
     /// of frames.
     fn believe_frames(&mut self, surely: bool) {
-        self.sound += 1;
+        (self.sound, self.unread) = (self.sound + 1, 0);
         if surely || self.sound >= FRAMES {
             self.speech = Speech::Frames;
         }
@@ -261,7 +271,9 @@ impl Receiver {
             Speech::Frames => Some(Doubt::NoData),
             _ => None,
         };
-        self.doubt.or(guess.filter(|_| silent))
+        let changed = self.speech == Speech::Frames && !silent && self.unread > UNREAD;
+        let changed = changed.then_some(Doubt::Changed);
+        self.doubt.or(guess.filter(|_| silent)).or(changed)
     }
 
     /// The line was cut; the counters go on.
@@ -399,6 +411,16 @@ mod tests {
         assert_eq!(doubt(b"\x81\xf3\x17 ready\n"), Some(Doubt::Neither));
         assert_eq!(doubt(&greeting(hello())), Some(Doubt::NoData));
         assert_eq!(doubt(&[&greeting(hello())[..], &data(1, 9)].concat()), None);
+        let framed = [&greeting(hello())[..], &data(1, 9)].concat();
+        let mut receiver = Receiver::default();
+        for (bytes, doubt) in [
+            (framed, None),
+            (b"2011,1987,2004\n".repeat(20), Some(Doubt::Changed)),
+            (data(9, 12), None),
+        ] {
+            receiver.push(&bytes, 0, |_| {});
+            assert_eq!(receiver.doubt(), doubt);
+        }
         assert_eq!(doubt(b"1,2\n"), None);
         assert_eq!(doubt(b""), None);
     }

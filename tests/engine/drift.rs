@@ -333,3 +333,66 @@ fn taps_lose_no_gauge() {
         assert!(lost == 0 && found > 60.0 * 190.0 && off / found < 2.0);
     }
 }
+
+/// Hands that drum for minutes, with hardly a rest between two presses and some of them far harder than others: what loads
+/// have hidden of the rest is seen in every gap, and no press becomes a part of it.
+#[test]
+fn no_press_is_lost_among_others() {
+    const PRESSES: usize = 400;
+    /// A gauge must read so much (strain) for a press to be one that can be felt at all.
+    const CLEAR: f64 = 40e-6;
+    let lab = lab();
+    for (bits, noise, creep) in [(12, 2e-6, 0.0), (16, 1e-6, 0.03)] {
+        let world = World {
+            bits,
+            noise,
+            creep,
+            drift: 0.1e-6,
+            ..CALM
+        };
+        // To the held ends, where one gauge feels anything.
+        let places = (lab.sensing)
+            .touches(&lab.inputs, PRESSES, 23, false)
+            .unwrap();
+        let presses: Vec<Press> = (places.into_iter().enumerate())
+            .map(|(k, touch)| Press {
+                touch: Touch {
+                    force: 2.0 * 12.5_f64.powf((k * 7919 % PRESSES) as f64 / PRESSES as f64),
+                    ..touch
+                },
+                from: 3.0 + 0.64 * k as f64,
+                lasts: 0.5,
+                ramp: 0.05,
+            })
+            .collect();
+        let last = presses[PRESSES - 1].from + 0.5;
+        let mut felt = vec![(0, 0); PRESSES];
+        let mut ghosts = 0;
+        run(world, &presses, last + 4.0, |now, update, press| {
+            let Some(press) = press else {
+                ghosts += usize::from(now > last + 0.3 && update.contact.is_some());
+                return;
+            };
+            if now > press.from + 0.15 && now < press.from + 0.45 {
+                let (shown, of) = &mut felt[((press.from - 3.0) / 0.64).round() as usize];
+                *shown += usize::from(update.touches.is_some());
+                *of += 1;
+            }
+        });
+        let clear = |k: &usize| {
+            let read = lab.sensing.sensitivity.read(&presses[*k].touch);
+            read.iter().any(|x| x.abs() > CLEAR)
+        };
+        let clear: Vec<usize> = (0..PRESSES).filter(clear).collect();
+        let lost = |k: &&usize| 2 * felt[**k].0 < felt[**k].1;
+        let lost: Vec<&usize> = clear.iter().filter(lost).collect();
+        println!(
+            "{bits} bits, creep {creep}: lost {} of {} clear ones, ghosts {ghosts}",
+            lost.len(),
+            clear.len()
+        );
+        assert!(clear.len() > PRESSES / 2);
+        assert!(lost.len() * 100 <= clear.len(), "{lost:?}");
+        assert_eq!(ghosts, 0);
+    }
+}

@@ -23,6 +23,21 @@ impl Listener {
                 "gauge {} is on channel {channel}, but this board has only {channels} channel{many} (from 0): nothing can be told of a touch. Correct “Channels of the gauges”, or channels in the project's table [live]",
                 gauge + 1
             )));
+            return;
+        }
+        let read = self.pipeline.settings.channels.iter().max();
+        let read = read.map_or(0, |highest| highest + 1);
+        // Frames name their channels; of lines, nobody knows what a comma is.
+        if self.receiver.speaks_lines() && channels >= 2 * read.max(1) {
+            let gauges = self.pipeline.settings.channels.len();
+            tell(SessionEvent::Message(&format!(
+                "the board prints {channels} numbers in a line, and {} only the first {read}. If its numbers have decimal commas, each is taken for two: print decimal points, or whole numbers",
+                if gauges == 1 {
+                    "the gauge takes".to_owned()
+                } else {
+                    format!("the {gauges} gauges take")
+                }
+            )));
         }
     }
 
