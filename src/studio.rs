@@ -5,6 +5,7 @@
 
 mod action;
 mod ask;
+mod by_force;
 mod commands;
 mod confusions;
 mod dialogs;

@@ -10,7 +10,7 @@ use super::{
     reduce_sites, reference, refine, select_step_by_step, simulate, sites_to_judge,
 };
 use crate::budget::{Budget, Watch, Work};
-use crate::evaluation::{Evaluation, EvaluationRow};
+use crate::evaluation::{Evaluation, EvaluationRow, Matched};
 use crate::feasible::Feasibility;
 use crate::mesh::{TriMesh, scatter};
 use crate::placement::candidates::Candidates;
@@ -142,6 +142,31 @@ impl Design {
             .map(|t| (t.position, t.normal))
             .collect();
         Some(scatter::to_vertices(mesh, &places, errors))
+    }
+
+    /// Share of the touches around each vertex of a mesh that the chosen gauges do not feel, of the lightest force (N) that
+    /// was judged; absent where all are felt, or where nobody asked.
+    #[must_use]
+    pub fn blind_map(&self, mesh: &TriMesh) -> Option<(f64, Vec<f64>)> {
+        let (lead, chosen) = (self.lead.name(), self.chosen().len());
+        let of_set = |m: &&Matched| m.selector == lead && m.sensors == chosen;
+        let found = self.evaluation.found.iter().filter(of_set);
+        let lightest = found.min_by(|a, b| a.force_n.total_cmp(&b.force_n))?;
+        if !lightest.blind.contains(&true) {
+            return None;
+        }
+        let blind: Vec<f64> = lightest
+            .blind
+            .iter()
+            .map(|&b| f64::from(u8::from(b)))
+            .collect();
+        let places: Vec<(DVec3, DVec3)> = (self.reference.touches.iter())
+            .map(|t| (t.position, t.normal))
+            .collect();
+        Some((
+            lightest.force_n,
+            scatter::to_vertices(mesh, &places, &blind),
+        ))
     }
 
     /// What the Gaussian process leaves uncertain around each vertex of a mesh (σ², 1 where nothing is

@@ -63,7 +63,7 @@ pub(super) fn by_hand(mesh: &TriMesh, asked: Vec<Touch>, hand: &Pressing, seed: 
 
 impl Pressed {
     /// The numbers of the presses of each round.
-    pub(super) fn rounds(&self) -> impl Iterator<Item = Range<usize>> {
+    pub fn rounds(&self) -> impl Iterator<Item = Range<usize>> {
         let each = self.presses.len() / ROUNDS as usize;
         (0..ROUNDS as usize).map(move |k| k * each..(k + 1) * each)
     }

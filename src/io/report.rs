@@ -14,7 +14,7 @@ use super::run::{Provenance, range, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Paint, Series, escape};
 use crate::colormap::ColorMap;
 use crate::design::curves::{curve, failure_curve, failure_name, failure_ways, title_of};
-use crate::design::{Design, Inputs};
+use crate::design::{BLIND, Design, Inputs};
 use crate::evaluation::{BASELINE, EstimatorKind};
 use crate::gaussian_process::GpTrial;
 use crate::mesh::flatten::Flat;
@@ -327,6 +327,7 @@ fn error_map(page: &mut String, inputs: &Inputs, design: &Design) {
         return;
     };
     let top = robust_top(&errors);
+    let markers = markers(inputs, design);
     let shares: Vec<f64> = errors.iter().map(|e| e / top).collect();
     let flat = Flat::of(mesh, inputs.stance());
     let map = ColorMap::Viridis;
@@ -335,13 +336,17 @@ fn error_map(page: &mut String, inputs: &Inputs, design: &Design) {
         "<h2>Where the error is</h2><p>Mean error around each place, of the chosen gauges on unseen touches of {} N.</p>{}<figure>{}<figcaption>unrolled, seen from outside. {}</figcaption></figure>",
         compared_n(inputs, design),
         svg::legend(map, "error (mm)", 0.0, top),
-        svg::unrolled(
-            &flat,
-            Paint::Map(map, &shares),
-            &markers(inputs, design),
-            900.0
-        ),
+        svg::unrolled(&flat, Paint::Map(map, &shares), &markers, 900.0),
         flat.stretch.words()
+    );
+    let Some((force, blind)) = design.blind_map(mesh) else {
+        return;
+    };
+    let _ = write!(
+        page,
+        "<h2>Where nothing is felt</h2><p>Share of the touches of {force} N around each place that move none of the gauges by more than {BLIND} times its noise.</p>{}<figure>{}<figcaption>unrolled, seen from outside.</figcaption></figure>",
+        svg::legend(map, "not felt (%)", 0.0, 100.0),
+        svg::unrolled(&flat, Paint::Map(map, &blind), &markers, 900.0),
     );
 }
 

@@ -5,6 +5,7 @@ use egui_plot::{Corner, HLine, Legend, Line, LineStyle, Plot, PlotPoints, PlotUi
 
 use super::action::Change;
 use super::ask::Ask;
+use super::by_force::{force_table, has_forces};
 use super::commands::Command;
 use super::paint::empty;
 use super::theme::kept_colour;
@@ -184,11 +185,17 @@ fn regions(ask: &Ask<'_>) -> Vec<String> {
     regions
 }
 
-/// The tab: error against number of gauges, a plot for each region.
+/// The tab: error against number of gauges, a plot for each region, and what the chosen ones do at each force.
 pub fn error_plots(ask: &Ask<'_>, ui: &mut Ui) {
     let regions = regions(ask);
     let height = ui.available_height() - 26.0;
-    ui.columns(regions.len().max(1), |columns| {
+    let design = (ask.session.results.design.as_ref()).map(|d| &d.value.design);
+    let design = design.filter(|d| has_forces(d));
+    let wanted = regions.len() + usize::from(design.is_some());
+    ui.columns(wanted.max(1), |columns| {
+        if let (Some(design), Some(ui)) = (design, columns.last_mut()) {
+            force_table(design, ui);
+        }
         for (ui, region) in columns.iter_mut().zip(&regions) {
             ui.label(RichText::new(region).strong());
             let id = ("error", region);

@@ -44,10 +44,17 @@ fn figures(r: &MatchedRow) -> String {
 /// How sets were judged, and every figure.
 pub(super) fn errors(page: &mut String, design: &Design) {
     let reference = &design.reference;
-    let presses = reference.pressed.as_ref().map_or(0, |p| p.presses.len());
+    let pressed = (reference.pressed.as_ref()).map_or_else(String::new, |p| {
+        let rounds: Vec<usize> = p.rounds().map(|round| round.len()).collect();
+        let known = rounds.first().copied().unwrap_or_default();
+        match rounds.len() {
+            1 => format!("{known} known presses"),
+            many => format!("{known} known presses (the mean of {many} rounds of them)"),
+        }
+    });
     let _ = write!(
         page,
-        "<p>Each reading is matched with the model ({:.2} mm elements), which needs no training; judged on {} touches that no selection has seen, {}. “As built”: every gauge {}, of which the model knows no more than that. “Calibrated”: the same gauges after {presses} known presses, each made by hand {}. “Blind”: touches that move no gauge by more than {BLIND} times its noise.</p>",
+        "<p>Each reading is matched with the model ({:.2} mm elements), which needs no training; judged on {} touches that no selection has seen, {}. “As built”: every gauge {}, of which the model knows no more than that. “Calibrated”: the same gauges after {pressed}, each made by hand {}. “Blind”: touches that move no gauge by more than {BLIND} times its noise.</p>",
         design.simulated.element_mm,
         reference.touches.len(),
         judged_on(design),
