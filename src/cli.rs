@@ -7,6 +7,7 @@ mod common;
 pub mod data;
 pub mod design;
 pub mod evaluate;
+pub mod export_c;
 pub mod keys;
 pub mod limb;
 pub mod listen;
@@ -18,6 +19,7 @@ pub mod render;
 pub mod select;
 pub mod simulate;
 pub mod spared;
+pub mod study;
 pub mod trade;
 pub mod train;
 
@@ -68,6 +70,8 @@ pub enum Command {
     Train(train::TrainArgs),
     /// What a trained estimator makes of readings, and how far that is off.
     Predict(predict::PredictArgs),
+    /// A trained estimator as C source for the board itself.
+    ExportC(export_c::ExportCArgs),
     /// A picture of the limb with its gauges.
     Render(render::RenderArgs),
     /// A simulated board, at a pseudo-terminal or a socket.
@@ -78,6 +82,8 @@ pub enum Command {
     Calibrate(calibrate::CalibrateArgs),
     /// Writes a bundled limb, or another of its family.
     Limb(limb::LimbArgs),
+    /// Many designs beside each other: a base project varied along axes, on one machine or many.
+    Study(study::StudyArgs),
     /// What a project file may hold: every key with its unit, range, default and meaning.
     Keys(keys::KeysArgs),
 }

@@ -15,11 +15,14 @@ pub mod points;
 pub mod project_file;
 pub mod report;
 pub mod run;
+pub mod scatter;
 pub mod source;
+pub mod study_folder;
 pub mod svg;
 pub mod table;
 pub mod together;
 pub mod touch_file;
+pub mod touch_source;
 pub mod trade_file;
 pub mod vtu;
 

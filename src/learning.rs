@@ -17,6 +17,7 @@ pub mod left_out;
 pub mod lessons;
 pub mod machine;
 pub mod nearest;
+pub mod portable;
 pub mod ridge;
 pub mod score;
 pub mod svr;

@@ -82,6 +82,7 @@ pub mod link;
 pub mod live;
 pub mod memory;
 pub mod mesh;
+pub mod parameter_study;
 pub mod pca;
 pub mod placement;
 pub mod plain;

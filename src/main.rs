@@ -60,11 +60,13 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Some(Command::Evaluate(args)) => cli::evaluate::run(args),
         Some(Command::Train(args)) => cli::train::run(args),
         Some(Command::Predict(args)) => cli::predict::run(args),
+        Some(Command::ExportC(args)) => cli::export_c::run(args),
         Some(Command::Render(args)) => render(args),
         Some(Command::Board(args)) => cli::board::run(args),
         Some(Command::Listen(args)) => cli::listen::run(args),
         Some(Command::Calibrate(args)) => cli::calibrate::run(args),
         Some(Command::Limb(args)) => cli::limb::run(args),
+        Some(Command::Study(args)) => cli::study::run(args),
         Some(Command::Keys(args)) => cli::keys::run(args),
         None => open_studio(cli),
     }

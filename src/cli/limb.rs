@@ -147,12 +147,27 @@ fn set(value: &mut f64, given: Option<f64>) {
 }
 
 /// A limb before it is written.
-struct Made {
+pub(super) struct Made {
     /// Of its files, without their endings.
     name: &'static str,
-    mesh: TriMesh,
-    project: Project,
+    pub mesh: TriMesh,
+    pub project: Project,
     radius_mm: f64,
+}
+
+/// The limb that is asked for.
+///
+/// # Errors
+/// What cannot be made of these options.
+pub(super) fn made(args: &LimbArgs) -> anyhow::Result<Made> {
+    anyhow::ensure!(
+        args.columns != Some(0) && args.hoops.is_none_or(|h| h >= 2),
+        "a limb has at least one column and two hoops"
+    );
+    match args.pattern {
+        Pattern::Columns => tube(args),
+        Pattern::Triangles => barrel(args),
+    }
 }
 
 /// Runs the command.
@@ -160,19 +175,12 @@ struct Made {
 /// # Errors
 /// A message in the user's terms.
 pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
-    anyhow::ensure!(
-        args.columns != Some(0) && args.hoops.is_none_or(|h| h >= 2),
-        "a limb has at least one column and two hoops"
-    );
     let Made {
         name,
         mesh,
         mut project,
         radius_mm,
-    } = match args.pattern {
-        Pattern::Columns => tube(args)?,
-        Pattern::Triangles => barrel(args)?,
-    };
+    } = made(args)?;
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{}: the folder cannot be created", args.out.display()))?;
     let mesh_path = args.out.join(format!("{name}.glb"));

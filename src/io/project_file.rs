@@ -40,8 +40,15 @@ pub struct LoadedProject {
 /// # Errors
 /// [`FileError`] naming the file, the place in it and the remedy.
 pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
-    let text = source::read_text(path)?;
-    let mut project = parse(&text).map_err(|m| FileError::broken(path, m))?;
+    load_text(path, &source::read_text(path)?)
+}
+
+/// As [`load`], of a text that may stand in that file.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_text(path: &Path, text: &str) -> Result<LoadedProject, FileError> {
+    let mut project = parse(text).map_err(|m| FileError::broken(path, m))?;
     let mesh_path = path
         .parent()
         .unwrap_or(Path::new("."))
@@ -57,7 +64,7 @@ pub fn load(path: &Path) -> Result<LoadedProject, FileError> {
         project.part.body,
         project.part.repair(),
     )?;
-    let keys: toml::Table = toml::from_str(&text).unwrap_or_default();
+    let keys: toml::Table = toml::from_str(text).unwrap_or_default();
     let taken = found.answer(&mut project, |key| is_given(&keys, key));
     project
         .check()

@@ -12,7 +12,7 @@ use super::distance::nearest;
 use crate::statistics::{mean, quantile};
 
 /// Neighbours that say how far an answer is off.
-const NEAR: usize = 30;
+pub const NEAR: usize = 30;
 /// The share of answers that lie within the radius.
 pub const SHARE: f64 = 0.9;
 /// Touches nearer than this share of all know their surroundings.

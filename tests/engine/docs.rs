@@ -204,9 +204,14 @@ fn names(row: &str, arg: &Arg) -> bool {
 }
 
 fn options(command: &Command) -> impl Iterator<Item = &Arg> {
-    command
+    // Those of its steps stand in its section too.
+    let steps = command
+        .get_subcommands()
+        .filter(|_| command.get_name() == "study");
+    let all = command
         .get_arguments()
-        .filter(|a| a.get_long().is_some_and(|long| long != "help"))
+        .chain(steps.flat_map(Command::get_arguments));
+    all.filter(|a| a.get_long().is_some_and(|long| long != "help"))
 }
 
 /// What an option is without being given, as it is written.

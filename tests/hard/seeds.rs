@@ -430,7 +430,7 @@ fn trade() -> Vec<u8> {
 }
 
 /// What three channels learned of touches along a line, and how hard they were.
-fn trained(family: Family) -> Vec<u8> {
+pub fn trained(family: Family) -> Vec<u8> {
     const TOUCHES: usize = 24;
     let at = |t: usize| (t * 7 % TOUCHES) as f64;
     let value = |k: usize| (0.2 * at(k % TOUCHES) + (k / TOUCHES) as f64).sin();

@@ -33,7 +33,7 @@ const ORDER: [&[&str]; 14] = [
     &["live", "board"],
     &["project"],
     &["design", "study"],
-    &["given", "trade"],
+    &["given", "trade", "parameter_study"],
     &[
         "io", "job", "link", "document", "render", "session", "cli", "studio",
     ],
@@ -47,7 +47,7 @@ pub const OUTER: [(&str, &[&str]); 8] = [
     ("render", &[]),
     ("document", &["io"]),
     ("session", &["io", "job", "link", "document"]),
-    ("cli", &["io", "link", "session"]),
+    ("cli", &["io", "link", "document", "session"]),
     (
         "studio",
         &["io", "job", "link", "document", "render", "session"],

@@ -1,0 +1,117 @@
+//! What a study says of each design: numbers with names.
+
+use crate::design::{Design, DesignError, Inputs};
+use crate::elasticity::Touch;
+use crate::elasticity::estimate::under_load;
+use crate::placement::SensorSet;
+use crate::project::PartModel;
+use crate::regression::folds::evenly;
+
+/// A number with its name; absent where there is none.
+pub type Figure = (String, Option<f64>);
+
+/// Touches that say how stiff a part is.
+const PRESSED: usize = 64;
+
+/// The figures of a design of a part of some density (g/cm³). Errors are means over unseen touches, in mm.
+///
+/// # Errors
+/// [`DesignError`] where the model cannot be built again.
+pub fn figures(
+    inputs: &Inputs,
+    design: &Design,
+    density_g_cm3: f64,
+) -> Result<Vec<Figure>, DesignError> {
+    let set = design.chosen_set();
+    let mut all = vec![
+        ("gauges".to_owned(), Some(design.chosen().len() as f64)),
+        ("expected_mm".into(), set.and_then(SensorSet::promised_mm)),
+        (
+            "bound_mm".into(),
+            set.and_then(|s| s.certificate).map(|c| c.bound_mm),
+        ),
+    ];
+    all.extend(errors(design));
+    all.extend(lost(design));
+    all.extend(mechanics(inputs, design)?);
+    let cm3 = volume_mm3(inputs) / 1e3;
+    all.push(("mass_g".into(), Some(density_g_cm3 * cm3)));
+    Ok(all)
+}
+
+/// Errors over all touches: at every force by matching, else by the regression at its own.
+fn errors(design: &Design) -> Vec<Figure> {
+    let (lead, chosen) = (design.lead.name(), design.chosen().len());
+    let mut all = Vec::new();
+    for row in design.evaluation.by_force(lead, chosen) {
+        let at = |what: &str| format!("{what}_{}n_mm", row.force_n);
+        all.extend([
+            (at("error"), Some(row.error_mm)),
+            (at("p95"), Some(row.p95_mm)),
+            (at("as_built"), Some(row.as_built_mm)),
+            (at("calibrated"), row.calibrated_mm),
+            (format!("blind_{}n", row.force_n), Some(row.blind)),
+        ]);
+    }
+    if all.is_empty()
+        && let Some(row) = design.chosen_row()
+    {
+        all.extend([
+            ("error_mm".into(), Some(row.error_mm)),
+            ("p95_mm".into(), Some(row.p95_mm)),
+            ("as_built_mm".into(), Some(row.workshop_mm)),
+        ]);
+    }
+    all
+}
+
+/// What is left when gauges are lost and nothing is done about it.
+fn lost(design: &Design) -> Vec<Figure> {
+    let mut sets = design.evaluation.failures.iter();
+    let of_lead = sets.find(|f| f.selector == design.lead.name());
+    let rows = of_lead.iter().flat_map(|f| &f.rows);
+    rows.filter(|r| r.failed > 0 && !r.retrained)
+        .map(|r| (format!("lost_{}_mm", r.failed), Some(r.error_mm)))
+        .collect()
+}
+
+/// How far the part gives way under the force of its touches, in the mean and at most, and the largest strain at any
+/// site.
+fn mechanics(inputs: &Inputs, design: &Design) -> Result<Vec<Figure>, DesignError> {
+    let dataset = &design.simulated.dataset;
+    let model = design.simulated.model()?;
+    let sample = evenly(dataset.touches.len(), PRESSED);
+    let touches: Vec<Touch> = sample.iter().map(|&t| dataset.touches[t]).collect();
+    let loads: Vec<_> = touches.iter().map(|t| model.load(t)).collect();
+    let solutions = model.system().solve_loads(&loads);
+    let gives: Vec<f64> = (touches.iter().zip(&loads).zip(&solutions))
+        .map(|((touch, load), u)| under_load(load, touch, u))
+        .collect();
+    let mean = gives.iter().sum::<f64>() / gives.len().max(1) as f64;
+    let most = gives.iter().copied().fold(0.0, f64::max);
+    let force = inputs.project.touch.force_n;
+    let strain = dataset
+        .sites
+        .iter()
+        .map(|s| s.rms_strain)
+        .fold(0.0, f64::max);
+    Ok(vec![
+        ("gives_way_mm".into(), Some(1e3 * mean)),
+        ("gives_way_most_mm".into(), Some(1e3 * most)),
+        (
+            "stiffness_n_mm".into(),
+            (mean > 0.0).then_some(force / (1e3 * mean)),
+        ),
+        ("largest_rms_microstrain".into(), Some(1e6 * strain)),
+    ])
+}
+
+/// Of a solid what its surface encloses, of a shell its middle surface times its wall.
+fn volume_mm3(inputs: &Inputs) -> f64 {
+    let part = &inputs.part;
+    let m3 = match inputs.project.part.model {
+        PartModel::Solid => part.volume_enclosed().abs(),
+        PartModel::Shell => part.area() * inputs.project.part.thickness_mm * 1e-3,
+    };
+    1e9 * m3
+}
