@@ -49,7 +49,7 @@ pub fn force_table(design: &Design, ui: &mut Ui) {
         Grid::new("by force")
             .num_columns(COLUMNS.len())
             .striped(true)
-            .spacing([14.0, 3.0])
+            .spacing([10.0, 3.0])
             .show(ui, |ui| {
                 for (title, says) in COLUMNS {
                     let says = match says {

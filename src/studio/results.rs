@@ -191,12 +191,28 @@ pub fn error_plots(ask: &Ask<'_>, ui: &mut Ui) {
     let height = ui.available_height() - 26.0;
     let design = (ask.session.results.design.as_ref()).map(|d| &d.value.design);
     let design = design.filter(|d| has_forces(d));
-    let wanted = regions.len() + usize::from(design.is_some());
-    ui.columns(wanted.max(1), |columns| {
-        if let (Some(design), Some(ui)) = (design, columns.last_mut()) {
-            force_table(design, ui);
+    let beside = if design.is_some() {
+        FORCE_TABLE.min(0.5 * ui.available_width())
+    } else {
+        0.0
+    };
+    let plots = egui::vec2(ui.available_width() - beside, ui.available_height());
+    ui.horizontal_top(|ui| {
+        ui.allocate_ui_with_layout(plots, egui::Layout::top_down(egui::Align::Min), |ui| {
+            region_plots(ask, ui, &regions, height);
+        });
+        if let Some(design) = design {
+            ui.vertical(|ui| force_table(design, ui));
         }
-        for (ui, region) in columns.iter_mut().zip(&regions) {
+    });
+}
+
+/// Width of what the chosen gauges do at each force, with all its columns.
+const FORCE_TABLE: f32 = 370.0;
+
+fn region_plots(ask: &Ask<'_>, ui: &mut Ui, regions: &[String], height: f32) {
+    ui.columns(regions.len().max(1), |columns| {
+        for (ui, region) in columns.iter_mut().zip(regions) {
             ui.label(RichText::new(region).strong());
             let id = ("error", region);
             let shown = plot(id, height, Corner::RightTop, "gauges", "mean error (mm)")
