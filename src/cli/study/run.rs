@@ -112,17 +112,24 @@ struct Progress {
     shared: usize,
 }
 
+/// How many of some units a worker takes at once: neighbours along the fastest axis often share a simulation, and yet
+/// all workers are to end at about the same time.
+fn together(units: usize, jobs: usize, fastest: usize) -> usize {
+    /// Turns of each worker.
+    const TURNS: usize = 8;
+    /// More of them save next to nothing more.
+    const SHARING: usize = 16;
+    let fair = units.div_ceil(jobs * TURNS);
+    let sharing = fastest.min(units.div_ceil(jobs)).min(SHARING);
+    fair.max(sharing).max(1)
+}
+
 impl<'a> Crew<'a> {
     fn new(args: &'a RunArgs, folder: &'a StudyFolder, wanted: Vec<usize>) -> Self {
-        /// Turns of each worker: enough that all end at about the same time.
-        const TURNS: usize = 8;
-        let fastest = folder.study.fastest().max(1);
-        let fair = wanted.len().div_ceil(args.jobs * TURNS).max(1);
         Self {
             args,
             folder,
-            // Whole rows of the fastest axis, where that leaves enough turns.
-            together: fastest * fair.div_ceil(fastest).min(fair.max(1)),
+            together: together(wanted.len(), args.jobs, folder.study.fastest()),
             wanted,
             taken: AtomicUsize::new(0),
             stop: AtomicBool::new(false),
@@ -220,6 +227,16 @@ impl<'a> Crew<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn neighbours_stay_together_and_nobody_waits_for_one() {
+        assert_eq!(together(6, 2, 3), 3);
+        assert_eq!(together(1000, 4, 1000), 32);
+        assert_eq!(together(100, 4, 1000), 16);
+        assert_eq!(together(60, 2, 1), 4);
+        assert_eq!(together(3, 8, 3), 1);
+        assert_eq!(together(0, 1, 0), 1);
+    }
 
     #[test]
     fn units_are_named_from_one_to_another() {

@@ -19,7 +19,8 @@ pub struct SubmitArgs {
     /// What carries the units to machines.
     #[arg(long, value_enum)]
     pub engine: EngineArg,
-    /// Units that one task runs one after another: those of the fastest axis when left out, which often share a simulation.
+    /// Units that one task runs one after another: those of the fastest axis when left out, which often share a simulation,
+    /// but 32 at most.
     #[arg(long, value_parser = whole(1, 100_000))]
     pub together: Option<usize>,
     /// Threads of a task.
@@ -56,13 +57,18 @@ impl From<EngineArg> for Engine {
     }
 }
 
+/// Units of a task that nobody has said the number of.
+const MOST_TOGETHER: usize = 32;
+
 /// Runs the command.
 ///
 /// # Errors
 /// A message in the user's terms.
 pub(super) fn run(args: &SubmitArgs) -> anyhow::Result<()> {
     let folder = StudyFolder::open(&args.folder)?;
-    let together = args.together.unwrap_or(folder.study.fastest().max(1));
+    let together = args
+        .together
+        .unwrap_or(folder.study.fastest().clamp(1, MOST_TOGETHER));
     let job = Job {
         units: folder.plan.units,
         together,
