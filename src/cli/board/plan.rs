@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn presses_far_from_the_part_are_refused_with_their_line() {
-        let part = crate::cli::bundled().unwrap().inputs.part;
+        let part = crate::io::opening::bundled().unwrap().inputs.part;
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("touches.csv");
         let head = "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n1,1,22.5,22.5,60,8\n";

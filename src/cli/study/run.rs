@@ -13,6 +13,7 @@ use super::unit::Bench;
 use crate::cli::out;
 use crate::cli::ranges::whole;
 use crate::io::study_folder::{Cost, StudyFolder};
+use crate::parameter_study::Points;
 use crate::plain;
 
 #[derive(Args, Debug, Clone)]
@@ -171,6 +172,8 @@ impl<'a> Crew<'a> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.context("the worker threads could not be started; try --threads 1")?;
         let mut bench = Bench::new(&self.folder.study, &self.folder.home())?;
+        // Once: a Latin hypercube draws all of them.
+        let points = Points::of(&self.folder.study).map_err(anyhow::Error::msg)?;
         let begun = Instant::now();
         let beside = self.args.jobs.min(self.wanted.len()).max(1);
         loop {
@@ -190,7 +193,8 @@ impl<'a> Crew<'a> {
                         ControlFlow::Continue(())
                     }
                 };
-                let found = pool.install(|| bench.compute(self.folder, unit, beside, &watch));
+                let found =
+                    pool.install(|| bench.compute((self.folder, &points), unit, beside, &watch));
                 let (outcome, cost) = match found {
                     // Another worker has failed, and has said why.
                     Err(_) if self.stop.load(Ordering::Relaxed) => return Ok(()),

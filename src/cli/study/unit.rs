@@ -170,17 +170,16 @@ impl Bench {
     /// Computes a unit, one of so many beside each other, among whom the processor's time is divided.
     ///
     /// # Errors
-    /// What is not the unit's own fault: a missing file, a full disk, too little memory, a stop.
+    /// What is not the unit's own fault: a base that cannot be read any more, too little memory, a stop.
     pub fn compute(
         &mut self,
-        folder: &StudyFolder,
+        (folder, points): (&StudyFolder, &Points),
         unit: usize,
         beside: usize,
         watch: Watch,
     ) -> anyhow::Result<(Outcome, Cost)> {
         let (cpu, start) = (cpu_seconds(), Instant::now());
         let study = &folder.study;
-        let points = Points::of(study).map_err(|why| anyhow!(why))?;
         let values = points.values(unit);
         let named = study.axes.iter().zip(&values);
         let plan = &folder.plan;
@@ -198,6 +197,7 @@ impl Bench {
         };
         let mut shared = false;
         match self.project(study, &values) {
+            Err(error) if self.lacks_base() => return Err(error),
             Err(error) => outcome.error = Some(self.without_home(&format!("{error:#}"))),
             Ok(loaded) => match self.designed(loaded, study, watch, &mut shared) {
                 Ok((figures, cautions)) => {
@@ -214,6 +214,11 @@ impl Bench {
             shared,
         };
         Ok((outcome, cost))
+    }
+
+    /// Whether the base, which was there when the work began, cannot be read any more.
+    fn lacks_base(&self) -> bool {
+        matches!(&self.base, Base::File(path) if std::fs::read(path).is_err())
     }
 
     /// Words in which files have the names that the study gives them, wherever it lies.
