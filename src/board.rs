@@ -41,6 +41,8 @@ pub struct Options {
     pub offset: f64,
     /// What else there is in the readings beside touches.
     pub disturbances: Disturbances,
+    /// Newtons a count of a force sensor, on the channel behind the gauges, where there is one.
+    pub tip_n: Option<f64>,
     /// What the board calls itself in its HELLO.
     pub name: String,
 }
@@ -184,6 +186,11 @@ impl SimulatedBoard {
         self.ears.reset();
     }
 
+    /// What presses from now on, where a machine does.
+    pub fn press(&mut self, push: Option<Push>) {
+        self.script.hold(push);
+    }
+
     /// What goes wrong, to be changed while the board runs.
     pub fn faults_mut(&mut self) -> &mut Faults {
         &mut self.faults
@@ -266,9 +273,15 @@ impl SimulatedBoard {
         let seconds = time_us as f64 * 1e-6;
         let pushes = self.script.at(seconds);
         let strains = self.felt(&pushes, seconds);
-        let counts = (0..self.options.channels)
+        let mut counts: Vec<u32> = (0..self.options.channels)
             .map(|c| self.count(c, strains[c], seconds))
             .collect();
+        let pressing: f64 = pushes.iter().map(|(_, push)| push.touch.force).sum();
+        if let Some(tip_n) = self.options.tip_n
+            && let Some(count) = counts.get_mut(self.sensitivity.gauges())
+        {
+            *count = self.tip_count(pressing / tip_n);
+        }
         (counts, pushes.into_iter().map(|(_, push)| push).collect())
     }
 
@@ -311,6 +324,16 @@ impl SimulatedBoard {
             _ => count.round().clamp(0.0, f64::from(highest)) as u32,
         };
         self.held[c]
+    }
+
+    /// What the converter makes of a force sensor that is so many counts above its rest.
+    fn tip_count(&mut self, above: f64) -> u32 {
+        /// At rest, and its noise.
+        const REST: f64 = 400.0;
+        const NOISE: f64 = 0.6;
+        let highest = f64::from(self.options.chain.highest_count());
+        let count = REST + above + NOISE * normal(&mut self.rng);
+        count.round().clamp(0.0, highest) as u32
     }
 
     /// Strains of the gauges; the readings a newton are worked out once a press.

@@ -3,8 +3,10 @@
 pub mod advise;
 pub mod board;
 pub mod calibrate;
+pub mod collect;
 mod common;
 pub mod data;
+pub mod dataset;
 pub mod design;
 pub mod evaluate;
 pub mod export_c;
@@ -80,6 +82,10 @@ pub enum Command {
     Listen(listen::ListenArgs),
     /// How the gauges are really glued, from presses at known places.
     Calibrate(calibrate::CalibrateArgs),
+    /// A machine presses the limb at many places, and what its gauges read is written down.
+    Collect(collect::CollectArgs),
+    /// What a machine pressed, as a dataset to train on.
+    Dataset(dataset::DatasetArgs),
     /// Writes a bundled limb, or another of its family.
     Limb(limb::LimbArgs),
     /// Many designs beside each other: a base project varied along axes, on one machine or many.

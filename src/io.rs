@@ -2,10 +2,12 @@
 
 pub mod artifacts;
 pub mod atomic;
+pub mod bench_folder;
 pub mod dataset_file;
 pub mod examples;
 pub mod fingerprint;
 pub mod glb;
+pub mod machine_file;
 pub mod mesh_file;
 pub mod npy;
 pub mod npz;

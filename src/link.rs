@@ -1,8 +1,10 @@
 //! Ports: serial lines, sockets and recordings behind one small trait, and the thread that listens.
 
+mod benching;
 mod host;
 mod port;
 mod ports;
+mod pressed;
 mod recorded;
 mod recording;
 mod replay;
@@ -15,9 +17,11 @@ mod truths;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+pub use benching::{BenchOrder, press_at_ports, press_simulated};
 pub use host::{Doorway, Entrance, Hosted, host};
 pub use port::{Got, Pace, Port};
 pub use ports::{PortInfo, ports};
+pub use pressed::{BenchPress, bench_presses};
 pub use recorded::{check_length, record};
 pub use recording::{Recorder, old_note};
 pub use session::{Command, Connection, Listener, SessionEvent, State, Timing};

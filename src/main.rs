@@ -64,6 +64,8 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Some(Command::Render(args)) => render(args),
         Some(Command::Board(args)) => cli::board::run(args),
         Some(Command::Listen(args)) => cli::listen::run(args),
+        Some(Command::Collect(args)) => cli::collect::run(args),
+        Some(Command::Dataset(args)) => cli::dataset::run(args),
         Some(Command::Calibrate(args)) => cli::calibrate::run(args),
         Some(Command::Limb(args)) => cli::limb::run(args),
         Some(Command::Study(args)) => cli::study::run(args),

@@ -55,6 +55,8 @@ pub enum Script {
     Given(Vec<Press>),
     /// Places in the order given, again and again, with drawn forces and pauses.
     Random(Box<Random>),
+    /// What a machine presses with just now, and how many pushes there were before it.
+    Held(Option<Push>, usize),
 }
 
 /// Presses without end.
@@ -129,6 +131,15 @@ impl Script {
         }
     }
 
+    /// A machine presses so from now on.
+    pub fn hold(&mut self, push: Option<Push>) {
+        if let Self::Held(held, number) = self
+            && *held != push
+        {
+            (*held, *number) = (push, *number + 1);
+        }
+    }
+
     /// The presses that are on at a time, by their numbers, with their forces at that moment. Times must not fall.
     pub fn at(&mut self, seconds: f64) -> Vec<(usize, Push)> {
         match self {
@@ -146,6 +157,7 @@ impl Script {
                 let push = random.press.at(seconds);
                 push.map(|push| (random.number, push)).into_iter().collect()
             }
+            Self::Held(held, number) => held.map(|push| (*number, push)).into_iter().collect(),
         }
     }
 }

@@ -12,7 +12,7 @@ use std::time::Duration;
 use anyhow::Context;
 use serde_json::json;
 
-pub use self::args::BoardArgs;
+pub use self::args::{BoardArgs, workshop};
 use self::plan::{Plan, on_surface};
 use self::truth::TruthFile;
 use super::spared::Spared;
@@ -212,6 +212,6 @@ fn build(
 fn strongest(script: &Script) -> Option<f64> {
     match script {
         Script::Given(presses) => presses.iter().map(|p| p.touch.force).max_by(f64::total_cmp),
-        Script::Random(_) => None,
+        Script::Random(_) | Script::Held(..) => None,
     }
 }

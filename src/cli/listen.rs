@@ -18,7 +18,9 @@ use super::ranges::between;
 use super::spared::Spared;
 use super::{out, progress::Bar};
 use crate::design::{self, Sensing};
+use crate::io::bench_folder::limb_key;
 use crate::io::project_file::LoadedProject;
+use crate::io::touch_file::{self, TouchFile};
 use crate::link::{Address, BAUD, Command, Listener, Pace, Recorder, SessionEvent, State, Table};
 use crate::live::{Estimator, Pipeline, Sample, Update};
 use crate::plain;
@@ -46,6 +48,10 @@ pub struct ListenArgs {
     /// touch, and of all of them, matching speaks anyway.
     #[arg(long, default_value = "matching")]
     pub estimator: EstimatorArg,
+    /// An estimator that was learned from presses (.hapdtouch), as `hapdef train` writes it, finds the touch instead. One of
+    /// another limb or another board is refused.
+    #[arg(long, conflicts_with = "estimator")]
+    pub model: Option<PathBuf>,
     /// At most so many lines a second; all samples when left out.
     #[arg(long, value_parser = between(0.001, 1e6))]
     pub every: Option<f64>,
@@ -99,8 +105,9 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     // All that may be wrong is found before the model is computed.
     spared(&loaded, &address).check("--csv", args.csv.as_deref())?;
     address.check().map_err(anyhow::Error::msg)?;
+    let learned = learned(args, &loaded)?;
     let (commands, inbox) = channel();
-    let mut output = Output::new(args, commands.clone())?;
+    let mut output = Output::new(args, commands.clone(), learned)?;
     let recorder = args.record.as_deref().map(Recorder::create).transpose();
     let recorder = recorder.map_err(anyhow::Error::msg)?;
     let listener = Listener::new(address, pipeline(args, &loaded)?)
@@ -139,6 +146,19 @@ fn load(args: &ListenArgs) -> anyhow::Result<LoadedProject> {
     project.check()?;
     project.live.check_gauges(&project.selection.sites)?;
     Ok(loaded)
+}
+
+/// The estimator that was learned on this limb.
+fn learned(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Option<TouchFile>> {
+    let Some(path) = &args.model else {
+        return Ok(None);
+    };
+    let file = touch_file::read(path)?;
+    let gauges = loaded.inputs.project.selection.sites.len();
+    file.check_channels(gauges)
+        .and_then(|()| file.check_limb(&limb_key(&loaded.inputs)))
+        .map_err(|why| anyhow::anyhow!("{}: {why}", path.display()))?;
+    Ok(Some(file))
 }
 
 /// What is read, a recording too.
@@ -204,6 +224,7 @@ struct Output {
     /// For whoever is served.
     commands: Sender<Command>,
     estimator: Estimator,
+    learned: Option<TouchFile>,
     period_us: u64,
     last_us: Option<u64>,
     /// As it was told last.
@@ -211,8 +232,13 @@ struct Output {
 }
 
 impl Output {
-    fn new(args: &ListenArgs, commands: Sender<Command>) -> anyhow::Result<Self> {
+    fn new(
+        args: &ListenArgs,
+        commands: Sender<Command>,
+        learned: Option<TouchFile>,
+    ) -> anyhow::Result<Self> {
         Ok(Self {
+            learned,
             commands,
             served: args.serve.as_deref().map(serve).transpose()?,
             csv: args.csv.as_deref().map(Table::create).transpose()?,
@@ -227,7 +253,7 @@ impl Output {
     fn on_event(&mut self, event: &SessionEvent) -> anyhow::Result<()> {
         match event {
             SessionEvent::State(state) => say(in_words(state)),
-            SessionEvent::Hello(hello) => self.greet(hello),
+            SessionEvent::Hello(hello) => self.greet(hello)?,
             SessionEvent::Message(text) | SessionEvent::Trouble(text) => say(text),
             // Nobody wants to find out afterwards.
             SessionEvent::Unrecorded(why) => anyhow::bail!("{why}"),
@@ -267,9 +293,13 @@ impl Output {
     }
 
     /// Says which board it is, once: a board repeats itself.
-    fn greet(&mut self, hello: &Hello) {
+    fn greet(&mut self, hello: &Hello) -> anyhow::Result<()> {
         if self.board.as_ref() == Some(hello) {
-            return;
+            return Ok(());
+        }
+        if let Some(learned) = &self.learned {
+            let board = format!("{:08x}", hello.board);
+            learned.check_board(&board).map_err(anyhow::Error::msg)?;
         }
         say(&format!(
             "{} ({:08x}), {} channels, {} bits, {} Hz",
@@ -280,6 +310,7 @@ impl Output {
             hello.rate_hz
         ));
         self.board = Some(hello.clone());
+        Ok(())
     }
 
     fn row(&mut self, sample: &Sample, update: &Update) -> anyhow::Result<()> {
@@ -304,7 +335,10 @@ impl Output {
             return Ok(());
         }
         self.last_us = Some(update.time_us);
-        let line = line::of(update, self.estimator);
+        let line = match &self.learned {
+            Some(learned) => line::learned(update, &learned.estimator),
+            None => line::of(update, self.estimator),
+        };
         if let Some((listener, clients)) = &mut self.served {
             while let Ok((client, _)) = listener.accept() {
                 clients.extend(Client::new(client).ok());

@@ -12,7 +12,7 @@ use super::progress::Bar;
 use super::ranges::whole;
 use super::spared::Spared;
 use crate::io::fingerprint::Fingerprint;
-use crate::io::{cpu_seconds, touch_file};
+use crate::io::{bench_folder, cpu_seconds, touch_file};
 use crate::learning::score::ForceRow;
 use crate::learning::{Asked, Family, Lessons, Scores, Trained, train};
 use crate::plain;
@@ -109,7 +109,12 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
         out::say(&format!("note: {note}"));
     }
     notes.extend(trained.notes.iter().cloned());
-    touch_file::write(&args.out, args.origin(&data, &trained), &trained.estimator)?;
+    let origin = touch_file::Origin {
+        limb: bench_folder::key_in(&args.data.data, bench_folder::LIMB)?,
+        board: bench_folder::key_in(&args.data.data, bench_folder::BOARD)?,
+        ..args.origin(&data, &trained)
+    };
+    touch_file::write(&args.out, origin, &trained.estimator)?;
     if args.json {
         return out::line(&json_of(&trained, &notes, cpu).to_string());
     }

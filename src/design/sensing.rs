@@ -160,6 +160,14 @@ impl Sensing {
         Ok((Sensitivity::new(&*model, &gauges, watch)?, gains))
     }
 
+    /// The model that the gauges were read on.
+    ///
+    /// # Errors
+    /// [`DesignError`] as for a simulation.
+    pub fn model(&self, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
+        self.meshed.model(watch)
+    }
+
     /// Evenly spread touches with forces drawn evenly from half a newton to the hardest of the paper's.
     ///
     /// # Errors

@@ -9,6 +9,7 @@ use super::{DesignError, Inputs, PRESS_SEED, Sensing, Workshop};
 use crate::board::{Disturbances, Faults, Options, Script, SimulatedBoard, fitting_gain};
 use crate::budget::Watch;
 use crate::draw::normal;
+use crate::elasticity::estimate::under_load;
 use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Push, Touch};
 use crate::inference::calibration::noise_of_mean;
@@ -26,6 +27,7 @@ pub fn options(inputs: &Inputs, channels: usize) -> Options {
         drift: 0.1e-6,
         offset: 100e-6,
         disturbances: Disturbances::default(),
+        tip_n: None,
         name: "Simulated board".into(),
     }
 }
@@ -66,6 +68,28 @@ pub fn simulated(
     Ok(SimulatedBoard::new(
         reference, gains, script, options, faults,
     ))
+}
+
+/// How far the part gives way under a tip at each of these touches (m/N), on the model that the simulated board reads.
+///
+/// # Errors
+/// [`DesignError`] as for a simulation.
+pub fn gives_way(
+    sensing: &Sensing,
+    touches: &[Touch],
+    watch: Watch,
+) -> Result<Vec<f64>, DesignError> {
+    /// Solutions that are held at a time.
+    const BLOCK: usize = 64;
+    let model = sensing.model(watch)?;
+    let mut gives = Vec::with_capacity(touches.len());
+    for block in touches.chunks(BLOCK) {
+        let loads: Vec<_> = block.iter().map(|t| model.load(t)).collect();
+        let solutions = model.system().solve_loads(&loads);
+        let own = block.iter().zip(&loads).zip(&solutions);
+        gives.extend(own.map(|((touch, load), u)| under_load(load, touch, u) / touch.force));
+    }
+    Ok(gives)
 }
 
 /// The known presses that are proposed, made by hand on such a board, as they are read: what the judge foresees of a

@@ -71,6 +71,33 @@ pub fn read(path: &Path) -> Result<TouchFile, FileError> {
 }
 
 impl TouchFile {
+    /// That it was learned on this limb, as far as it is known.
+    ///
+    /// # Errors
+    /// A message that says so.
+    pub fn check_limb(&self, limb: &str) -> Result<(), String> {
+        match &self.header.origin.limb {
+            Some(own) if own != limb => Err(
+                "the estimator was learned on another limb, or with other gauges on it: train one on presses of this limb".into(),
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    /// That it was learned with this board, as far as it is known.
+    ///
+    /// # Errors
+    /// A message that says both.
+    pub fn check_board(&self, board: &str) -> Result<(), String> {
+        match &self.header.origin.board {
+            Some(own) if own != board => Err(format!(
+                "the estimator was learned with the board {}, and this is {board}: its amplifiers are others. Train one with this board",
+                crate::plain::quote(own)
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// That readings of so many channels are what it learned from.
     ///
     /// # Errors

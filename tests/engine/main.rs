@@ -49,6 +49,7 @@ mod solid;
 mod solid_extremes;
 mod solids;
 mod study;
+mod test_bed;
 mod tried;
 mod volumes;
 mod words;

@@ -30,7 +30,7 @@ const ORDER: [&[&str]; 14] = [
     &["gaussian_process"],
     &["placement", "evaluation"],
     &["inference"],
-    &["live", "board"],
+    &["live", "board", "bench"],
     &["project"],
     &["design", "study"],
     &["given", "trade", "parameter_study"],

@@ -82,7 +82,10 @@ pub struct BoardArgs {
 }
 
 /// What the gauges are off by, as it is written.
-fn workshop(text: &str) -> Result<Workshop, String> {
+///
+/// # Errors
+/// The words that there are.
+pub fn workshop(text: &str) -> Result<Workshop, String> {
     match text {
         "exact" => Ok(Workshop::Exact),
         "gains" => Ok(Workshop::Gains),

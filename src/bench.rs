@@ -1,0 +1,23 @@
+//! The test-bed: a machine that presses a limb at known places, without any port.
+//!
+//! A [`Machine`] knows how its axes move a tip about a limb that it turns, a [`Mount`] how the limb stands in it. The
+//! [`Collector`] goes through a plan of presses: it is given what machine and board say and answers what the machine is to be
+//! told, so that a real printer, and a simulated one in its own time, are driven by the same code.
+
+mod collector;
+mod contact;
+mod machine;
+mod marlin;
+mod mount;
+mod plan;
+mod press;
+mod printer;
+
+pub use collector::{Collector, Ended, News};
+pub use contact::Contact;
+pub use machine::{Axis, Machine, Pose, TipSensor};
+pub use marlin::{Heard, Marlin, position_in};
+pub use mount::{Mount, Touched};
+pub use plan::{Planned, Reach, plan};
+pub use press::{Limits, Reading};
+pub use printer::{PrinterFaults, SimulatedPrinter};

@@ -1,0 +1,393 @@
+//! Press after press, as a plan says: what the machine is told next, from what it and the board say.
+
+mod motion;
+mod phases;
+mod watch;
+
+use std::collections::VecDeque;
+
+use self::motion::{Motion, Moved};
+use super::machine::Machine;
+use super::marlin::{Heard, Marlin};
+use super::plan::Planned;
+use super::press::{Limits, Reading};
+
+/// What whoever drives it is told.
+#[derive(Clone, Debug, PartialEq)]
+pub enum News {
+    /// To be written down between the samples.
+    Note(String),
+    /// The sample that was given last belongs to a reading: it is to be written down.
+    Keep,
+    /// A press is over: its number, and why it is none if it is none.
+    Press {
+        /// In the plan, from 0.
+        number: usize,
+        /// Why it failed.
+        failed: Option<String>,
+    },
+    /// For people.
+    Say(String),
+}
+
+/// How it ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// All presses of the plan were tried.
+    Finished,
+    /// Something is wrong, and the tip was taken back if that was possible.
+    Stopped(String),
+}
+
+/// Seconds without a sample after which the board is silent, while the tip is near the limb and before the first one (µs).
+const SILENT_US: u64 = 500_000;
+const FIRST_US: u64 = 10_000_000;
+/// A tip that is out of the way reads no force larger than this (N).
+const FREE_N: f64 = 1.0;
+/// Presses in a row that fail before something is wrong with the bench rather than with them.
+const FAILURES: usize = 5;
+/// How fast the tip goes into the limb, and near it (mm/s).
+const SLOW: f64 = 1.0;
+const NEARING: f64 = 15.0;
+/// Share of all presses that may fail before that is so too.
+const FAIL: f64 = 0.25;
+/// How often a machine is homed after it began anew, before a press is over.
+const RESTARTS: u32 = 5;
+
+/// Where in a press it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The machine is told what it must know; nothing moves.
+    Opening,
+    Retract,
+    Turn,
+    Rest,
+    Approach,
+    Seek,
+    Feel,
+    Step,
+    Read,
+    Withdraw,
+    After,
+    /// The tip is taken back because something is wrong.
+    Escape,
+    Over,
+}
+
+/// What is waited for.
+enum Doing {
+    /// Commands one after the other.
+    Orders(VecDeque<String>),
+    Moving(Motion),
+    /// Samples from a time until a time (µs).
+    Reading {
+        from_us: u64,
+        until_us: u64,
+        reading: Reading,
+        kept: bool,
+    },
+    Nothing,
+}
+
+/// Goes through a plan.
+pub struct Collector {
+    machine: Machine,
+    limits: Limits,
+    marlin: Marlin,
+    /// What is still to be pressed, with its numbers.
+    plan: VecDeque<(usize, Planned)>,
+    retreat: f64,
+    phase: Phase,
+    doing: Doing,
+    /// Of the tip's middle from the table's axis, as it was sent last, and before that (m).
+    radial: f64,
+    came_from: f64,
+    /// Of the press that goes on, and of the last one that had any (counts).
+    rest: Vec<f64>,
+    last_rest: Vec<f64>,
+    rest_deviation: Vec<f64>,
+    /// Of a sample of the tip's sensor (N).
+    tip_noise: f64,
+    /// Where it was first felt (m from the axis).
+    contact: f64,
+    /// Of the last two readings (N), and where the first of them was taken (m from the axis).
+    forces: [Option<f64>; 2],
+    read_from: Option<f64>,
+    failed: Option<String>,
+    /// Why all of it ends, while the tip is still taken back.
+    wrong: Option<String>,
+    failures: usize,
+    /// Presses that were tried, and that failed.
+    tried: [usize; 2],
+    restarts: u32,
+    sample_us: Option<u64>,
+    begun_us: Option<u64>,
+    paused: bool,
+    ended: Option<Ended>,
+    /// Moves that were made and found to be right.
+    pub moves: u64,
+    /// The hardest that was felt (N).
+    pub hardest: f64,
+}
+
+impl Collector {
+    /// For these presses, each with its number; `retreat` (m) as [`super::Reach::retreat`].
+    #[must_use]
+    pub fn new(
+        machine: Machine,
+        limits: Limits,
+        plan: impl IntoIterator<Item = (usize, Planned)>,
+        retreat: f64,
+    ) -> Self {
+        Self {
+            machine,
+            limits,
+            marlin: Marlin::default(),
+            plan: plan.into_iter().collect(),
+            retreat,
+            phase: Phase::Opening,
+            doing: Doing::Nothing,
+            radial: retreat,
+            came_from: retreat,
+            tip_noise: 0.0,
+            rest: Vec::new(),
+            last_rest: Vec::new(),
+            rest_deviation: Vec::new(),
+            contact: 0.0,
+            forces: [None; 2],
+            read_from: None,
+            failed: None,
+            wrong: None,
+            failures: 0,
+            tried: [0; 2],
+            restarts: 0,
+            sample_us: None,
+            begun_us: None,
+            paused: false,
+            ended: None,
+            moves: 0,
+            hardest: 0.0,
+        }
+    }
+
+    /// How it ended, once it has.
+    #[must_use]
+    pub fn ended(&self) -> Option<&Ended> {
+        self.ended.as_ref()
+    }
+
+    /// Presses that are still to be made, the one that goes on included.
+    #[must_use]
+    pub fn left(&self) -> usize {
+        self.plan.len()
+    }
+
+    /// Lines that had to be sent again.
+    #[must_use]
+    pub fn resent(&self) -> u32 {
+        self.marlin.resent
+    }
+
+    /// Waits, or goes on, before the next press.
+    pub fn pause(&mut self, paused: bool) {
+        self.paused = paused;
+    }
+
+    /// Ends it as soon as the tip is out of the way: the machine stops at once.
+    pub fn stop(&mut self, why: &str, now_us: u64, out: &mut Vec<u8>) {
+        self.escape(why.to_owned(), now_us, out);
+    }
+
+    /// Cuts the machine's power to its motors, wherever it is. Nothing is taken back.
+    pub fn kill(&mut self, out: &mut Vec<u8>) {
+        Marlin::shout("M112", out);
+        self.end(Ended::Stopped(
+            "the machine was told to halt (M112): reset it before the next run, and look where the tip is".into(),
+        ));
+    }
+
+    /// The machine's port is gone.
+    pub fn unplugged(&mut self) {
+        self.lose("the machine's port is gone");
+    }
+
+    fn end(&mut self, how: Ended) {
+        self.ended.get_or_insert(how);
+        self.phase = Phase::Over;
+        self.doing = Doing::Nothing;
+    }
+
+    /// Something is wrong: stops what moves, and takes the tip back.
+    fn escape(&mut self, why: String, now_us: u64, out: &mut Vec<u8>) {
+        if matches!(self.phase, Phase::Escape | Phase::Over) {
+            return;
+        }
+        self.wrong = Some(why);
+        if self.phase == Phase::Opening {
+            self.give_up();
+            return;
+        }
+        self.phase = Phase::Escape;
+        Marlin::shout("M410", out);
+        self.marlin.forget();
+        self.go_radial(self.retreat, now_us, out);
+    }
+
+    /// It ends as it stands.
+    fn give_up(&mut self) {
+        let why = self.wrong.take().unwrap_or_default();
+        self.end(Ended::Stopped(why));
+    }
+
+    /// Takes in what the machine says.
+    pub fn heard(
+        &mut self,
+        bytes: &[u8],
+        now_us: u64,
+        out: &mut Vec<u8>,
+        tell: &mut dyn FnMut(News),
+    ) {
+        for heard in self.marlin.push(bytes, now_us, out) {
+            self.take(heard, now_us, out, tell);
+        }
+    }
+
+    fn take(&mut self, heard: Heard, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+        if self.phase == Phase::Over {
+            return;
+        }
+        match heard {
+            Heard::Restarted => self.restarted(now_us, out, tell),
+            Heard::Failed(why) => {
+                self.lose(&format!("the machine cannot be trusted any more: {why}"));
+            }
+            Heard::Done(said) => self.done(&said, now_us, out, tell),
+        }
+    }
+
+    /// The machine can be told nothing any more.
+    fn lose(&mut self, why: &str) {
+        let before = self.wrong.take();
+        let also = before.map_or(String::new(), |b| format!("{b}; and "));
+        self.end(Ended::Stopped(format!(
+            "{also}{why}. Look where the tip is before the next run"
+        )));
+    }
+
+    fn restarted(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+        // Boards begin anew when their port is opened.
+        let opening = self.phase == Phase::Opening && self.moves == 0;
+        if !opening {
+            self.restarts += 1;
+            if self.wrong.is_some() || self.machine.home.is_empty() || self.restarts > RESTARTS {
+                let why = "the machine began anew, and knows no longer where the tip is";
+                self.lose(why);
+                return;
+            }
+            tell(News::Say(
+                "the machine began anew: its axes are sent home, and the press is repeated".into(),
+            ));
+            self.unmake(tell);
+        }
+        self.open(!opening, now_us, out);
+    }
+
+    /// The press that goes on is none: it is made again.
+    fn unmake(&mut self, tell: &mut dyn FnMut(News)) {
+        if let Some((number, _)) = self.plan.front() {
+            tell(News::Note(format!("again {number}")));
+        }
+        self.failed = None;
+    }
+
+    /// Says what the machine must know before it moves.
+    fn open(&mut self, home: bool, now_us: u64, out: &mut Vec<u8>) {
+        self.phase = Phase::Opening;
+        let home = self.machine.home.iter().filter(|_| home);
+        let orders = home.chain(&self.machine.begin).cloned().collect();
+        self.marlin.begin(now_us, out);
+        self.doing = Doing::Orders(orders);
+    }
+
+    fn done(
+        &mut self,
+        said: &[String],
+        now_us: u64,
+        out: &mut Vec<u8>,
+        tell: &mut dyn FnMut(News),
+    ) {
+        match &mut self.doing {
+            Doing::Orders(orders) => match orders.pop_front() {
+                // Homing may take its time.
+                Some(order) => self.marlin.order(&order, 60_000_000, now_us, out),
+                None => self.next(now_us, out, tell),
+            },
+            Doing::Moving(motion) => match motion.take(said, &mut self.marlin, now_us, out) {
+                Moved::NotYet => {}
+                Moved::There => {
+                    if let Some(number) = motion.found {
+                        self.radial = self.machine.radial.way(number) * 1e-3;
+                    }
+                    self.moves += 1;
+                    self.next(now_us, out, tell);
+                }
+                Moved::Wrong(why) if self.phase == Phase::Escape => self.lose(&why),
+                Moved::Wrong(why) => self.escape(why, now_us, out),
+            },
+            Doing::Reading { .. } | Doing::Nothing => {}
+        }
+    }
+
+    /// To be called every few milliseconds.
+    pub fn look(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+        if self.phase == Phase::Over {
+            return;
+        }
+        let Some(begun) = self.begun_us else {
+            self.begun_us = Some(now_us);
+            self.open(false, now_us, out);
+            return;
+        };
+        if let Some(heard) = self.marlin.look(now_us, out) {
+            self.take(heard, now_us, out, tell);
+        }
+        if let Doing::Moving(motion) = &self.doing
+            && motion.is_late(now_us)
+        {
+            self.lose("the machine does not come to an end of its move");
+            return;
+        }
+        let (since, most) = match self.sample_us {
+            Some(last) => (last, SILENT_US),
+            None => (begun, FIRST_US),
+        };
+        let escaping = matches!(self.phase, Phase::Escape | Phase::Over);
+        if !escaping && now_us.saturating_sub(since) > most {
+            self.escape("the board has fallen silent".into(), now_us, out);
+            return;
+        }
+        // Whoever was paused is looked after here.
+        if self.phase == Phase::Retract && matches!(self.doing, Doing::Nothing) && !self.paused {
+            self.begin_press(now_us, out, tell);
+        }
+    }
+
+    fn go(&mut self, targets: Vec<(char, f64, f64)>, now_us: u64, out: &mut Vec<u8>) {
+        self.doing = Doing::Moving(Motion::begin(targets, &mut self.marlin, now_us, out));
+    }
+
+    fn go_radial(&mut self, radial: f64, now_us: u64, out: &mut Vec<u8>) {
+        self.came_from = std::mem::replace(&mut self.radial, radial);
+        let axis = &self.machine.radial;
+        let speed = match self.phase {
+            Phase::Seek | Phase::Step => axis.speed.min(SLOW),
+            Phase::Approach => axis.speed.min(NEARING),
+            _ => axis.speed,
+        };
+        let target = (axis.letter, axis.number(radial * 1e3), speed);
+        self.go(vec![target], now_us, out);
+    }
+}
+
+#[cfg(test)]
+mod tests;

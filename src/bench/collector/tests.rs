@@ -1,0 +1,337 @@
+use glam::DVec3;
+
+use super::super::machine::tests::paper;
+use super::super::{Contact, Mount, PrinterFaults, SimulatedPrinter, plan};
+use super::*;
+use crate::limb::LimbSpec;
+use crate::mesh::{TriMesh, sample};
+
+/// A limb on a simulated bench whose board reads three gauges and the tip.
+struct Bench<'a> {
+    printer: SimulatedPrinter,
+    contact: Contact<'a>,
+    now_us: u64,
+    /// The hardest that the tip really pressed (N).
+    hardest: f64,
+    silent_from: Option<u64>,
+    /// Between two samples.
+    every_us: u64,
+    /// What the printer has said, on its way.
+    said: Vec<u8>,
+}
+
+const NEWTON_PER_COUNT: f64 = 0.05;
+const TURN_US: u64 = 5000;
+
+impl<'a> Bench<'a> {
+    fn new(
+        machine: &'a Machine,
+        surface: &'a TriMesh,
+        mount: Mount,
+        faults: PrinterFaults,
+    ) -> Self {
+        Self {
+            printer: SimulatedPrinter::new([('X', 0.0), ('Z', 0.0), ('E', 0.0)], faults, 5),
+            contact: Contact {
+                surface,
+                mount,
+                machine,
+                machine_gives: 0.0,
+                gives: vec![(DVec3::ZERO, 1e-4)],
+            },
+            now_us: 0,
+            hardest: 0.0,
+            silent_from: None,
+            every_us: TURN_US,
+            said: Vec::new(),
+        }
+    }
+
+    fn counts(&mut self) -> Vec<f64> {
+        let printer = &self.printer;
+        let number = |axis: &crate::bench::Axis| printer.real(axis.letter).unwrap();
+        let pose = self.contact.machine.pose_of(number);
+        let push = self.contact.push(&pose);
+        let force = push.map_or(0.0, |p| p.touch.force);
+        self.hardest = self.hardest.max(force);
+        let place = push.map_or(DVec3::ZERO, |p| p.touch.position * 1e3);
+        let mut counts: Vec<f64> = place.to_array().map(|x| 2048.0 + x).to_vec();
+        counts.push((400.0 + force / NEWTON_PER_COUNT).round());
+        counts
+    }
+
+    /// Until it has ended, or for so many seconds.
+    fn run(&mut self, collector: &mut Collector, seconds: f64) -> Vec<News> {
+        let mut news = Vec::new();
+        let until = self.now_us + (seconds * 1e6) as u64;
+        while collector.ended().is_none() && self.now_us < until {
+            let mut out = Vec::new();
+            let mut tell = |n| news.push(n);
+            if self.silent_from.is_none_or(|from| self.now_us < from)
+                && self.now_us.is_multiple_of(self.every_us)
+            {
+                let counts = self.counts();
+                collector.felt(&counts, self.now_us, &mut out, &mut tell);
+            }
+            collector.look(self.now_us, &mut out, &mut tell);
+            collector.heard(
+                &std::mem::take(&mut self.said),
+                self.now_us,
+                &mut out,
+                &mut tell,
+            );
+            self.printer.receive(&out, &mut self.said);
+            self.now_us += TURN_US;
+            self.printer.say(self.now_us, &mut self.said);
+        }
+        news
+    }
+}
+
+struct Case {
+    surface: TriMesh,
+    mount: Mount,
+    machine: Machine,
+}
+
+impl Case {
+    fn new() -> Self {
+        let (surface, _) = LimbSpec::default().build().unwrap();
+        let (low, high) = surface.bounds();
+        Self {
+            mount: Mount::upright(DVec3::Z, DVec3::X, (low + high) / 2.0),
+            surface,
+            machine: paper(),
+        }
+    }
+
+    fn collector(&self, places: usize) -> Collector {
+        let places: Vec<(DVec3, DVec3)> = (sample::random(&self.surface, 4 * places, 3, |_| true)
+            .into_iter())
+        .map(|at| (self.surface.point(at), self.surface.normal(at)))
+        .collect();
+        let reach = plan(&places, &self.surface, &self.machine, &self.mount).unwrap();
+        let presses = reach.presses.into_iter().take(places.len() / 4);
+        Collector::new(
+            self.machine.clone(),
+            Limits::default(),
+            presses.enumerate(),
+            reach.retreat,
+        )
+    }
+}
+
+fn done(news: &[News]) -> Vec<usize> {
+    (news.iter())
+        .filter_map(|n| match n {
+            News::Press {
+                number,
+                failed: None,
+            } => Some(*number),
+            _ => None,
+        })
+        .collect()
+}
+
+/// Every reading that is kept, with the place that was really pressed meanwhile against the one that was meant.
+fn depths(news: &[News]) -> Vec<f64> {
+    (news.iter())
+        .filter_map(|n| match n {
+            News::Note(note) => note.strip_prefix("read depth ")?.parse().ok(),
+            _ => None,
+        })
+        .collect()
+}
+
+#[test]
+fn a_plan_is_pressed_step_by_step() {
+    let case = Case::new();
+    let mut collector = case.collector(6);
+    let mut bench = Bench::new(
+        &case.machine,
+        &case.surface,
+        case.mount,
+        PrinterFaults::default(),
+    );
+    let news = bench.run(&mut collector, 1e4);
+    assert_eq!(collector.ended(), Some(&Ended::Finished));
+    assert_eq!(done(&news), [0, 1, 2, 3, 4, 5]);
+    let depths = depths(&news);
+    // 10 N/mm to 2 mm by 0.15 mm: from the contact on fourteen readings each.
+    assert!(depths.len() >= 6 * 13, "{}", depths.len());
+    assert!(depths.iter().all(|d| (-0.001..2.2).contains(d)));
+    assert!(
+        bench.hardest > 15.0 && bench.hardest < 35.0,
+        "{}",
+        bench.hardest
+    );
+    assert!((collector.hardest - bench.hardest).abs() < 0.2);
+}
+
+#[test]
+fn lines_that_are_lost_or_garbled_change_nothing_but_the_time() {
+    let case = Case::new();
+    let faults = PrinterFaults {
+        lose: 0.03,
+        garble: 0.03,
+        lose_answer: 0.03,
+        garble_answer: 0.01,
+        ..PrinterFaults::default()
+    };
+    let mut clean = case.collector(4);
+    let mut bench = Bench::new(
+        &case.machine,
+        &case.surface,
+        case.mount,
+        PrinterFaults::default(),
+    );
+    let wanted = bench.run(&mut clean, 1e4);
+    let mut collector = case.collector(4);
+    let mut bench = Bench::new(&case.machine, &case.surface, case.mount, faults);
+    let news = bench.run(&mut collector, 1e5);
+    assert_eq!(collector.ended(), Some(&Ended::Finished));
+    assert_eq!(done(&news), done(&wanted));
+    assert_eq!(depths(&news), depths(&wanted));
+    assert!(collector.resent() > 10, "{}", collector.resent());
+}
+
+#[test]
+fn a_machine_that_began_anew_is_sent_home_and_the_press_is_repeated() {
+    let case = Case::new();
+    let faults = PrinterFaults {
+        reset: 0.008,
+        ..PrinterFaults::default()
+    };
+    let mut collector = case.collector(4);
+    let mut bench = Bench::new(&case.machine, &case.surface, case.mount, faults);
+    let news = bench.run(&mut collector, 1e5);
+    assert!(bench.printer.restarts > 0);
+    assert_eq!(collector.ended(), Some(&Ended::Finished));
+    assert_eq!(done(&news), [0, 1, 2, 3]);
+    // Without a way to find its place again it is not gone on with.
+    let mut machine = case.machine.clone();
+    machine.home.clear();
+    let mut collector = case.collector(4);
+    collector.machine = machine;
+    let mut bench = Bench::new(&case.machine, &case.surface, case.mount, faults);
+    bench.run(&mut collector, 1e5);
+    let ended = collector.ended();
+    assert!(
+        matches!(ended, Some(Ended::Stopped(why)) if why.contains("began anew")),
+        "{ended:?}"
+    );
+}
+
+#[test]
+fn a_force_beyond_the_limit_stops_and_takes_back() {
+    let case = Case::new();
+    let mut collector = case.collector(4);
+    collector.limits.most_force = 12.0;
+    collector.limits.enough = 50.0;
+    let mut bench = Bench::new(
+        &case.machine,
+        &case.surface,
+        case.mount,
+        PrinterFaults::default(),
+    );
+    // It is foreseen, and no press comes beyond it.
+    let news = bench.run(&mut collector, 1e4);
+    assert_eq!(done(&news).len(), 4);
+    assert!(bench.hardest < 12.0, "{}", bench.hardest);
+    // However stiff the limb is, the tip is stopped on its way.
+    let mut collector = case.collector(4);
+    let mut bench = Bench::new(
+        &case.machine,
+        &case.surface,
+        case.mount,
+        PrinterFaults::default(),
+    );
+    bench.contact.gives[0].1 = 2e-6;
+    let news = bench.run(&mut collector, 1e4);
+    assert_eq!(done(&news).len(), 4);
+    assert!(bench.hardest < 35.0, "{}", bench.hardest);
+    // Where the board is too slow for that, all ends, and the tip is taken back.
+    let mut collector = case.collector(4);
+    let mut bench = Bench::new(
+        &case.machine,
+        &case.surface,
+        case.mount,
+        PrinterFaults::default(),
+    );
+    (bench.contact.gives[0].1, bench.every_us) = (2e-6, 400_000);
+    bench.run(&mut collector, 1e4);
+    let ended = collector.ended();
+    assert!(
+        matches!(ended, Some(Ended::Stopped(why)) if why.contains("the most")),
+        "{ended:?}"
+    );
+    let counts = bench.counts();
+    assert_eq!(counts[3], 400.0, "the tip was not taken back");
+}
+
+#[test]
+fn a_board_that_falls_silent_stops_it_with_the_tip_taken_back() {
+    let case = Case::new();
+    let mut collector = case.collector(3);
+    let mut bench = Bench::new(
+        &case.machine,
+        &case.surface,
+        case.mount,
+        PrinterFaults::default(),
+    );
+    while bench.hardest < 5.0 {
+        bench.run(&mut collector, 0.1);
+    }
+    bench.silent_from = Some(bench.now_us);
+    bench.run(&mut collector, 100.0);
+    let ended = collector.ended();
+    assert!(
+        matches!(ended, Some(Ended::Stopped(why)) if why.contains("silent")),
+        "{ended:?}"
+    );
+    assert_eq!(bench.counts()[3], 400.0);
+}
+
+#[test]
+fn a_limb_that_is_not_where_it_should_be_is_found_out() {
+    let case = Case::new();
+    let mut collector = case.collector(12);
+    let mut bench = Bench::new(
+        &case.machine,
+        &case.surface,
+        case.mount,
+        PrinterFaults::default(),
+    );
+    bench.contact.mount.shift.z += 500e-3;
+    let news = bench.run(&mut collector, 1e5);
+    let ended = collector.ended();
+    assert!(
+        matches!(ended, Some(Ended::Stopped(why)) if why.contains("mounted")),
+        "{ended:?}"
+    );
+    assert!(done(&news).is_empty());
+}
+
+#[test]
+fn what_is_paused_goes_on_and_what_is_stopped_ends_out_of_the_way() {
+    let case = Case::new();
+    let mut collector = case.collector(3);
+    let mut bench = Bench::new(
+        &case.machine,
+        &case.surface,
+        case.mount,
+        PrinterFaults::default(),
+    );
+    bench.run(&mut collector, 5.0);
+    collector.pause(true);
+    bench.run(&mut collector, 200.0);
+    assert_eq!((collector.left(), collector.ended()), (2, None));
+    collector.pause(false);
+    bench.run(&mut collector, 5.0);
+    let mut out = Vec::new();
+    collector.stop("asked to", bench.now_us, &mut out);
+    bench.printer.receive(&out, &mut Vec::new());
+    bench.run(&mut collector, 100.0);
+    assert_eq!(collector.ended(), Some(&Ended::Stopped("asked to".into())));
+    assert_eq!(bench.counts()[3], 400.0);
+}

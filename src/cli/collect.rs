@@ -1,0 +1,371 @@
+//! `hapdef collect`: a machine presses the limb at many places, and what the gauges read is written down.
+
+mod args;
+mod simulated;
+
+use std::collections::BTreeSet;
+use std::io::BufRead as _;
+use std::path::Path;
+use std::sync::mpsc::{Sender, channel};
+
+use anyhow::{Context as _, ensure};
+use glam::DVec3;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+
+pub use self::args::CollectArgs;
+use super::listen::sensing_for;
+use super::out;
+use super::spared::Spared;
+use crate::bench::{Collector, Ended, Limits, News, Planned, Reach, plan};
+use crate::design::Sensing;
+use crate::io::bench_folder::{self, About, limb_key};
+use crate::io::machine_file::{self, MachineFile};
+use crate::io::project_file::LoadedProject;
+use crate::io::{outlet, points, source};
+use crate::link::{Address, BenchOrder, Pace, Recorder, bench_presses, press_at_ports};
+use crate::plain;
+
+/// Runs the command.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
+    let loaded = args.common.load()?;
+    loaded.inputs.project.check()?;
+    Spared::of(&loaded).check("--out", Some(&args.out))?;
+    let (about, file) = about(args, &loaded)?;
+    let ports = ports(args)?;
+    std::fs::create_dir_all(&args.out).with_context(|| {
+        format!(
+            "{}: the folder cannot be created. Choose another",
+            args.out.display()
+        )
+    })?;
+    outlet::folder(&args.out)?;
+    let begun = About::read(&args.out)?;
+    if let Some(before) = &begun {
+        same(before, &about, &args.out)?;
+    }
+    let sensing = sensing_for(&args.common, &loaded)?;
+    let places = places(args, &loaded, &sensing, begun.is_some())?;
+    let reach = reached(&places, &loaded, &sensing, &file)?;
+    if begun.is_none() {
+        about.write(&args.out)?;
+        let all: Vec<_> = reach.presses.iter().map(|p| (p.at, p.normal)).collect();
+        bench_folder::write_plan(&args.out, &all)?;
+    }
+    say_plan(&reach, &about);
+    if args.plan_only {
+        let said = json!({ "presses": reach.presses.len(), "left_out": reach.left_out.len() });
+        return out::line(&said.to_string());
+    }
+    let done = pressed(&args.out)?;
+    let presses = reach.presses.len();
+    let left: Vec<(usize, Planned)> = (reach.presses.iter().copied().enumerate())
+        .filter(|(k, _)| !done.contains(k))
+        .collect();
+    if !done.is_empty() {
+        let there = plain::either(done.len(), "press", "presses");
+        out::say(&format!("{there} of {presses} are there already"));
+    }
+    let limits = Limits {
+        step: about.step_mm * 1e-3,
+        depth: about.depth_mm * 1e-3,
+        enough: about.force_n,
+        most_force: about.most_force_n,
+        ..Limits::default()
+    };
+    let machine = file.machine.clone();
+    let mut collector = Collector::new(machine, limits, left.iter().copied(), reach.retreat);
+    let (ended, failed) = if left.is_empty() {
+        (Ended::Finished, 0)
+    } else {
+        let bench = (&loaded, &sensing, &file);
+        press(args, bench, ports, &mut collector, &reach, done.len())?
+    };
+    finish(args, &collector, &ended, presses, failed)
+}
+
+/// What is asked for, and its machine.
+fn about(args: &CollectArgs, loaded: &LoadedProject) -> anyhow::Result<(About, MachineFile)> {
+    let project = &loaded.inputs.project;
+    let gauges = project.selection.sites.len();
+    ensure!(
+        gauges > 0,
+        "the project has no gauges yet: choose them first (hapdef design)"
+    );
+    ensure!(
+        args.force < args.most_force,
+        "--force {} must be less than --most-force {}",
+        args.force,
+        args.most_force
+    );
+    let text = match &args.machine {
+        Some(path) => source::read_text(path)?,
+        None => machine_file::PAPER.to_owned(),
+    };
+    let file = match &args.machine {
+        Some(path) => machine_file::read(path)?,
+        None => machine_file::parse(&text).map_err(anyhow::Error::msg)?,
+    };
+    let mut file = file;
+    if args.simulate
+        && let Some(sensor) = &mut file.machine.sensor
+    {
+        // The simulated board has its force sensor behind the gauges.
+        sensor.channel = gauges;
+    }
+    let settings = project.live.settings(gauges);
+    let about = About {
+        format: About::format(),
+        limb: limb_key(&loaded.inputs),
+        machine: text,
+        seed: project.budget.seed,
+        step_mm: args.step,
+        depth_mm: args.depth,
+        force_n: args.force,
+        most_force_n: args.most_force,
+        channels: settings.channels,
+        gauge_factor: settings.chain.gauge_factor,
+        active_arms: settings.chain.active_arms,
+        simulated: args.simulate,
+    };
+    Ok((about, file))
+}
+
+/// Printer and board, where they are real.
+fn ports(args: &CollectArgs) -> anyhow::Result<Option<(Address, Address)>> {
+    if args.simulate || args.plan_only {
+        return Ok(None);
+    }
+    let (Some(printer), Some(board)) = (&args.printer, &args.board) else {
+        anyhow::bail!(
+            "name the ports of both with --printer and --board, or press on a simulated bench with --simulate"
+        );
+    };
+    let address = |text: &str, baud| Address::parse(text, baud, Pace::Real);
+    let ports = (
+        address(printer, args.printer_baud),
+        address(board, args.board_baud),
+    );
+    for port in [&ports.0, &ports.1] {
+        ensure!(
+            !port.is_recording(),
+            "{port}: a recording cannot be pressed"
+        );
+        port.check().map_err(anyhow::Error::msg)?;
+    }
+    Ok(Some(ports))
+}
+
+/// A run is gone on with only as it was begun.
+fn same(before: &About, now: &About, folder: &Path) -> anyhow::Result<()> {
+    let what = if before.limb != now.limb {
+        "another limb or other gauges"
+    } else if before.machine != now.machine {
+        "another machine file"
+    } else if before != now {
+        "other settings (seed, step, depth, forces, channels, or simulated and not)"
+    } else {
+        return Ok(());
+    };
+    anyhow::bail!(
+        "{}: a run was begun there with {what}. Name another folder, or go on as it was begun",
+        folder.display()
+    )
+}
+
+/// Where to press: as it was planned before, as somebody says, or evenly over the part in an order of chance, so that the first
+/// presses cover all of it too.
+fn places(
+    args: &CollectArgs,
+    loaded: &LoadedProject,
+    sensing: &Sensing,
+    begun: bool,
+) -> anyhow::Result<Vec<DVec3>> {
+    if begun {
+        return Ok(bench_folder::read_plan(&args.out)?);
+    }
+    if let Some(path) = &args.points {
+        let points = points::read_points(path)?;
+        return Ok(points.into_iter().map(|p| p.position).collect());
+    }
+    let seed = loaded.inputs.project.budget.seed;
+    let touches = sensing.touches(&loaded.inputs, args.places, seed, true)?;
+    let mut places: Vec<DVec3> = touches.iter().map(|t| t.position).collect();
+    places.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+    Ok(places)
+}
+
+/// Those that the machine gets to.
+fn reached(
+    places: &[DVec3],
+    loaded: &LoadedProject,
+    sensing: &Sensing,
+    file: &MachineFile,
+) -> anyhow::Result<Reach> {
+    let surface = &sensing.drawn.map.mesh;
+    let stance = loaded.inputs.project.part.axis.stance(&loaded.inputs.part);
+    let (mount, off) = file
+        .mount(&loaded.inputs.part, &stance)
+        .map_err(anyhow::Error::msg)?;
+    if !off.is_empty() {
+        let each: Vec<String> = off.iter().map(|o| format!("{:.2}", o * 1e3)).collect();
+        out::say(&format!(
+            "the limb stands as its touched points say; they are {} mm off",
+            each.join(", ")
+        ));
+    }
+    let on_surface: Vec<(DVec3, DVec3)> = (places.iter())
+        .map(|place| {
+            let (at, _) = surface.index().nearest(*place);
+            (surface.point(at), surface.normal(at))
+        })
+        .collect();
+    let reach = plan(&on_surface, surface, &file.machine, &mount).map_err(anyhow::Error::msg)?;
+    ensure!(
+        !reach.presses.is_empty(),
+        "the machine gets to none of {}: {}",
+        plain::either(places.len(), "place", "places"),
+        reach.left_out.first().map_or("there is none", |l| &l.1)
+    );
+    Ok(reach)
+}
+
+fn say_plan(reach: &Reach, about: &About) {
+    /// Of a step with its settling and reading, and of a press beside its steps (s).
+    const STEP_S: f64 = 0.45;
+    const PRESS_S: f64 = 9.0;
+    let presses = reach.presses.len();
+    let steps = (about.depth_mm / about.step_mm).ceil() + 14.0;
+    let hours = presses as f64 * (PRESS_S + STEP_S * steps) / 3600.0;
+    out::say(&format!(
+        "{} of up to {:.2} mm or {} N, at most {hours:.1} hours of the machine's time",
+        plain::either(presses, "press", "presses"),
+        about.depth_mm,
+        about.force_n
+    ));
+    if let Some((_, why)) = reach.left_out.first() {
+        out::say(&format!(
+            "{} left out, the first because {why}",
+            plain::either(reach.left_out.len(), "place is", "places are"),
+        ));
+    }
+}
+
+/// Presses that are in the folder's recordings.
+fn pressed(folder: &Path) -> anyhow::Result<BTreeSet<usize>> {
+    let mut done = BTreeSet::new();
+    for part in bench_folder::parts(folder)? {
+        let bytes = std::fs::read(&part).with_context(|| plain::path(&part))?;
+        done.extend(bench_presses(&bytes).iter().map(|p| p.number));
+    }
+    Ok(done)
+}
+
+/// Presses what is left; how it ended, and how many failed.
+fn press(
+    args: &CollectArgs,
+    (loaded, sensing, file): (&LoadedProject, &Sensing, &MachineFile),
+    ports: Option<(Address, Address)>,
+    collector: &mut Collector,
+    reach: &Reach,
+    before: usize,
+) -> anyhow::Result<(Ended, usize)> {
+    let recorder = Recorder::create(&bench_folder::next_part(&args.out)?);
+    let recorder = recorder.map_err(anyhow::Error::msg)?;
+    let all = reach.presses.len();
+    let (mut done, mut failed) = (before, 0);
+    let mut failures = Vec::new();
+    let tell = |news: News| match news {
+        News::Say(text) => out::say(&format!("hapdef: {text}")),
+        News::Press { failed: None, .. } => {
+            done += 1;
+            if done.is_multiple_of(10) || done == all {
+                out::say(&format!("{done} of {all} presses"));
+            }
+        }
+        News::Press {
+            number,
+            failed: Some(why),
+        } => {
+            failed += 1;
+            failures.push(number);
+            out::say(&format!("press {number} failed: {why}"));
+        }
+        News::Note(_) | News::Keep => {}
+    };
+    let ended = match ports {
+        Some((printer, board)) => {
+            let (orders, inbox) = channel();
+            obey_stdin(orders);
+            press_at_ports(collector, (&printer, &board), recorder, &inbox, tell)
+        }
+        None => simulated::press(
+            args,
+            (loaded, sensing, file),
+            reach,
+            collector,
+            recorder,
+            tell,
+        )?,
+    };
+    Ok((ended.map_err(anyhow::Error::msg)?, failed))
+}
+
+/// Lines on standard input: pause, resume, stop, kill.
+fn obey_stdin(orders: Sender<BenchOrder>) {
+    out::say(
+        "write pause, resume, stop (takes the tip back) or kill (halts the machine) and press Enter",
+    );
+    let listen = move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            let order = match line.trim() {
+                "pause" => BenchOrder::Pause,
+                "resume" => BenchOrder::Resume,
+                "stop" => BenchOrder::Stop,
+                "kill" => BenchOrder::Kill,
+                "" => continue,
+                other => {
+                    out::say(&format!("{} is no order", plain::quote(other)));
+                    continue;
+                }
+            };
+            if orders.send(order).is_err() {
+                return;
+            }
+        }
+    };
+    // Without a thread there are no orders, and all else works.
+    let _ = std::thread::Builder::new()
+        .name("orders".into())
+        .spawn(listen);
+}
+
+fn finish(
+    args: &CollectArgs,
+    collector: &Collector,
+    ended: &Ended,
+    presses: usize,
+    failed: usize,
+) -> anyhow::Result<()> {
+    let done = pressed(&args.out)?.len();
+    let said = json!({
+        "presses": presses,
+        "pressed": done,
+        "failed": failed,
+        "moves": collector.moves,
+        "lines_sent_again": collector.resent(),
+        "hardest_n": collector.hardest,
+    });
+    out::line(&said.to_string())?;
+    match ended {
+        Ended::Finished => Ok(()),
+        Ended::Stopped(why) => anyhow::bail!(
+            "{why}. {done} of {presses} presses are kept; the same command goes on with the rest"
+        ),
+    }
+}

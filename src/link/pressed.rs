@@ -1,0 +1,126 @@
+//! Presses out of recordings of the test-bed.
+
+use glam::DVec3;
+
+use crate::bench::Reading;
+use crate::live::{Input, Receiver};
+use crate::wire::Hello;
+
+/// A press that was made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BenchPress {
+    /// In the plan.
+    pub number: usize,
+    /// On the limb (m).
+    pub at: DVec3,
+    /// Before it (counts).
+    pub rest: Vec<f64>,
+    /// What was read, from the first contact on.
+    pub steps: Vec<Depth>,
+    /// After it (counts).
+    pub after: Vec<f64>,
+    /// What board read it.
+    pub board: Option<Hello>,
+}
+
+/// A reading at a depth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Depth {
+    /// From the first contact (m).
+    pub below: f64,
+    /// On the board's clock (µs).
+    pub time_us: u64,
+    /// Mean of each channel (counts).
+    pub counts: Vec<f64>,
+}
+
+/// All presses that were finished in a recording's bytes, in their order. What was cut off in the middle is none.
+#[must_use]
+pub fn bench_presses(bytes: &[u8]) -> Vec<BenchPress> {
+    let mut scribe = Scribe::default();
+    let mut receiver = Receiver::default();
+    receiver.push(bytes, 0, |input| scribe.take(input));
+    scribe.done
+}
+
+#[derive(Default)]
+struct Scribe {
+    board: Option<Hello>,
+    open: Option<BenchPress>,
+    /// What is read just now, with when it began.
+    reading: Option<(String, Reading, u64)>,
+    done: Vec<BenchPress>,
+}
+
+impl Scribe {
+    fn take(&mut self, input: Input) {
+        match input {
+            Input::Hello(hello) => self.board = Some(hello),
+            Input::Sample(sample) => {
+                if let Some((_, reading, first)) = &mut self.reading {
+                    if reading.samples() == 0 {
+                        *first = sample.time_us;
+                    }
+                    reading.push(&sample.counts);
+                }
+            }
+            Input::Note { text, .. } => self.note(&text),
+            Input::Log { .. } | Input::Pong(_) => {}
+        }
+    }
+
+    fn note(&mut self, text: &str) {
+        let (word, rest) = text.split_once(' ').unwrap_or((text, ""));
+        match word {
+            "press" => self.open = self.begun(rest),
+            "read" => self.reading = Some((rest.to_owned(), Reading::default(), 0)),
+            "end" => self.close(),
+            "again" | "failed" => (self.open, self.reading) = (None, None),
+            "pressed" => {
+                let whole = |p: &BenchPress| !p.rest.is_empty() && !p.steps.is_empty();
+                self.done.extend(self.open.take().filter(whole));
+            }
+            _ => {}
+        }
+    }
+
+    fn begun(&self, text: &str) -> Option<BenchPress> {
+        let mut words = text.split(' ');
+        let number = words.next()?.parse().ok()?;
+        let mm: Vec<f64> = words.map_while(|w| w.parse().ok()).collect();
+        let [x, y, z, ..] = mm[..] else { return None };
+        Some(BenchPress {
+            number,
+            at: DVec3::new(x, y, z) * 1e-3,
+            rest: Vec::new(),
+            steps: Vec::new(),
+            after: Vec::new(),
+            board: self.board.clone(),
+        })
+    }
+
+    fn close(&mut self) {
+        let (Some(press), Some((what, reading, time_us))) = (&mut self.open, self.reading.take())
+        else {
+            return;
+        };
+        if reading.samples() == 0 {
+            return;
+        }
+        let counts = reading.mean();
+        match what.split_once(' ') {
+            None if what == "rest" => press.rest = counts,
+            None if what == "after" => press.after = counts,
+            Some(("depth", mm)) => {
+                if let Ok(mm) = mm.parse::<f64>() {
+                    press.steps.push(Depth {
+                        below: mm * 1e-3,
+                        time_us,
+                        counts,
+                    });
+                }
+            }
+            _ => {}
+        }
+    }
+}
