@@ -1,0 +1,131 @@
+//! What the machine says, and what is looked at as time passes.
+
+use super::super::marlin::Heard;
+use super::motion::Moved;
+use super::{Collector, Doing, FIRST_US, News, Phase, RESTARTS, SILENT_US};
+
+impl Collector {
+    /// Takes in what the machine says.
+    pub fn heard(
+        &mut self,
+        bytes: &[u8],
+        now_us: u64,
+        out: &mut Vec<u8>,
+        tell: &mut dyn FnMut(News),
+    ) {
+        for heard in self.marlin.push(bytes, now_us, out) {
+            self.take(heard, now_us, out, tell);
+        }
+    }
+
+    fn take(&mut self, heard: Heard, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+        if self.phase == Phase::Over {
+            return;
+        }
+        match heard {
+            Heard::Restarted => self.restarted(now_us, out, tell),
+            Heard::Failed(why) => {
+                self.lose(&format!("the machine cannot be trusted any more: {why}"));
+            }
+            Heard::Done(said) => self.done(&said, now_us, out, tell),
+        }
+    }
+
+    fn restarted(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+        // Boards begin anew when their port is opened.
+        let opening = self.phase == Phase::Opening && self.moves == 0;
+        if !opening {
+            self.restarts += 1;
+            if self.wrong.is_some() || self.machine.home.is_empty() || self.restarts > RESTARTS {
+                let why = "the machine began anew, and knows no longer where the tip is";
+                self.lose(why);
+                return;
+            }
+            tell(News::Say(
+                "the machine began anew: its axes are sent home, and the press is repeated".into(),
+            ));
+            self.unmake(tell);
+        }
+        self.open(!opening, now_us, out);
+    }
+
+    /// The press that goes on is none: it is made again.
+    fn unmake(&mut self, tell: &mut dyn FnMut(News)) {
+        if let Some((number, _)) = self.plan.front() {
+            tell(News::Note(format!("again {number}")));
+        }
+        self.failed = None;
+    }
+
+    /// Says what the machine must know before it moves.
+    fn open(&mut self, home: bool, now_us: u64, out: &mut Vec<u8>) {
+        self.phase = Phase::Opening;
+        let home = self.machine.home.iter().filter(|_| home);
+        let orders = home.chain(&self.machine.begin).cloned().collect();
+        self.marlin.begin(now_us, out);
+        self.doing = Doing::Orders(orders);
+    }
+
+    fn done(
+        &mut self,
+        said: &[String],
+        now_us: u64,
+        out: &mut Vec<u8>,
+        tell: &mut dyn FnMut(News),
+    ) {
+        match &mut self.doing {
+            Doing::Orders(orders) => match orders.pop_front() {
+                // Homing may take its time.
+                Some(order) => self.marlin.order(&order, 60_000_000, now_us, out),
+                None => self.next(now_us, out, tell),
+            },
+            Doing::Moving(motion) => match motion.take(said, &mut self.marlin, now_us, out) {
+                Moved::NotYet => {}
+                Moved::There => {
+                    if let Some(number) = motion.found {
+                        self.radial = self.machine.radial.way(number) * 1e-3;
+                    }
+                    self.moves += 1;
+                    self.next(now_us, out, tell);
+                }
+                Moved::Wrong(why) if self.phase == Phase::Escape => self.lose(&why),
+                Moved::Wrong(why) => self.escape(why, now_us, out),
+            },
+            Doing::Reading { .. } | Doing::Nothing => {}
+        }
+    }
+
+    /// To be called every few milliseconds.
+    pub fn look(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+        if self.phase == Phase::Over {
+            return;
+        }
+        let Some(begun) = self.begun_us else {
+            self.begun_us = Some(now_us);
+            self.open(false, now_us, out);
+            return;
+        };
+        if let Some(heard) = self.marlin.look(now_us, out) {
+            self.take(heard, now_us, out, tell);
+        }
+        if let Doing::Moving(motion) = &self.doing
+            && motion.is_late(now_us)
+        {
+            self.lose("the machine does not come to an end of its move");
+            return;
+        }
+        let (since, most) = match self.sample_us {
+            Some(last) => (last, SILENT_US),
+            None => (begun, FIRST_US),
+        };
+        let escaping = matches!(self.phase, Phase::Escape | Phase::Over);
+        if !escaping && now_us.saturating_sub(since) > most {
+            self.escape("the board has fallen silent".into(), now_us, out);
+            return;
+        }
+        // Whoever was paused is looked after here.
+        if self.phase == Phase::Retract && matches!(self.doing, Doing::Nothing) && !self.paused {
+            self.begin_press(now_us, out, tell);
+        }
+    }
+}
