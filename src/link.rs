@@ -1,6 +1,7 @@
 //! Ports: serial lines, sockets and recordings behind one small trait, and the thread that listens.
 
 mod benching;
+mod counted_line;
 mod host;
 mod port;
 mod ports;

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::counted_line::CountedLine;
 use crate::bench::Reading;
 use crate::live::{Input, Receiver};
 use crate::wire::Hello;
@@ -50,22 +51,29 @@ struct Scribe {
     /// What is read just now, with when it began.
     reading: Option<(String, Reading, u64)>,
     done: Vec<BenchPress>,
+    /// Of a board that prints lines.
+    line: CountedLine,
 }
 
 impl Scribe {
     fn take(&mut self, input: Input) {
         match input {
             Input::Hello(hello) => self.board = Some(hello),
-            Input::Sample(sample) => {
-                if let Some((_, reading, first)) = &mut self.reading {
-                    if reading.samples() == 0 {
-                        *first = sample.time_us;
-                    }
-                    reading.push(&sample.counts);
-                }
-            }
-            Input::Note { text, .. } => self.note(&text),
+            Input::Sample(sample) => self.sample(&sample.counts, sample.time_us),
+            Input::Note { text, time_us } => match self.line.take(&text) {
+                Some(counts) => self.sample(&counts, time_us),
+                None => self.note(&text),
+            },
             Input::Log { .. } | Input::Pong(_) => {}
+        }
+    }
+
+    fn sample(&mut self, counts: &[f64], time_us: u64) {
+        if let Some((_, reading, first)) = &mut self.reading {
+            if reading.samples() == 0 {
+                *first = time_us;
+            }
+            reading.push(counts);
         }
     }
 
@@ -122,5 +130,47 @@ impl Scribe {
             }
             _ => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::Recorder;
+    use crate::live::Sample;
+
+    /// A board that prints lines has no HELLO, and its samples are notes.
+    #[test]
+    fn presses_of_a_board_that_prints_lines_are_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("part-001.hapdrec");
+        let mut recorder = Recorder::create(&path).unwrap();
+        let sample = |recorder: &mut Recorder, k: f64| {
+            let counts = (0..11).map(|c| 1700.5 + f64::from(c) * k).collect();
+            recorder.sample(&Sample { time_us: 7, counts });
+        };
+        let press = |recorder: &mut Recorder, number: u32, end: &str| {
+            recorder.own(&format!("press {number} 1.0 2.0 3.0 1.0 0.0 0.0"));
+            for (what, k) in [("rest", 0.0), ("depth 0.1500", 1.0), ("after", 0.0)] {
+                recorder.own(&format!("read {what}"));
+                (0..3).for_each(|_| sample(recorder, k));
+                recorder.own("end");
+                sample(recorder, 99.0);
+            }
+            recorder.own(end);
+        };
+        press(&mut recorder, 4, "pressed 4");
+        press(&mut recorder, 5, "failed 5 nothing was felt");
+        press(&mut recorder, 6, "read");
+        recorder.flush();
+        let presses = bench_presses(&std::fs::read(&path).unwrap());
+        assert_eq!(presses.len(), 1);
+        let press = &presses[0];
+        assert_eq!((press.number, press.at), (4, DVec3::new(1e-3, 2e-3, 3e-3)));
+        assert_eq!(
+            (press.rest[10], press.steps[0].counts[10]),
+            (1700.5, 1710.5)
+        );
+        assert!((press.steps[0].below - 0.15e-3).abs() < 1e-12);
     }
 }

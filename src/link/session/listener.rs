@@ -7,6 +7,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::timing::Timing;
+use crate::link::counted_line::CountedLine;
 use crate::link::{Address, Port, Recorder, Truths};
 use crate::live::{Doubt, Pipeline, Receiver, Rest, Sample, Traffic, Update};
 use crate::wire::{Hello, Message, encode};
@@ -83,7 +84,7 @@ pub struct Listener {
     pub(super) compared: Option<usize>,
     /// What a recording brings in pieces: a rest, and the counts of a line.
     pub(super) rest: Rest,
-    pub(super) line: Vec<f64>,
+    pub(super) line: CountedLine,
     /// Whether a recording has notes. Texts of the board are never taken for them then.
     pub(super) noted: bool,
     pub(super) measured: u64,
@@ -109,7 +110,7 @@ impl Listener {
             explained: Vec::new(),
             compared: None,
             rest: Rest::default(),
-            line: Vec::new(),
+            line: CountedLine::default(),
             noted: false,
             measured: 0,
             begun: Instant::now(),

@@ -5,8 +5,8 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::listener::{Listener, SessionEvent};
+use crate::link::counted_line::number;
 use crate::live::Sample;
-use crate::wire::MOST_CHANNELS;
 
 impl Listener {
     /// What the studio did when this was recorded.
@@ -36,11 +36,11 @@ impl Listener {
                     ))));
                 }
             }
-            ["part", from, values] => {
-                self.gather(from, values);
+            ["part" | "line", ..] => {
+                if let Some(counts) = self.line.take(own) {
+                    self.measure(&Sample { time_us, counts }, arrived, tell);
+                }
             }
-            ["line", values] => self.replay_line("0", values, time_us, arrived, tell),
-            ["line", from, values] => self.replay_line(from, values, time_us, arrived, tell),
             _ => {}
         }
     }
@@ -58,39 +58,4 @@ impl Listener {
             self.pipeline.set_rest(std::mem::take(&mut self.rest));
         }
     }
-
-    /// The end of a line of counts, with what was gathered of it before.
-    fn replay_line(
-        &mut self,
-        from: &str,
-        values: &str,
-        time_us: u64,
-        arrived: Instant,
-        tell: &mut impl FnMut(SessionEvent),
-    ) {
-        if self.gather(from, values) {
-            let counts = std::mem::take(&mut self.line);
-            self.measure(&Sample { time_us, counts }, arrived, tell);
-        }
-    }
-
-    /// Counts of a line from one channel on; none of it is used where those before them are missing.
-    fn gather(&mut self, from: &str, values: &str) -> bool {
-        let from = from.parse().unwrap_or(usize::MAX);
-        if from == 0 {
-            self.line.clear();
-        }
-        let piece: Option<Vec<f64>> = values.split(',').map(number).collect();
-        let piece = piece.filter(|p| from == self.line.len() && from + p.len() <= MOST_CHANNELS);
-        if let Some(piece) = &piece {
-            self.line.extend(piece);
-        } else {
-            self.line.clear();
-        }
-        piece.is_some()
-    }
-}
-
-fn number(text: &str) -> Option<f64> {
-    text.parse().ok().filter(|v: &f64| v.is_finite())
 }
