@@ -64,8 +64,11 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
     }
     let done = pressed(&args.out)?;
     let presses = reach.presses.len();
+    // Numbers are the lines of plan.csv, which holds what was in reach when it was written.
+    let number = |k: usize| if begun.is_some() { reach.asked[k] } else { k };
     let left: Vec<(usize, Planned)> = (reach.presses.iter().copied().enumerate())
-        .filter(|(k, _)| !done.contains(k))
+        .map(|(k, press)| (number(k), press))
+        .filter(|(number, _)| !done.contains(number))
         .collect();
     if !done.is_empty() {
         let there = plain::either(done.len(), "press", "presses");
