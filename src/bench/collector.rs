@@ -209,7 +209,7 @@ impl Collector {
 
     /// The machine's port is gone.
     pub fn unplugged(&mut self) {
-        self.lose("the machine's port is gone");
+        self.lose("the machine's port is gone", &mut Vec::new());
     }
 
     fn end(&mut self, how: Ended) {
@@ -240,8 +240,9 @@ impl Collector {
         self.end(Ended::Stopped(why));
     }
 
-    /// The machine can be told nothing any more.
-    fn lose(&mut self, why: &str) {
+    /// The machine cannot be believed any more: it is told to stop, and nothing is taken back.
+    fn lose(&mut self, why: &str, out: &mut Vec<u8>) {
+        Marlin::shout("M410", out);
         let before = self.wrong.take();
         let also = before.map_or(String::new(), |b| format!("{b}; and "));
         self.end(Ended::Stopped(format!(

@@ -16,6 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
 pub use self::args::CollectArgs;
+use super::common::make_folder;
 use super::listen::sensing_for;
 use super::out;
 use super::spared::Spared;
@@ -24,7 +25,7 @@ use crate::design::Sensing;
 use crate::io::bench_folder::{self, About, limb_key};
 use crate::io::machine_file::{self, MachineFile};
 use crate::io::project_file::LoadedProject;
-use crate::io::{outlet, points, source};
+use crate::io::{points, source};
 use crate::link::{Address, BenchOrder, Pace, Recorder, bench_presses, press_at_ports};
 use crate::plain;
 
@@ -38,13 +39,7 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
     Spared::of(&loaded).check("--out", Some(&args.out))?;
     let (about, file) = about(args, &loaded)?;
     let ports = ports(args)?;
-    std::fs::create_dir_all(&args.out).with_context(|| {
-        format!(
-            "{}: the folder cannot be created. Choose another",
-            args.out.display()
-        )
-    })?;
-    outlet::folder(&args.out)?;
+    make_folder(&args.out)?;
     let begun = About::read(&args.out)?;
     if let Some(before) = &begun {
         same(before, &about, &args.out)?;
@@ -72,7 +67,9 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
         .collect();
     if !done.is_empty() {
         let there = plain::either(done.len(), "press", "presses");
-        out::say(&format!("{there} of {presses} are there already"));
+        out::say(&format!(
+            "{there} of {presses} are there already; places are those that it was begun with"
+        ));
     }
     let limits = Limits {
         step: about.step_mm * 1e-3,

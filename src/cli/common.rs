@@ -115,19 +115,27 @@ fn say_repairs(loaded: &LoadedProject) {
     }
 }
 
-/// Makes the folder for results before anything is computed, and puts the bundled mesh into it where
-/// that is what was computed on.
+/// Makes a folder for results before anything is computed.
 ///
 /// # Errors
-/// When it cannot be written, or when another mesh of that name is there already.
-pub fn prepare_folder(loaded: &mut LoadedProject, folder: &Path) -> anyhow::Result<()> {
+/// When it cannot be made or written.
+pub fn make_folder(folder: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| {
         format!(
             "{}: the folder cannot be created. Choose another",
             folder.display()
         )
     })?;
-    outlet::folder(folder)?;
+    Ok(outlet::folder(folder)?)
+}
+
+/// Makes the folder for results before anything is computed, and puts the bundled mesh into it where
+/// that is what was computed on.
+///
+/// # Errors
+/// When it cannot be written, or when another mesh of that name is there already.
+pub fn prepare_folder(loaded: &mut LoadedProject, folder: &Path) -> anyhow::Result<()> {
+    make_folder(folder)?;
     if loaded.bundled {
         loaded.mesh_path = write_bundled_mesh(folder, &loaded.mesh_path)?;
     }

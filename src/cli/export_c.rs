@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, ensure};
+use anyhow::ensure;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
+use super::common::make_folder;
 use super::out;
+use crate::io::touch_file;
 use crate::io::touch_source::{AGREES_MM, FILES, Source};
-use crate::io::{outlet, touch_file};
 use crate::learning::portable::Precision;
 use crate::plain;
 
@@ -64,13 +65,7 @@ pub fn run(args: &ExportCArgs) -> anyhow::Result<()> {
         touches <= MOST_TOUCHES,
         "the estimator knows {touches} touches, and a board's table at most {MOST_TOUCHES}: train it on fewer (--train-touches)"
     );
-    std::fs::create_dir_all(&args.out).with_context(|| {
-        format!(
-            "{}: the folder cannot be created. Choose another",
-            args.out.display()
-        )
-    })?;
-    outlet::folder(&args.out)?;
+    make_folder(&args.out)?;
     let source = Source::new(&file.estimator, args.precision.asked());
     let origin = &file.header.origin;
     let about = format!(

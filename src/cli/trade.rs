@@ -4,15 +4,13 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::Context;
 use clap::Args;
 
-use super::common::{Common, QualityArg};
+use super::common::{Common, QualityArg, make_folder};
 use super::out;
 use super::progress::Bar;
 use crate::budget::Quality;
 use crate::design::Finest;
-use crate::io::outlet;
 use crate::io::project_file::LoadedProject;
 use crate::io::together::Together;
 use crate::io::trade_file::{self, Judge, Record};
@@ -51,13 +49,7 @@ pub struct TradeArgs {
 pub fn run(args: &TradeArgs) -> anyhow::Result<()> {
     let mut loaded = args.common.load()?;
     loaded.inputs.project.check()?;
-    std::fs::create_dir_all(&args.out).with_context(|| {
-        format!(
-            "{}: the folder cannot be created. Choose another",
-            args.out.display()
-        )
-    })?;
-    outlet::folder(&args.out)?;
+    make_folder(&args.out)?;
     let threads = args.common.in_pool(|| Ok(rayon::current_num_threads()))?;
     let asked = match (args.within_s, args.of_the_best_mm) {
         (Some(seconds), _) => Some(Asked::Within(seconds)),

@@ -109,7 +109,7 @@ impl Collector {
         let moved = self.machine.force(&self.rest, &before);
         if let Some(force) = moved.filter(|f| f.abs() > FREE_N) {
             let why = format!(
-                "the tip reads {force:.1} N more than before, though it is out of the limb's way: something touches it, or its sensor drifts"
+                "the tip reads {force:+.1} N since the press before, though it is out of the limb's way: something touches it, or its sensor drifts"
             );
             self.escape(why, now_us, out);
             return;

@@ -25,7 +25,10 @@ impl Collector {
         match heard {
             Heard::Restarted => self.restarted(now_us, out, tell),
             Heard::Failed(why) => {
-                self.lose(&format!("the machine cannot be trusted any more: {why}"));
+                self.lose(
+                    &format!("the machine cannot be trusted any more: {why}"),
+                    out,
+                );
             }
             Heard::Done(said) => self.done(&said, now_us, out, tell),
         }
@@ -38,7 +41,7 @@ impl Collector {
             self.restarts += 1;
             if self.wrong.is_some() || self.machine.home.is_empty() || self.restarts > RESTARTS {
                 let why = "the machine began anew, and knows no longer where the tip is";
-                self.lose(why);
+                self.lose(why, out);
                 return;
             }
             tell(News::Say(
@@ -88,7 +91,7 @@ impl Collector {
                     self.moves += 1;
                     self.next(now_us, out, tell);
                 }
-                Moved::Wrong(why) if self.phase == Phase::Escape => self.lose(&why),
+                Moved::Wrong(why) if self.phase == Phase::Escape => self.lose(&why, out),
                 Moved::Wrong(why) => self.escape(why, now_us, out),
             },
             Doing::Reading { .. } | Doing::Nothing => {}
@@ -111,7 +114,7 @@ impl Collector {
         if let Doing::Moving(motion) = &self.doing
             && motion.is_late(now_us)
         {
-            self.lose("the machine does not come to an end of its move");
+            self.lose("the machine does not come to an end of its move", out);
             return;
         }
         let (since, most) = match self.sample_us {

@@ -105,6 +105,10 @@ impl Case {
         }
     }
 
+    fn bench(&self, faults: PrinterFaults) -> Bench<'_> {
+        Bench::new(&self.machine, &self.surface, self.mount, faults)
+    }
+
     fn collector(&self, places: usize) -> Collector {
         let places: Vec<(DVec3, DVec3)> = (sample::random(&self.surface, 4 * places, 3, |_| true)
             .into_iter())
@@ -147,12 +151,7 @@ fn depths(news: &[News]) -> Vec<f64> {
 fn a_plan_is_pressed_step_by_step() {
     let case = Case::new();
     let mut collector = case.collector(6);
-    let mut bench = Bench::new(
-        &case.machine,
-        &case.surface,
-        case.mount,
-        PrinterFaults::default(),
-    );
+    let mut bench = case.bench(PrinterFaults::default());
     let news = bench.run(&mut collector, 1e4);
     assert_eq!(collector.ended(), Some(&Ended::Finished));
     assert_eq!(done(&news), [0, 1, 2, 3, 4, 5]);
@@ -179,15 +178,10 @@ fn lines_that_are_lost_or_garbled_change_nothing_but_the_time() {
         ..PrinterFaults::default()
     };
     let mut clean = case.collector(4);
-    let mut bench = Bench::new(
-        &case.machine,
-        &case.surface,
-        case.mount,
-        PrinterFaults::default(),
-    );
+    let mut bench = case.bench(PrinterFaults::default());
     let wanted = bench.run(&mut clean, 1e4);
     let mut collector = case.collector(4);
-    let mut bench = Bench::new(&case.machine, &case.surface, case.mount, faults);
+    let mut bench = case.bench(faults);
     let news = bench.run(&mut collector, 1e5);
     assert_eq!(collector.ended(), Some(&Ended::Finished));
     assert_eq!(done(&news), done(&wanted));
@@ -203,7 +197,7 @@ fn a_machine_that_began_anew_is_sent_home_and_the_press_is_repeated() {
         ..PrinterFaults::default()
     };
     let mut collector = case.collector(4);
-    let mut bench = Bench::new(&case.machine, &case.surface, case.mount, faults);
+    let mut bench = case.bench(faults);
     let news = bench.run(&mut collector, 1e5);
     assert!(bench.printer.restarts > 0);
     assert_eq!(collector.ended(), Some(&Ended::Finished));
@@ -213,7 +207,7 @@ fn a_machine_that_began_anew_is_sent_home_and_the_press_is_repeated() {
     machine.home.clear();
     let mut collector = case.collector(4);
     collector.machine = machine;
-    let mut bench = Bench::new(&case.machine, &case.surface, case.mount, faults);
+    let mut bench = case.bench(faults);
     bench.run(&mut collector, 1e5);
     let ended = collector.ended();
     assert!(
@@ -228,36 +222,21 @@ fn a_force_beyond_the_limit_stops_and_takes_back() {
     let mut collector = case.collector(4);
     collector.limits.most_force = 12.0;
     collector.limits.enough = 50.0;
-    let mut bench = Bench::new(
-        &case.machine,
-        &case.surface,
-        case.mount,
-        PrinterFaults::default(),
-    );
+    let mut bench = case.bench(PrinterFaults::default());
     // It is foreseen, and no press comes beyond it.
     let news = bench.run(&mut collector, 1e4);
     assert_eq!(done(&news).len(), 4);
     assert!(bench.hardest < 12.0, "{}", bench.hardest);
     // However stiff the limb is, the tip is stopped on its way.
     let mut collector = case.collector(4);
-    let mut bench = Bench::new(
-        &case.machine,
-        &case.surface,
-        case.mount,
-        PrinterFaults::default(),
-    );
+    let mut bench = case.bench(PrinterFaults::default());
     bench.contact.gives[0].1 = 2e-6;
     let news = bench.run(&mut collector, 1e4);
     assert_eq!(done(&news).len(), 4);
     assert!(bench.hardest < 35.0, "{}", bench.hardest);
     // Where the board is too slow for that, all ends, and the tip is taken back.
     let mut collector = case.collector(4);
-    let mut bench = Bench::new(
-        &case.machine,
-        &case.surface,
-        case.mount,
-        PrinterFaults::default(),
-    );
+    let mut bench = case.bench(PrinterFaults::default());
     (bench.contact.gives[0].1, bench.every_us) = (2e-6, 400_000);
     bench.run(&mut collector, 1e4);
     let ended = collector.ended();
@@ -273,12 +252,7 @@ fn a_force_beyond_the_limit_stops_and_takes_back() {
 fn a_board_that_falls_silent_stops_it_with_the_tip_taken_back() {
     let case = Case::new();
     let mut collector = case.collector(3);
-    let mut bench = Bench::new(
-        &case.machine,
-        &case.surface,
-        case.mount,
-        PrinterFaults::default(),
-    );
+    let mut bench = case.bench(PrinterFaults::default());
     while bench.hardest < 5.0 {
         bench.run(&mut collector, 0.1);
     }
@@ -296,12 +270,7 @@ fn a_board_that_falls_silent_stops_it_with_the_tip_taken_back() {
 fn a_limb_that_is_not_where_it_should_be_is_found_out() {
     let case = Case::new();
     let mut collector = case.collector(12);
-    let mut bench = Bench::new(
-        &case.machine,
-        &case.surface,
-        case.mount,
-        PrinterFaults::default(),
-    );
+    let mut bench = case.bench(PrinterFaults::default());
     bench.contact.mount.shift.z += 500e-3;
     let news = bench.run(&mut collector, 1e5);
     let ended = collector.ended();
@@ -316,12 +285,7 @@ fn a_limb_that_is_not_where_it_should_be_is_found_out() {
 fn what_is_paused_goes_on_and_what_is_stopped_ends_out_of_the_way() {
     let case = Case::new();
     let mut collector = case.collector(3);
-    let mut bench = Bench::new(
-        &case.machine,
-        &case.surface,
-        case.mount,
-        PrinterFaults::default(),
-    );
+    let mut bench = case.bench(PrinterFaults::default());
     bench.run(&mut collector, 5.0);
     collector.pause(true);
     bench.run(&mut collector, 200.0);
@@ -334,4 +298,32 @@ fn what_is_paused_goes_on_and_what_is_stopped_ends_out_of_the_way() {
     bench.run(&mut collector, 100.0);
     assert_eq!(collector.ended(), Some(&Ended::Stopped("asked to".into())));
     assert_eq!(bench.counts()[3], 400.0);
+}
+
+#[test]
+fn a_machine_that_cannot_be_believed_is_told_to_stop() {
+    let case = Case::new();
+    let mut collector = case.collector(2);
+    let mut bench = case.bench(PrinterFaults::default());
+    bench.run(&mut collector, 3.0);
+    let mut out = Vec::new();
+    let halted = b"Error:Printer halted. kill() called!\n";
+    collector.heard(halted, bench.now_us, &mut out, &mut |_| {});
+    assert!(out.ends_with(b"M410\n"));
+    assert!(matches!(collector.ended(), Some(Ended::Stopped(_))));
+}
+
+#[test]
+fn a_limb_that_turns_into_the_tip_stops_the_machine() {
+    let case = Case::new();
+    let mut collector = case.collector(3);
+    let mut bench = case.bench(PrinterFaults::default());
+    while collector.left() > 2 {
+        bench.run(&mut collector, 0.1);
+    }
+    // The tip is out of the way, and something presses it all the same.
+    let mut out = Vec::new();
+    let counts = [2048.0, 2048.0, 2048.0, 400.0 + 60.0 / NEWTON_PER_COUNT];
+    collector.felt(&counts, bench.now_us, &mut out, &mut |_| {});
+    assert!(out.starts_with(b"M410\n"));
 }

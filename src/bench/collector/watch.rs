@@ -13,8 +13,14 @@ impl Collector {
         tell: &mut dyn FnMut(News),
     ) {
         self.sample_us = Some(now_us);
-        if self.is_near() && !self.rest.is_empty() {
-            let force = self.machine.force(counts, &self.rest);
+        if self.is_watched() {
+            // A limb that turns into the tip is felt against the rest before it.
+            let rest = if self.rest.is_empty() {
+                &self.last_rest
+            } else {
+                &self.rest
+            };
+            let force = self.machine.force(counts, rest);
             self.hardest = self.hardest.max(force.unwrap_or(0.0));
             if let Some(force) = force.filter(|f| *f > self.limits.most_force) {
                 let most = self.limits.most_force;
@@ -81,10 +87,9 @@ impl Collector {
         self.doing = Doing::Moving(motion);
     }
 
-    /// Whether the tip may touch.
-    pub(super) fn is_near(&self) -> bool {
-        use Phase::{Approach, Feel, Read, Seek, Step, Withdraw};
-        matches!(self.phase, Approach | Seek | Feel | Step | Read | Withdraw)
+    /// Whether a force can be too large: always but while the tip is taken back from one.
+    fn is_watched(&self) -> bool {
+        !matches!(self.phase, Phase::Opening | Phase::Escape | Phase::Over)
     }
 
     /// Whether the tip touches, by its own sensor or, where it has none, by the gauges.
