@@ -13,7 +13,7 @@ mod plan;
 mod press;
 mod printer;
 
-pub use collector::{Collector, Ended, News};
+pub use collector::{Answer, Collector, Ended, News, Reference};
 pub use contact::Contact;
 pub use machine::{Axis, Machine, Pose, TipSensor};
 pub use marlin::{Heard, Marlin, position_in};

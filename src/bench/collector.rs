@@ -1,12 +1,15 @@
 //! Press after press, as a plan says: what the machine is told next, from what it and the board say.
 
+mod check;
 mod motion;
 mod phases;
 mod talk;
 mod watch;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
+use self::check::Check;
+pub use self::check::{Answer, Reference};
 use self::motion::Motion;
 use super::machine::Machine;
 use super::marlin::Marlin;
@@ -27,6 +30,10 @@ pub enum News {
         /// Why it failed.
         failed: Option<String>,
     },
+    /// What the limb answered where it is pressed again and again, when it was pressed there for the first time.
+    Answer(Answer),
+    /// So many presses that were over are none: they are made again.
+    Discarded(usize),
     /// For people.
     Say(String),
 }
@@ -97,6 +104,7 @@ pub struct Collector {
     marlin: Marlin,
     /// What is still to be pressed, with its numbers.
     plan: VecDeque<(usize, Planned)>,
+    check: Check,
     retreat: f64,
     phase: Phase,
     doing: Doing,
@@ -118,6 +126,8 @@ pub struct Collector {
     /// Why all of it ends, while the tip is still taken back.
     wrong: Option<String>,
     failures: usize,
+    /// Presses that failed once, and are tried once more.
+    failed_before: BTreeSet<usize>,
     /// Presses that were tried, and that failed.
     tried: [usize; 2],
     restarts: u32,
@@ -145,6 +155,7 @@ impl Collector {
             limits,
             marlin: Marlin::default(),
             plan: plan.into_iter().collect(),
+            check: Check::default(),
             retreat,
             phase: Phase::Opening,
             doing: Doing::Nothing,
@@ -160,6 +171,7 @@ impl Collector {
             failed: None,
             wrong: None,
             failures: 0,
+            failed_before: BTreeSet::new(),
             tried: [0; 2],
             restarts: 0,
             sample_us: None,
@@ -181,6 +193,14 @@ impl Collector {
     #[must_use]
     pub fn left(&self) -> usize {
         self.plan.len()
+    }
+
+    /// What is pressed now, or next.
+    fn planned(&self) -> Option<Planned> {
+        match &self.check.reference {
+            Some(reference) if self.check.now => Some(reference.at),
+            _ => self.plan.front().map(|(_, planned)| *planned),
+        }
     }
 
     /// Lines that had to be sent again.

@@ -18,7 +18,7 @@ pub struct PrinterFaults {
     pub garble_answer: f64,
     /// It begins anew, and believes that it stands at zero.
     pub reset: f64,
-    /// Steps are lost: it says that it is where it was sent to, less than half of the way.
+    /// Every second step of a move is lost: it says that it is where it was sent to, after half of the way.
     pub stall: f64,
 }
 
@@ -32,6 +32,8 @@ struct Drive {
     target: f64,
     /// Units a second.
     speed: f64,
+    /// Share of its steps that are really made.
+    kept: f64,
 }
 
 /// A printer without a port or a clock of its own.
@@ -69,6 +71,7 @@ impl SimulatedPrinter {
             believed: at,
             target: at,
             speed: 10.0,
+            kept: 1.0,
         };
         Self {
             drives: axes.into_iter().map(drive).collect(),
@@ -276,10 +279,8 @@ impl SimulatedPrinter {
             if let Some(feed) = feed {
                 drive.speed = feed.max(0.1);
             }
-            if stalls {
-                // It goes on from half of the way, and knows nothing of it.
-                drive.real -= 0.5 * (to - drive.believed);
-            }
+            // Every second step is lost on this way, and it knows nothing of it.
+            drive.kept = if stalls { 0.5 } else { 1.0 };
             drive.target = *to;
         }
     }
@@ -299,7 +300,7 @@ impl SimulatedPrinter {
             } else {
                 drive.believed + step
             };
-            drive.real += step;
+            drive.real += drive.kept * step;
         }
         self.work(out);
         if self.waiting.is_empty() {

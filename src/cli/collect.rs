@@ -1,6 +1,7 @@
 //! `hapdef collect`: a machine presses the limb at many places, and what the gauges read is written down.
 
 mod args;
+mod reference;
 mod simulated;
 
 use std::collections::BTreeSet;
@@ -20,7 +21,7 @@ use super::common::make_folder;
 use super::listen::sensing_for;
 use super::out;
 use super::spared::Spared;
-use crate::bench::{Collector, Ended, Limits, News, Planned, Reach, plan};
+use crate::bench::{Collector, Ended, Limits, News, Planned, Reach, Reference, plan};
 use crate::design::Sensing;
 use crate::io::bench_folder::{self, About, limb_key};
 use crate::io::machine_file::{self, MachineFile};
@@ -46,7 +47,9 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
     }
     let sensing = sensing_for(&args.common, &loaded)?;
     let places = places(args, &loaded, &sensing, begun.is_some())?;
-    let reach = reached(&places, &loaded, &sensing, &file)?;
+    let reach = reached(&places, &loaded, &sensing, &file, &mut |text| {
+        out::say(text)
+    })?;
     if begun.is_none() {
         about.write(&args.out)?;
         let all: Vec<_> = reach.presses.iter().map(|p| (p.at, p.normal)).collect();
@@ -68,7 +71,7 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
     if !done.is_empty() {
         let there = plain::either(done.len(), "press", "presses");
         out::say(&format!(
-            "{there} of {presses} are there already; places are those that it was begun with"
+            "{there} of {presses} are there already; places are those that it was begun with, and --places and --points are not looked at"
         ));
     }
     let limits = Limits {
@@ -80,6 +83,15 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
     };
     let machine = file.machine.clone();
     let mut collector = Collector::new(machine, limits, left.iter().copied(), reach.retreat);
+    match reference::reference(args, &loaded, &sensing, &file)? {
+        Some(reference) => {
+            out::say(&on_reference(&reference));
+            collector = collector.checked_at(reference);
+        }
+        None => out::say(
+            "steps that a motor loses are not looked for: no place is pressed again and again",
+        ),
+    }
     let (ended, failed) = if left.is_empty() {
         (Ended::Finished, 0)
     } else {
@@ -206,6 +218,7 @@ fn reached(
     loaded: &LoadedProject,
     sensing: &Sensing,
     file: &MachineFile,
+    say: &mut dyn FnMut(&str),
 ) -> anyhow::Result<Reach> {
     let surface = &sensing.drawn.map.mesh;
     let stance = loaded.inputs.project.part.axis.stance(&loaded.inputs.part);
@@ -214,7 +227,7 @@ fn reached(
         .map_err(anyhow::Error::msg)?;
     if !off.is_empty() {
         let each: Vec<String> = off.iter().map(|o| format!("{:.2}", o * 1e3)).collect();
-        out::say(&format!(
+        say(&format!(
             "the limb stands as its touched points say; they are {} mm off",
             each.join(", ")
         ));
@@ -254,6 +267,17 @@ fn say_plan(reach: &Reach, about: &About) {
             plain::either(reach.left_out.len(), "place is", "places are"),
         ));
     }
+}
+
+fn on_reference(reference: &Reference) -> String {
+    let at = reference.at.at * 1e3;
+    format!(
+        "({:.1}, {:.1}, {:.1}) mm is pressed at first, after every {} and at the end, to see whether the machine lost steps",
+        at.x,
+        at.y,
+        at.z,
+        plain::either(reference.every, "press", "presses")
+    )
 }
 
 /// Presses that are in the folder's recordings.
@@ -296,11 +320,18 @@ fn press(
             failures.push(number);
             out::say(&format!("press {number} failed: {why}"));
         }
+        News::Answer(answer) => {
+            if let Err(error) = bench_folder::write_answer(&args.out, &answer) {
+                out::say(&format!("hapdef: {error}"));
+            }
+        }
+        News::Discarded(presses) => done = done.saturating_sub(presses),
         News::Note(_) | News::Keep => {}
     };
     let ended = match ports {
         Some((printer, board)) => {
             let (orders, inbox) = channel();
+            obey_signals(orders.clone());
             obey_stdin(orders);
             press_at_ports(collector, (&printer, &board), recorder, &inbox, tell)
         }
@@ -314,6 +345,16 @@ fn press(
         )?,
     };
     Ok((ended.map_err(anyhow::Error::msg)?, failed))
+}
+
+/// Ctrl-C and a request to end take the tip back before the program ends.
+fn obey_signals(orders: Sender<BenchOrder>) {
+    let stop = move || {
+        let _ = orders.send(BenchOrder::Stop);
+    };
+    if ctrlc::set_handler(stop).is_err() {
+        out::say("Ctrl-C does not take the tip back here: write stop");
+    }
 }
 
 /// Lines on standard input: pause, resume, stop, kill.

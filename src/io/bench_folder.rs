@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `bench.json` | the limb, the machine, the limits and how readings become strains |
 //! | `plan.csv` | the places, in their order |
+//! | `answer.json` | what the limb answered at first where it is pressed again and again |
 //! | `part-001.hapdrec` … | what was read, a file for each time that it was begun; only ever appended to |
 
 use std::path::{Path, PathBuf};
@@ -15,10 +16,12 @@ use super::fingerprint::Fingerprint;
 use super::npz::{self, NpzFile};
 use super::table::Writing;
 use super::{FileError, atomic, points, source};
+use crate::bench::Answer;
 use crate::design::Inputs;
 
 const FORMAT: u32 = 1;
 const ABOUT: &str = "bench.json";
+const ANSWER: &str = "answer.json";
 /// The planned places.
 pub const PLAN: &str = "plan.csv";
 
@@ -125,6 +128,33 @@ impl About {
             .map_err(|e| FileError::broken(&path, e.to_string()))?;
         atomic::write(&path, format!("{text}\n").as_bytes())
     }
+}
+
+/// What the limb answered at first where a run presses it again and again, if it was pressed there already.
+///
+/// # Errors
+/// [`FileError`] where it cannot be read.
+pub fn read_answer(folder: &Path) -> Result<Option<Answer>, FileError> {
+    let path = folder.join(ANSWER);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let text = source::read_text(&path)?;
+    let answer = serde_json::from_str(&text);
+    answer
+        .map(Some)
+        .map_err(|e| FileError::broken(&path, format!("it is damaged: {}", crate::plain::json(&e))))
+}
+
+/// Writes it.
+///
+/// # Errors
+/// [`FileError`] where it cannot be written.
+pub fn write_answer(folder: &Path, answer: &Answer) -> Result<(), FileError> {
+    let path = folder.join(ANSWER);
+    let text = serde_json::to_string_pretty(answer)
+        .map_err(|e| FileError::broken(&path, e.to_string()))?;
+    atomic::write(&path, format!("{text}\n").as_bytes())
 }
 
 /// Writes the places of a plan with their normals (m).

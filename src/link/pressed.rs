@@ -44,6 +44,7 @@ pub fn bench_presses(bytes: &[u8]) -> Vec<BenchPress> {
     scribe.done
 }
 
+/// Of a run that presses one place again and again, only what stands between two such presses that were alike is believed.
 #[derive(Default)]
 struct Scribe {
     board: Option<Hello>,
@@ -51,6 +52,8 @@ struct Scribe {
     /// What is read just now, with when it began.
     reading: Option<(String, Reading, u64)>,
     done: Vec<BenchPress>,
+    /// Presses since that place was last found to be as at first, where there is such a place.
+    doubted: Option<Vec<BenchPress>>,
     /// Of a board that prints lines.
     line: CountedLine,
 }
@@ -86,8 +89,15 @@ impl Scribe {
             "again" | "failed" => (self.open, self.reading) = (None, None),
             "pressed" => {
                 let whole = |p: &BenchPress| !p.rest.is_empty() && !p.steps.is_empty();
-                self.done.extend(self.open.take().filter(whole));
+                let to = self.doubted.as_mut().unwrap_or(&mut self.done);
+                to.extend(self.open.take().filter(whole));
             }
+            "check" => {
+                (self.open, self.reading) = (None, None);
+                self.doubted.get_or_insert_default();
+            }
+            "checked" => self.done.append(self.doubted.get_or_insert_default()),
+            "moved" => self.doubted = Some(Vec::new()),
             _ => {}
         }
     }
@@ -172,5 +182,37 @@ mod tests {
             (1700.5, 1710.5)
         );
         assert!((press.steps[0].below - 0.15e-3).abs() < 1e-12);
+    }
+
+    /// A machine that lost steps does not say so: what it pressed since its limb last answered as at first is left out.
+    #[test]
+    fn presses_that_were_not_checked_are_not_believed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("part-001.hapdrec");
+        let mut recorder = Recorder::create(&path).unwrap();
+        let place = "1.0 2.0 3.0 1.0 0.0 0.0";
+        let press = |recorder: &mut Recorder, what: &str, end: &str| {
+            recorder.own(&format!("{what} {place}"));
+            for what in ["rest", "depth 0.1500", "after"] {
+                recorder.own(&format!("read {what}"));
+                let counts = vec![1700.5; 11];
+                recorder.sample(&Sample { time_us: 7, counts });
+                recorder.own("end");
+            }
+            recorder.own(end);
+        };
+        press(&mut recorder, "check", "checked");
+        press(&mut recorder, "press 0", "pressed 0");
+        press(&mut recorder, "check", "checked");
+        press(&mut recorder, "press 1", "pressed 1");
+        press(&mut recorder, "check", "moved the tip meets it later");
+        press(&mut recorder, "check", "checked");
+        press(&mut recorder, "press 2", "pressed 2");
+        press(&mut recorder, "check", "checked");
+        press(&mut recorder, "press 3", "pressed 3");
+        recorder.flush();
+        let presses = bench_presses(&std::fs::read(&path).unwrap());
+        let numbers: Vec<usize> = presses.iter().map(|p| p.number).collect();
+        assert_eq!(numbers, [0, 2]);
     }
 }

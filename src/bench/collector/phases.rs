@@ -1,6 +1,7 @@
 //! One press, from the tip out of the way to the tip out of the way.
 
 use super::super::machine::Pose;
+use super::super::plan::Planned;
 use super::super::press::Reading;
 use super::{Collector, Doing, Ended, FAIL, FAILURES, FREE_N, News, Phase};
 
@@ -24,13 +25,20 @@ impl Collector {
         out: &mut Vec<u8>,
         tell: &mut dyn FnMut(News),
     ) {
-        let Some((number, planned)) = self.plan.front() else {
+        if self.check.is_due(self.plan.len()) {
+            self.check.begin();
+        }
+        let Some(planned) = self.planned() else {
             self.end(Ended::Finished);
             return;
         };
+        let what = match self.plan.front() {
+            Some((number, _)) if !self.check.now => format!("press {number}"),
+            _ => "check".into(),
+        };
         let (p, n) = (planned.at * 1e3, planned.normal);
         tell(News::Note(format!(
-            "press {number} {:.4} {:.4} {:.4} {:.5} {:.5} {:.5}",
+            "{what} {:.4} {:.4} {:.4} {:.5} {:.5} {:.5}",
             p.x, p.y, p.z, n.x, n.y, n.z
         )));
         self.phase = Phase::Retract;
@@ -48,12 +56,23 @@ impl Collector {
             Doing::Reading { reading, .. } => Some(reading),
             _ => None,
         };
-        let Some(pose) = self.plan.front().map(|(_, planned)| planned.pose) else {
+        match self.phase {
+            // The next look begins a press, unless it is paused.
+            Phase::Opening => {
+                self.phase = Phase::Retract;
+                return;
+            }
+            Phase::Escape => {
+                self.give_up();
+                return;
+            }
+            _ => {}
+        }
+        let Some(pose) = self.planned().map(|planned| planned.pose) else {
             self.end(Ended::Finished);
             return;
         };
         match self.phase {
-            Phase::Opening => self.phase = Phase::Retract,
             Phase::Retract => self.turn(&pose, now_us, out),
             Phase::Turn => {
                 self.phase = Phase::Rest;
@@ -77,9 +96,9 @@ impl Collector {
                 self.phase = Phase::After;
                 self.read(Some("after"), now_us, tell);
             }
+            Phase::After if self.check.now => self.checked(now_us, out, tell),
             Phase::After => self.pressed(tell),
-            Phase::Escape => self.give_up(),
-            Phase::Over => {}
+            Phase::Opening | Phase::Escape | Phase::Over => {}
         }
     }
 
@@ -147,6 +166,7 @@ impl Collector {
             self.withdraw(now_us, out);
         } else if self.touches(&mean) {
             self.contact = self.radial;
+            self.check.met(self.radial - pose.radial);
             self.forces = [None, self.machine.force(&mean, &self.rest)];
             tell(News::Note(format!(
                 "contact {:.4}",
@@ -176,6 +196,9 @@ impl Collector {
         let force = self.machine.force(&reading.mean(), &self.rest);
         self.forces = [self.forces[1], force];
         let depth = self.contact - self.radial;
+        if self.check.now {
+            self.check.read(depth, force, reading, &self.rest);
+        }
         let step = self.next_step(force);
         let enough = depth + 0.5 * self.limits.step >= self.limits.depth
             || force.is_some_and(|f| f >= self.limits.enough)
@@ -210,20 +233,29 @@ impl Collector {
     }
 
     pub(super) fn pressed(&mut self, tell: &mut dyn FnMut(News)) {
-        let Some((number, _)) = self.plan.pop_front() else {
+        let Some((number, planned)) = self.plan.pop_front() else {
             return;
         };
         let failed = self.failed.take();
-        match &failed {
-            Some(why) => tell(News::Note(format!("failed {number} {why}"))),
-            None => tell(News::Note(format!("pressed {number}"))),
+        if let Some(why) = &failed {
+            tell(News::Note(format!("failed {number} {why}")));
+        } else {
+            tell(News::Note(format!("pressed {number}")));
+            self.check.made(number, planned);
         }
         self.restarts = 0;
         self.failures = failed.as_ref().map_or(0, |_| self.failures + 1);
         let why = failed.clone();
         self.tried[0] += 1;
         self.tried[1] += usize::from(why.is_some());
-        tell(News::Press { number, failed });
+        match failed {
+            None => tell(News::Press { number, failed }),
+            Some(why) if !self.check.look_first(number, planned, &why) => {
+                self.failed(number, planned, why, tell);
+            }
+            // Whether it is this press or the machine is looked at first.
+            Some(_) => {}
+        }
         let [tried, none] = self.tried;
         let often = none >= FAILURES && none as f64 > FAIL * tried as f64;
         if let Some(why) = why.filter(|_| self.failures >= FAILURES || often) {
@@ -233,11 +265,30 @@ impl Collector {
             )));
             return;
         }
-        if self.plan.is_empty() {
+        let over = self.plan.is_empty() && !self.check.is_due(0);
+        if over {
             self.end(Ended::Finished);
             return;
         }
         // The next look begins the next one, unless it is paused.
         self.phase = Phase::Retract;
+    }
+
+    /// A press failed, and not because the machine stands where it should not: it is tried once more at the end.
+    pub(super) fn failed(
+        &mut self,
+        number: usize,
+        planned: Planned,
+        why: String,
+        tell: &mut dyn FnMut(News),
+    ) {
+        if self.failed_before.insert(number) {
+            let text = format!("press {number} failed: {why}. It is tried again at the end");
+            tell(News::Say(text));
+            self.plan.push_back((number, planned));
+        } else {
+            let failed = Some(why);
+            tell(News::Press { number, failed });
+        }
     }
 }

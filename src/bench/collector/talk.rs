@@ -48,20 +48,25 @@ impl Collector {
                 "the machine began anew: its axes are sent home, and the press is repeated".into(),
             ));
             self.unmake(tell);
+            self.doubt("the machine began anew", tell);
         }
         self.open(!opening, now_us, out);
     }
 
     /// The press that goes on is none: it is made again.
     fn unmake(&mut self, tell: &mut dyn FnMut(News)) {
-        if let Some((number, _)) = self.plan.front() {
-            tell(News::Note(format!("again {number}")));
+        match self.plan.front() {
+            Some((number, _)) if !self.check.now => {
+                tell(News::Note(format!("again {number}")));
+            }
+            _ => tell(News::Note("again".into())),
         }
+        self.check.now = false;
         self.failed = None;
     }
 
     /// Says what the machine must know before it moves.
-    fn open(&mut self, home: bool, now_us: u64, out: &mut Vec<u8>) {
+    pub(super) fn open(&mut self, home: bool, now_us: u64, out: &mut Vec<u8>) {
         self.phase = Phase::Opening;
         let home = self.machine.home.iter().filter(|_| home);
         let orders = home.chain(&self.machine.begin).cloned().collect();

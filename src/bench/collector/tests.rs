@@ -18,6 +18,10 @@ struct Bench<'a> {
     every_us: u64,
     /// What the printer has said, on its way.
     said: Vec<u8>,
+    /// Where the limb was really pressed last (m).
+    place: DVec3,
+    /// Where it was, each time that a press was over.
+    pressed: Vec<(usize, DVec3)>,
 }
 
 const NEWTON_PER_COUNT: f64 = 0.05;
@@ -44,6 +48,8 @@ impl<'a> Bench<'a> {
             silent_from: None,
             every_us: TURN_US,
             said: Vec::new(),
+            place: DVec3::ZERO,
+            pressed: Vec::new(),
         }
     }
 
@@ -54,8 +60,13 @@ impl<'a> Bench<'a> {
         let push = self.contact.push(&pose);
         let force = push.map_or(0.0, |p| p.touch.force);
         self.hardest = self.hardest.max(force);
-        let place = push.map_or(DVec3::ZERO, |p| p.touch.position * 1e3);
-        let mut counts: Vec<f64> = place.to_array().map(|x| 2048.0 + x).to_vec();
+        self.place = push.map_or(self.place, |p| p.touch.position);
+        // Strains change with the place about as those of a limb like the paper's do.
+        let waves = self
+            .place
+            .to_array()
+            .map(|x| 20.0 * force * (x / 0.015).sin());
+        let mut counts: Vec<f64> = waves.map(|x| (2048.0 + x).round()).to_vec();
         counts.push((400.0 + force / NEWTON_PER_COUNT).round());
         counts
     }
@@ -66,6 +77,7 @@ impl<'a> Bench<'a> {
         let until = self.now_us + (seconds * 1e6) as u64;
         while collector.ended().is_none() && self.now_us < until {
             let mut out = Vec::new();
+            let known = news.len();
             let mut tell = |n| news.push(n);
             if self.silent_from.is_none_or(|from| self.now_us < from)
                 && self.now_us.is_multiple_of(self.every_us)
@@ -83,8 +95,25 @@ impl<'a> Bench<'a> {
             self.printer.receive(&out, &mut self.said);
             self.now_us += TURN_US;
             self.printer.say(self.now_us, &mut self.said);
+            self.note(&news[known..]);
         }
         news
+    }
+}
+
+impl Bench<'_> {
+    /// Remembers where what was pressed really was.
+    fn note(&mut self, news: &[News]) {
+        for one in news {
+            match one {
+                News::Press {
+                    number,
+                    failed: None,
+                } => self.pressed.push((*number, self.place)),
+                News::Discarded(count) => self.pressed.truncate(self.pressed.len() - count),
+                _ => {}
+            }
+        }
     }
 }
 
@@ -311,6 +340,81 @@ fn a_machine_that_cannot_be_believed_is_told_to_stop() {
     collector.heard(halted, bench.now_us, &mut out, &mut |_| {});
     assert!(out.ends_with(b"M410\n"));
     assert!(matches!(collector.ended(), Some(Ended::Stopped(_))));
+}
+
+#[test]
+fn steps_that_a_motor_loses_are_noticed_and_their_presses_made_again() {
+    let case = Case::new();
+    let faults = PrinterFaults {
+        stall: 0.004,
+        ..PrinterFaults::default()
+    };
+    let far = |collector: &Collector, pressed: &[(usize, DVec3)]| {
+        let wanted: Vec<(usize, Planned)> = collector.plan.iter().copied().collect();
+        farthest(&wanted, pressed)
+    };
+    // Believed as it says, some are at wrong places.
+    let blind = case.collector(40);
+    let mut bench = case.bench(faults);
+    let mut collector = case.collector(40);
+    bench.run(&mut collector, 1e5);
+    assert!(far(&blind, &bench.pressed) > 3e-3);
+    // Looked at again and again, none is.
+    let reference = Reference {
+        // There, the waves rise along all axes.
+        at: blind.plan[4].1,
+        every: 5,
+        answer: None,
+    };
+    let mut bench = case.bench(faults);
+    let mut collector = case.collector(40).checked_at(reference.clone());
+    let news = bench.run(&mut collector, 1e6);
+    assert_eq!(collector.ended(), Some(&Ended::Finished));
+    let mut numbers: Vec<usize> = bench.pressed.iter().map(|p| p.0).collect();
+    numbers.sort_unstable();
+    assert_eq!(numbers, (0..blind.left()).collect::<Vec<_>>());
+    let off = far(&blind, &bench.pressed);
+    assert!(off < 1e-3, "{off}");
+    let again = |n: &&News| matches!(n, News::Discarded(_));
+    assert!(news.iter().filter(again).count() >= 2);
+    // Without a way to find its place it is not gone on with.
+    let mut bench = case.bench(faults);
+    let mut collector = case.collector(40).checked_at(reference);
+    collector.machine.home.clear();
+    bench.run(&mut collector, 1e6);
+    let ended = collector.ended();
+    assert!(
+        matches!(ended, Some(Ended::Stopped(why)) if why.contains("lost steps")),
+        "{ended:?}"
+    );
+}
+
+/// The farthest that a place was pressed from where it should have been (m).
+fn farthest(wanted: &[(usize, Planned)], pressed: &[(usize, DVec3)]) -> f64 {
+    let off = pressed.iter().map(|(number, place)| {
+        let planned = wanted.iter().find(|w| w.0 == *number).unwrap();
+        planned.1.at.distance(*place)
+    });
+    off.fold(0.0, f64::max)
+}
+
+#[test]
+fn a_press_that_failed_is_tried_again_at_the_end() {
+    let case = Case::new();
+    let mut collector = case.collector(6);
+    // A place that is beside the limb at first.
+    let lost = collector.plan[2].1.pose.along;
+    collector.plan[2].1.pose.along += 0.3;
+    let mut bench = case.bench(PrinterFaults::default());
+    while collector.plan.front().is_some_and(|p| p.0 != 3) {
+        bench.run(&mut collector, 0.1);
+    }
+    let last = collector.plan.back_mut().unwrap();
+    assert_eq!(last.0, 2);
+    last.1.pose.along = lost;
+    let news = bench.run(&mut collector, 1e4);
+    assert_eq!(collector.ended(), Some(&Ended::Finished));
+    assert_eq!(done(&news), [3, 4, 5, 2]);
 }
 
 #[test]

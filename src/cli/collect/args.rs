@@ -48,6 +48,10 @@ pub struct CollectArgs {
     /// The force at which the machine stops and takes its tip back (N).
     #[arg(long, default_value_t = 35.0, value_parser = between(0.1, 1e4))]
     pub most_force: f64,
+    /// Presses between two of the reference: a place that is pressed again and again, so that steps that a motor lost are noticed,
+    /// and what was pressed since then is made again. 0: never.
+    #[arg(long, default_value_t = 20, value_parser = whole(0, 100_000))]
+    pub check: usize,
     /// Only write the plan, and say what of it is in reach and how long it takes.
     #[arg(long)]
     pub plan_only: bool,
