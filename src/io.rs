@@ -7,6 +7,7 @@ pub mod dataset_file;
 pub mod examples;
 pub mod fingerprint;
 pub mod glb;
+pub mod handover;
 pub mod machine_file;
 pub mod mesh_file;
 pub mod npy;

@@ -83,6 +83,8 @@ pub mod link;
 pub mod live;
 pub mod memory;
 pub mod mesh;
+#[allow(missing_docs)]
+pub mod paper;
 pub mod parameter_study;
 pub mod pca;
 pub mod placement;
@@ -102,3 +104,4 @@ pub mod tally;
 pub mod trade;
 pub mod uncertainty;
 pub mod wire;
+pub mod workshop;

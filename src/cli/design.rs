@@ -11,6 +11,7 @@ use crate::design::{self, Design};
 use crate::evaluation::{BASELINE, EvaluationRow};
 use crate::io::artifacts::{self, Provenance};
 use crate::io::together::Together;
+use crate::paper::Format;
 use crate::placement::{SelectorKind, SensorSet};
 use crate::plain;
 use crate::project::Project;
@@ -19,7 +20,7 @@ use crate::project::Project;
 pub struct DesignArgs {
     #[command(flatten)]
     pub common: Common,
-    /// Folder for report.html, sites.csv, design.json, dataset.npz and design.hapdef.toml.
+    /// Folder for report.html, sites.csv, design.json, dataset.npz, design.hapdef.toml and what the workshop is given.
     #[arg(long)]
     pub out: PathBuf,
     /// Gauges to place.
@@ -34,6 +35,12 @@ pub struct DesignArgs {
     /// The comparison of the paper, whatever the project says: its four selectors, judged by regression.
     #[arg(long)]
     pub paper: bool,
+    /// Leave out what the workshop is given: report.pdf, template.pdf, wiring.csv, bill.csv and hapd_config.h.
+    #[arg(long)]
+    pub no_workshop: bool,
+    /// Sheets of report.pdf and template.pdf: a4 or letter.
+    #[arg(long, default_value = "a4")]
+    pub sheet: Format,
 }
 
 /// Runs the command.
@@ -81,7 +88,13 @@ pub fn run(args: &DesignArgs) -> anyhow::Result<()> {
         version: env!("CARGO_PKG_VERSION"),
         taken_in: loaded.repairs.in_words(loaded.inputs.project.part.body),
     };
-    let files = artifacts::write_into(&report, &loaded.inputs, &design, &provenance)?;
+    let files = artifacts::write_into(
+        &report,
+        &loaded.inputs,
+        &design,
+        &provenance,
+        (!args.no_workshop).then_some(args.sheet),
+    )?;
     if args.common.json {
         return out::line(&artifacts::summary(&loaded.inputs, &design).to_string());
     }

@@ -9,11 +9,12 @@ use super::npz::NpzFile;
 use super::run::as_computed;
 use super::table::Writing;
 use super::together::Together;
-use super::{FileError, atomic, project_file, report, source};
+use super::{FileError, atomic, handover, project_file, report, source};
 use crate::dataset::Dataset;
 use crate::design::{Design, Inputs};
 use crate::evaluation::{EstimatorKind, EvaluationRow};
 use crate::placement::expected_error::ASSUMES;
+use crate::paper::Format;
 use crate::placement::information::Geometry;
 use crate::project::Project;
 
@@ -34,10 +35,11 @@ pub fn write_all(
     provenance: &Provenance,
 ) -> Result<Vec<PathBuf>, FileError> {
     std::fs::create_dir_all(folder).map_err(|e| FileError::of(folder, &e))?;
-    write_into(&Together::claim(folder)?, inputs, design, provenance)
+    let place = Together::claim(folder)?;
+    write_into(&place, inputs, design, provenance, Some(Format::default()))
 }
 
-/// As [`write_all`], into a folder that is claimed already.
+/// As [`write_all`], into a folder that is claimed already; what the workshop is given only where there is a format for it.
 ///
 /// # Errors
 /// [`FileError`] naming what could not be written.
@@ -46,6 +48,7 @@ pub fn write_into(
     inputs: &Inputs,
     design: &Design,
     provenance: &Provenance,
+    handed_over: Option<Format>,
 ) -> Result<Vec<PathBuf>, FileError> {
     place.replace(|new| {
         let write = |name: &str, text: &str| atomic::write(&new.join(name), text.as_bytes());
@@ -58,17 +61,19 @@ pub fn write_into(
             &design.simulated.dataset,
             Some(&run),
         )?;
+        if let Some(format) = handed_over {
+            let files = handover::files(inputs, design, provenance, format)
+                .map_err(|why| FileError::broken(place.folder(), why))?;
+            for (name, bytes) in files {
+                atomic::write(&new.join(name), &bytes)?;
+            }
+        }
         write_project(new, place.folder(), inputs, design, provenance)
     })?;
-    Ok([
-        "report.html",
-        "sites.csv",
-        "design.json",
-        "dataset.npz",
-        PROJECT,
-    ]
-    .map(|name| place.folder().join(name))
-    .to_vec())
+    let names = ["report.html", "sites.csv", "design.json", "dataset.npz", PROJECT];
+    let others = handover::FILES.iter().filter(|_| handed_over.is_some());
+    let names = names.iter().chain(others);
+    Ok(names.map(|name| place.folder().join(name)).collect())
 }
 
 /// Writes the project that reproduces the run into a folder, for another one. What stands there under its name, which

@@ -2,8 +2,8 @@
 
 mod certificate;
 mod matched;
-mod part;
-mod settings;
+pub mod part;
+pub mod settings;
 mod words;
 
 use std::fmt::Write as _;
@@ -145,7 +145,7 @@ fn list(page: &mut String, class: &str, items: &[String]) {
 }
 
 /// The force (N) that figures without one of their own are of.
-fn compared_n(inputs: &Inputs, design: &Design) -> f64 {
+pub(super) fn compared_n(inputs: &Inputs, design: &Design) -> f64 {
     let judged = design.evaluation.judging.middle_n();
     judged.unwrap_or(inputs.project.touch.force_n)
 }
@@ -180,7 +180,8 @@ pub fn markers(inputs: &Inputs, design: &Design) -> Vec<Marker> {
 }
 
 /// Share of the sites around each vertex that are feasible: what tints the pictures.
-fn feasible_tint(design: &Design) -> Vec<f64> {
+#[must_use]
+pub fn feasible_tint(design: &Design) -> Vec<f64> {
     let mesh = &design.simulated.mesh;
     let (mut sum, mut count) = (
         vec![0.0; mesh.positions().len()],

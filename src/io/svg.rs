@@ -79,7 +79,8 @@ pub fn limb(mesh: &TriMesh, paint: Paint, markers: &[Marker], view: &View, width
 }
 
 /// Facets in the order in which they are painted over each other: those with the least z first.
-fn from_behind(triangles: &[[u32; 3]], positions: &[DVec3]) -> Vec<usize> {
+#[must_use]
+pub fn from_behind(triangles: &[[u32; 3]], positions: &[DVec3]) -> Vec<usize> {
     let depth = |t: usize| -> f64 {
         let corners = triangles[t].iter();
         corners.map(|&v| positions[v as usize].z).sum()
@@ -319,14 +320,21 @@ pub enum Paint<'a> {
 impl Paint<'_> {
     /// Fill and stroke of a facet, darker when turned away.
     fn facet(self, tri: [u32; 3], facing: f64) -> String {
+        stroked(self.ink(tri, facing))
+    }
+
+    /// Red, green and blue of a facet, darker when turned away.
+    #[must_use]
+    pub fn ink(self, tri: [u32; 3], facing: f64) -> [u8; 3] {
         let level = |values: &[f64]| tri.iter().map(|&v| values[v as usize]).sum::<f64>() / 3.0;
-        match self {
+        let rgb = match self {
             Self::Tint(values) => shade(facing, level(values)),
             Self::Map(map, values) => {
                 let light = 0.6 + 0.4 * facing.abs();
-                stroked(map.at(level(values)).map(|c| 255.0 * c * light))
+                map.at(level(values)).map(|c| 255.0 * c * light)
             }
-        }
+        };
+        rgb.map(|c| c.round() as u8)
     }
 }
 
@@ -355,14 +363,13 @@ pub fn legend(map: ColorMap, title: &str, low: f64, high: f64) -> String {
 }
 
 /// A stroke of the same colour closes the hairlines between facets.
-fn stroked(rgb: [f64; 3]) -> String {
-    let [r, g, b] = rgb.map(|c| c.round() as u8);
+fn stroked([r, g, b]: [u8; 3]) -> String {
     let colour = format!("#{r:02x}{g:02x}{b:02x}");
     format!("{colour}\" stroke=\"{colour}")
 }
 
 /// Grey to blue-green by tint, darker when turned away, browner on the inside.
-fn shade(facing: f64, tint: f64) -> String {
+fn shade(facing: f64, tint: f64) -> [f64; 3] {
     let light = 0.45 + 0.55 * facing.abs();
     let base = if facing > 0.0 {
         [222.0, 224.0, 228.0]
@@ -375,7 +382,7 @@ fn shade(facing: f64, tint: f64) -> String {
         [96.0, 150.0, 140.0]
     };
     let mix = |k: usize| light * (base[k] + (tinted[k] - base[k]) * tint.clamp(0.0, 1.0));
-    stroked([mix(0), mix(1), mix(2)])
+    [mix(0), mix(1), mix(2)]
 }
 
 fn draw_marker(svg: &mut String, at: DVec2, direction: DVec2, number: usize, near: bool) {

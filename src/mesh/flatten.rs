@@ -106,6 +106,24 @@ impl Flat {
         sums.into_iter().map(mean).collect()
     }
 
+    /// A point of the axis that a tube is unrolled about (m); a plate has none.
+    #[must_use]
+    pub fn axis_point(&self) -> Option<DVec3> {
+        match &self.rule {
+            Rule::Tube(unrolling) => Some(unrolling.origin),
+            Rule::Plate { .. } => None,
+        }
+    }
+
+    /// Once around a tube, in the plane (m); a plate has no such way.
+    #[must_use]
+    pub fn around(&self) -> Option<f64> {
+        match &self.rule {
+            Rule::Tube(unrolling) => Some(unrolling.circumference()),
+            Rule::Plate { .. } => None,
+        }
+    }
+
     /// Where a point of the part (m) is in the plane.
     #[must_use]
     pub fn place(&self, p: DVec3) -> DVec2 {

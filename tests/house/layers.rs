@@ -16,6 +16,7 @@ const ORDER: [&[&str]; 14] = [
         "eigen",
         "lanes",
         "memory",
+        "paper",
         "plain",
         "statistics",
         "tally",
@@ -33,7 +34,7 @@ const ORDER: [&[&str]; 14] = [
     &["live", "board", "bench"],
     &["project"],
     &["design", "study"],
-    &["given", "trade", "parameter_study"],
+    &["given", "trade", "parameter_study", "workshop"],
     &[
         "io", "job", "link", "document", "render", "session", "cli", "studio",
     ],

@@ -15,6 +15,15 @@ pub(super) fn section(
     design: &Design,
     provenance: &Provenance,
 ) {
+    page.push_str("<h2>The part</h2><ul>");
+    for line in lines(inputs, design, provenance) {
+        let _ = write!(page, "<li>{}</li>", escape(&line));
+    }
+    page.push_str("</ul>");
+}
+
+/// Of which part, and under which assumptions, all other figures are: a sentence each.
+pub fn lines(inputs: &Inputs, design: &Design, provenance: &Provenance) -> Vec<String> {
     let mut lines = vec![
         mesh(inputs, provenance),
         stance(inputs),
@@ -25,11 +34,7 @@ pub(super) fn section(
     lines.extend(
         (provenance.taken_in.as_ref()).map(|words| format!("When the mesh was read: {words}.")),
     );
-    page.push_str("<h2>The part</h2><ul>");
-    for line in lines {
-        let _ = write!(page, "<li>{}</li>", escape(&line));
-    }
-    page.push_str("</ul>");
+    lines
 }
 
 fn mesh(inputs: &Inputs, provenance: &Provenance) -> String {

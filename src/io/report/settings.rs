@@ -55,9 +55,34 @@ pub(super) fn settings(
         let _ = write!(page, "<tr><td>{}</td><td>{count}</td></tr>", filter.label());
     }
     page.push_str("</table><h2>Settings and what was achieved</h2><table>");
+    for (label, value) in rows(inputs, design, provenance) {
+        let _ = write!(page, "<tr><td>{label}</td><td>{value}</td></tr>");
+    }
+    page.push_str("</table>");
+}
+
+/// What was asked for, what was achieved with it, and how long each stage took.
+pub fn rows(inputs: &Inputs, design: &Design, provenance: &Provenance) -> Vec<(String, String)> {
+    let mut rows: Vec<(String, String)> = (asked(inputs, design).into_iter())
+        .chain(trust(&design.simulated))
+        .map(|(label, value)| (label.to_owned(), value))
+        .collect();
+    let time = |s: &crate::design::StageTime| {
+        (format!("Time, {}", s.stage), format!("{:.2} s", s.seconds))
+    };
+    rows.extend(design.seconds.iter().map(time));
+    rows.push(("Version".into(), format!("HapDef {}", provenance.version)));
+    rows.push((
+        "Run, as in the files beside this one".into(),
+        run_key(inputs, design),
+    ));
+    rows
+}
+
+fn asked(inputs: &Inputs, design: &Design) -> Vec<(&'static str, String)> {
     let p = &inputs.project;
     let work = design.work();
-    let rows: Vec<(&str, String)> = vec![
+    vec![
         (
             "Touch",
             format!(
@@ -100,21 +125,5 @@ pub(super) fn settings(
                 work.fits
             ),
         ),
-    ];
-    for (label, value) in rows.into_iter().chain(trust(&design.simulated)) {
-        let _ = write!(page, "<tr><td>{label}</td><td>{value}</td></tr>");
-    }
-    for stage in &design.seconds {
-        let _ = write!(
-            page,
-            "<tr><td>Time, {}</td><td>{:.2} s</td></tr>",
-            stage.stage, stage.seconds
-        );
-    }
-    let _ = write!(
-        page,
-        "<tr><td>Version</td><td>HapDef {}</td></tr><tr><td>Run, as in the files beside this one</td><td>{}</td></tr></table>",
-        provenance.version,
-        run_key(inputs, design)
-    );
+    ]
 }

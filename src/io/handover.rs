@@ -1,0 +1,98 @@
+//! What whoever builds the limb is given: the report on paper, templates at full size, wiring, and the sketch's settings.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `report.pdf` | what is promised, pictures, a card for each gauge, wiring, assembly, settings |
+//! | `template.pdf` | 1 : 1, seen from inside: a patch for each gauge, and the unrolled inside over several sheets |
+//! | `wiring.csv` | gauge, channel, pin, expected ranges, length of cable |
+//! | `bill.csv` | what must be bought |
+//! | `hapd_config.h` | pins, name and electric constants for the sketch |
+
+mod cards;
+mod document;
+mod drawing;
+mod marks;
+mod tables;
+mod templates;
+
+use super::bench_folder::limb_key;
+use super::run::Provenance;
+use crate::design::{Design, Inputs};
+use crate::paper::{self, Format};
+use crate::workshop::{self, Inner, Wiring};
+
+/// The names of all files.
+pub const FILES: [&str; 5] = [
+    "report.pdf",
+    "template.pdf",
+    "wiring.csv",
+    "bill.csv",
+    "hapd_config.h",
+];
+
+/// What the documents are made from.
+struct Source<'a> {
+    inputs: &'a Inputs,
+    design: &'a Design,
+    provenance: &'a Provenance<'a>,
+    inner: Inner,
+    wiring: Wiring,
+    landmarks: Vec<workshop::Landmarks>,
+    name: String,
+    format: Format,
+}
+
+/// All files with their names, as [`FILES`] has them.
+///
+/// # Errors
+/// Why a document could not be made.
+pub fn files(
+    inputs: &Inputs,
+    design: &Design,
+    provenance: &Provenance,
+    format: Format,
+) -> Result<Vec<(&'static str, Vec<u8>)>, String> {
+    let inner = Inner::of(inputs, design);
+    let landmarks = workshop::landmarks(&inner);
+    let source = Source {
+        wiring: wiring(inputs, &inner, &landmarks),
+        name: name(provenance),
+        inputs,
+        design,
+        provenance,
+        inner,
+        landmarks,
+        format,
+    };
+    let title = format!("Gauge placement for {}", source.name);
+    let report = paper::pdf(&title, &document::sheets(&source))?;
+    let title = format!("Templates for {}", source.name);
+    let template = paper::pdf(&title, &templates::sheets(&source)?)?;
+    let header = workshop::header(&source.wiring, &source.name, board(inputs));
+    let texts = [
+        tables::wiring(&source.wiring),
+        tables::bill(&source.wiring),
+        header,
+    ];
+    let files = [report, template].into_iter().chain(texts.map(String::into_bytes));
+    Ok(FILES.into_iter().zip(files).collect())
+}
+
+fn name(provenance: &Provenance) -> String {
+    let stem = provenance.mesh_path.file_stem();
+    stem.map_or_else(|| "limb".to_owned(), |s| s.to_string_lossy().into_owned())
+}
+
+fn wiring(inputs: &Inputs, inner: &Inner, landmarks: &[workshop::Landmarks]) -> Wiring {
+    let project = &inputs.project;
+    let settings = project.live.settings(inner.gauges.len());
+    let heights: Vec<f64> = landmarks.iter().map(|l| l.above_foot).collect();
+    let forces = [project.touch.force_n, project.touch.forces_n[1]];
+    workshop::wiring(&inner.gauges, &settings.channels, &heights, settings.chain, forces)
+}
+
+/// A number for the board: of the limb and its gauges.
+fn board(inputs: &Inputs) -> u32 {
+    let key = limb_key(inputs);
+    u32::from_str_radix(&key[..key.len().min(8)], 16).unwrap_or(1)
+}

@@ -1,0 +1,14 @@
+//! Documents on paper: sheets that are drawn on in millimetres, and written as PDF.
+//!
+//! A [`Sheet`] holds shapes and words; [`Flow`] sets headings, text and tables one below the other over as many sheets as they
+//! need; [`pdf`] writes them. The same sheets give the same bytes.
+
+mod flow;
+mod pdf;
+mod sheet;
+mod text;
+
+pub use flow::Flow;
+pub use pdf::pdf;
+pub use sheet::{Align, Format, Ink, Item, Line, Sheet, Words};
+pub use text::{Face, width_mm, wrapped};

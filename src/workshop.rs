@@ -1,0 +1,14 @@
+//! What whoever builds the limb needs: where each gauge is by callipers, pieces of the wall laid flat, and the wiring.
+//!
+//! All of it is about the wall's inner face, which gauges are glued to, and all pictures are seen from inside, as whoever glues
+//! them sees it.
+
+mod inner;
+mod landmarks;
+mod patch;
+mod wiring;
+
+pub use inner::{Glued, Inner};
+pub use landmarks::{Landmarks, Neighbour, landmarks};
+pub use patch::Patch;
+pub use wiring::{Channel, Wiring, bill, header, wiring};

@@ -1,0 +1,105 @@
+//! The face of the wall that gauges are glued to, and where they are on it.
+
+use glam::DVec3;
+
+use crate::design::{Design, Inputs};
+use crate::mesh::stance::Stance;
+use crate::mesh::{SurfacePoint, TriMesh};
+use crate::project::PartModel;
+
+/// A gauge on the wall's inner face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Glued {
+    /// From 1.
+    pub number: usize,
+    /// On the inner face (m).
+    pub place: DVec3,
+    /// From the inside to the outside, of unit length.
+    pub out: DVec3,
+    /// In which it measures.
+    pub direction: DVec3,
+    /// Smallest and largest strain that it reads under the touches of the design.
+    pub strain: [f64; 2],
+    /// Rms strain under them.
+    pub rms: f64,
+}
+
+/// The wall's inner face.
+#[derive(Clone, Debug)]
+pub struct Inner {
+    /// The face (m).
+    pub mesh: TriMesh,
+    /// Whether its normals look inwards.
+    looks_in: bool,
+    /// Which way the part stands.
+    pub stance: Stance,
+    /// The chosen gauges.
+    pub gauges: Vec<Glued>,
+}
+
+impl Inner {
+    /// Of a design. The wall of a shell lies half of its thickness to each side of the surface that is computed with.
+    #[must_use]
+    pub fn of(inputs: &Inputs, design: &Design) -> Self {
+        let drawn = &design.simulated.mesh;
+        let (looks_in, depth) = match inputs.project.part.model {
+            PartModel::Solid => (true, 0.0),
+            PartModel::Shell => (false, 0.5e-3 * inputs.project.part.thickness_mm),
+        };
+        let mesh = inside(drawn, depth);
+        let dataset = &design.simulated.dataset;
+        let gauges = (1..).zip(design.chosen()).map(|(number, &s)| {
+            let site = &dataset.sites[s];
+            let out = if looks_in { -site.normal } else { site.normal };
+            let row = dataset.x.row(s);
+            let ends = row.iter().fold([0.0_f64; 2], |[l, h], v| [l.min(*v), h.max(*v)]);
+            Glued {
+                number,
+                place: site.position - out * depth,
+                out,
+                direction: site.direction,
+                strain: ends,
+                rms: site.rms_strain,
+            }
+        });
+        let gauges = gauges.collect();
+        Self {
+            mesh,
+            looks_in,
+            stance: inputs.stance(),
+            gauges,
+        }
+    }
+
+    /// A face by itself, which looks outwards, with gauges on it.
+    #[must_use]
+    pub fn outward(mesh: TriMesh, stance: Stance, gauges: Vec<Glued>) -> Self {
+        Self {
+            mesh,
+            looks_in: false,
+            stance,
+            gauges,
+        }
+    }
+
+    /// From the inside to the outside at a point.
+    #[must_use]
+    pub fn out(&self, at: SurfacePoint) -> DVec3 {
+        let normal = self.mesh.normal(at);
+        if self.looks_in { -normal } else { normal }
+    }
+
+    /// From the inside to the outside of a facet.
+    #[must_use]
+    pub fn facet_out(&self, triangle: u32) -> DVec3 {
+        let normal = self.mesh.facet_normal(triangle);
+        if self.looks_in { -normal } else { normal }
+    }
+}
+
+/// A surface moved against its normals (m).
+fn inside(mesh: &TriMesh, depth: f64) -> TriMesh {
+    let both = mesh.positions().iter().zip(mesh.vertex_normals());
+    let moved: Vec<DVec3> = both.map(|(p, n)| *p - *n * depth).collect();
+    TriMesh::from_checked(moved, mesh.triangles().to_vec())
+}
