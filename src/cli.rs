@@ -9,6 +9,7 @@ pub mod data;
 pub mod dataset;
 pub mod design;
 pub mod evaluate;
+pub mod export;
 pub mod export_c;
 pub mod keys;
 pub mod limb;
@@ -86,6 +87,8 @@ pub enum Command {
     Collect(collect::CollectArgs),
     /// What a machine pressed, as a dataset to train on.
     Dataset(dataset::DatasetArgs),
+    /// The limb with its gauges for colleagues (glTF) and robots (URDF).
+    Export(export::ExportArgs),
     /// Writes a bundled limb, or another of its family.
     Limb(limb::LimbArgs),
     /// Many designs beside each other: a base project varied along axes, on one machine or many.

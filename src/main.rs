@@ -65,6 +65,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Some(Command::Board(args)) => cli::board::run(args),
         Some(Command::Listen(args)) => cli::listen::run(args),
         Some(Command::Collect(args)) => cli::collect::run(args),
+        Some(Command::Export(args)) => cli::export::run(args),
         Some(Command::Dataset(args)) => cli::dataset::run(args),
         Some(Command::Calibrate(args)) => cli::calibrate::run(args),
         Some(Command::Limb(args)) => cli::limb::run(args),

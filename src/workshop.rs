@@ -6,9 +6,13 @@
 mod inner;
 mod landmarks;
 mod patch;
+mod robot;
+mod solids;
 mod wiring;
 
 pub use inner::{Glued, Inner};
 pub use landmarks::{Landmarks, Neighbour, landmarks};
 pub use patch::Patch;
+pub use robot::{frame, roll_pitch_yaw, turn_of, urdf};
+pub use solids::{Solid, arrow, plate};
 pub use wiring::{Channel, Wiring, bill, header, wiring};

@@ -9,6 +9,7 @@ use super::out;
 use crate::budget::Quality;
 use crate::dataset::Signal;
 use crate::io::examples::write_bundled_mesh;
+use crate::io::mesh_file::urdf;
 use crate::io::opening::{bundled, open};
 use crate::io::outlet;
 use crate::io::project_file::LoadedProject;
@@ -50,6 +51,9 @@ pub struct Common {
     /// Unit of a mesh file that does not say its own.
     #[arg(long)]
     pub unit: Option<UnitArg>,
+    /// Folder in which the packages of a robot's description (robot.urdf#LINK) are looked for; may be given more than once.
+    #[arg(long)]
+    pub package_path: Vec<PathBuf>,
     /// Print one JSON object on stdout.
     #[arg(long)]
     pub json: bool,
@@ -73,6 +77,7 @@ impl Common {
     /// # Errors
     /// As [`open`].
     pub fn load(&self) -> anyhow::Result<LoadedProject> {
+        urdf::look_in(self.package_path.clone());
         let mut loaded = match &self.project {
             Some(path) => open(path, self.unit.map(Into::into))?,
             None => bundled()?,

@@ -13,8 +13,8 @@ use super::{FileError, atomic, handover, project_file, report, source};
 use crate::dataset::Dataset;
 use crate::design::{Design, Inputs};
 use crate::evaluation::{EstimatorKind, EvaluationRow};
-use crate::placement::expected_error::ASSUMES;
 use crate::paper::Format;
+use crate::placement::expected_error::ASSUMES;
 use crate::placement::information::Geometry;
 use crate::project::Project;
 
@@ -70,7 +70,13 @@ pub fn write_into(
         }
         write_project(new, place.folder(), inputs, design, provenance)
     })?;
-    let names = ["report.html", "sites.csv", "design.json", "dataset.npz", PROJECT];
+    let names = [
+        "report.html",
+        "sites.csv",
+        "design.json",
+        "dataset.npz",
+        PROJECT,
+    ];
     let others = handover::FILES.iter().filter(|_| handed_over.is_some());
     let names = names.iter().chain(others);
     Ok(names.map(|name| place.folder().join(name)).collect())

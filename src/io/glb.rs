@@ -1,52 +1,66 @@
-//! Binary glTF: the bundled limb is written with this.
+//! Binary glTF: the bundled limb is written with this, and scenes for colleagues.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
+use glam::{DMat3, DQuat, DVec3};
 use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf::json::buffer::{Target, View};
 use gltf::json::extras::Void;
+use gltf::json::mesh::Semantic;
 use gltf::json::validation::{Checked::Valid, USize64};
 use gltf::json::{self, Index, Root};
 
 use crate::mesh::TriMesh;
+use crate::mesh::stance::Stance;
 
 /// A GLB file with one mesh; positions in metres as glTF asks, kept to f32 as it stores them.
 ///
 /// # Errors
 /// Only what serialization itself reports.
 pub fn write_glb(mesh: &TriMesh) -> Result<Vec<u8>, gltf::Error> {
-    let positions: Vec<[f32; 3]> = mesh
-        .positions()
-        .iter()
-        .map(|p| p.as_vec3().to_array())
+    let mut builder = Builder::new();
+    let primitive = builder.primitive(mesh.positions(), mesh.triangles(), None);
+    let node = builder.node(None, primitive);
+    builder.finish(vec![node])
+}
+
+/// A piece of a scene.
+#[derive(Clone, Debug)]
+pub struct Piece {
+    pub name: String,
+    /// m.
+    pub positions: Vec<DVec3>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Red, green, blue of each vertex, as a screen shows them.
+    pub colours: Vec<[u8; 3]>,
+}
+
+/// A GLB file with named pieces, coloured by vertex and seen from both sides; a node above them turns the part's axis up and
+/// its front to the viewer.
+///
+/// # Errors
+/// Only what serialization itself reports.
+pub fn write_scene(pieces: &[Piece], stance: Stance) -> Result<Vec<u8>, gltf::Error> {
+    let mut builder = Builder::new();
+    let material = builder.matt();
+    let nodes: Vec<Index<json::Node>> = (pieces.iter())
+        .map(|piece| {
+            let colours = Some((&piece.colours[..], material));
+            let primitive = builder.primitive(&piece.positions, &piece.triangles, colours);
+            builder.node(Some(piece.name.clone()), primitive)
+        })
         .collect();
-    let indices: Vec<u32> = mesh.triangles().iter().flatten().copied().collect();
-    let mut builder = Builder::new(positions.len() * 12 + indices.len() * 4);
-    let fold = |pick: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
-        (0..3)
-            .map(|k| positions.iter().fold(start, |m, p| pick(m, p[k])))
-            .collect()
-    };
-    let bounds = Some((
-        fold(f32::min, f32::INFINITY),
-        fold(f32::max, f32::NEG_INFINITY),
-    ));
-    let position_bytes = positions.iter().flatten().flat_map(|x| x.to_le_bytes());
-    let at = builder.accessor(
-        position_bytes,
-        positions.len(),
-        (ComponentType::F32, Type::Vec3, Target::ArrayBuffer),
-        bounds,
-    );
-    let index_bytes = indices.iter().flat_map(|i| i.to_le_bytes());
-    let by = builder.accessor(
-        index_bytes,
-        indices.len(),
-        (ComponentType::U32, Type::Scalar, Target::ElementArrayBuffer),
-        None,
-    );
-    builder.finish(at, by)
+    // glTF's up is y, and its front is z.
+    let axes = DMat3::from_cols(stance.right(), stance.up(), stance.front()).transpose();
+    let turn = DQuat::from_mat3(&axes).as_quat();
+    let root = builder.root.push(json::Node {
+        children: Some(nodes),
+        rotation: Some(json::scene::UnitQuaternion(turn.to_array())),
+        name: Some("limb and gauges".into()),
+        ..Default::default()
+    });
+    builder.finish(vec![root])
 }
 
 struct Builder {
@@ -56,11 +70,11 @@ struct Builder {
 }
 
 impl Builder {
-    fn new(total: usize) -> Self {
+    fn new() -> Self {
         let mut root = Root::default();
-        root.asset.generator = Some("hapdef limb".into());
+        root.asset.generator = Some("hapdef".into());
         let buffer = root.push(json::Buffer {
-            byte_length: USize64::from(total),
+            byte_length: USize64(0),
             name: None,
             uri: None,
             extensions: None,
@@ -69,7 +83,7 @@ impl Builder {
         Self {
             root,
             buffer,
-            bytes: Vec::with_capacity(total),
+            bytes: Vec::new(),
         }
     }
 
@@ -109,38 +123,100 @@ impl Builder {
         })
     }
 
-    fn finish(
-        mut self,
-        positions: Index<json::Accessor>,
-        indices: Index<json::Accessor>,
-    ) -> Result<Vec<u8>, gltf::Error> {
-        let attributes = BTreeMap::from([(Valid(json::mesh::Semantic::Positions), positions)]);
+    /// Positions, colours and triangles as they are stored.
+    fn primitive(
+        &mut self,
+        positions: &[DVec3],
+        triangles: &[[u32; 3]],
+        colours: Option<(&[[u8; 3]], Index<json::Material>)>,
+    ) -> json::mesh::Primitive {
+        let stored: Vec<[f32; 3]> = positions.iter().map(|p| p.as_vec3().to_array()).collect();
+        let fold = |pick: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
+            (0..3)
+                .map(|k| stored.iter().fold(start, |m, p| pick(m, p[k])))
+                .collect()
+        };
+        let bounds = (
+            fold(f32::min, f32::INFINITY),
+            fold(f32::max, f32::NEG_INFINITY),
+        );
+        let at = self.accessor(
+            stored.iter().flatten().flat_map(|x| x.to_le_bytes()),
+            stored.len(),
+            (ComponentType::F32, Type::Vec3, Target::ArrayBuffer),
+            Some(bounds),
+        );
+        let mut attributes = BTreeMap::from([(Valid(Semantic::Positions), at)]);
+        if let Some((colours, _)) = colours {
+            // Stored as light, which viewers make a screen's values of again.
+            let light = colours
+                .iter()
+                .flat_map(|c| c.map(linear))
+                .flat_map(f32::to_le_bytes);
+            let kind = (ComponentType::F32, Type::Vec3, Target::ArrayBuffer);
+            let colour = self.accessor(light, colours.len(), kind, None);
+            attributes.insert(Valid(Semantic::Colors(0)), colour);
+        }
+        let indices: Vec<u32> = triangles.iter().flatten().copied().collect();
+        let by = self.accessor(
+            indices.iter().flat_map(|i| i.to_le_bytes()),
+            indices.len(),
+            (ComponentType::U32, Type::Scalar, Target::ElementArrayBuffer),
+            None,
+        );
+        json::mesh::Primitive {
+            attributes,
+            indices: Some(by),
+            material: colours.map(|(_, material)| material),
+            mode: Valid(json::mesh::Mode::Triangles),
+            targets: None,
+            extensions: None,
+            extras: Void::default(),
+        }
+    }
+
+    /// A material without shine.
+    fn matt(&mut self) -> Index<json::Material> {
+        let surface = json::material::PbrMetallicRoughness {
+            metallic_factor: json::material::StrengthFactor(0.0),
+            roughness_factor: json::material::StrengthFactor(0.8),
+            ..Default::default()
+        };
+        self.root.push(json::Material {
+            pbr_metallic_roughness: surface,
+            double_sided: true,
+            ..Default::default()
+        })
+    }
+
+    fn node(
+        &mut self,
+        name: Option<String>,
+        primitive: json::mesh::Primitive,
+    ) -> Index<json::Node> {
         let mesh = self.root.push(json::Mesh {
-            name: None,
+            name: name.clone(),
             weights: None,
             extensions: None,
             extras: Void::default(),
-            primitives: vec![json::mesh::Primitive {
-                attributes,
-                indices: Some(indices),
-                material: None,
-                mode: Valid(json::mesh::Mode::Triangles),
-                targets: None,
-                extensions: None,
-                extras: Void::default(),
-            }],
+            primitives: vec![primitive],
         });
-        let node = self.root.push(json::Node {
+        self.root.push(json::Node {
             mesh: Some(mesh),
+            name,
             ..Default::default()
-        });
+        })
+    }
+
+    fn finish(mut self, nodes: Vec<Index<json::Node>>) -> Result<Vec<u8>, gltf::Error> {
         let scene = self.root.push(json::Scene {
             name: None,
-            nodes: vec![node],
+            nodes,
             extensions: None,
             extras: Void::default(),
         });
         self.root.scene = Some(scene);
+        self.root.buffers[self.buffer.value()].byte_length = USize64::from(self.bytes.len());
         let glb = gltf::Glb {
             header: gltf::binary::Header {
                 magic: *b"glTF",
@@ -153,5 +229,15 @@ impl Builder {
             bin: Some(Cow::Owned(self.bytes)),
         };
         glb.to_vec()
+    }
+}
+
+/// What light a screen makes of a value (IEC 61966-2-1).
+fn linear(value: u8) -> f32 {
+    let v = f32::from(value) / 255.0;
+    if v <= 0.040_45 {
+        v / 12.92
+    } else {
+        ((v + 0.055) / 1.055).powf(2.4)
     }
 }

@@ -7,27 +7,38 @@
 //! | `wiring.csv` | gauge, channel, pin, expected ranges, length of cable |
 //! | `bill.csv` | what must be bought |
 //! | `hapd_config.h` | pins, name and electric constants for the sketch |
+//! | `gauges.urdf` | a frame for each gauge on the robot's link |
+//! | `scene.glb` | the limb with its gauges, coloured by the error of touches, for any viewer |
+//! | `zones.csv` | error, and what is not felt, at each vertex, in the link's frame |
 
 mod cards;
 mod document;
 mod drawing;
 mod marks;
+mod scene;
 mod tables;
 mod templates;
 
 use super::bench_folder::limb_key;
+use super::mesh_file::urdf::link_of;
 use super::run::Provenance;
 use crate::design::{Design, Inputs};
 use crate::paper::{self, Format};
+use crate::plain::robust_top;
 use crate::workshop::{self, Inner, Wiring};
 
+pub use self::scene::Scene;
+
 /// The names of all files.
-pub const FILES: [&str; 5] = [
+pub const FILES: [&str; 8] = [
     "report.pdf",
     "template.pdf",
     "wiring.csv",
     "bill.csv",
     "hapd_config.h",
+    "gauges.urdf",
+    "zones.csv",
+    "scene.glb",
 ];
 
 /// What the documents are made from.
@@ -73,12 +84,48 @@ pub fn files(
         tables::wiring(&source.wiring),
         tables::bill(&source.wiring),
         header,
+        workshop::urdf(&source.inner.gauges, &source.name, &link(provenance)),
+        tables::zones(design),
     ];
-    let files = [report, template].into_iter().chain(texts.map(String::into_bytes));
+    let files = [report, template]
+        .into_iter()
+        .chain(texts.map(String::into_bytes));
+    let files = files.chain([scene(&source)?]);
     Ok(FILES.into_iter().zip(files).collect())
 }
 
+/// The limb coloured by the mean error of touches around each place, where that was judged.
+fn scene(source: &Source<'_>) -> Result<Vec<u8>, String> {
+    let mesh = &source.design.simulated.mesh;
+    let errors = source.design.error_map(mesh);
+    let field = errors.map(|errors| {
+        let top = robust_top(&errors).max(f64::MIN_POSITIVE);
+        errors
+            .iter()
+            .map(|e| (e / top).min(1.0))
+            .collect::<Vec<f64>>()
+    });
+    let keys = &source.inputs.project.gauge;
+    Scene {
+        limb: mesh,
+        field: field.as_deref(),
+        inner: &source.inner,
+        grid_mm: [keys.grid_length_mm, keys.grid_width_mm],
+        touch: None,
+    }
+    .glb()
+}
+
+/// The robot's link that the limb is: the one that was opened, or a name like the mesh's.
+#[must_use]
+pub fn link(provenance: &Provenance) -> String {
+    link_of(provenance.mesh_path).unwrap_or_else(|| name(provenance))
+}
+
 fn name(provenance: &Provenance) -> String {
+    if let Some(link) = link_of(provenance.mesh_path) {
+        return link;
+    }
     let stem = provenance.mesh_path.file_stem();
     stem.map_or_else(|| "limb".to_owned(), |s| s.to_string_lossy().into_owned())
 }
@@ -88,7 +135,13 @@ fn wiring(inputs: &Inputs, inner: &Inner, landmarks: &[workshop::Landmarks]) -> 
     let settings = project.live.settings(inner.gauges.len());
     let heights: Vec<f64> = landmarks.iter().map(|l| l.above_foot).collect();
     let forces = [project.touch.force_n, project.touch.forces_n[1]];
-    workshop::wiring(&inner.gauges, &settings.channels, &heights, settings.chain, forces)
+    workshop::wiring(
+        &inner.gauges,
+        &settings.channels,
+        &heights,
+        settings.chain,
+        forces,
+    )
 }
 
 /// A number for the board: of the limb and its gauges.

@@ -19,6 +19,7 @@ mod soup;
 mod stl;
 mod tetrahedra;
 mod unread;
+pub mod urdf;
 mod words;
 
 use std::collections::HashSet;
@@ -52,7 +53,7 @@ pub struct LoadedMesh {
 /// Whether a mesh of this name does not say its unit.
 #[must_use]
 pub fn needs_unit(path: &Path) -> bool {
-    !ending(path).starts_with("gl") && !may_say_unit(path)
+    !ending(path).starts_with("gl") && !may_say_unit(path) && urdf::named(path).is_none()
 }
 
 /// Whether a mesh of this name may say its unit, or leave it out.
@@ -86,6 +87,11 @@ pub fn read_mesh(
     body: usize,
     repair: Repair,
 ) -> Result<LoadedMesh, FileError> {
+    if let Some((file, link)) = urdf::named(path) {
+        // In metres, as descriptions are.
+        let soup = urdf::read(&file, link.as_deref())?;
+        return taken_in(soup, 1.0, body, &repair).map_err(|m| FileError::broken(path, m));
+    }
     let ending = ending(path);
     if !ENDINGS.contains(&ending.as_str()) {
         return Err(FileError::broken(

@@ -146,12 +146,15 @@ impl Flow {
     /// they need, made narrower together where the sheet is not wide enough, and words are broken then.
     pub fn table(&mut self, names: &[&str], rows: &[Vec<String>]) {
         let widths = self.widths(names, rows);
-        let is_number = |cell: &String| {
-            cell.starts_with(|c: char| c.is_ascii_digit() || "–-+<".contains(c))
-        };
+        let is_number =
+            |cell: &String| cell.starts_with(|c: char| c.is_ascii_digit() || "–-+<".contains(c));
         let column = |k: usize| {
             let numbers = rows.iter().all(|row| row.get(k).is_none_or(is_number));
-            let align = if k > 0 && numbers { Align::Right } else { Align::Left };
+            let align = if k > 0 && numbers {
+                Align::Right
+            } else {
+                Align::Left
+            };
             (widths[k], align)
         };
         let columns: Vec<(f64, Align)> = (0..widths.len()).map(column).collect();
@@ -166,7 +169,11 @@ impl Flow {
     fn widths(&self, names: &[&str], rows: &[Vec<String>]) -> Vec<f64> {
         let width = |text: &str| width_mm(text, SMALL, Face::Text);
         // A name may stand on two lines.
-        let name = |text: &str| text.split_whitespace().map(width).fold(0.55 * width(text), f64::max);
+        let name = |text: &str| {
+            text.split_whitespace()
+                .map(width)
+                .fold(0.55 * width(text), f64::max)
+        };
         let column = |k: usize| {
             let cells = rows.iter().filter_map(|row| row.get(k)).map(|c| width(c));
             cells.fold(names.get(k).map_or(0.0, |n| name(n)), f64::max) + 0.2
@@ -261,10 +268,16 @@ mod tests {
                     Align::Middle => w.at.x - width / 2.0,
                     Align::Right => w.at.x - width,
                 };
-                assert!(left > MARGIN - 0.3 && left + width < sheet.size.x - MARGIN + 0.3, "{}", w.text);
+                assert!(
+                    left > MARGIN - 0.3 && left + width < sheet.size.x - MARGIN + 0.3,
+                    "{}",
+                    w.text
+                );
                 assert!(w.at.y < sheet.size.y - 5.0 && w.at.y > 5.0);
                 let over = |l: &&(f64, f64, f64)| {
-                    (l.0 - w.at.y).abs() < 0.5 * w.size && left < l.2 - 0.1 && l.1 < left + width - 0.1
+                    (l.0 - w.at.y).abs() < 0.5 * w.size
+                        && left < l.2 - 0.1
+                        && l.1 < left + width - 0.1
                 };
                 assert_eq!(lines.iter().find(over), None, "{}", w.text);
                 lines.push((w.at.y, left, left + width));
@@ -286,7 +299,17 @@ mod tests {
                     cells[4] = "a cell with many words in it that must be broken".into();
                     cells
                 };
-                let names = ["Name", "A longer name", "x (mm)", "y (mm)", "z", "u", "v", "w", "Signal to noise"];
+                let names = [
+                    "Name",
+                    "A longer name",
+                    "x (mm)",
+                    "y (mm)",
+                    "z",
+                    "u",
+                    "v",
+                    "w",
+                    "Signal to noise",
+                ];
                 flow.table(&names, &(0..7).map(row).collect::<Vec<_>>());
             }
             let sheets = flow.sheets("the foot");

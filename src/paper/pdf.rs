@@ -22,8 +22,13 @@ const POINTS: f64 = 72.0 / 25.4;
 /// Why no document could be made of them, in a few words.
 pub fn pdf(title: &str, sheets: &[Sheet]) -> Result<Vec<u8>, String> {
     let mut document = Document::new();
-    document.set_metadata(Metadata::new().title(title.to_owned()).language("en".into()));
-    let font = |face: Face| Font::new(face.bytes().to_vec().into(), 0).ok_or("a typeface is damaged");
+    document.set_metadata(
+        Metadata::new()
+            .title(title.to_owned())
+            .language("en".into()),
+    );
+    let font =
+        |face: Face| Font::new(face.bytes().to_vec().into(), 0).ok_or("a typeface is damaged");
     let fonts = (font(Face::Text)?, font(Face::Fixed)?);
     for sheet in sheets {
         let settings = PageSettings::from_wh(points(sheet.size.x), points(sheet.size.y));
@@ -110,7 +115,15 @@ fn write(surface: &mut Surface<'_>, words: &Words, font: &Font) {
     };
     let glyph = |l: &super::text::Letter| {
         let advance = l.advance as f32;
-        KrillaGlyph::new(GlyphId::new(l.glyph), advance, 0.0, 0.0, 0.0, l.from..l.to, None)
+        KrillaGlyph::new(
+            GlyphId::new(l.glyph),
+            advance,
+            0.0,
+            0.0,
+            0.0,
+            l.from..l.to,
+            None,
+        )
     };
     let glyphs: Vec<KrillaGlyph> = letters.iter().map(glyph).collect();
     if glyphs.is_empty() {
@@ -136,8 +149,18 @@ mod tests {
     #[test]
     fn the_same_sheets_are_the_same_bytes() {
         let mut sheet = Sheet::new(Format::A4);
-        sheet.circle(DVec2::new(50.0, 50.0), 20.0, Some([1, 2, 3]), Some(Line::new([0; 3], 0.3)));
-        sheet.say(DVec2::new(20.0, 20.0), "Gauge 1, ± 3 µε", 4.0, Align::Middle);
+        sheet.circle(
+            DVec2::new(50.0, 50.0),
+            20.0,
+            Some([1, 2, 3]),
+            Some(Line::new([0; 3], 0.3)),
+        );
+        sheet.say(
+            DVec2::new(20.0, 20.0),
+            "Gauge 1, ± 3 µε",
+            4.0,
+            Align::Middle,
+        );
         let once = pdf("A title", &[sheet.clone(), sheet.clone()]).unwrap();
         assert!(once.starts_with(b"%PDF-"));
         assert_eq!(once, pdf("A title", &[sheet.clone(), sheet]).unwrap());

@@ -152,8 +152,9 @@ impl Sheet {
         const OFF: f64 = 0.01;
         let sides = (std::f64::consts::PI / (2.0 * OFF / radius.max(OFF)).sqrt()).ceil();
         let sides = sides.clamp(12.0, 360.0) as usize;
-        let corner =
-            |k: usize| at + radius * DVec2::from_angle(std::f64::consts::TAU * k as f64 / sides as f64);
+        let corner = |k: usize| {
+            at + radius * DVec2::from_angle(std::f64::consts::TAU * k as f64 / sides as f64)
+        };
         self.shape((0..sides).map(corner), fill, line);
     }
 

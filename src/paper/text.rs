@@ -39,7 +39,11 @@ pub(super) fn letters(text: &str, face: Face) -> Vec<Letter> {
     };
     let map = font.charmap();
     let metrics = font.glyph_metrics(Size::new(1.0), LocationRef::default());
-    let glyph = |c: char| map.map(c).or_else(|| map.map('?')).unwrap_or(GlyphId::NOTDEF);
+    let glyph = |c: char| {
+        map.map(c)
+            .or_else(|| map.map('?'))
+            .unwrap_or(GlyphId::NOTDEF)
+    };
     text.char_indices()
         .map(|(from, c)| {
             let glyph = glyph(c);

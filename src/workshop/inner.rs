@@ -52,7 +52,9 @@ impl Inner {
             let site = &dataset.sites[s];
             let out = if looks_in { -site.normal } else { site.normal };
             let row = dataset.x.row(s);
-            let ends = row.iter().fold([0.0_f64; 2], |[l, h], v| [l.min(*v), h.max(*v)]);
+            let ends = row
+                .iter()
+                .fold([0.0_f64; 2], |[l, h], v| [l.min(*v), h.max(*v)]);
             Glued {
                 number,
                 place: site.position - out * depth,
@@ -68,6 +70,41 @@ impl Inner {
             looks_in,
             stance: inputs.stance(),
             gauges,
+        }
+    }
+
+    /// Of a project, with the gauges that are chosen in it.
+    #[must_use]
+    pub fn of_project(inputs: &Inputs) -> Self {
+        let project = &inputs.project;
+        let (looks_in, depth) = match project.part.model {
+            PartModel::Solid => (true, 0.0),
+            PartModel::Shell => (false, 0.5e-3 * project.part.thickness_mm),
+        };
+        let part = &inputs.part;
+        let gauges = (1..).zip(&project.selection.sites).map(|(number, site)| {
+            let at = DVec3::from_array(site.position_mm) * 1e-3;
+            let (on, _) = part.index().nearest(at);
+            let out = if looks_in {
+                -part.normal(on)
+            } else {
+                part.normal(on)
+            };
+            let direction = DVec3::from_array(site.direction).reject_from_normalized(out);
+            Glued {
+                number,
+                place: at - out * depth,
+                out,
+                direction: direction.normalize_or(out.any_orthonormal_vector()),
+                strain: [0.0; 2],
+                rms: 0.0,
+            }
+        });
+        Self {
+            gauges: gauges.collect(),
+            mesh: inside(part, depth),
+            looks_in,
+            stance: inputs.stance(),
         }
     }
 

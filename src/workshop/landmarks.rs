@@ -35,8 +35,14 @@ pub struct Landmarks {
 #[must_use]
 pub fn landmarks(inner: &Inner) -> Vec<Landmarks> {
     let rims = rims(inner);
-    let heights = inner.mesh.positions().iter().map(|p| inner.stance.coordinates(*p).z);
-    let (foot, top) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
+    let heights = inner
+        .mesh
+        .positions()
+        .iter()
+        .map(|p| inner.stance.coordinates(*p).z);
+    let (foot, top) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| {
+        (l.min(z), h.max(z))
+    });
     let flat = Flat::of(&inner.mesh, inner.stance);
     let axis = flat.axis_point();
     (inner.gauges.iter())
@@ -65,7 +71,11 @@ fn of(
             distance: other.place.distance(gauge.place),
         })
         .collect();
-    neighbours.sort_by(|a, b| a.distance.total_cmp(&b.distance).then(a.number.cmp(&b.number)));
+    neighbours.sort_by(|a, b| {
+        a.distance
+            .total_cmp(&b.distance)
+            .then(a.number.cmp(&b.number))
+    });
     neighbours.truncate(NEAREST);
     let nearest = |[a, b]: &[DVec3; 2]| {
         let along = *b - *a;
@@ -87,8 +97,15 @@ fn of(
 fn turned(inner: &Inner, gauge: &Glued) -> f64 {
     let flat = |d: DVec3| d.reject_from_normalized(gauge.out);
     let up = flat(inner.stance.up());
-    let up = if up.length() > 0.1 { up } else { flat(inner.stance.front()) };
-    let (up, right) = (up.normalize_or_zero(), gauge.out.cross(up).normalize_or_zero());
+    let up = if up.length() > 0.1 {
+        up
+    } else {
+        flat(inner.stance.front())
+    };
+    let (up, right) = (
+        up.normalize_or_zero(),
+        gauge.out.cross(up).normalize_or_zero(),
+    );
     let angle = gauge.direction.dot(right).atan2(gauge.direction.dot(up));
     let half = std::f64::consts::FRAC_PI_2;
     if angle > half {
@@ -138,16 +155,28 @@ mod tests {
                 rms: 0.0,
             }
         };
-        let gauges = vec![gauge(1, 0.03, 0.2), gauge(2, 0.05, -0.4), gauge(3, 0.09, 3.0)];
+        let gauges = vec![
+            gauge(1, 0.03, 0.2),
+            gauge(2, 0.05, -0.4),
+            gauge(3, 0.09, 3.0),
+        ];
         let inner = Inner::outward(mesh, stance, gauges);
         let found = landmarks(&inner);
         assert!((found[0].above_foot - (0.03 - low.z)).abs() < 1e-9);
         assert!((found[0].above_foot + found[0].below_top - (high.z - low.z)).abs() < 1e-9);
-        assert!((found[1].around_deg - 0.6_f64.to_degrees()).abs() < 0.5, "{}", found[1].around_deg);
+        assert!(
+            (found[1].around_deg - 0.6_f64.to_degrees()).abs() < 0.5,
+            "{}",
+            found[1].around_deg
+        );
         let turned: Vec<f64> = found.iter().map(|l| l.turned_deg.to_radians()).collect();
         assert!((turned[0] - 0.2).abs() < 1e-9 && (turned[1] + 0.4).abs() < 1e-9);
         assert!((turned[2] - (3.0 - std::f64::consts::PI)).abs() < 1e-9);
         assert_eq!(found[0].neighbours[0].number, 2);
-        assert!(found.iter().all(|l| l.from_edge.is_some_and(|e| e.0 < 0.03)));
+        assert!(
+            found
+                .iter()
+                .all(|l| l.from_edge.is_some_and(|e| e.0 < 0.03))
+        );
     }
 }

@@ -76,7 +76,9 @@ impl Patch {
         };
         let stretch = pairs.keys().map(off).fold(0.0, f64::max);
         let edges = (pairs.iter())
-            .filter(|(pair, count)| **count == 1 && is_edge(inner, of[pair.0 as usize], of[pair.1 as usize]))
+            .filter(|(pair, count)| {
+                **count == 1 && is_edge(inner, of[pair.0 as usize], of[pair.1 as usize])
+            })
             .map(|(&(a, b), _)| [a, b])
             .collect();
         if triangles.is_empty() {
@@ -139,7 +141,11 @@ impl Frame {
         let along = |d: DVec3| d.reject_from_normalized(out);
         let up = along(stance.up());
         // On a floor, up is to the front.
-        let up = if up.length() > 0.1 { up } else { along(stance.front()) };
+        let up = if up.length() > 0.1 {
+            up
+        } else {
+            along(stance.front())
+        };
         let up = up.normalize_or(out.any_orthonormal_vector());
         Self {
             place: inner.mesh.point(source),
@@ -176,7 +182,9 @@ fn grown(inner: &Inner, from: u32, wanted: impl Fn(&[u32; 3]) -> bool) -> Vec<u3
             }
         }
     }
-    (0..taken.len() as u32).filter(|&t| taken[t as usize]).collect()
+    (0..taken.len() as u32)
+        .filter(|&t| taken[t as usize])
+        .collect()
 }
 
 /// Whether the wall ends between two vertices, or turns sharply.
@@ -228,7 +236,11 @@ fn unrolled(
         beside[b as usize].push(a);
     }
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();
-    order.sort_by(|&a, &b| distance[a as usize].total_cmp(&distance[b as usize]).then(a.cmp(&b)));
+    order.sort_by(|&a, &b| {
+        distance[a as usize]
+            .total_cmp(&distance[b as usize])
+            .then(a.cmp(&b))
+    });
     let mut flat = vec![DVec2::ZERO; positions.len()];
     let mut done = vec![false; positions.len()];
     for &v in &order {
@@ -289,7 +301,11 @@ fn settle(
         return;
     };
     let tri = triangles[own].map(|v| v as usize);
-    let middle: DVec2 = tri.iter().zip(source.barycentric).map(|(&v, w)| flat[v] * w).sum();
+    let middle: DVec2 = tri
+        .iter()
+        .zip(source.barycentric)
+        .map(|(&v, w)| flat[v] * w)
+        .sum();
     // The rotation that brings the facet nearest to how it lies in the frame.
     let (mut cos, mut sin) = (0.0, 0.0);
     for &v in &tri {
@@ -308,8 +324,8 @@ fn settle(
 mod tests {
     use super::*;
     use crate::limb::LimbSpec;
-    use crate::mesh::stance::Stance;
     use crate::mesh::sample;
+    use crate::mesh::stance::Stance;
 
     /// Distances on paper against those over the surface, by fast marching.
     fn worst(inner: &Inner, patch: &Patch, place: DVec3, radius: f64) -> f64 {
@@ -334,7 +350,10 @@ mod tests {
         let (mesh, _) = LimbSpec::default().build().unwrap();
         let stance = Stance::of(&mesh);
         let inner = Inner::outward(mesh, stance, Vec::new());
-        for (k, at) in sample::random(&inner.mesh, 12, 5, |_| true).into_iter().enumerate() {
+        for (k, at) in sample::random(&inner.mesh, 12, 5, |_| true)
+            .into_iter()
+            .enumerate()
+        {
             let place = inner.mesh.point(at);
             let patch = Patch::around(&inner, place, 15e-3).unwrap();
             let off = worst(&inner, &patch, place, 12e-3) * 1e3;

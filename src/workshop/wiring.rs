@@ -74,7 +74,11 @@ pub fn wiring(
     let most_gain = USED * 0.5 * chain.reference_v / (bridge * at_hardest).max(f64::MIN_POSITIVE);
     Wiring {
         chain,
-        channels: gauges.iter().zip(channels.iter().zip(heights)).map(channel).collect(),
+        channels: gauges
+            .iter()
+            .zip(channels.iter().zip(heights))
+            .map(channel)
+            .collect(),
         force_n,
         hardest_n,
         offset_v: chain.supply_v / 4.0 * (GAUGES + 3.0 * RESISTORS) * chain.gain,
@@ -89,7 +93,9 @@ impl Wiring {
         let chain = &self.chain;
         let half = chain.reference_v / 2.0;
         let bridge = match chain.active_arms {
-            1 => "one gauge and three resistors (or a gauge that is not glued to the wall in place of the one beside it, which takes away what warmth does)",
+            1 => {
+                "one gauge and three resistors (or a gauge that is not glued to the wall in place of the one beside it, which takes away what warmth does)"
+            }
             2 => "two gauges side by side in the bridge and two resistors",
             _ => "gauges in more than two arms",
         };
@@ -132,17 +138,32 @@ impl Wiring {
 #[must_use]
 pub fn header(wiring: &Wiring, name: &str, board: u32) -> String {
     let chain = &wiring.chain;
-    let most = wiring.channels.iter().map(|c| c.channel + 1).max().unwrap_or(0);
+    let most = wiring
+        .channels
+        .iter()
+        .map(|c| c.channel + 1)
+        .max()
+        .unwrap_or(0);
     let pins: Vec<String> = (0..most).map(|k| format!("A{k}")).collect();
     let name: String = (name.chars())
-        .map(|c| if c.is_ascii_alphanumeric() || "-_ ".contains(c) { c } else { '-' })
+        .map(|c| {
+            if c.is_ascii_alphanumeric() || "-_ ".contains(c) {
+                c
+            } else {
+                '-'
+            }
+        })
         .take(24)
         .collect();
     let mut text = String::from(
         "/* Written by HapDef Studio with the report of this limb: put it beside hapd.ino.\n * Which channel is which gauge:\n",
     );
     for c in &wiring.channels {
-        let _ = writeln!(text, " *   gauge {:>2}: channel {:>2}, pin {}", c.gauge, c.channel, c.pin);
+        let _ = writeln!(
+            text,
+            " *   gauge {:>2}: channel {:>2}, pin {}",
+            c.gauge, c.channel, c.pin
+        );
     }
     let _ = write!(
         text,
@@ -173,7 +194,11 @@ pub fn bill(wiring: &Wiring) -> Vec<[String; 3]> {
             (gauges * (4 - arms)).to_string(),
             "bridges; or gauges that are not glued, beside the glued ones",
         ),
-        item("trimmer 10 kΩ with resistor 100 kΩ", gauges.to_string(), "to trim a bridge to the middle"),
+        item(
+            "trimmer 10 kΩ with resistor 100 kΩ",
+            gauges.to_string(),
+            "to trim a bridge to the middle",
+        ),
         item(
             "amplifier channel",
             gauges.to_string(),
@@ -189,8 +214,16 @@ pub fn bill(wiring: &Wiring) -> Vec<[String; 3]> {
             format!("{:.1}", cable / 3.0 * 1.2),
             "along the wall to the foot, with 15 cm to the plug",
         ),
-        item("strain gauge adhesive, two components", "1".into(), "with cleaner and coating"),
-        item("absorbent wool, separating film, adhesive tape", "1".into(), "between pads and gauges"),
+        item(
+            "strain gauge adhesive, two components",
+            "1".into(),
+            "with cleaner and coating",
+        ),
+        item(
+            "absorbent wool, separating film, adhesive tape",
+            "1".into(),
+            "between pads and gauges",
+        ),
     ]
 }
 
@@ -214,7 +247,13 @@ mod tests {
     #[test]
     fn board_project_and_labels_say_the_same() {
         let gauges = [gauge(1, [-200e-6, 100e-6]), gauge(2, [0.0, 400e-6])];
-        let made = wiring(&gauges, &[5, 0], &[0.03, 0.07], Chain::default(), [10.0, 30.0]);
+        let made = wiring(
+            &gauges,
+            &[5, 0],
+            &[0.03, 0.07],
+            Chain::default(),
+            [10.0, 30.0],
+        );
         let header = header(&made, "my \"limb\"", 0xABC);
         for line in [
             "#define HAPD_PINS {A0, A1, A2, A3, A4, A5}",

@@ -21,7 +21,13 @@ pub(super) fn all(flow: &mut Flow, source: &Source<'_>) {
         if let Ok(patch) = patch {
             picture(sheet, source, &patch, glued, corner);
         }
-        words(sheet, source, glued, landmarks, corner + DVec2::new(PICTURE + 6.0, 0.0));
+        words(
+            sheet,
+            source,
+            glued,
+            landmarks,
+            corner + DVec2::new(PICTURE + 6.0, 0.0),
+        );
     }
 }
 
@@ -44,7 +50,10 @@ fn picture(sheet: &mut Sheet, source: &Source<'_>, patch: &Patch, glued: &Glued,
     for edge in &patch.edges {
         let ends = edge.map(|v| patch.flat[v as usize] * 1e3);
         if let Some(ends) = clipped(ends, half) {
-            sheet.line(ends.map(|p| middle + DVec2::new(p.x, -p.y)), Line::new(BLUE, 0.35));
+            sheet.line(
+                ends.map(|p| middle + DVec2::new(p.x, -p.y)),
+                Line::new(BLUE, 0.35),
+            );
         }
     }
     let keys = &source.inputs.project.gauge;
@@ -57,10 +66,18 @@ fn picture(sheet: &mut Sheet, source: &Source<'_>, patch: &Patch, glued: &Glued,
         if other.number != glued.number {
             label(sheet, place(at), other.number);
         } else if let Some(along) = patch.turn(glued.place, glued.direction) {
-            gauge(sheet, place(at), DVec2::new(along.x, -along.y), size, glued.number);
+            gauge(
+                sheet,
+                place(at),
+                DVec2::new(along.x, -along.y),
+                size,
+                glued.number,
+            );
         }
     }
-    sheet.say(corner + DVec2::new(1.5, 3.6), "↑", 3.0, Align::Left);
+    let arrow =
+        [(-1.2, 3.0), (0.0, 0.0), (1.2, 3.0)].map(|(x, y)| corner + DVec2::new(2.8 + x, 1.4 + y));
+    sheet.shape(arrow, Some(INK), None);
 }
 
 /// What of a line lies in a square about the origin.
@@ -83,22 +100,50 @@ fn clipped([a, b]: [DVec2; 2], half: f64) -> Option<[DVec2; 2]> {
 
 fn words(sheet: &mut Sheet, source: &Source<'_>, glued: &Glued, at: &Landmarks, corner: DVec2) {
     let mm = |metres: f64| format!("{:.1} mm", metres * 1e3);
-    let channel = source.wiring.channels.iter().find(|c| c.gauge == glued.number);
+    let channel = source
+        .wiring
+        .channels
+        .iter()
+        .find(|c| c.gauge == glued.number);
     let turned = at.turned_deg;
-    let side = if turned >= 0.0 { "clockwise" } else { "counterclockwise" };
+    let side = if turned >= 0.0 {
+        "clockwise"
+    } else {
+        "counterclockwise"
+    };
     let around = format!(
         "{:.1}° about the axis from the front, towards the {}",
         at.around_deg.abs(),
-        if at.around_deg >= 0.0 { "right" } else { "left" }
+        if at.around_deg >= 0.0 {
+            "right"
+        } else {
+            "left"
+        }
     );
     let mut lines = vec![
-        ("Height", format!("{} above the foot, {} below the top", mm(at.above_foot), mm(at.below_top))),
+        (
+            "Height",
+            format!(
+                "{} above the foot, {} below the top",
+                mm(at.above_foot),
+                mm(at.below_top)
+            ),
+        ),
         ("Around", around),
     ];
     if let Some((distance, _)) = at.from_edge {
-        lines.push(("Edge", format!("{} from the nearest edge of the wall", mm(distance))));
+        lines.push((
+            "Edge",
+            format!("{} from the nearest edge of the wall", mm(distance)),
+        ));
     }
-    lines.push(("Direction", format!("{:.0}° {side} from the part's axis, seen from inside", turned.abs())));
+    lines.push((
+        "Direction",
+        format!(
+            "{:.0}° {side} from the part's axis, seen from inside",
+            turned.abs()
+        ),
+    ));
     let others: Vec<String> = (at.neighbours.iter())
         .map(|n| format!("gauge {}: {}", n.number, mm(n.distance)))
         .collect();
@@ -106,16 +151,27 @@ fn words(sheet: &mut Sheet, source: &Source<'_>, glued: &Glued, at: &Landmarks, 
         lines.push(("Neighbours", others.join(", ")));
     }
     let p = glued.place * 1e3;
-    lines.push(("Place", format!("({:.2}, {:.2}, {:.2}) mm, on the inner face", p.x, p.y, p.z)));
+    lines.push((
+        "Place",
+        format!("({:.2}, {:.2}, {:.2}) mm, on the inner face", p.x, p.y, p.z),
+    ));
     if let Some(c) = channel {
         let ([low, high], [least, most]) = (c.microstrain, c.counts);
         lines.push((
             "Reads",
-            format!("{low:.0} to {high:+.0} µε under {} N, {least:.0} to {most:+.0} counts", source.wiring.force_n),
+            format!(
+                "{low:.0} to {high:+.0} µε under {} N, {least:.0} to {most:+.0} counts",
+                source.wiring.force_n
+            ),
         ));
         lines.push(("Wired to", format!("pin {}, channel {}", c.pin, c.channel)));
     }
-    sheet.say(corner + DVec2::new(0.0, 4.6), &format!("Gauge {}", glued.number), 4.2, Align::Left);
+    sheet.say(
+        corner + DVec2::new(0.0, 4.6),
+        &format!("Gauge {}", glued.number),
+        4.2,
+        Align::Left,
+    );
     for (k, (label, text)) in lines.iter().enumerate() {
         let y = 10.4 + 4.9 * k as f64;
         sheet.words(crate::paper::Words {

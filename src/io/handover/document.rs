@@ -38,14 +38,19 @@ pub(super) fn sheets(source: &Source<'_>) -> Vec<Sheet> {
     let rows = settings::rows(source.inputs, source.design, source.provenance);
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(a, b)| vec![a, b]).collect();
     flow.table(&["Setting", "Value"], &rows);
-    flow.sheets(&format!("HapDef {} · {}", source.provenance.version, source.name))
+    flow.sheets(&format!(
+        "HapDef {} · {}",
+        source.provenance.version, source.name
+    ))
 }
 
 fn promise(flow: &mut Flow, source: &Source<'_>) {
     let design = source.design;
     let chosen = design.chosen().len();
     let selector = source.inputs.project.selection.selector;
-    let by = design.led().map_or(selector.title(), |s| s.selector.title());
+    let by = design
+        .led()
+        .map_or(selector.title(), |s| s.selector.title());
     flow.text(&format!(
         "{chosen} strain gauges, chosen by {by} on {}, to find where a touch of {} N lands.",
         design.simulated.dataset.signal.name(),
@@ -65,7 +70,10 @@ fn promise(flow: &mut Flow, source: &Source<'_>) {
         });
     let regions: Vec<Vec<String>> = regions.collect();
     if !regions.is_empty() {
-        flow.table(&["Region", "Mean error (mm)", "Median (mm)", "95 % (mm)"], &regions);
+        flow.table(
+            &["Region", "Mean error (mm)", "Median (mm)", "95 % (mm)"],
+            &regions,
+        );
     }
     failures(flow, design);
     let doubts = design.doubts();
@@ -138,9 +146,16 @@ fn failures(flow: &mut Flow, design: &Design) {
     flow.text(&format!(
         "When gauges of the set by {} fail{}:",
         title_of(&set.selector),
-        if retrained { ", as trained with all" } else { " and are left out" }
+        if retrained {
+            ", as trained with all"
+        } else {
+            " and are left out"
+        }
     ));
-    flow.table(&["Failed gauges", "Mean (mm)", "Worst (mm)", "Subsets judged"], &rows);
+    flow.table(
+        &["Failed gauges", "Mean (mm)", "Worst (mm)", "Subsets judged"],
+        &rows,
+    );
 }
 
 fn wiring(flow: &mut Flow, source: &Source<'_>) {
@@ -162,7 +177,14 @@ fn wiring(flow: &mut Flow, source: &Source<'_>) {
         })
         .collect();
     let microstrain = format!("Microstrain under {} N", source.wiring.force_n);
-    let names = ["Gauge", "Pin", "Channel", microstrain.as_str(), "Counts", "Cable (mm)"];
+    let names = [
+        "Gauge",
+        "Pin",
+        "Channel",
+        microstrain.as_str(),
+        "Counts",
+        "Cable (mm)",
+    ];
     flow.table(&names, &rows);
     flow.text("hapd_config.h beside this report goes into the sketch's folder: pins, board number, gain and supply are then those of this table.");
     let bill = crate::workshop::bill(&source.wiring);

@@ -25,7 +25,14 @@ pub(super) fn all(flow: &mut Flow, source: &Source<'_>) {
         let (sheet, corner) = flow.room(HEIGHT + 7.0);
         for (k, view) in pair.iter().enumerate() {
             let corner = corner + DVec2::new(k as f64 * (width + GAP), 0.0);
-            side(sheet, source, &tint, view, corner, DVec2::new(width, HEIGHT));
+            side(
+                sheet,
+                source,
+                &tint,
+                view,
+                corner,
+                DVec2::new(width, HEIGHT),
+            );
             let below = corner + DVec2::new(width / 2.0, HEIGHT + 4.0);
             sheet.say(below, view.name, 3.0, Align::Middle);
         }
@@ -61,10 +68,19 @@ impl Fit {
 }
 
 fn bounds(points: impl Iterator<Item = DVec2>) -> (DVec2, DVec2) {
-    points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, u), p| (l.min(p), u.max(p)))
+    points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, u), p| {
+        (l.min(p), u.max(p))
+    })
 }
 
-fn side(sheet: &mut Sheet, source: &Source<'_>, tint: &[f64], view: &View, corner: DVec2, room: DVec2) {
+fn side(
+    sheet: &mut Sheet,
+    source: &Source<'_>,
+    tint: &[f64],
+    view: &View,
+    corner: DVec2,
+    room: DVec2,
+) {
     let mesh = &source.design.simulated.mesh;
     let right = view.up.cross(view.toward).normalize();
     let frame = DMat3::from_cols(right, view.toward.cross(right), view.toward).transpose();
@@ -81,7 +97,13 @@ fn side(sheet: &mut Sheet, source: &Source<'_>, tint: &[f64], view: &View, corne
         let at = fit.place((frame * marker.position).truncate());
         let along = (frame * marker.direction).truncate();
         let near = marker.normal.dot(view.toward) > 0.0;
-        small(sheet, at, DVec2::new(along.x, -along.y), marker.number, near);
+        small(
+            sheet,
+            at,
+            DVec2::new(along.x, -along.y),
+            marker.number,
+            near,
+        );
     }
 }
 
@@ -107,8 +129,16 @@ fn unrolled(flow: &mut Flow, source: &Source<'_>, tint: &[f64]) {
     }
     for marker in markers(source.inputs, source.design) {
         let at = fit.place(flat.place(marker.position));
-        let along = flat.turn(marker.position, marker.direction).normalize_or_zero();
-        small(sheet, at, DVec2::new(along.x, -along.y), marker.number, true);
+        let along = flat
+            .turn(marker.position, marker.direction)
+            .normalize_or_zero();
+        small(
+            sheet,
+            at,
+            DVec2::new(along.x, -along.y),
+            marker.number,
+            true,
+        );
     }
     flow.note(&format!(
         "{words} {:.0} mm across, {:.0} mm up.",

@@ -17,20 +17,38 @@ pub(super) fn gauge(sheet: &mut Sheet, at: DVec2, along: DVec2, size: DVec2, num
         [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
             .map(|(u, v)| at + along * (u * half.x) + across * (v * half.y))
     };
-    sheet.shape(corners(size / 2.0 + FILM), Some([255; 3]), Some(Line::new(ACCENT, 0.2)));
-    sheet.shape(corners(size / 2.0), Some([0xfb, 0xe3, 0xcf]), Some(Line::new(ACCENT, 0.3)));
+    sheet.shape(
+        corners(size / 2.0 + FILM),
+        Some([255; 3]),
+        Some(Line::new(ACCENT, 0.2)),
+    );
+    sheet.shape(
+        corners(size / 2.0),
+        Some([0xfb, 0xe3, 0xcf]),
+        Some(Line::new(ACCENT, 0.3)),
+    );
     let reach = size.x / 2.0 + FILM.x;
-    let cross = [along * (reach + 3.0), across * (size.y / 2.0 + FILM.y + 3.0)];
+    let cross = [
+        along * (reach + 3.0),
+        across * (size.y / 2.0 + FILM.y + 3.0),
+    ];
     for way in cross {
         for side in [-1.0, 1.0] {
             let inner = way * (1.0 - 3.0 / way.length());
             sheet.line([at + inner * side, at + way * side], Line::new(ACCENT, 0.2));
         }
     }
-    sheet.line([at - along * (size.x / 2.0), at + along * (size.x / 2.0)], Line::new(ACCENT, 0.15));
-    sheet.line([at - across * (size.y / 2.0), at + across * (size.y / 2.0)], Line::new(ACCENT, 0.15));
+    sheet.line(
+        [at - along * (size.x / 2.0), at + along * (size.x / 2.0)],
+        Line::new(ACCENT, 0.15),
+    );
+    sheet.line(
+        [at - across * (size.y / 2.0), at + across * (size.y / 2.0)],
+        Line::new(ACCENT, 0.15),
+    );
     // The number stands beside the film.
-    let beside = at + across * (size.y / 2.0 + FILM.y + 2.6) + along * (size.x / 2.0 + FILM.x - 1.0);
+    let beside =
+        at + across * (size.y / 2.0 + FILM.y + 2.6) + along * (size.x / 2.0 + FILM.x - 1.0);
     label(sheet, beside, number);
 }
 
@@ -44,7 +62,11 @@ pub(super) fn small(sheet: &mut Sheet, at: DVec2, along: DVec2, number: usize, n
         ..Line::new(ACCENT, 1.1)
     };
     sheet.line([at - along * REACH, at + along * REACH], line);
-    let (fill, ink) = if near { (ACCENT, [255; 3]) } else { ([255; 3], ACCENT) };
+    let (fill, ink) = if near {
+        (ACCENT, [255; 3])
+    } else {
+        ([255; 3], ACCENT)
+    };
     sheet.circle(at, RADIUS, Some(fill), Some(Line::new(ACCENT, 0.25)));
     number_at(sheet, at, number, ink);
 }

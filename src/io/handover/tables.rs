@@ -1,5 +1,6 @@
 //! Tables for whoever wires and buys.
 
+use crate::design::Design;
 use crate::io::table::Writing;
 use crate::workshop::{Wiring, bill as items};
 
@@ -37,6 +38,30 @@ pub(super) fn bill(wiring: &Wiring) -> String {
     let mut table = Writing::new(["item", "quantity", "about"]);
     for item in items(wiring) {
         table.row(item);
+    }
+    table.text().to_owned()
+}
+
+/// A row a vertex of the limb: mean error of the chosen gauges around it, and the share of light touches that they do not feel.
+pub(super) fn zones(design: &Design) -> String {
+    let mesh = &design.simulated.mesh;
+    let errors = design.error_map(mesh);
+    let blind = design.blind_map(mesh);
+    let force = blind.as_ref().map_or(0.0, |(force, _)| *force);
+    let mut table = Writing::new([
+        "x_mm".to_owned(),
+        "y_mm".to_owned(),
+        "z_mm".to_owned(),
+        "error_mm".to_owned(),
+        format!("not_felt_at_{force}n"),
+    ]);
+    let cell = |values: Option<&Vec<f64>>, k: usize| {
+        values.map_or(String::new(), |v| format!("{:.3}", v[k]))
+    };
+    for (k, p) in mesh.positions().iter().enumerate() {
+        let [x, y, z] = (*p * 1e3).to_array().map(|v| format!("{v:.3}"));
+        let felt = blind.as_ref().map(|(_, share)| share);
+        table.row([x, y, z, cell(errors.as_ref(), k), cell(felt, k)]);
     }
     table.text().to_owned()
 }

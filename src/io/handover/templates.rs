@@ -25,7 +25,12 @@ pub(super) fn sheets(source: &Source<'_>) -> Result<Vec<Sheet>, String> {
         let at = DVec2::new(sheet.size.x - MARGIN, sheet.size.y - 7.0);
         sheet.say(at, &format!("{} of {count}", k + 1), 2.8, Align::Right);
         let at = DVec2::new(MARGIN, sheet.size.y - 7.0);
-        sheet.say(at, &format!("Templates for {}, 1 : 1, seen from inside", source.name), 2.8, Align::Left);
+        sheet.say(
+            at,
+            &format!("Templates for {}, 1 : 1, seen from inside", source.name),
+            2.8,
+            Align::Left,
+        );
     }
     Ok(sheets)
 }
@@ -35,14 +40,25 @@ fn head(sheet: &mut Sheet, title: &str, words: &str) {
     sheet.say(DVec2::new(MARGIN, 11.0), title, 4.2, Align::Left);
     sheet.say(DVec2::new(MARGIN, 16.5), words, 2.8, Align::Left);
     let (y, from) = (23.0, MARGIN);
-    sheet.line([DVec2::new(from, y), DVec2::new(from + 100.0, y)], Line::new(INK, 0.25));
+    sheet.line(
+        [DVec2::new(from, y), DVec2::new(from + 100.0, y)],
+        Line::new(INK, 0.25),
+    );
     for k in 0..=10 {
         let x = from + 10.0 * f64::from(k);
         let tall = if k % 5 == 0 { 2.4 } else { 1.4 };
-        sheet.line([DVec2::new(x, y - tall), DVec2::new(x, y)], Line::new(INK, 0.2));
+        sheet.line(
+            [DVec2::new(x, y - tall), DVec2::new(x, y)],
+            Line::new(INK, 0.2),
+        );
     }
     let at = DVec2::new(from + 103.0, y);
-    sheet.say(at, "100 mm: print at 100 %, and measure this bar", 2.6, Align::Left);
+    sheet.say(
+        at,
+        "100 mm: print at 100 %, and measure this bar",
+        2.6,
+        Align::Left,
+    );
 }
 
 fn patches(source: &Source<'_>) -> Result<Vec<Sheet>, String> {
@@ -77,7 +93,14 @@ fn patches(source: &Source<'_>) -> Result<Vec<Sheet>, String> {
             tall = 0.0;
         }
         let last = sheets.len() - 1;
-        one(&mut sheets[last], source, &patch, glued, corner + DVec2::new(side / 2.0, radius), radius);
+        one(
+            &mut sheets[last],
+            source,
+            &patch,
+            glued,
+            corner + DVec2::new(side / 2.0, radius),
+            radius,
+        );
         tall = tall.max(2.0 * radius + WORDS);
         corner.x += side + GAP;
     }
@@ -95,7 +118,14 @@ fn radius(source: &Source<'_>, landmarks: &Landmarks) -> f64 {
     (edge + BEYOND).clamp(film, LARGEST.max(film))
 }
 
-fn one(sheet: &mut Sheet, source: &Source<'_>, patch: &Patch, glued: &Glued, middle: DVec2, radius: f64) {
+fn one(
+    sheet: &mut Sheet,
+    source: &Source<'_>,
+    patch: &Patch,
+    glued: &Glued,
+    middle: DVec2,
+    radius: f64,
+) {
     let place = |p: DVec2| middle + DVec2::new(p.x, -p.y) * 1e3;
     for tri in &patch.triangles {
         let corners = tri.map(|v| patch.flat[v as usize] * 1e3);
@@ -110,26 +140,48 @@ fn one(sheet: &mut Sheet, source: &Source<'_>, patch: &Patch, glued: &Glued, mid
         let [a, b] = edge.map(|v| patch.flat[v as usize] * 1e3);
         if let Some((from, to)) = chord(a, b, radius) {
             let ends = [a.lerp(b, from), a.lerp(b, to)];
-            sheet.line(ends.map(|p| middle + DVec2::new(p.x, -p.y)), Line::new(BLUE, 0.4));
+            sheet.line(
+                ends.map(|p| middle + DVec2::new(p.x, -p.y)),
+                Line::new(BLUE, 0.4),
+            );
         }
     }
     sheet.circle(middle, radius, None, Some(Line::new(INK, 0.2)));
     let keys = &source.inputs.project.gauge;
     let size = DVec2::new(keys.grid_length_mm, keys.grid_width_mm);
-    for other in source.inner.gauges.iter().filter(|o| o.number != glued.number) {
-        if let Some(at) = patch.lay(other.place).filter(|p| p.length() * 1e3 < radius - 2.5) {
+    for other in source
+        .inner
+        .gauges
+        .iter()
+        .filter(|o| o.number != glued.number)
+    {
+        if let Some(at) = patch
+            .lay(other.place)
+            .filter(|p| p.length() * 1e3 < radius - 2.5)
+        {
             label(sheet, place(at), other.number);
         }
     }
     if let Some(along) = patch.turn(glued.place, glued.direction) {
-        gauge(sheet, middle, DVec2::new(along.x, -along.y), size, glued.number);
+        gauge(
+            sheet,
+            middle,
+            DVec2::new(along.x, -along.y),
+            size,
+            glued.number,
+        );
     }
     // Up is marked on the rim.
     let top = middle - DVec2::new(0.0, radius);
     let arrow = [(-1.4, 3.6), (0.0, 0.8), (1.4, 3.6)].map(|(x, y)| top + DVec2::new(x, y));
     sheet.shape(arrow, Some(INK), None);
     let below = middle + DVec2::new(0.0, radius + 4.0);
-    sheet.say(below, &format!("Gauge {}", glued.number), 2.6, Align::Middle);
+    sheet.say(
+        below,
+        &format!("Gauge {}", glued.number),
+        2.6,
+        Align::Middle,
+    );
     let words = format!("stretched {:.1} % at most", 100.0 * patch.stretch);
     sheet.say(below + DVec2::new(0.0, 3.6), &words, 2.6, Align::Middle);
 }
@@ -171,10 +223,17 @@ mod tests {
     fn lines_are_cut_where_the_paper_ends() {
         let (from, to) = chord(DVec2::new(-2.0, 0.0), DVec2::new(2.0, 0.0), 1.0).unwrap();
         assert!((from - 0.25).abs() < 1e-12 && (to - 0.75).abs() < 1e-12);
-        assert_eq!(chord(DVec2::new(-2.0, 3.0), DVec2::new(2.0, 3.0), 1.0), None);
+        assert_eq!(
+            chord(DVec2::new(-2.0, 3.0), DVec2::new(2.0, 3.0), 1.0),
+            None
+        );
         let small = [DVec2::ZERO, DVec2::X * 0.5, DVec2::Y * 0.5];
         assert_eq!(in_circle(&small, 1.0), small);
         let large = small.map(|p| p * 10.0);
-        assert!(in_circle(&large, 1.0).iter().all(|p| p.length() < 1.0 + 1e-9));
+        assert!(
+            in_circle(&large, 1.0)
+                .iter()
+                .all(|p| p.length() < 1.0 + 1e-9)
+        );
     }
 }

@@ -44,11 +44,15 @@ impl Plan {
             let along = flat.turn(g.place, g.direction).normalize_or(DVec2::Y);
             let at = seen(flat.place(g.place));
             // Beside the seam it is on both ends.
-            let turns = flat.around().map_or(vec![0.0], |m| vec![0.0, m * 1e3, -m * 1e3]);
+            let turns = flat
+                .around()
+                .map_or(vec![0.0], |m| vec![0.0, m * 1e3, -m * 1e3]);
             let near = (a.min(b).x - SEAM..=a.max(b).x + SEAM).clone();
-            (turns.into_iter().map(move |turn| DVec2::new(at.x + turn, at.y)))
-                .filter(move |at| near.contains(&at.x))
-                .map(move |at| (at, DVec2::new(-along.x, along.y), g.number))
+            (turns
+                .into_iter()
+                .map(move |turn| DVec2::new(at.x + turn, at.y)))
+            .filter(move |at| near.contains(&at.x))
+            .map(move |at| (at, DVec2::new(-along.x, along.y), g.number))
         });
         let gauges = gauges.collect();
         let plan = Self {
@@ -72,7 +76,11 @@ fn rims(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
             *sides.entry([a.min(b), a.max(b)]).or_default() += 1;
         }
     }
-    sides.into_iter().filter(|(_, count)| *count == 1).map(|(side, _)| side).collect()
+    sides
+        .into_iter()
+        .filter(|(_, count)| *count == 1)
+        .map(|(side, _)| side)
+        .collect()
 }
 
 /// The sheets, rows from above; none where there would be more than anybody glues together.
@@ -98,7 +106,11 @@ pub(super) fn sheets(source: &Source<'_>) -> Vec<Sheet> {
     for row in 0..rows {
         for column in 0..columns {
             let mut sheet = empty.clone();
-            let title = format!("The inside unrolled: row {} of {rows}, column {} of {columns}", row + 1, column + 1);
+            let title = format!(
+                "The inside unrolled: row {} of {rows}, column {} of {columns}",
+                row + 1,
+                column + 1
+            );
             head(&mut sheet, &title, &stretch);
             // Of the plane, what lies at the upper left corner of the sheet's room.
             let corner = DVec2::new(
@@ -107,7 +119,10 @@ pub(super) fn sheets(source: &Source<'_>) -> Vec<Sheet> {
             );
             let window = Window {
                 corner,
-                room: room.min(DVec2::new(plan.upper.x - corner.x, corner.y - plan.lower.y) + DVec2::splat(3.0)),
+                room: room.min(
+                    DVec2::new(plan.upper.x - corner.x, corner.y - plan.lower.y)
+                        + DVec2::splat(3.0),
+                ),
             };
             draw(&mut sheet, &plan, &window, source);
             crosses(&mut sheet, room, (row, rows), (column, columns));
@@ -125,7 +140,9 @@ fn room(sheet: &Sheet) -> DVec2 {
 /// Columns and rows of sheets for a drawing of a size (mm).
 fn count(whole: DVec2, room: DVec2) -> (usize, usize) {
     let step = room - DVec2::splat(OVERLAP);
-    let count = ((whole - DVec2::splat(OVERLAP)) / step).ceil().max(DVec2::ONE);
+    let count = ((whole - DVec2::splat(OVERLAP)) / step)
+        .ceil()
+        .max(DVec2::ONE);
     (count.x as usize, count.y as usize)
 }
 
@@ -143,7 +160,10 @@ impl Window {
 
     /// A convex shape's part on the sheet (I. Sutherland and G. Hodgman, 1974).
     fn clipped(&self, corners: &[DVec2]) -> Vec<DVec2> {
-        let (low, high) = (DVec2::new(MARGIN, HEAD), DVec2::new(MARGIN, HEAD) + self.room);
+        let (low, high) = (
+            DVec2::new(MARGIN, HEAD),
+            DVec2::new(MARGIN, HEAD) + self.room,
+        );
         let mut shape: Vec<DVec2> = corners.iter().map(|&p| self.place(p)).collect();
         for k in 0..2 {
             for (limit, sign) in [(low[k], 1.0), (high[k], -1.0)] {
@@ -183,7 +203,10 @@ fn draw(sheet: &mut Sheet, plan: &Plan, window: &Window, source: &Source<'_>) {
     let size = DVec2::new(keys.grid_length_mm, keys.grid_width_mm);
     for (at, along, number) in &plan.gauges {
         let at = window.place(*at);
-        let near = at.clamp(DVec2::new(MARGIN, HEAD), DVec2::new(MARGIN, HEAD) + window.room);
+        let near = at.clamp(
+            DVec2::new(MARGIN, HEAD),
+            DVec2::new(MARGIN, HEAD) + window.room,
+        );
         if near == at {
             gauge(sheet, at, DVec2::new(along.x, -along.y), size, *number);
         }
@@ -191,7 +214,12 @@ fn draw(sheet: &mut Sheet, plan: &Plan, window: &Window, source: &Source<'_>) {
 }
 
 /// Crosses in the corners of what neighbours have in common: they come to lie on each other.
-fn crosses(sheet: &mut Sheet, room: DVec2, (row, rows): (usize, usize), (column, columns): (usize, usize)) {
+fn crosses(
+    sheet: &mut Sheet,
+    room: DVec2,
+    (row, rows): (usize, usize),
+    (column, columns): (usize, usize),
+) {
     let ends = |k: usize, count: usize, room: f64| {
         let mut at = Vec::new();
         if k > 0 {
@@ -238,7 +266,11 @@ mod tests {
             corner: DVec2::new(40.0, 100.0),
             ..left
         };
-        let triangle = [DVec2::new(30.0, 90.0), DVec2::new(70.0, 90.0), DVec2::new(30.0, 60.0)];
+        let triangle = [
+            DVec2::new(30.0, 90.0),
+            DVec2::new(70.0, 90.0),
+            DVec2::new(30.0, 60.0),
+        ];
         let area = |shape: &[DVec2]| {
             let pairs = shape.iter().zip(shape.iter().cycle().skip(1));
             pairs.map(|(a, b)| a.perp_dot(*b)).sum::<f64>().abs() / 2.0
@@ -247,6 +279,9 @@ mod tests {
         // Both have what lies between 40 and 50.
         let common = 0.5 * 10.0 * (22.5 + 15.0);
         assert!((area(&a) + area(&b) - common - 600.0).abs() < 1e-9);
-        assert_eq!(left.place(DVec2::new(45.0, 90.0)).x - right.place(DVec2::new(45.0, 90.0)).x, 40.0);
+        assert_eq!(
+            left.place(DVec2::new(45.0, 90.0)).x - right.place(DVec2::new(45.0, 90.0)).x,
+            40.0
+        );
     }
 }

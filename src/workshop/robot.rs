@@ -1,0 +1,120 @@
+//! Gauges as frames of a robot's description.
+
+use std::fmt::Write as _;
+
+use glam::{DMat3, DVec3};
+
+use super::inner::Glued;
+
+/// A frame at a gauge: its place (m), and the turn of its axes: x along the gauge, z from the inside to the outside.
+#[must_use]
+pub fn frame(gauge: &Glued) -> (DVec3, DMat3) {
+    let z = gauge.out.normalize_or(DVec3::Z);
+    let x = gauge.direction.reject_from_normalized(z);
+    let x = x.normalize_or(z.any_orthonormal_vector());
+    (gauge.place, DMat3::from_cols(x, z.cross(x), z))
+}
+
+/// Roll, pitch and yaw (radians) of a turn, as URDF has them: about the fixed axes x, y and z, one after the other.
+#[must_use]
+pub fn roll_pitch_yaw(turn: &DMat3) -> [f64; 3] {
+    /// Of the cosine of the pitch: below, roll and yaw turn about the same axis.
+    const LOCKED: f64 = 1e-9;
+    let [x, y, z] = [turn.x_axis, turn.y_axis, turn.z_axis];
+    let level = x.x.hypot(x.y);
+    let pitch = (-x.z).atan2(level);
+    if level < LOCKED {
+        return [(-z.y).atan2(y.y), pitch, 0.0];
+    }
+    [y.z.atan2(z.z), pitch, x.y.atan2(x.x)]
+}
+
+/// The turn of a roll, a pitch and a yaw (radians).
+#[must_use]
+pub fn turn_of([roll, pitch, yaw]: [f64; 3]) -> DMat3 {
+    DMat3::from_rotation_z(yaw) * DMat3::from_rotation_y(pitch) * DMat3::from_rotation_x(roll)
+}
+
+/// A URDF fragment with a link and a fixed joint for each gauge, on the link that the limb is.
+#[must_use]
+pub fn urdf(gauges: &[Glued], robot: &str, link: &str) -> String {
+    let (robot, link) = (escaped(robot), escaped(link));
+    let mut text = format!(
+        "<?xml version=\"1.0\"?>\n<!-- A frame for each gauge: x along it, z from the inside to the outside. Metres and radians in the frame of \"{link}\".\n     Copy the links and joints into the robot's own description. -->\n<robot name=\"{robot}\">\n  <link name=\"{link}\"/>\n"
+    );
+    for gauge in gauges {
+        let (place, turn) = frame(gauge);
+        let [roll, pitch, yaw] = roll_pitch_yaw(&turn);
+        let name = format!("{link}_gauge_{}", gauge.number);
+        let _ = write!(
+            text,
+            "  <link name=\"{name}\"/>\n  <joint name=\"{name}_joint\" type=\"fixed\">\n    <parent link=\"{link}\"/>\n    <child link=\"{name}\"/>\n    <origin xyz=\"{:.6} {:.6} {:.6}\" rpy=\"{roll:.6} {pitch:.6} {yaw:.6}\"/>\n  </joint>\n",
+            place.x, place.y, place.z
+        );
+    }
+    text.push_str("</robot>\n");
+    text
+}
+
+/// Text inside an attribute; two dashes would end the comment.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace("--", "-")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_those_of_the_turn() {
+        for k in 0..200 {
+            let a = f64::from(k);
+            let angles = [a.sin() * 3.1, (1.7 * a).cos() * 1.57, (0.3 * a).sin() * 3.1];
+            let turn = turn_of(angles);
+            let again = turn_of(roll_pitch_yaw(&turn));
+            assert!(
+                (turn - again)
+                    .to_cols_array()
+                    .iter()
+                    .all(|x| x.abs() < 1e-9),
+                "{angles:?}"
+            );
+        }
+        for pitch in [-1.0, 1.0] {
+            let turn = turn_of([0.4, pitch * std::f64::consts::FRAC_PI_2, -0.9]);
+            let again = turn_of(roll_pitch_yaw(&turn));
+            assert!(
+                (turn - again)
+                    .to_cols_array()
+                    .iter()
+                    .all(|x| x.abs() < 1e-7)
+            );
+        }
+    }
+
+    #[test]
+    fn a_frame_lies_along_its_gauge() {
+        let gauge = Glued {
+            number: 3,
+            place: DVec3::new(0.01, 0.02, 0.03),
+            out: DVec3::Y,
+            direction: DVec3::new(0.6, 0.0, 0.8),
+            strain: [0.0; 2],
+            rms: 0.0,
+        };
+        let (_, turn) = frame(&gauge);
+        assert!((turn * DVec3::X - gauge.direction).length() < 1e-12);
+        assert!((turn * DVec3::Z - gauge.out).length() < 1e-12);
+        assert!((turn.determinant() - 1.0).abs() < 1e-12);
+        let text = urdf(&[gauge], "r\"obot", "shin");
+        assert!(text.contains("<child link=\"shin_gauge_3\"/>") && text.contains("r&quot;obot"));
+        assert!(
+            text.contains("xyz=\"0.010000 0.020000 0.030000\""),
+            "{text}"
+        );
+    }
+}
