@@ -4,6 +4,7 @@
 //! [`Collector`] goes through a plan of presses: it is given what machine and board say and answers what the machine is to be
 //! told, so that a real printer, and a simulated one in its own time, are driven by the same code.
 
+mod check;
 mod collector;
 mod contact;
 mod machine;
@@ -13,7 +14,8 @@ mod plan;
 mod press;
 mod printer;
 
-pub use collector::{Answer, Collector, Ended, News, Reference};
+pub use check::{Answer, Reference};
+pub use collector::{Collector, Ended, News};
 pub use contact::Contact;
 pub use machine::{Axis, Machine, Pose, TipSensor};
 pub use marlin::{Heard, Marlin, position_in};

@@ -83,7 +83,6 @@ pub mod link;
 pub mod live;
 pub mod memory;
 pub mod mesh;
-#[allow(missing_docs)]
 pub mod paper;
 pub mod parameter_study;
 pub mod pca;

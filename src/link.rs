@@ -3,6 +3,8 @@
 mod benching;
 mod counted_line;
 mod host;
+#[cfg(feature = "mcap")]
+mod mcap_log;
 mod port;
 mod ports;
 mod pressed;
@@ -20,6 +22,8 @@ use std::path::{Path, PathBuf};
 
 pub use benching::{BenchOrder, press_at_ports, press_simulated};
 pub use host::{Doorway, Entrance, Hosted, host};
+#[cfg(feature = "mcap")]
+pub use mcap_log::McapLog;
 pub use port::{Got, Pace, Port};
 pub use ports::{PortInfo, ports};
 pub use pressed::{BenchPress, bench_presses};

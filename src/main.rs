@@ -85,7 +85,7 @@ fn open_studio(cli: &Cli) -> anyhow::Result<()> {
 fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
     use cli::render::ViewArg;
     use hapdef::render::camera::Preset;
-    use hapdef::studio::picture::{Picture, png};
+    use hapdef::studio::picture::{Picture, png, turning};
 
     let picture = Picture {
         size: args.size.0,
@@ -102,16 +102,25 @@ fn render(args: &cli::render::RenderArgs) -> anyhow::Result<()> {
     };
     let loaded = args.common().load()?;
     cli::spared::Spared::of(&loaded).check_result("--out", Some(&args.out))?;
-    let is_png = args
-        .out
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    let ending = args.out.extension().unwrap_or_default();
+    let is_png = ending.eq_ignore_ascii_case("png")
+        || (args.turn.is_some() && ending.eq_ignore_ascii_case("apng"));
     anyhow::ensure!(
         is_png,
-        "--out {}: pictures are written as PNG. Choose a name that ends in .png",
-        hapdef::plain::path(&args.out)
+        "--out {}: pictures are written as PNG. Choose a name that ends in .png{}",
+        hapdef::plain::path(&args.out),
+        if args.turn.is_some() { " or .apng" } else { "" }
     );
-    let png = png(loaded, &picture).map_err(anyhow::Error::msg)?;
+    let tell = |done: usize, all: usize| {
+        if done.is_multiple_of(12) || done == all {
+            cli::out::say(&format!("{done} of {all} frames"));
+        }
+    };
+    let png = match args.turn {
+        Some(seconds) => turning(loaded, &picture, seconds, tell),
+        None => png(loaded, &picture),
+    };
+    let png = png.map_err(anyhow::Error::msg)?;
     hapdef::io::atomic::write(&args.out, &png).context("the picture could not be written")
 }
 

@@ -1,6 +1,6 @@
 //! Press after press, as a plan says: what the machine is told next, from what it and the board say.
 
-mod check;
+mod checking;
 mod motion;
 mod phases;
 mod talk;
@@ -8,9 +8,8 @@ mod watch;
 
 use std::collections::{BTreeSet, VecDeque};
 
-use self::check::Check;
-pub use self::check::{Answer, Reference};
 use self::motion::Motion;
+use super::check::{Answer, Check};
 use super::machine::Machine;
 use super::marlin::Marlin;
 use super::plan::Planned;
@@ -268,6 +267,15 @@ impl Collector {
         self.end(Ended::Stopped(format!(
             "{also}{why}. Look where the tip is before the next run"
         )));
+    }
+
+    /// Says what the machine must know before it moves.
+    fn open(&mut self, home: bool, now_us: u64, out: &mut Vec<u8>) {
+        self.phase = Phase::Opening;
+        let home = self.machine.home.iter().filter(|_| home);
+        let orders = home.chain(&self.machine.begin).cloned().collect();
+        self.marlin.begin(now_us, out);
+        self.doing = Doing::Orders(orders);
     }
 
     fn go(&mut self, targets: Vec<(char, f64, f64)>, now_us: u64, out: &mut Vec<u8>) {

@@ -1,6 +1,7 @@
 //! `hapdef collect`: a machine presses the limb at many places, and what the gauges read is written down.
 
 mod args;
+mod places;
 mod reference;
 mod simulated;
 
@@ -10,23 +11,20 @@ use std::path::Path;
 use std::sync::mpsc::{Sender, channel};
 
 use anyhow::{Context as _, ensure};
-use glam::DVec3;
-use rand::SeedableRng;
-use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
 pub use self::args::CollectArgs;
+use self::places::{places, reached};
 use super::common::make_folder;
 use super::listen::sensing_for;
 use super::out;
 use super::spared::Spared;
-use crate::bench::{Collector, Ended, Limits, News, Planned, Reach, Reference, plan};
+use crate::bench::{Collector, Ended, Limits, News, Planned, Reach, Reference};
 use crate::design::Sensing;
 use crate::io::bench_folder::{self, About, limb_key};
 use crate::io::machine_file::{self, MachineFile};
 use crate::io::project_file::LoadedProject;
-use crate::io::{points, source};
+use crate::io::source;
 use crate::link::{Address, BenchOrder, Pace, Recorder, bench_presses, press_at_ports};
 use crate::plain;
 
@@ -188,64 +186,6 @@ fn same(before: &About, now: &About, folder: &Path) -> anyhow::Result<()> {
         "{}: a run was begun there with {what}. Name another folder, or go on as it was begun",
         folder.display()
     )
-}
-
-/// Where to press: as it was planned before, as somebody says, or evenly over the part in an order of chance, so that the first
-/// presses cover all of it too.
-fn places(
-    args: &CollectArgs,
-    loaded: &LoadedProject,
-    sensing: &Sensing,
-    begun: bool,
-) -> anyhow::Result<Vec<DVec3>> {
-    if begun {
-        return Ok(bench_folder::read_plan(&args.out)?);
-    }
-    if let Some(path) = &args.points {
-        let points = points::read_points(path)?;
-        return Ok(points.into_iter().map(|p| p.position).collect());
-    }
-    let seed = loaded.inputs.project.budget.seed;
-    let touches = sensing.touches(&loaded.inputs, args.places, seed, true)?;
-    let mut places: Vec<DVec3> = touches.iter().map(|t| t.position).collect();
-    places.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
-    Ok(places)
-}
-
-/// Those that the machine gets to.
-fn reached(
-    places: &[DVec3],
-    loaded: &LoadedProject,
-    sensing: &Sensing,
-    file: &MachineFile,
-    say: &mut dyn FnMut(&str),
-) -> anyhow::Result<Reach> {
-    let surface = &sensing.drawn.map.mesh;
-    let stance = loaded.inputs.project.part.axis.stance(&loaded.inputs.part);
-    let (mount, off) = file
-        .mount(&loaded.inputs.part, &stance)
-        .map_err(anyhow::Error::msg)?;
-    if !off.is_empty() {
-        let each: Vec<String> = off.iter().map(|o| format!("{:.2}", o * 1e3)).collect();
-        say(&format!(
-            "the limb stands as its touched points say; they are {} mm off",
-            each.join(", ")
-        ));
-    }
-    let on_surface: Vec<(DVec3, DVec3)> = (places.iter())
-        .map(|place| {
-            let (at, _) = surface.index().nearest(*place);
-            (surface.point(at), surface.normal(at))
-        })
-        .collect();
-    let reach = plan(&on_surface, surface, &file.machine, &mount).map_err(anyhow::Error::msg)?;
-    ensure!(
-        !reach.presses.is_empty(),
-        "the machine gets to none of {}: {}",
-        plain::either(places.len(), "place", "places"),
-        reach.left_out.first().map_or("there is none", |l| &l.1)
-    );
-    Ok(reach)
 }
 
 fn say_plan(reach: &Reach, about: &About) {

@@ -6,6 +6,7 @@ mod orders;
 use std::io::{BufWriter, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
@@ -65,6 +66,10 @@ pub struct ListenArgs {
     /// older file. Where the number of channels changes it goes on in a file beside it.
     #[arg(long)]
     pub csv: Option<PathBuf>,
+    /// Write touches into an MCAP file too, as messages of ROS (.mcap): all contacts, the wrench of the hardest and its frame on
+    /// the link, found by matching. Never over an older file.
+    #[arg(long)]
+    pub mcap: Option<PathBuf>,
     /// Serve the same lines to whoever connects to HOST:PORT, and obey what they write: `tare`.
     #[arg(long)]
     pub serve: Option<String>,
@@ -108,13 +113,19 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     let learned = learned(args, &loaded)?;
     let (commands, inbox) = channel();
     let mut output = Output::new(args, commands.clone(), learned)?;
+    output.log = mcap_log(args, &loaded)?;
     let recorder = args.record.as_deref().map(Recorder::create).transpose();
     let recorder = recorder.map_err(anyhow::Error::msg)?;
     let listener = Listener::new(address, pipeline(args, &loaded)?)
         .at_rate(args.rate)
         .recording(recorder);
 
-    let stop = AtomicBool::new(false);
+    let stop = Arc::new(AtomicBool::new(false));
+    if output.log.is_some() {
+        let asked = Arc::clone(&stop);
+        // Whoever ends it wants a whole file.
+        let _ = ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed));
+    }
     from_stdin(commands, say);
     let begun = std::time::Instant::now();
     let mut shown: anyhow::Result<()> = Ok(());
@@ -127,9 +138,37 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
             stop.store(true, Ordering::Relaxed);
         }
     });
+    output.end_log()?;
     shown?;
     ended.map_err(anyhow::Error::msg)?;
     output.flush()
+}
+
+#[cfg(feature = "mcap")]
+type Log = crate::link::McapLog;
+/// There is none in this build.
+#[cfg(not(feature = "mcap"))]
+enum Log {}
+
+#[cfg(feature = "mcap")]
+fn mcap_log(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Option<Log>> {
+    let provenance = crate::io::run::Provenance {
+        mesh_path: &loaded.mesh_path,
+        version: env!("CARGO_PKG_VERSION"),
+        taken_in: None,
+    };
+    let link = crate::io::handover::link(&provenance);
+    let log = args.mcap.as_deref().map(|path| Log::create(path, &link));
+    log.transpose().map_err(anyhow::Error::msg)
+}
+
+#[cfg(not(feature = "mcap"))]
+fn mcap_log(args: &ListenArgs, _: &LoadedProject) -> anyhow::Result<Option<Log>> {
+    anyhow::ensure!(
+        args.mcap.is_none(),
+        "this build writes no MCAP (feature \"mcap\")"
+    );
+    Ok(None)
 }
 
 /// The project, whose gauges, channels and calibration fit each other.
@@ -220,6 +259,7 @@ fn say(text: &str) {
 struct Output {
     stdout: BufWriter<std::io::Stdout>,
     csv: Option<Table>,
+    log: Option<Log>,
     served: Option<(TcpListener, Vec<Client>)>,
     /// For whoever is served.
     commands: Sender<Command>,
@@ -240,6 +280,7 @@ impl Output {
         Ok(Self {
             learned,
             commands,
+            log: None,
             served: args.serve.as_deref().map(serve).transpose()?,
             csv: args.csv.as_deref().map(Table::create).transpose()?,
             stdout: BufWriter::new(std::io::stdout()),
@@ -335,6 +376,7 @@ impl Output {
             return Ok(());
         }
         self.last_us = Some(update.time_us);
+        self.log(update)?;
         let line = match &self.learned {
             Some(learned) => line::learned(update, &learned.estimator),
             None => line::of(update, self.estimator),
@@ -346,6 +388,28 @@ impl Output {
             clients.retain_mut(|client| client.tell(&line));
         }
         out::printed(writeln!(self.stdout, "{line}"))
+    }
+
+    #[cfg(feature = "mcap")]
+    fn log(&mut self, update: &Update) -> anyhow::Result<()> {
+        let written = self.log.as_mut().map(|log| log.sample(update));
+        written.transpose().map(drop).map_err(anyhow::Error::msg)
+    }
+
+    #[cfg(feature = "mcap")]
+    fn end_log(&mut self) -> anyhow::Result<()> {
+        let ended = self.log.as_mut().map(Log::finish);
+        ended.transpose().map(drop).map_err(anyhow::Error::msg)
+    }
+
+    #[cfg(not(feature = "mcap"))]
+    fn log(&mut self, _: &Update) -> anyhow::Result<()> {
+        Ok(())
+    }
+
+    #[cfg(not(feature = "mcap"))]
+    fn end_log(&mut self) -> anyhow::Result<()> {
+        Ok(())
     }
 
     fn flush(&mut self) -> anyhow::Result<()> {

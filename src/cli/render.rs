@@ -23,9 +23,20 @@ pub struct RenderArgs {
     /// Unit of a mesh file that does not say its own.
     #[arg(long)]
     pub unit: Option<UnitArg>,
-    /// The picture (.png).
+    /// The limb turns once about its axis in so many seconds, such as 4s: an animated PNG.
+    #[arg(long, value_parser = seconds)]
+    pub turn: Option<f64>,
+    /// The picture (.png, or .apng where it turns).
     #[arg(long)]
     pub out: PathBuf,
+}
+
+/// Seconds, with or without their unit.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.trim_end_matches('s').trim().parse() {
+        Ok(seconds) if (0.5..=60.0).contains(&seconds) => Ok(seconds),
+        _ => Err("a turn takes 0.5 to 60 seconds, such as 4s".into()),
+    }
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy, Default)]

@@ -43,6 +43,7 @@ pub struct Piece {
 /// Only what serialization itself reports.
 pub fn write_scene(pieces: &[Piece], stance: Stance) -> Result<Vec<u8>, gltf::Error> {
     let mut builder = Builder::new();
+    builder.root.asset.generator = Some("hapdef".into());
     let material = builder.matt();
     let nodes: Vec<Index<json::Node>> = (pieces.iter())
         .map(|piece| {
@@ -72,7 +73,7 @@ struct Builder {
 impl Builder {
     fn new() -> Self {
         let mut root = Root::default();
-        root.asset.generator = Some("hapdef".into());
+        root.asset.generator = Some("hapdef limb".into());
         let buffer = root.push(json::Buffer {
             byte_length: USize64(0),
             name: None,

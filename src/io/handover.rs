@@ -16,9 +16,11 @@ mod document;
 mod drawing;
 mod marks;
 mod scene;
+mod source;
 mod tables;
 mod templates;
 
+use self::source::Source;
 use super::bench_folder::limb_key;
 use super::mesh_file::urdf::link_of;
 use super::run::Provenance;
@@ -40,18 +42,6 @@ pub const FILES: [&str; 8] = [
     "zones.csv",
     "scene.glb",
 ];
-
-/// What the documents are made from.
-struct Source<'a> {
-    inputs: &'a Inputs,
-    design: &'a Design,
-    provenance: &'a Provenance<'a>,
-    inner: Inner,
-    wiring: Wiring,
-    landmarks: Vec<workshop::Landmarks>,
-    name: String,
-    format: Format,
-}
 
 /// All files with their names, as [`FILES`] has them.
 ///

@@ -88,9 +88,7 @@ pub fn read_mesh(
     repair: Repair,
 ) -> Result<LoadedMesh, FileError> {
     if let Some((file, link)) = urdf::named(path) {
-        // In metres, as descriptions are.
-        let soup = urdf::read(&file, link.as_deref())?;
-        return taken_in(soup, 1.0, body, &repair).map_err(|m| FileError::broken(path, m));
+        return read_link(&file, link.as_deref(), body, &repair);
     }
     let ending = ending(path);
     if !ENDINGS.contains(&ending.as_str()) {
@@ -115,6 +113,34 @@ pub fn read_mesh(
         taken_in(soup, scale, body, &repair)
     };
     read().map_err(|m| FileError::broken(path, m))
+}
+
+/// Reads one body of the mesh of a robot's link, in the link's frame: in metres, as descriptions are.
+fn read_link(
+    urdf: &Path,
+    link: Option<&str>,
+    body: usize,
+    repair: &Repair,
+) -> Result<LoadedMesh, FileError> {
+    let link = urdf::find(urdf, link)?;
+    let mesh = &link.mesh;
+    let ending = ending(mesh);
+    if !ENDINGS.contains(&ending.as_str()) {
+        return Err(FileError::broken(
+            mesh,
+            "a mesh of a robot's link that is not read: convert it to STL, OBJ or GLB, and name that in the description",
+        ));
+    }
+    let bytes = source::read(mesh)?;
+    let read = || {
+        let mut soup = parsed(&bytes, &ending, mesh.parent())?;
+        if soup.volume.is_some() {
+            return Err("tetrahedra are no mesh of a link: name a surface".into());
+        }
+        link.place(&mut soup);
+        taken_in(soup, 1.0, body, repair)
+    };
+    read().map_err(|m| FileError::broken(mesh, m))
 }
 
 /// Reads one body of a mesh from the bytes of a file with this ending; `folder` is where other files

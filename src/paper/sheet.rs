@@ -45,6 +45,7 @@ pub type Ink = [u8; 3];
 /// How a line is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
+    /// Its colour.
     pub ink: Ink,
     /// mm.
     pub width: f64,
@@ -64,8 +65,11 @@ impl Line {
 /// Where words stand about their place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
+    /// They begin there.
     Left,
+    /// Their middle is there.
     Middle,
+    /// They end there.
     Right,
 }
 
@@ -74,11 +78,15 @@ pub enum Align {
 pub struct Words {
     /// Of their base line (mm).
     pub at: DVec2,
+    /// What they say.
     pub text: String,
     /// Height of the type (mm).
     pub size: f64,
+    /// Their typeface.
     pub face: Face,
+    /// Their colour.
     pub ink: Ink,
+    /// How they stand about their place.
     pub align: Align,
 }
 
@@ -87,11 +95,16 @@ pub struct Words {
 pub enum Item {
     /// Lines from point to point (mm).
     Path {
+        /// In their order.
         points: Vec<DVec2>,
+        /// Whether the last is joined to the first.
         closed: bool,
+        /// What is inside.
         fill: Option<Ink>,
+        /// Along it.
         line: Option<Line>,
     },
+    /// Words.
     Words(Words),
 }
 
@@ -100,6 +113,7 @@ pub enum Item {
 pub struct Sheet {
     /// Width and height (mm).
     pub size: DVec2,
+    /// What is drawn, one over the other.
     pub items: Vec<Item>,
 }
 

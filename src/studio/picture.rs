@@ -28,20 +28,82 @@ const POINTS: f32 = 720.0;
 /// # Errors
 /// A message in the user's terms.
 pub fn png(loaded: LoadedProject, picture: &Picture) -> Result<Vec<u8>, String> {
-    let state = offscreen::adapter()?;
-    gpu::install(&state);
-    let ctx = Context::default();
-    theme::apply(&ctx);
-    let session = Session::new(Document::new(loaded, None), Wake::default());
-    let mut view = View::of(&session.document);
-    let mut scene = Scene::of(&session.document, &session.shape);
-    if let Some(preset) = picture.view {
-        view.camera.look_from(preset);
+    let mut easel = Easel::new(loaded, picture)?;
+    encode(easel.frame(picture, 0.0)?, picture.size)
+}
+
+/// The limb with its gauges as it turns once about its axis, as an animated PNG that goes on for ever.
+///
+/// # Errors
+/// A message in the user's terms.
+pub fn turning(
+    loaded: LoadedProject,
+    picture: &Picture,
+    seconds: f64,
+    mut tell: impl FnMut(usize, usize),
+) -> Result<Vec<u8>, String> {
+    /// Frames a second.
+    const RATE: u16 = 12;
+    let frames = (seconds * f64::from(RATE)).round().max(2.0) as u32;
+    let mut easel = Easel::new(loaded, picture)?;
+    let [width, height] = picture.size;
+    let mut bytes = Vec::new();
+    let failed = |e: png::EncodingError| format!("the animation could not be written: {e}");
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_animated(frames, 0).map_err(failed)?;
+    encoder.set_frame_delay(1, RATE).map_err(failed)?;
+    let mut writer = encoder.write_header().map_err(failed)?;
+    for k in 0..frames {
+        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(frames);
+        let pixels = easel.frame(picture, angle)?;
+        writer.write_image_data(&pixels).map_err(failed)?;
+        tell(k as usize + 1, frames as usize);
     }
-    let [width, height] = picture.size.map(|s| s as f32);
-    fit(&mut view.camera, &session.document.part, width / height);
-    let output = drawn(&session, &view, &mut scene, &ctx, picture);
-    finish(&state, &ctx, output, picture.size)
+    writer.finish().map_err(failed)?;
+    Ok(bytes)
+}
+
+/// What pictures of a project are drawn with.
+struct Easel {
+    state: RenderState,
+    ctx: Context,
+    session: Session,
+    view: View,
+    scene: Scene,
+}
+
+impl Easel {
+    fn new(loaded: LoadedProject, picture: &Picture) -> Result<Self, String> {
+        let state = offscreen::adapter()?;
+        gpu::install(&state);
+        let ctx = Context::default();
+        theme::apply(&ctx);
+        let session = Session::new(Document::new(loaded, None), Wake::default());
+        let mut view = View::of(&session.document);
+        let scene = Scene::of(&session.document, &session.shape);
+        if let Some(preset) = picture.view {
+            view.camera.look_from(preset);
+        }
+        let [width, height] = picture.size.map(|s| s as f32);
+        fit(&mut view.camera, &session.document.part, width / height);
+        Ok(Self {
+            state,
+            ctx,
+            session,
+            view,
+            scene,
+        })
+    }
+
+    /// Pixels, the camera being turned about the limb's axis by an angle (radians).
+    fn frame(&mut self, picture: &Picture, angle: f64) -> Result<Vec<u8>, String> {
+        let mut view = self.view.clone();
+        view.camera.yaw += angle;
+        let output = drawn(&self.session, &view, &mut self.scene, &self.ctx, picture);
+        pixels(&self.state, &self.ctx, output, picture.size)
+    }
 }
 
 /// What was drawn, as a PNG file.
@@ -51,9 +113,19 @@ fn finish(
     output: FullOutput,
     size: [u32; 2],
 ) -> Result<Vec<u8>, String> {
+    encode(pixels(state, ctx, output, size)?, size)
+}
+
+/// What was drawn: red, green, blue and alpha of each pixel.
+fn pixels(
+    state: &RenderState,
+    ctx: &Context,
+    output: FullOutput,
+    size: [u32; 2],
+) -> Result<Vec<u8>, String> {
     let mut pixels = offscreen::draw(state, ctx, output, size)?;
     straighten(&mut pixels);
-    encode(pixels, size)
+    Ok(pixels)
 }
 
 /// The 3D view as it would be in a window of a picture's size, on a context of its own.

@@ -53,3 +53,4 @@ mod test_bed;
 mod tried;
 mod volumes;
 mod words;
+mod workshop;

@@ -1,17 +1,31 @@
 /* Strain gauges to HapDef Studio: an Arduino Due, or any Arduino with analogue inputs.
  *
- * Change what stands between the lines, upload, and choose the port in the studio. See ../PROTOCOL.md.
+ * Put hapd_config.h of the limb's report beside this file, or change what stands between the lines, upload, and choose the
+ * port in the studio. See ../PROTOCOL.md.
  * On a Due use the native USB port: at 115 200 baud no more than 397 frames a second go through.
  */
 #include "hapd_frame.h"
 
+#if defined(__has_include)
+#if __has_include("hapd_config.h")
+#include "hapd_config.h"
+#endif
+#endif
+
 /* ------------------------------------------------------------------------------------------------- */
-static const uint8_t PINS[] = {A0, A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11};
-static const uint32_t BOARD = 0x48415001; /* another number for each board */
-static const char NAME[] = "limb";
-static const uint16_t REFERENCE_MV = 3300; /* of the converter: 3300 on a Due, 5000 on most others */
-static const uint16_t SUPPLY_MV = 5000;    /* of the bridges */
-static const uint32_t GAIN_MILLI = 330000; /* of the amplifiers, in thousandths */
+#ifndef HAPD_PINS
+#define HAPD_PINS {A0, A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11}
+#define HAPD_BOARD 0x48415001   /* another number for each board */
+#define HAPD_NAME "limb"
+#define HAPD_REFERENCE_MV 3300  /* of the converter: 3300 on a Due, 5000 on most others */
+#define HAPD_SUPPLY_MV 5000     /* of the bridges */
+#define HAPD_GAIN_MILLI 330000  /* of the amplifiers, in thousandths */
+#endif
+static const uint8_t PINS[] = HAPD_PINS;
+static const uint32_t BOARD = HAPD_BOARD;
+static const char NAME[] = HAPD_NAME;
+static const uint16_t REFERENCE_MV = HAPD_REFERENCE_MV, SUPPLY_MV = HAPD_SUPPLY_MV;
+static const uint32_t GAIN_MILLI = HAPD_GAIN_MILLI;
 static uint16_t rate_hz = 1000;
 /* ------------------------------------------------------------------------------------------------- */
 

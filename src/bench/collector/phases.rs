@@ -1,7 +1,6 @@
 //! One press, from the tip out of the way to the tip out of the way.
 
 use super::super::machine::Pose;
-use super::super::plan::Planned;
 use super::super::press::Reading;
 use super::{Collector, Doing, Ended, FAIL, FAILURES, FREE_N, News, Phase};
 
@@ -272,23 +271,5 @@ impl Collector {
         }
         // The next look begins the next one, unless it is paused.
         self.phase = Phase::Retract;
-    }
-
-    /// A press failed, and not because the machine stands where it should not: it is tried once more at the end.
-    pub(super) fn failed(
-        &mut self,
-        number: usize,
-        planned: Planned,
-        why: String,
-        tell: &mut dyn FnMut(News),
-    ) {
-        if self.failed_before.insert(number) {
-            let text = format!("press {number} failed: {why}. It is tried again at the end");
-            tell(News::Say(text));
-            self.plan.push_back((number, planned));
-        } else {
-            let failed = Some(why);
-            tell(News::Press { number, failed });
-        }
     }
 }

@@ -65,15 +65,6 @@ impl Collector {
         self.failed = None;
     }
 
-    /// Says what the machine must know before it moves.
-    pub(super) fn open(&mut self, home: bool, now_us: u64, out: &mut Vec<u8>) {
-        self.phase = Phase::Opening;
-        let home = self.machine.home.iter().filter(|_| home);
-        let orders = home.chain(&self.machine.begin).cloned().collect();
-        self.marlin.begin(now_us, out);
-        self.doing = Doing::Orders(orders);
-    }
-
     fn done(
         &mut self,
         said: &[String],

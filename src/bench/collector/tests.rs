@@ -1,5 +1,6 @@
 use glam::DVec3;
 
+use super::super::check::Reference;
 use super::super::machine::tests::paper;
 use super::super::{Contact, Mount, PrinterFaults, SimulatedPrinter, plan};
 use super::*;

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use super::{CollectArgs, reached};
+use super::args::CollectArgs;
+use super::places::reached;
 use crate::bench::{Planned, Reference};
 use crate::design::Sensing;
 use crate::elasticity::Touch;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::CollectArgs;
+use super::args::CollectArgs;
 use crate::bench::{Collector, Contact, Ended, News, PrinterFaults, Reach, SimulatedPrinter};
 use crate::board::{Faults, Options, Script};
 use crate::cli::progress::Bar;

@@ -2,9 +2,9 @@
 
 use glam::DVec2;
 
-use super::Source;
 use super::marks::{BLUE, INK, gauge, label};
-use crate::paper::{Align, Flow, Line, Sheet};
+use super::source::Source;
+use crate::paper::{Align, Face, Flow, Ink, Line, Sheet, Words};
 use crate::workshop::{Glued, Landmarks, Patch};
 
 const HEIGHT: f64 = 50.0;
@@ -99,27 +99,44 @@ fn clipped([a, b]: [DVec2; 2], half: f64) -> Option<[DVec2; 2]> {
 }
 
 fn words(sheet: &mut Sheet, source: &Source<'_>, glued: &Glued, at: &Landmarks, corner: DVec2) {
+    const PALE: Ink = [0x4a, 0x55, 0x68];
+    /// Between two lines, and before their texts (mm).
+    const LINE: f64 = 4.9;
+    const IN: f64 = 20.0;
+    let title = format!("Gauge {}", glued.number);
+    sheet.say(corner + DVec2::new(0.0, 4.6), &title, 4.2, Align::Left);
+    let lines = place(glued, at).into_iter().chain(read(source, glued));
+    for (k, (label, text)) in lines.enumerate() {
+        let at = corner + DVec2::new(0.0, 10.4 + LINE * k as f64);
+        for (at, text, size, ink) in [
+            (at, label.to_owned(), 2.8, PALE),
+            (at + DVec2::new(IN, 0.0), text, 3.1, INK),
+        ] {
+            sheet.words(Words {
+                at,
+                text,
+                size,
+                face: Face::Text,
+                ink,
+                align: Align::Left,
+            });
+        }
+    }
+}
+
+/// Where it is.
+fn place(glued: &Glued, at: &Landmarks) -> Vec<(&'static str, String)> {
     let mm = |metres: f64| format!("{:.1} mm", metres * 1e3);
-    let channel = source
-        .wiring
-        .channels
-        .iter()
-        .find(|c| c.gauge == glued.number);
-    let turned = at.turned_deg;
-    let side = if turned >= 0.0 {
+    let side = if at.turned_deg >= 0.0 {
         "clockwise"
     } else {
         "counterclockwise"
     };
-    let around = format!(
-        "{:.1}° about the axis from the front, towards the {}",
-        at.around_deg.abs(),
-        if at.around_deg >= 0.0 {
-            "right"
-        } else {
-            "left"
-        }
-    );
+    let towards = if at.around_deg >= 0.0 {
+        "right"
+    } else {
+        "left"
+    };
     let mut lines = vec![
         (
             "Height",
@@ -129,7 +146,13 @@ fn words(sheet: &mut Sheet, source: &Source<'_>, glued: &Glued, at: &Landmarks, 
                 mm(at.below_top)
             ),
         ),
-        ("Around", around),
+        (
+            "Around",
+            format!(
+                "{:.1}° about the axis from the front, towards the {towards}",
+                at.around_deg.abs()
+            ),
+        ),
     ];
     if let Some((distance, _)) = at.from_edge {
         lines.push((
@@ -141,7 +164,7 @@ fn words(sheet: &mut Sheet, source: &Source<'_>, glued: &Glued, at: &Landmarks, 
         "Direction",
         format!(
             "{:.0}° {side} from the part's axis, seen from inside",
-            turned.abs()
+            at.turned_deg.abs()
         ),
     ));
     let others: Vec<String> = (at.neighbours.iter())
@@ -155,40 +178,26 @@ fn words(sheet: &mut Sheet, source: &Source<'_>, glued: &Glued, at: &Landmarks, 
         "Place",
         format!("({:.2}, {:.2}, {:.2}) mm, on the inner face", p.x, p.y, p.z),
     ));
-    if let Some(c) = channel {
-        let ([low, high], [least, most]) = (c.microstrain, c.counts);
-        lines.push((
+    lines
+}
+
+/// What it reads, and where it is wired to.
+fn read(source: &Source<'_>, glued: &Glued) -> Vec<(&'static str, String)> {
+    let channel = source
+        .wiring
+        .channels
+        .iter()
+        .find(|c| c.gauge == glued.number);
+    let Some(c) = channel else { return Vec::new() };
+    let ([low, high], [least, most]) = (c.microstrain, c.counts);
+    vec![
+        (
             "Reads",
             format!(
                 "{low:.0} to {high:+.0} µε under {} N, {least:.0} to {most:+.0} counts",
                 source.wiring.force_n
             ),
-        ));
-        lines.push(("Wired to", format!("pin {}, channel {}", c.pin, c.channel)));
-    }
-    sheet.say(
-        corner + DVec2::new(0.0, 4.6),
-        &format!("Gauge {}", glued.number),
-        4.2,
-        Align::Left,
-    );
-    for (k, (label, text)) in lines.iter().enumerate() {
-        let y = 10.4 + 4.9 * k as f64;
-        sheet.words(crate::paper::Words {
-            at: corner + DVec2::new(0.0, y),
-            text: (*label).to_owned(),
-            size: 2.8,
-            face: crate::paper::Face::Text,
-            ink: [0x4a, 0x55, 0x68],
-            align: Align::Left,
-        });
-        sheet.words(crate::paper::Words {
-            at: corner + DVec2::new(20.0, y),
-            text: text.clone(),
-            size: 3.1,
-            face: crate::paper::Face::Text,
-            ink: INK,
-            align: Align::Left,
-        });
-    }
+        ),
+        ("Wired to", format!("pin {}, channel {}", c.pin, c.channel)),
+    ]
 }

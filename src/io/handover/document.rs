@@ -1,6 +1,7 @@
 //! `report.pdf`.
 
-use super::{Source, cards, drawing};
+use super::source::Source;
+use super::{cards, drawing};
 use crate::design::curves::{failure_ways, title_of};
 use crate::design::{BLIND, Design};
 use crate::io::report::{compared_n, part, settings};

@@ -2,11 +2,12 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::Source;
 use super::marks::small;
+use super::source::Source;
 use crate::io::report::{feasible_tint, markers};
 use crate::io::svg::{Paint, View, from_behind, standard_views};
 use crate::mesh::flatten::Flat;
+use crate::mesh::stretch::KEPT;
 use crate::paper::{Align, Flow, Line, Sheet};
 
 /// Of a picture of a side (mm).
@@ -118,14 +119,20 @@ fn unrolled(flow: &mut Flow, source: &Source<'_>, tint: &[f64]) {
     let size = flat.upper - flat.lower;
     let width = flow.width();
     let height = (width * size.y / size.x.max(1e-9)).min(150.0);
-    let words = format!("Unrolled, seen from outside. {}", flat.stretch.words());
+    let words = format!(
+        "Unrolled, seen from outside. {}.",
+        flat.stretch.words().replace("Hatched", "Shaded")
+    );
     let (sheet, corner) = flow.room(height + 3.0);
     let fit = Fit::new(flat.lower, flat.upper, corner, DVec2::new(width, height));
     for t in from_behind(&flat.triangles, &flat.positions) {
         let tri = flat.triangles[t];
         let corners = tri.map(|v| fit.place(flat.positions[v as usize].truncate()));
         let of_part = tri.map(|v| flat.vertices[v as usize]);
-        facet(sheet, corners, Paint::Tint(tint).ink(of_part, 0.85));
+        let ink = Paint::Tint(tint).ink(of_part, 0.85);
+        let shaded = flat.stretch.facets[t] > KEPT;
+        let ink = if shaded { ink.map(|c| c - c / 4) } else { ink };
+        facet(sheet, corners, ink);
     }
     for marker in markers(source.inputs, source.design) {
         let at = fit.place(flat.place(marker.position));

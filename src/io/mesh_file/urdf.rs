@@ -9,9 +9,8 @@ use std::sync::OnceLock;
 use glam::{DMat3, DVec3};
 use roxmltree::{Document, Node};
 
-use super::super::source;
+use super::super::{FileError, source};
 use super::soup::Soup;
-use super::{FileError, parsed};
 use crate::workshop::turn_of;
 
 /// Folders in which packages are looked for beside those above the description: what was asked for when the program was begun.
@@ -50,45 +49,39 @@ struct Shape {
     turn: DMat3,
 }
 
-/// Reads the mesh of a link.
-pub(super) fn read(urdf: &Path, link: Option<&str>) -> Result<Soup, FileError> {
+/// A link's mesh: the file, and how it lies in the link's frame.
+pub(super) struct Link {
+    pub mesh: PathBuf,
+    shape: Shape,
+}
+
+/// The mesh of a link, as the description says.
+pub(super) fn find(urdf: &Path, link: Option<&str>) -> Result<Link, FileError> {
     let text = source::read_text(urdf)?;
     let refuse = |m: String| FileError::broken(urdf, m);
     let shapes = shapes(&text).map_err(refuse)?;
-    let shape = chosen(&shapes, link).map_err(refuse)?;
+    let shape = chosen(shapes, link).map_err(refuse)?;
     let mesh = located(urdf, &shape.file).map_err(refuse)?;
-    let ending = super::ending(&mesh);
-    if !super::ENDINGS.contains(&ending.as_str()) {
-        return Err(refuse(format!(
-            "the mesh of the link “{}” is {}, which is not read: convert it to STL, OBJ or GLB, and name that in the description",
-            shape.link, shape.file
-        )));
-    }
-    let bytes = source::read(&mesh)?;
-    let soup = parsed(&bytes, &ending, mesh.parent()).map_err(|m| FileError::broken(&mesh, m))?;
-    if soup.volume.is_some() {
-        return Err(FileError::broken(
-            &mesh,
-            "tetrahedra are no mesh of a link: name a surface",
-        ));
-    }
-    Ok(placed(soup, shape))
+    Ok(Link { mesh, shape })
 }
 
-fn placed(mut soup: Soup, shape: &Shape) -> Soup {
-    for p in &mut soup.positions {
-        *p = shape.turn * (shape.scale * *p) + shape.shift;
-    }
-    if (shape.scale.x * shape.scale.y * shape.scale.z) < 0.0 {
-        for tri in &mut soup.triangles {
-            tri.swap(1, 2);
+impl Link {
+    /// Moves what was read of its mesh into the link's frame (m).
+    pub fn place(&self, soup: &mut Soup) {
+        let shape = &self.shape;
+        for p in &mut soup.positions {
+            *p = shape.turn * (shape.scale * *p) + shape.shift;
         }
+        if (shape.scale.x * shape.scale.y * shape.scale.z) < 0.0 {
+            for tri in &mut soup.triangles {
+                tri.swap(1, 2);
+            }
+        }
+        soup.notes.push(format!(
+            "the link “{}” of a robot, in its own frame: {}",
+            shape.link, shape.file
+        ));
     }
-    soup.notes.push(format!(
-        "the link “{}” of a robot, in its own frame: {}",
-        shape.link, shape.file
-    ));
-    soup
 }
 
 /// All links with a mesh: what is seen where there is one, else what collides.
@@ -159,25 +152,21 @@ fn shape(link: &Node, of: &Node) -> Result<Option<Shape>, String> {
     }))
 }
 
-fn chosen<'a>(shapes: &'a [Shape], link: Option<&str>) -> Result<&'a Shape, String> {
-    let names = || {
-        let names: Vec<&str> = shapes.iter().map(|s| s.link.as_str()).collect();
-        names.join(", ")
-    };
-    match (link, shapes) {
+fn chosen(mut shapes: Vec<Shape>, link: Option<&str>) -> Result<Shape, String> {
+    let names: Vec<&str> = shapes.iter().map(|s| s.link.as_str()).collect();
+    let names = names.join(", ");
+    let at = match (link, &shapes[..]) {
         (_, []) => Err("none of its links has a mesh".into()),
-        (None, [only]) => Ok(only),
+        (None, [_]) => Ok(0),
         (None, _) => Err(format!(
-            "say which link is the limb, behind the file's name: robot.urdf#LINK, of {}",
-            names()
+            "say which link is the limb, behind the file's name: robot.urdf#LINK, of {names}"
         )),
-        (Some(link), _) => {
-            let found = shapes.iter().find(|s| s.link == link);
-            found.ok_or_else(|| {
-                format!("it has no link “{link}” with a mesh: there are {}", names())
-            })
-        }
-    }
+        (Some(link), _) => shapes
+            .iter()
+            .position(|s| s.link == link)
+            .ok_or_else(|| format!("it has no link “{link}” with a mesh: there are {names}")),
+    };
+    at.map(|k| shapes.swap_remove(k))
 }
 
 /// Where a mesh lies that a description names.
@@ -221,76 +210,4 @@ fn located(urdf: &Path, name: &str) -> Result<PathBuf, String> {
                 }
             )
         })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const ROBOT: &str = r#"<?xml version="1.0"?><robot name="r">
-        <link name="base"/>
-        <link name="thigh"><visual><geometry><box size="1 1 1"/></geometry></visual></link>
-        <link name="shin"><visual><origin xyz="0 0 0.1" rpy="0 0 1.5707963267948966"/>
-          <geometry><mesh filename="package://r_description/meshes/shin.stl" scale="0.001 0.001 -0.001"/></geometry></visual></link>
-        <link name="foot"><collision><geometry><mesh filename="foot.dae"/></geometry></collision></link></robot>"#;
-
-    fn tetrahedron() -> String {
-        let corners = [[0, 0, 0], [30, 0, 0], [0, 20, 0], [0, 0, 10]];
-        let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
-        let mut text = String::from("solid t\n");
-        for face in faces {
-            text.push_str("facet normal 0 0 0\nouter loop\n");
-            for k in face {
-                let [x, y, z]: [i32; 3] = corners[k];
-                text.push_str(&format!("vertex {x} {y} {z}\n"));
-            }
-            text.push_str("endloop\nendfacet\n");
-        }
-        text + "endsolid t\n"
-    }
-
-    #[test]
-    fn a_link_is_read_in_its_own_frame() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        std::fs::create_dir_all(at("r_description/meshes")).unwrap();
-        std::fs::create_dir_all(at("r_description/urdf")).unwrap();
-        std::fs::write(at("r_description/meshes/shin.stl"), tetrahedron()).unwrap();
-        let urdf = at("r_description/urdf/r.urdf");
-        std::fs::write(&urdf, ROBOT).unwrap();
-        let named = |link: &str| PathBuf::from(format!("{}#{link}", urdf.display()));
-        let read = |path: &Path| {
-            super::super::read_mesh(path, None, 0, crate::mesh::repair::Repair::default())
-        };
-        let loaded = read(&named("shin")).unwrap();
-        let (low, high) = loaded.mesh.bounds();
-        // Mirrored in z, turned by a right angle, and lifted.
-        assert!(
-            (low - DVec3::new(-0.02, 0.0, 0.09)).length() < 1e-9,
-            "{low}"
-        );
-        assert!(
-            (high - DVec3::new(0.0, 0.03, 0.1)).length() < 1e-9,
-            "{high}"
-        );
-        assert!(loaded.mesh.volume_enclosed() > 0.0);
-        let refused = |path: &Path| read(path).err().unwrap().to_string();
-        assert!(
-            refused(&urdf).contains("robot.urdf#LINK, of shin, foot"),
-            "{}",
-            refused(&urdf)
-        );
-        assert!(refused(&named("arm")).contains("no link “arm”"));
-        assert!(refused(&named("foot")).contains("foot.dae is not there"));
-        std::fs::write(at("r_description/urdf/foot.dae"), "<COLLADA/>").unwrap();
-        assert!(
-            refused(&named("foot")).contains("convert it"),
-            "{}",
-            refused(&named("foot"))
-        );
-        std::fs::write(&urdf, ROBOT.replace("0 0 0.1", "0 0")).unwrap();
-        assert!(refused(&named("shin")).contains("three numbers"));
-        std::fs::write(&urdf, "<sdf/>").unwrap();
-        assert!(refused(&named("shin")).contains("begins with <robot>"));
-    }
 }

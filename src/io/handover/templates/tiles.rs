@@ -4,17 +4,20 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::{HEAD, MARGIN, head};
-use crate::io::handover::Source;
+use super::head::{HEAD, MARGIN, head};
 use crate::io::handover::marks::{BLUE, INK, gauge};
+use crate::io::handover::source::Source;
 use crate::io::svg::from_behind;
 use crate::mesh::flatten::Flat;
+use crate::mesh::stretch::KEPT;
 use crate::paper::{Line, Sheet};
 
 /// What neighbouring sheets have in common (mm).
 const OVERLAP: f64 = 10.0;
 /// What a gauge reaches beyond the seam (mm).
 const SEAM: f64 = 6.0;
+/// Share of the view in which lengths may be off where gauges may be placed by it.
+const TRUSTED: f64 = 0.02;
 /// More sheets than anybody glues together.
 const MOST: usize = 40;
 
@@ -22,6 +25,8 @@ const MOST: usize = 40;
 struct Plan {
     positions: Vec<DVec2>,
     triangles: Vec<[u32; 3]>,
+    /// Whether lengths on each of them are off.
+    stretched: Vec<bool>,
     rims: Vec<[u32; 2]>,
     /// Middle, direction and number of each gauge.
     gauges: Vec<(DVec2, DVec2, usize)>,
@@ -35,10 +40,8 @@ impl Plan {
         let flat = Flat::of(&inner.mesh, inner.stance);
         let seen = |p: DVec2| DVec2::new(-p.x, p.y) * 1e3;
         let positions: Vec<DVec2> = flat.positions.iter().map(|p| seen(p.truncate())).collect();
-        let triangles: Vec<[u32; 3]> = from_behind(&flat.triangles, &flat.positions)
-            .into_iter()
-            .map(|t| flat.triangles[t])
-            .collect();
+        let order = from_behind(&flat.triangles, &flat.positions);
+        let triangles: Vec<[u32; 3]> = order.iter().map(|&t| flat.triangles[t]).collect();
         let (a, b) = (seen(flat.lower), seen(flat.upper));
         let gauges = inner.gauges.iter().flat_map(|g| {
             let along = flat.turn(g.place, g.direction).normalize_or(DVec2::Y);
@@ -56,6 +59,10 @@ impl Plan {
         });
         let gauges = gauges.collect();
         let plan = Self {
+            stretched: order
+                .iter()
+                .map(|&t| flat.stretch.facets[t] > KEPT)
+                .collect(),
             rims: rims(&triangles),
             positions,
             triangles,
@@ -63,7 +70,14 @@ impl Plan {
             lower: a.min(b),
             upper: a.max(b),
         };
-        (plan, flat.stretch.words())
+        let words = flat.stretch.words().replace("Hatched", "Shaded");
+        let trusted = flat.stretch.off < TRUSTED;
+        let more = if trusted {
+            ""
+        } else {
+            ". Place gauges by their patches"
+        };
+        (plan, format!("{words}{more}."))
     }
 }
 
@@ -186,8 +200,12 @@ impl Window {
 }
 
 fn draw(sheet: &mut Sheet, plan: &Plan, window: &Window, source: &Source<'_>) {
-    let grey = [0xf2, 0xf3, 0xf5];
-    for tri in &plan.triangles {
+    for (tri, stretched) in plan.triangles.iter().zip(&plan.stretched) {
+        let grey = if *stretched {
+            [0xdd, 0xd9, 0xd0]
+        } else {
+            [0xf2, 0xf3, 0xf5]
+        };
         let shape = window.clipped(&tri.map(|v| plan.positions[v as usize]));
         if shape.len() > 2 {
             sheet.shape(shape, Some(grey), Some(Line::new(grey, 0.05)));

@@ -1,14 +1,10 @@
 //! A place that is pressed again and again: whatever a machine says of where it is, the limb's own answer there shows whether
 //! steps were lost, the limb has slipped, or the board reads something else than it did.
 
-use std::collections::VecDeque;
-
 use serde::{Deserialize, Serialize};
 
-use super::super::plan::Planned;
-use super::super::press::Reading;
-use super::{Collector, Ended, News, Phase, RESTARTS};
-use crate::plain;
+use super::plan::Planned;
+use super::press::Reading;
 
 /// What the limb answers at a place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,21 +36,22 @@ pub(super) struct Check {
     /// Whether what is pressed now is the reference.
     pub now: bool,
     /// Whether it was pressed since the run was begun, or the axes were found again.
-    begun: bool,
+    pub begun: bool,
     /// Whether what it answered at first is still to be confirmed by pressing it once more.
-    fresh: bool,
+    pub fresh: bool,
     /// Presses between two checks just now: fewer where a machine begins anew more often than that.
-    every: usize,
+    pub every: usize,
     /// Presses that were made since it last was as at first.
-    since: Vec<(usize, Planned)>,
+    pub since: Vec<(usize, Planned)>,
     /// Those that failed since then, and why.
-    failed: Vec<(usize, Planned, String)>,
+    pub failed: Vec<(usize, Planned, String)>,
     /// Their readings: depth (mm), force (N) where it is known, and what changed against the rest (counts).
     steps: Vec<(f64, Option<f64>, Vec<f64>)>,
     /// Of a mean of a reading (counts).
     deviation: Vec<f64>,
     early: f64,
-    homed: u32,
+    /// How often the axes were found again since it was as at first.
+    pub homed: u32,
 }
 
 impl Answer {
@@ -84,7 +81,7 @@ impl Answer {
     }
 
     /// What is not as it was, for people. `near` (m) is what the tip may come earlier or later.
-    fn differs(&self, before: &Self, near: f64) -> Option<String> {
+    pub fn differs(&self, before: &Self, near: f64) -> Option<String> {
         /// Share of an answer that may change with wear, warmth and friction: about half a millimetre on a limb like the paper's.
         const SAME: f64 = 0.03;
         /// Deviations that are no noise.
@@ -162,7 +159,7 @@ impl Check {
     }
 
     /// What it answered, or why it did not.
-    fn answer(
+    pub fn answer(
         &self,
         failed: Option<String>,
         gauges: impl Fn(usize) -> bool,
@@ -176,119 +173,6 @@ impl Check {
             (answer.slopes[channel], answer.deviations[channel]) = (0.0, 0.0);
         }
         Ok(answer)
-    }
-}
-
-impl Collector {
-    /// Presses a reference too: first of all, again and again, and last of all.
-    #[must_use]
-    pub fn checked_at(mut self, reference: Reference) -> Self {
-        self.check.every = reference.every;
-        self.check.reference = Some(reference);
-        self
-    }
-
-    /// The reference was pressed.
-    pub(super) fn checked(&mut self, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
-        self.check.now = false;
-        self.phase = Phase::Retract;
-        let tip = self.machine.sensor.map(|s| s.channel);
-        let near = 1.5 * self.limits.step.max(1e-4);
-        let failed = self.failed.take();
-        let answer = (self.check).answer(failed, |channel| Some(channel) != tip);
-        let Some(reference) = &mut self.check.reference else {
-            return;
-        };
-        let most = reference.every;
-        let off = match (answer, &reference.answer) {
-            (Err(why), Some(_)) => Some(why),
-            (Err(why), None) => {
-                self.end(Ended::Stopped(format!(
-                    "the place that is to be pressed again and again cannot be pressed at all: {why}: look how the limb is mounted, and whether the tip and its sensor work"
-                )));
-                return;
-            }
-            (Ok(now), Some(before)) => now.differs(before, near),
-            (Ok(now), None) => {
-                // Steps may be lost on the way to the first of all, too: it is believed when it is repeated, from home if there is
-                // one.
-                reference.answer = Some(now);
-                self.check.fresh = true;
-                if !self.machine.home.is_empty() {
-                    self.open(true, now_us, out);
-                }
-                return;
-            }
-        };
-        let confirmed = std::mem::take(&mut self.check.fresh);
-        match off {
-            None => {
-                if let Some(answer) = reference.answer.as_ref().filter(|_| confirmed) {
-                    tell(News::Answer(answer.clone()));
-                }
-                tell(News::Note("checked".into()));
-                self.check.begun = true;
-                self.check.since.clear();
-                self.check.homed = 0;
-                self.check.every = (2 * self.check.every).min(most);
-                for (number, planned, why) in std::mem::take(&mut self.check.failed) {
-                    self.failed(number, planned, why, tell);
-                }
-                if self.plan.is_empty() {
-                    self.end(Ended::Finished);
-                }
-            }
-            Some(why) => {
-                if confirmed {
-                    reference.answer = None;
-                }
-                self.moved(&why, now_us, out, tell);
-            }
-        }
-    }
-
-    /// Whether what was pressed since the last check was right will never be known: it is pressed again. How many those are.
-    pub(super) fn doubt(&mut self, why: &str, tell: &mut dyn FnMut(News)) -> usize {
-        if self.check.reference.is_none() {
-            return 0;
-        }
-        tell(News::Note(format!("moved {why}")));
-        let mut plan = VecDeque::from(std::mem::take(&mut self.check.since));
-        let doubted = plan.len();
-        let failed = std::mem::take(&mut self.check.failed);
-        plan.extend(failed.into_iter().map(|(number, at, _)| (number, at)));
-        self.failures = 0;
-        plan.append(&mut self.plan);
-        self.plan = plan;
-        self.check.begun = false;
-        if doubted > 0 {
-            self.check.every = (doubted / 2).max(1);
-            tell(News::Discarded(doubted));
-        }
-        doubted
-    }
-
-    /// The reference is not as it was.
-    fn moved(&mut self, why: &str, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
-        let discarded = match self.doubt(why, tell) {
-            0 => String::new(),
-            n => format!(
-                ", and {} made since it last was as at first {} not believed",
-                plain::either(n, "press", "presses"),
-                if n == 1 { "is" } else { "are" }
-            ),
-        };
-        let what =
-            format!("the place that is pressed again and again is not as it was: {why}{discarded}");
-        self.check.homed += 1;
-        if self.machine.home.is_empty() || self.check.homed > RESTARTS {
-            self.end(Ended::Stopped(format!(
-                "{what}. A motor lost steps, the limb slipped, or a gauge is off: find the axes again and look how the limb stands"
-            )));
-            return;
-        }
-        tell(News::Say(format!("{what}; the axes are sent home")));
-        self.open(true, now_us, out);
     }
 }
 
