@@ -300,3 +300,45 @@ fn a_link_is_read_in_its_own_frame() {
     std::fs::write(&urdf, "<sdf/>").unwrap();
     assert!(refused(&named("shin")).contains("begins with <robot>"));
 }
+
+/// Touches as a robot's recording, read by the format's own library.
+#[cfg(feature = "mcap")]
+#[test]
+fn touches_are_messages_in_an_mcap_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let script = "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n3,1.5,22.5,22.5,60,15\n";
+    std::fs::write(here.join("s.csv"), script).unwrap();
+    let board = [
+        "board", "--simulate", "--quality", "draft", "--script", "s.csv", "--record", "r.hapdrec", "--rate", "200",
+    ];
+    let (made, said) = hapdef(here, &board);
+    assert!(made, "{said}");
+    let listen = ["listen", "r.hapdrec", "--fast", "--quality", "draft", "--mcap", "t.mcap"];
+    let (made, said) = hapdef(here, &listen);
+    assert!(made, "{said}");
+    let bytes = std::fs::read(here.join("t.mcap")).unwrap();
+    let (mut samples, mut pressed, mut near) = (0, 0.0_f64, 0);
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        let value: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
+        match message.channel.topic.as_str() {
+            "/touch/contacts" => samples += 1,
+            "/touch/wrench" => {
+                // In the contact's frame a touch pushes against z.
+                pressed = pressed.min(value["wrench"]["force"]["z"].as_f64().unwrap());
+            }
+            "/tf" => {
+                assert_eq!(value["parent_frame_id"], "limb");
+                let at = ["x", "y", "z"].map(|k| value["translation"][k].as_f64().unwrap());
+                let off = DVec3::from_array(at).distance(DVec3::new(0.0225, 0.0225, 0.06));
+                near += u32::from(off < 5e-3);
+            }
+            other => panic!("{other}"),
+        }
+    }
+    assert!(samples > 800 && near > 200, "{samples}, {near}");
+    assert!((pressed + 15.0).abs() < 3.0, "{pressed}");
+    let (again, said) = hapdef(here, &listen);
+    assert!(!again && said.contains("not written over"), "{said}");
+}
