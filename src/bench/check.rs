@@ -81,6 +81,7 @@ impl Answer {
     }
 
     /// What is not as it was, for people. `near` (m) is what the tip may come earlier or later.
+    #[must_use]
     pub fn differs(&self, before: &Self, near: f64) -> Option<String> {
         /// Share of an answer that may change with wear, warmth and friction: about half a millimetre on a limb like the paper's.
         const SAME: f64 = 0.03;

@@ -46,7 +46,7 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
     let sensing = sensing_for(&args.common, &loaded)?;
     let places = places(args, &loaded, &sensing, begun.is_some())?;
     let reach = reached(&places, &loaded, &sensing, &file, &mut |text| {
-        out::say(text)
+        out::say(text);
     })?;
     if begun.is_none() {
         about.write(&args.out)?;

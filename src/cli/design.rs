@@ -35,7 +35,7 @@ pub struct DesignArgs {
     /// The comparison of the paper, whatever the project says: its four selectors, judged by regression.
     #[arg(long)]
     pub paper: bool,
-    /// Leave out what the workshop is given: report.pdf, template.pdf, wiring.csv, bill.csv and hapd_config.h.
+    /// Leave out what the workshop is given: report.pdf, template.pdf, wiring.csv, bill.csv, `hapd_config.h` and what goes with them.
     #[arg(long)]
     pub no_workshop: bool,
     /// Sheets of report.pdf and template.pdf: a4 or letter.

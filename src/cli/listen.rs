@@ -1,6 +1,7 @@
 //! `hapdef listen`: live touch without a window.
 
 mod line;
+mod log;
 mod orders;
 
 use std::io::{BufWriter, Write};
@@ -20,7 +21,9 @@ use super::spared::Spared;
 use super::{out, progress::Bar};
 use crate::design::{self, Sensing};
 use crate::io::bench_folder::limb_key;
+use crate::io::handover;
 use crate::io::project_file::LoadedProject;
+use crate::io::run::Provenance;
 use crate::io::touch_file::{self, TouchFile};
 use crate::link::{Address, BAUD, Command, Listener, Pace, Recorder, SessionEvent, State, Table};
 use crate::live::{Estimator, Pipeline, Sample, Update};
@@ -28,6 +31,7 @@ use crate::plain;
 use crate::session::{train, training_touches};
 use crate::wire::Hello;
 
+use log::Log;
 use orders::{Client, from_stdin, order};
 
 #[derive(Args, Debug, Clone)]
@@ -144,31 +148,16 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     output.flush()
 }
 
-#[cfg(feature = "mcap")]
-type Log = crate::link::McapLog;
-/// There is none in this build.
-#[cfg(not(feature = "mcap"))]
-enum Log {}
-
-#[cfg(feature = "mcap")]
+/// Where touches go as messages.
 fn mcap_log(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Option<Log>> {
-    let provenance = crate::io::run::Provenance {
+    let provenance = Provenance {
         mesh_path: &loaded.mesh_path,
         version: env!("CARGO_PKG_VERSION"),
         taken_in: None,
     };
-    let link = crate::io::handover::link(&provenance);
+    let link = handover::link(&provenance);
     let log = args.mcap.as_deref().map(|path| Log::create(path, &link));
     log.transpose().map_err(anyhow::Error::msg)
-}
-
-#[cfg(not(feature = "mcap"))]
-fn mcap_log(args: &ListenArgs, _: &LoadedProject) -> anyhow::Result<Option<Log>> {
-    anyhow::ensure!(
-        args.mcap.is_none(),
-        "this build writes no MCAP (feature \"mcap\")"
-    );
-    Ok(None)
 }
 
 /// The project, whose gauges, channels and calibration fit each other.
@@ -390,26 +379,14 @@ impl Output {
         out::printed(writeln!(self.stdout, "{line}"))
     }
 
-    #[cfg(feature = "mcap")]
     fn log(&mut self, update: &Update) -> anyhow::Result<()> {
         let written = self.log.as_mut().map(|log| log.sample(update));
         written.transpose().map(drop).map_err(anyhow::Error::msg)
     }
 
-    #[cfg(feature = "mcap")]
     fn end_log(&mut self) -> anyhow::Result<()> {
         let ended = self.log.as_mut().map(Log::finish);
         ended.transpose().map(drop).map_err(anyhow::Error::msg)
-    }
-
-    #[cfg(not(feature = "mcap"))]
-    fn log(&mut self, _: &Update) -> anyhow::Result<()> {
-        Ok(())
-    }
-
-    #[cfg(not(feature = "mcap"))]
-    fn end_log(&mut self) -> anyhow::Result<()> {
-        Ok(())
     }
 
     fn flush(&mut self) -> anyhow::Result<()> {

@@ -1,5 +1,6 @@
 //! What the workshop and the robot are given, read by somebody else's readers: PDF, glTF, XML and a C compiler.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -251,7 +252,7 @@ fn tetrahedron() -> String {
         text.push_str("facet normal 0 0 0\nouter loop\n");
         for k in face {
             let [x, y, z]: [i32; 3] = corners[k];
-            text.push_str(&format!("vertex {x} {y} {z}\n"));
+            let _ = writeln!(text, "vertex {x} {y} {z}");
         }
         text.push_str("endloop\nendfacet\n");
     }
@@ -310,11 +311,28 @@ fn touches_are_messages_in_an_mcap_file() {
     let script = "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n3,1.5,22.5,22.5,60,15\n";
     std::fs::write(here.join("s.csv"), script).unwrap();
     let board = [
-        "board", "--simulate", "--quality", "draft", "--script", "s.csv", "--record", "r.hapdrec", "--rate", "200",
+        "board",
+        "--simulate",
+        "--quality",
+        "draft",
+        "--script",
+        "s.csv",
+        "--record",
+        "r.hapdrec",
+        "--rate",
+        "200",
     ];
     let (made, said) = hapdef(here, &board);
     assert!(made, "{said}");
-    let listen = ["listen", "r.hapdrec", "--fast", "--quality", "draft", "--mcap", "t.mcap"];
+    let listen = [
+        "listen",
+        "r.hapdrec",
+        "--fast",
+        "--quality",
+        "draft",
+        "--mcap",
+        "t.mcap",
+    ];
     let (made, said) = hapdef(here, &listen);
     assert!(made, "{said}");
     let bytes = std::fs::read(here.join("t.mcap")).unwrap();

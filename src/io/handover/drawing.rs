@@ -15,10 +15,11 @@ const HEIGHT: f64 = 88.0;
 
 /// The limb from four sides, and unrolled as seen from outside.
 pub(super) fn all(flow: &mut Flow, source: &Source<'_>) {
+    /// Between two pictures (mm).
+    const GAP: f64 = 4.0;
     flow.need(2.0 * HEIGHT);
     flow.heading("Where the gauges go");
     flow.text("Green: feasible for a gauge. Each bar shows a gauge's direction; hollow ones are on the far wall. All are glued to the inside.");
-    const GAP: f64 = 4.0;
     let tint = feasible_tint(source.design);
     let width = (flow.width() - GAP) / 2.0;
     let views = standard_views(source.inner.stance);

@@ -30,7 +30,7 @@ pub(super) fn wiring(wiring: &Wiring) -> String {
             format!("{:.0}", c.cable * 1e3),
         ]);
     }
-    table.text().to_owned()
+    table.text().clone()
 }
 
 /// A row an item.
@@ -39,7 +39,7 @@ pub(super) fn bill(wiring: &Wiring) -> String {
     for item in items(wiring) {
         table.row(item);
     }
-    table.text().to_owned()
+    table.text().clone()
 }
 
 /// A row a vertex of the limb: mean error of the chosen gauges around it, and the share of light touches that they do not feel.
@@ -63,5 +63,5 @@ pub(super) fn zones(design: &Design) -> String {
         let felt = blind.as_ref().map(|(_, share)| share);
         table.row([x, y, z, cell(errors.as_ref(), k), cell(felt, k)]);
     }
-    table.text().to_owned()
+    table.text().clone()
 }

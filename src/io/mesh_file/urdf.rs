@@ -26,7 +26,8 @@ pub fn look_in(folders: Vec<PathBuf>) {
 pub fn named(path: &Path) -> Option<(PathBuf, Option<String>)> {
     let text = path.to_str()?;
     let lower = text.to_ascii_lowercase();
-    if lower.ends_with(".urdf") {
+    let ending = path.extension().unwrap_or_default();
+    if ending.eq_ignore_ascii_case("urdf") {
         return Some((path.to_owned(), None));
     }
     let at = lower.rfind(".urdf#")?;

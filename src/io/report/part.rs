@@ -23,6 +23,7 @@ pub(super) fn section(
 }
 
 /// Of which part, and under which assumptions, all other figures are: a sentence each.
+#[must_use]
 pub fn lines(inputs: &Inputs, design: &Design, provenance: &Provenance) -> Vec<String> {
     let mut lines = vec![
         mesh(inputs, provenance),

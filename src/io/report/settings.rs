@@ -62,6 +62,7 @@ pub(super) fn settings(
 }
 
 /// What was asked for, what was achieved with it, and how long each stage took.
+#[must_use]
 pub fn rows(inputs: &Inputs, design: &Design, provenance: &Provenance) -> Vec<(String, String)> {
     let mut rows: Vec<(String, String)> = (asked(inputs, design).into_iter())
         .chain(trust(&design.simulated))
