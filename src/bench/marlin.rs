@@ -146,7 +146,8 @@ impl Marlin {
             return None;
         }
         if lower.starts_with("error:") || lower.starts_with("!!") {
-            let of_lines = ["line number", "checksum", "no line number"];
+            // “Line Number is not Last Line Number+1”, “expected line 106 got 105”, “Missing checksum”: what follows asks again.
+            let of_lines = ["line", "checksum"];
             if !of_lines.iter().any(|what| lower.contains(what)) {
                 self.sent = None;
                 return Some(Heard::Failed(format!(
@@ -296,6 +297,17 @@ mod tests {
         assert_eq!((out.clone(), marlin.is_idle()), (sent, false));
         assert_eq!(marlin.push(b"ok P15 B3\n", 0, &mut out).len(), 1);
         assert_eq!(marlin.resent, 1);
+    }
+
+    /// As OctoPrint's virtual printer says it.
+    #[test]
+    fn complaints_of_lines_in_other_words_are_no_end() {
+        let (mut marlin, mut out) = (begun(), Vec::new());
+        marlin.order("G1 X1", 0, 0, &mut out);
+        let refused = b"Error: Missing checksum\nResend:1\nok\n";
+        assert_eq!(marlin.push(refused, 0, &mut out), []);
+        let had = b"Error: expected line 2 got 1\nResend:2\nok\n";
+        assert_eq!(marlin.push(had, 0, &mut out), [done(&[])]);
     }
 
     #[test]

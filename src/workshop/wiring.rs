@@ -113,7 +113,7 @@ impl Wiring {
                 "Resistors and gauges as far off as their classes allow put a bridge {:.2} V off the converter's middle of {half:.2} V behind the amplifier{}",
                 self.offset_v,
                 if self.offset_v > 0.5 * half {
-                    ": each channel needs a trimmer (a potentiometer of 10 kΩ to the bridge's corner through 100 kΩ), set so that the untouched limb reads the middle."
+                    ": each channel needs a trimmer (a potentiometer of 10 kΩ to the bridge's corner through 47 kΩ), set so that the untouched limb reads the middle."
                 } else {
                     ", which leaves room for touches."
                 }
@@ -181,7 +181,7 @@ pub fn header(wiring: &Wiring, name: &str, board: u32) -> String {
 pub fn bill(wiring: &Wiring) -> Vec<[String; 3]> {
     let gauges = wiring.channels.len();
     let arms = usize::from(wiring.chain.active_arms.clamp(1, 4));
-    let cable: f64 = wiring.channels.iter().map(|c| 3.0 * c.cable).sum();
+    let cable: f64 = wiring.channels.iter().map(|c| c.cable).sum();
     let item = |what: &str, count: String, about: &str| [what.to_owned(), count, about.to_owned()];
     vec![
         item(
@@ -195,7 +195,7 @@ pub fn bill(wiring: &Wiring) -> Vec<[String; 3]> {
             "bridges; or gauges that are not glued, beside the glued ones",
         ),
         item(
-            "trimmer 10 kΩ with resistor 100 kΩ",
+            "trimmer 10 kΩ with resistor 47 kΩ",
             gauges.to_string(),
             "to trim a bridge to the middle",
         ),
@@ -211,7 +211,7 @@ pub fn bill(wiring: &Wiring) -> Vec<[String; 3]> {
         ),
         item(
             "cable, three strands of 0.1 mm² (m)",
-            format!("{:.1}", cable / 3.0 * 1.2),
+            format!("{:.1}", cable * 1.2),
             "along the wall to the foot, with 15 cm to the plug",
         ),
         item(

@@ -58,6 +58,7 @@ impl Collector {
                 self.check.begun = true;
                 self.check.since.clear();
                 self.check.homed = 0;
+                self.restarts = 0;
                 self.check.every = (2 * self.check.every).min(most);
                 for (number, planned, why) in std::mem::take(&mut self.check.failed) {
                     self.failed(number, planned, why, tell);
