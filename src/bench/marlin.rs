@@ -299,7 +299,7 @@ mod tests {
         assert_eq!(marlin.resent, 1);
     }
 
-    /// As OctoPrint's virtual printer says it.
+    /// As `OctoPrint`'s virtual printer says it.
     #[test]
     fn complaints_of_lines_in_other_words_are_no_end() {
         let (mut marlin, mut out) = (begun(), Vec::new());
