@@ -196,7 +196,13 @@ impl Marlin {
             out.extend(earlier);
             return self.again(now_us, out);
         }
-        // A number that was damaged itself; a machine that has forgotten all of them asks until it is believed.
+        // A number that was damaged itself, or, when it comes again, a machine that counts otherwise: it is told where it is.
+        // Lines say where to, not how far, so one that it had already does no harm.
+        if sent.tries > 1 {
+            let last = sent.number.saturating_sub(1);
+            self.stale += 1;
+            out.extend_from_slice(&line(last, &format!("M110 N{last}")));
+        }
         self.again(now_us, out)
     }
 
@@ -297,6 +303,21 @@ mod tests {
         assert_eq!((out.clone(), marlin.is_idle()), (sent, false));
         assert_eq!(marlin.push(b"ok P15 B3\n", 0, &mut out).len(), 1);
         assert_eq!(marlin.resent, 1);
+    }
+
+    #[test]
+    fn a_machine_that_counts_otherwise_is_told_where_it_is() {
+        let (mut marlin, mut out) = (begun(), Vec::new());
+        marlin.order("G1 X1", 0, 0, &mut out);
+        let sent = std::mem::take(&mut out);
+        let asks = b"Error: expected line 359 got 1\nResend:359\nok\n";
+        assert_eq!(marlin.push(asks, 0, &mut out), []);
+        assert_eq!(std::mem::take(&mut out), sent);
+        assert_eq!(marlin.push(asks, 0, &mut out), []);
+        assert_eq!(out, [line(0, "M110 N0"), sent].concat());
+        // Its answer to that is none to the line.
+        assert_eq!(marlin.push(b"ok\n", 0, &mut out), []);
+        assert_eq!(marlin.push(b"ok\n", 0, &mut out), [done(&[])]);
     }
 
     /// As `OctoPrint`'s virtual printer says it.
