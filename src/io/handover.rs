@@ -23,7 +23,7 @@ mod templates;
 use self::source::Source;
 use super::bench_folder::limb_key;
 use super::mesh_file::urdf::link_of;
-use super::run::Provenance;
+use super::run::{Provenance, as_computed};
 use crate::design::{Design, Inputs};
 use crate::paper::{self, Format};
 use crate::plain::robust_top;
@@ -69,7 +69,7 @@ pub fn files(
     let report = paper::pdf(&title, &document::sheets(&source))?;
     let title = format!("Templates for {}", source.name);
     let template = paper::pdf(&title, &templates::sheets(&source)?)?;
-    let header = workshop::header(&source.wiring, &source.name, board(inputs));
+    let header = workshop::header(&source.wiring, &source.name, board(inputs, design));
     let texts = [
         tables::wiring(&source.wiring),
         tables::bill(&source.wiring),
@@ -134,8 +134,12 @@ fn wiring(inputs: &Inputs, inner: &Inner, landmarks: &[workshop::Landmarks]) -> 
     )
 }
 
-/// A number for the board: of the limb and its gauges.
-fn board(inputs: &Inputs) -> u32 {
-    let key = limb_key(inputs);
+/// A number for the board: of the limb and the gauges that were chosen.
+fn board(inputs: &Inputs, design: &Design) -> u32 {
+    let chosen = Inputs {
+        project: as_computed(&inputs.project, design),
+        ..inputs.clone()
+    };
+    let key = limb_key(&chosen);
     u32::from_str_radix(&key[..key.len().min(8)], 16).unwrap_or(1)
 }

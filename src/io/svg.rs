@@ -295,7 +295,8 @@ impl Canvas {
     }
 }
 
-fn bounds(points: impl Iterator<Item = DVec2>) -> (DVec2, DVec2) {
+/// The smallest box around points.
+pub(super) fn bounds(points: impl Iterator<Item = DVec2>) -> (DVec2, DVec2) {
     points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, u), p| {
         (l.min(p), u.max(p))
     })

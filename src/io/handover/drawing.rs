@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 use super::marks::small;
 use super::source::Source;
 use crate::io::report::{feasible_tint, markers};
-use crate::io::svg::{Paint, View, from_behind, standard_views};
+use crate::io::svg::{Paint, View, bounds, from_behind, standard_views};
 use crate::mesh::flatten::Flat;
 use crate::mesh::stretch::KEPT;
 use crate::paper::{Align, Flow, Line, Sheet};
@@ -67,12 +67,6 @@ impl Fit {
         let q = (p - self.lower) * self.scale;
         self.corner + DVec2::new(q.x, self.height - q.y)
     }
-}
-
-fn bounds(points: impl Iterator<Item = DVec2>) -> (DVec2, DVec2) {
-    points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, u), p| {
-        (l.min(p), u.max(p))
-    })
 }
 
 fn side(
