@@ -8,6 +8,7 @@ pub mod examples;
 pub mod fingerprint;
 pub mod glb;
 pub mod handover;
+pub mod kept_model;
 pub mod machine_file;
 pub mod mesh_file;
 pub mod npy;

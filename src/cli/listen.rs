@@ -19,9 +19,9 @@ use super::common::Common;
 use super::ranges::between;
 use super::spared::Spared;
 use super::{out, progress::Bar};
-use crate::design::{self, Sensing};
+use crate::design::Sensing;
 use crate::io::bench_folder::limb_key;
-use crate::io::handover;
+use crate::io::{handover, kept_model};
 use crate::io::project_file::LoadedProject;
 use crate::io::run::Provenance;
 use crate::io::touch_file::{self, TouchFile};
@@ -198,16 +198,17 @@ fn spared(loaded: &LoadedProject, address: &Address) -> Spared {
     Spared::of(loaded).and("the recording itself", recording)
 }
 
-/// The model of a project's gauges, with its progress on stderr.
+/// The model of a project's gauges, with its progress on stderr: the one beside the project, where there is one.
 ///
 /// # Errors
-/// As [`design::sensing`].
+/// As [`kept_model::sensing`].
 pub(super) fn sensing_for(common: &Common, loaded: &LoadedProject) -> anyhow::Result<Sensing> {
     let bar = Bar::default();
     let sensing = common.in_pool(|| {
         let watch = |p| bar.show(p);
         let budget = loaded.inputs.project.budget.budget();
-        Ok(design::sensing(&loaded.inputs, &budget, &watch)?)
+        let project = Some(&*loaded.path);
+        Ok(kept_model::sensing(&loaded.inputs, project, &budget, &watch)?)
     });
     bar.finish();
     sensing

@@ -1,6 +1,8 @@
 //! The project's model as live touch needs it: what its chosen gauges read of any touch.
 
-use std::sync::Arc;
+mod kept;
+
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
@@ -10,7 +12,7 @@ use rayon::prelude::*;
 use super::as_built::{as_built, workshop_draw};
 use super::drawn::{drawn_on, map_size, proposed};
 use super::layout::{lay_out_sites, lay_out_touches, test_touches, touches_on};
-use super::{DesignError, Inputs, Meshed, ground};
+use super::{Built, DesignError, Ground, Inputs, Meshed, ground};
 use crate::budget::{Budget, Watch};
 use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
@@ -19,6 +21,8 @@ use crate::inference::{AsDrawn, Deviations};
 use crate::live::GaugeModel;
 use crate::project::{ChosenSite, LiveKeys, Project};
 use crate::uncertainty::{Gluing, Uncertainty};
+
+pub use kept::Computed;
 
 /// A model of the chosen gauges, without the stiffness it came from.
 pub struct Sensing {
@@ -39,7 +43,13 @@ pub struct Sensing {
     pub proposed: Vec<Touch>,
     /// Mean edge of the elements (mm).
     pub element_mm: f64,
-    meshed: Meshed,
+    /// Rms error of the strain that the elements leave (%).
+    strain_percent: f64,
+    /// Whether the elements are coarser than they should be, for want of memory.
+    is_short: bool,
+    budget: Budget,
+    /// What was kept has no elements until somebody asks for them.
+    meshed: OnceLock<Meshed>,
 }
 
 /// Readings of the model under touches of many forces: what the trained estimators learn from.
@@ -89,18 +99,13 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
     if project.selection.sites.is_empty() {
         return Err(DesignError::NoGauges);
     }
-    let ground = ground(inputs, watch)?;
-    ground.check(project)?;
-    let even = ground.site_layout(&inputs.part);
-    let touches = lay_out_touches(&ground.touch_layout(&inputs.part), inputs, budget)?;
-    let sites = lay_out_sites(&even, inputs)?;
-    let places: Vec<DVec3> = sites.iter().map(|&at| even.point(at)).collect();
-    let graded = ground.build(&touches, &places, &budget.elements, watch)?;
+    let (ground, graded) = laid(inputs, budget, watch)?;
     let gauges = chosen_gauges(project, &*graded.model);
     let sensitivity = Sensitivity::new(&*graded.model, &gauges, watch)?;
     let tip_radius = project.tip().1;
     let mesh = ground.of_size(map_size(&ground, tip_radius));
-    let off = (project.uncertainty()).with_elements(graded.estimate.strain_percent);
+    let strain_percent = graded.estimate.strain_percent;
+    let off = (project.uncertainty()).with_elements(strain_percent);
     let tip = (tip_radius, &off.making_at_most());
     let drawn = drawn_on(&*graded.model, &gauges, &mesh, tip, watch)?;
     let proposed = proposed(&drawn.map.mesh, inputs)?;
@@ -113,8 +118,23 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
         drawn: Arc::new(drawn),
         proposed,
         element_mm: graded.meshed.element_mm(),
-        meshed: graded.meshed,
+        strain_percent,
+        is_short: graded.is_short,
+        budget: *budget,
+        meshed: OnceLock::from(graded.meshed),
     })
+}
+
+/// The elements that a design of this project and budget has, with the model on them.
+fn laid(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<(Ground, Built), DesignError> {
+    let ground = ground(inputs, watch)?;
+    ground.check(&inputs.project)?;
+    let even = ground.site_layout(&inputs.part);
+    let touches = lay_out_touches(&ground.touch_layout(&inputs.part), inputs, budget)?;
+    let sites = lay_out_sites(&even, inputs)?;
+    let places: Vec<DVec3> = sites.iter().map(|&at| even.point(at)).collect();
+    let built = ground.build(&touches, &places, &budget.elements, watch)?;
+    Ok((ground, built))
 }
 
 /// The chosen gauges on the model's own surface.
@@ -147,11 +167,12 @@ impl Sensing {
     /// [`DesignError`] as for a simulation.
     pub fn reference(
         &self,
+        inputs: &Inputs,
         gluing: &Gluing,
         seed: u64,
         watch: Watch,
     ) -> Result<(Sensitivity, Vec<f64>), DesignError> {
-        let (_, model) = self.meshed.reference_model(watch)?;
+        let (_, model) = self.meshed(inputs, watch)?.reference_model(watch)?;
         let gauges: Vec<Gauge> = (self.gauges.iter().enumerate())
             .map(|(k, gauge)| glued(gauge, gluing, seed, k))
             .collect();
@@ -164,8 +185,17 @@ impl Sensing {
     ///
     /// # Errors
     /// [`DesignError`] as for a simulation.
-    pub fn model(&self, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
-        self.meshed.model(watch)
+    pub fn model(&self, inputs: &Inputs, watch: Watch) -> Result<Box<dyn Model>, DesignError> {
+        self.meshed(inputs, watch)?.model(watch)
+    }
+
+    /// The elements, laid anew where the results on them were kept: `inputs` are those that they were laid for.
+    fn meshed(&self, inputs: &Inputs, watch: Watch) -> Result<&Meshed, DesignError> {
+        if let Some(meshed) = self.meshed.get() {
+            return Ok(meshed);
+        }
+        let (_, built) = laid(inputs, &self.budget, watch)?;
+        Ok(self.meshed.get_or_init(|| built.meshed))
     }
 
     /// Evenly spread touches with forces drawn evenly from half a newton to the hardest of the paper's.
@@ -204,7 +234,7 @@ impl Sensing {
         budget: &Budget,
         watch: Watch,
     ) -> Result<Vec<Touch>, DesignError> {
-        let (meshed, _) = self.meshed.reference_model(watch)?;
+        let (meshed, _) = self.meshed(inputs, watch)?.reference_model(watch)?;
         test_touches(&meshed.touched_surface(), inputs, budget.test_touches)
     }
 

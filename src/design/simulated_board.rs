@@ -59,7 +59,7 @@ pub fn simulated(
 ) -> Result<SimulatedBoard, DesignError> {
     let seed = inputs.project.budget.seed;
     let (reference, gains) =
-        sensing.reference(&workshop.of(inputs.project.gluing()), seed, watch)?;
+        sensing.reference(inputs, &workshop.of(inputs.project.gluing()), seed, watch)?;
     let typical: Vec<Touch> = places(inputs, sensing, seed)?
         .into_iter()
         .take(300)
@@ -75,13 +75,14 @@ pub fn simulated(
 /// # Errors
 /// [`DesignError`] as for a simulation.
 pub fn gives_way(
+    inputs: &Inputs,
     sensing: &Sensing,
     touches: &[Touch],
     watch: Watch,
 ) -> Result<Vec<f64>, DesignError> {
     /// Solutions that are held at a time.
     const BLOCK: usize = 64;
-    let model = sensing.model(watch)?;
+    let model = sensing.model(inputs, watch)?;
     let mut gives = Vec::with_capacity(touches.len());
     for block in touches.chunks(BLOCK) {
         let loads: Vec<_> = block.iter().map(|t| model.load(t)).collect();

@@ -93,6 +93,23 @@ impl Sensitivity {
         })
     }
 
+    /// From weights that are known (vertices × gauges: strain a newton along x, y and z there).
+    #[must_use]
+    pub fn of(mesh: Arc<TriMesh>, gauges: usize, weights: Vec<DVec3>) -> Self {
+        debug_assert_eq!(weights.len(), mesh.positions().len() * gauges);
+        Self {
+            mesh,
+            gauges,
+            weights,
+        }
+    }
+
+    /// Vertices × gauges: strain a newton along x, y and z there.
+    #[must_use]
+    pub fn weights(&self) -> &[DVec3] {
+        &self.weights
+    }
+
     /// How many gauges there are.
     #[must_use]
     pub fn gauges(&self) -> usize {

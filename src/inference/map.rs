@@ -116,6 +116,12 @@ impl ResponseMap {
         }
     }
 
+    /// Nodes (vertices, then edges) × channels: strain a newton.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
     /// How many gauges it has.
     #[must_use]
     pub fn channels(&self) -> usize {

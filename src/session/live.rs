@@ -21,8 +21,9 @@ use crate::board::{
     ChannelFault, Drawn, Faults, Illness, Script, SimulatedBoard, Truth, script_seed,
 };
 use crate::design::simulated_board::{options, places, simulated};
-use crate::design::{self, Inputs, Sensing, Workshop};
+use crate::design::{Inputs, Sensing, Workshop};
 use crate::document::SensingInputs;
+use crate::io::kept_model;
 use crate::job::{Reporter, Stop};
 use crate::link::{
     Address, BAUD, Command, Connection, Doorway, ENDING, Listener, Pace, Truths, host, write_table,
@@ -133,25 +134,30 @@ impl Session {
     }
 
     fn make_sensing(&mut self) {
-        let (inputs, budget) = (self.document.inputs(), self.budget());
-        let work = move |r: &Reporter| {
-            let watch = |p| r.report(p);
-            let sensing = design::sensing(&inputs, &budget, &watch).map_err(|e| stop(&e))?;
-            Ok(Arc::new(sensing))
-        };
+        let sensing = self.to_sense();
+        let work = move |r: &Reporter| Ok(Arc::new(sensing(r)?));
         self.start_sensing(Task::Sense, work, |s, inputs, value| {
             s.live.sensing = Some(Slot { inputs, value });
             s.go_on_connecting();
         });
     }
 
-    fn make_board(&mut self, known: Option<Arc<Sensing>>) {
+    /// Work that gets the model of the gauges as they are now: from beside the project, where it was kept.
+    fn to_sense(&self) -> impl FnOnce(&Reporter) -> Result<Sensing, Stop> + Send + 'static {
         let (inputs, budget) = (self.document.inputs(), self.budget());
-        let work = move |r: &Reporter| {
+        let project = self.document.path.clone();
+        move |r| {
             let watch = |p| r.report(p);
+            kept_model::sensing(&inputs, project.as_deref(), &budget, &watch).map_err(|e| stop(&e))
+        }
+    }
+
+    fn make_board(&mut self, known: Option<Arc<Sensing>>) {
+        let (inputs, anew) = (self.document.inputs(), self.to_sense());
+        let work = move |r: &Reporter| {
             let sensing = match known {
                 Some(sensing) => sensing,
-                None => Arc::new(design::sensing(&inputs, &budget, &watch).map_err(|e| stop(&e))?),
+                None => Arc::new(anew(r)?),
             };
             let board = board(&inputs, &sensing, r)?;
             Ok((sensing, board))

@@ -42,7 +42,7 @@ pub(super) fn press(
     let bar = Bar::default();
     let built = args.common.in_pool(|| {
         let watch = |p| bar.show(p);
-        let gives = gives_way(sensing, &touches, &watch)?;
+        let gives = gives_way(inputs, sensing, &touches, &watch)?;
         let options = Options {
             tip_n: machine.sensor.map(|s| s.newton_per_count),
             ..options(inputs, sensing.gauges.len() + 1)
