@@ -21,6 +21,7 @@ mod layout;
 mod meshed;
 mod pipeline;
 mod presses;
+mod pressing;
 mod reduce;
 mod reference;
 mod refine;

@@ -15,7 +15,7 @@ use crate::mesh::{RepairReport, TriMesh};
 use crate::project::{ChosenSite, PartModel};
 
 pub use inputs::{
-    DesignInputs, ElementInputs, ExpectedInputs, FilterInputs, ModelInputs, PaintInputs,
+    DesignInputs, ElementInputs, ExpectedInputs, FilterInputs, JigInputs, ModelInputs, PaintInputs,
     ReductionInputs, SelectionInputs, SensingInputs, SimulationInputs, TradeInputs, WallInputs,
 };
 pub use paint::Brush;

@@ -55,6 +55,8 @@ pub enum Filter {
     Noise,
     /// The strain is beyond what gauge or amplifier can take.
     Range,
+    /// No arm of a jig gets there.
+    Jig,
     /// Outside the painted region.
     Painted,
     /// Where no gauge may go.
@@ -63,7 +65,7 @@ pub enum Filter {
 
 impl Filter {
     /// In the order they are applied.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::NotBehind,
         Self::OutOfReach,
         Self::SupportClearance,
@@ -72,6 +74,7 @@ impl Filter {
         Self::Flatness,
         Self::Noise,
         Self::Range,
+        Self::Jig,
         Self::Painted,
         Self::KeptOut,
     ];
@@ -88,6 +91,7 @@ impl Filter {
             Self::Flatness => "Too curved",
             Self::Noise => "Signal below noise",
             Self::Range => "Strain beyond range",
+            Self::Jig => "No arm of a jig gets there",
             Self::Painted => "Not painted",
             Self::KeptOut => "Kept out",
         }
@@ -165,6 +169,8 @@ pub struct FeasibleInput<'a> {
     pub sites: &'a [Site],
     /// What lies before and behind the sites of a solid; absent for a shell, which is all wall.
     pub surroundings: Option<&'a Surroundings>,
+    /// One value a site: whether a jig gets to it; absent where that is not asked.
+    pub jig: Option<&'a [bool]>,
     /// One value a site: in the painted region or not; absent when nothing was painted.
     pub painted: Option<&'a [bool]>,
     /// One value a site: where no gauge may go; absent when there is no such region.
@@ -282,6 +288,7 @@ impl<'a> Filters<'a> {
             Filter::Flatness => self.footprint(i).height <= rules.flatness,
             Filter::Noise => site.rms_strain >= rules.least_signal_to_noise * rules.noise,
             Filter::Range => site.peak_strain <= rules.range,
+            Filter::Jig => input.jig.is_none_or(|reached| reached[i]),
             Filter::Painted => input.painted.is_none_or(|p| p[i]),
             Filter::KeptOut => input.kept_out.is_none_or(|k| !k[i]),
         }
@@ -318,7 +325,11 @@ impl<'a> Filters<'a> {
             Filter::Flatness => Some(self.footprint(i).height),
             Filter::Noise => Some(self.input.sites[i].rms_strain),
             Filter::Range => Some(self.input.sites[i].peak_strain),
-            Filter::NotBehind | Filter::Footprint | Filter::Painted | Filter::KeptOut => None,
+            Filter::NotBehind
+            | Filter::Footprint
+            | Filter::Jig
+            | Filter::Painted
+            | Filter::KeptOut => None,
         }
     }
 

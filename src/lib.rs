@@ -73,6 +73,7 @@ pub mod given;
 pub mod inference;
 #[allow(missing_docs)]
 pub mod io;
+pub mod jig;
 #[allow(missing_docs)]
 pub mod job;
 mod lanes;

@@ -7,6 +7,7 @@ mod bodies;
 pub mod canonical;
 pub mod cut;
 mod error;
+mod facets;
 pub mod flatten;
 pub mod geodesic;
 pub mod inside;
@@ -44,6 +45,7 @@ use topology::Sides;
 use volume::VolumeMesh;
 
 pub use error::MeshError;
+pub use facets::Facets;
 pub use intake::TakenIn;
 pub use point::SurfacePoint;
 pub use report::RepairReport;
@@ -180,6 +182,14 @@ impl TriMesh {
     #[must_use]
     pub fn vertex_normals(&self) -> &[DVec3] {
         &self.vertex_normals
+    }
+
+    /// The same surface moved along its normals (m); against them where that is less than nothing.
+    #[must_use]
+    pub fn offset(&self, by: f64) -> Self {
+        let both = self.positions.iter().zip(&self.vertex_normals);
+        let moved = both.map(|(p, n)| *p + *n * by).collect();
+        Self::from_checked(moved, self.triangles.clone())
     }
 
     /// The same surface with its inside out.

@@ -17,6 +17,7 @@ mod fields;
 mod gauges;
 mod helping;
 mod holds;
+mod jig;
 mod jobs;
 mod kept;
 mod latest;

@@ -14,6 +14,7 @@ mod execute;
 mod fields;
 mod form;
 mod inspector;
+mod jig;
 mod jobs;
 mod kept;
 mod keys;
@@ -204,6 +205,7 @@ impl Studio {
                 Field::Faces | Field::Thickness => Some(Colours::Walls),
                 _ => None,
             },
+            jig: view.jig_shown,
             pointed: view.hover.filter(|_| expected),
         }
     }

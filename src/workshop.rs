@@ -4,6 +4,7 @@
 //! them sees it.
 
 mod inner;
+mod jigged;
 mod landmarks;
 mod patch;
 mod robot;
@@ -11,8 +12,9 @@ mod solids;
 mod wiring;
 
 pub use inner::{Glued, Inner};
+pub use jigged::jig_of;
 pub use landmarks::{Landmarks, Neighbour, landmarks};
 pub use patch::Patch;
 pub use robot::{frame, roll_pitch_yaw, turn_of, urdf};
-pub use solids::{Solid, arrow, plate};
+pub use solids::{arrow, plate};
 pub use wiring::{Channel, Wiring, bill, header, wiring};

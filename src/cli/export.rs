@@ -158,7 +158,9 @@ fn pressed(
     const BESIDE: f64 = 5e-3;
     let sensing = sensing_for(&args.common, loaded)
         .context("what a touch does is computed with the gauges of a project")?;
-    let model = args.common.in_pool(|| Ok(sensing.model(&loaded.inputs, &unwatched)?))?;
+    let model = args
+        .common
+        .in_pool(|| Ok(sensing.model(&loaded.inputs, &unwatched)?))?;
     let mesh = model.mesh();
     let (at, off) = mesh.index().nearest(place);
     ensure!(

@@ -21,10 +21,10 @@ use super::spared::Spared;
 use super::{out, progress::Bar};
 use crate::design::Sensing;
 use crate::io::bench_folder::limb_key;
-use crate::io::{handover, kept_model};
 use crate::io::project_file::LoadedProject;
 use crate::io::run::Provenance;
 use crate::io::touch_file::{self, TouchFile};
+use crate::io::{handover, kept_model};
 use crate::link::{Address, BAUD, Command, Listener, Pace, Recorder, SessionEvent, State, Table};
 use crate::live::{Estimator, Pipeline, Sample, Update};
 use crate::plain;
@@ -208,7 +208,12 @@ pub(super) fn sensing_for(common: &Common, loaded: &LoadedProject) -> anyhow::Re
         let watch = |p| bar.show(p);
         let budget = loaded.inputs.project.budget.budget();
         let project = Some(&*loaded.path);
-        Ok(kept_model::sensing(&loaded.inputs, project, &budget, &watch)?)
+        Ok(kept_model::sensing(
+            &loaded.inputs,
+            project,
+            &budget,
+            &watch,
+        )?)
     });
     bar.finish();
     sensing

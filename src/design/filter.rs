@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::pressing::Pressing;
 use super::{Inputs, Shortage, Simulated};
 use crate::dataset::Site;
 use crate::elasticity::support::supported_vertices;
@@ -34,6 +35,7 @@ struct LookedAt {
     supported: Vec<u32>,
     painted: Option<Vec<bool>>,
     kept_out: Option<Vec<bool>>,
+    jig: Option<Vec<bool>>,
 }
 
 impl LookedAt {
@@ -46,6 +48,7 @@ impl LookedAt {
             supported: supported_vertices(&simulated.held),
             painted: inputs.painted.as_ref().map(on),
             kept_out: named.and_then(|name| inputs.masks.get(name)).map(on),
+            jig: Pressing::of(inputs, simulated).map(|jig| jig.gets_to(sites)),
         }
     }
 
@@ -58,6 +61,7 @@ impl LookedAt {
             surroundings: simulated.surroundings.as_ref(),
             painted: self.painted.as_deref(),
             kept_out: self.kept_out.as_deref(),
+            jig: self.jig.as_deref(),
         }
     }
 }

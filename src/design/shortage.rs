@@ -127,6 +127,7 @@ fn remedy(inputs: &Inputs, blame: &Blame) -> String {
             up(limit(MICRO)),
             project.touch.force_n
         ),
+        Filter::Jig => "switch feasible.jig off and press some gauges by hand, or choose a part with a straight way in".to_owned(),
         Filter::Painted => painted(inputs),
         Filter::KeptOut => {
             "make the region where no gauge may go (feasible.keep_out) smaller".to_owned()

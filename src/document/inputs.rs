@@ -168,7 +168,29 @@ pub struct SensingInputs {
     aside_percent: [f64; 2],
 }
 
+/// What a jig for the chosen gauges depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JigInputs {
+    sites: Vec<ChosenSite>,
+    grid_mm: [f64; 2],
+    part: Part,
+}
+
 impl Document {
+    /// What a jig for the chosen gauges depends on now.
+    #[must_use]
+    pub fn jig_inputs(&self) -> JigInputs {
+        let p = &self.state.project;
+        JigInputs {
+            sites: p.selection.sites.clone(),
+            grid_mm: [p.gauge.grid_length_mm, p.gauge.grid_width_mm],
+            part: Part {
+                mesh: String::new(),
+                ..p.part.clone()
+            },
+        }
+    }
+
     fn mask(&self, name: &str) -> Mask {
         self.state.masks.get(name).cloned()
     }

@@ -50,6 +50,7 @@ pub fn write_into(
     provenance: &Provenance,
     handed_over: Option<Format>,
 ) -> Result<Vec<PathBuf>, FileError> {
+    let mut handed = Vec::new();
     place.replace(|new| {
         let write = |name: &str, text: &str| atomic::write(&new.join(name), text.as_bytes());
         write("sites.csv", &sites_csv(inputs, design))?;
@@ -65,7 +66,12 @@ pub fn write_into(
             let files = handover::files(inputs, design, provenance, format)
                 .map_err(|why| FileError::broken(place.folder(), why))?;
             for (name, bytes) in files {
-                atomic::write(&new.join(name), &bytes)?;
+                let path = new.join(&name);
+                if let Some(folder) = path.parent() {
+                    std::fs::create_dir_all(folder).map_err(|e| FileError::of(folder, &e))?;
+                }
+                atomic::write(&path, &bytes)?;
+                handed.push(name);
             }
         }
         write_project(new, place.folder(), inputs, design, provenance)
@@ -77,9 +83,28 @@ pub fn write_into(
         "dataset.npz",
         PROJECT,
     ];
-    let others = handover::FILES.iter().filter(|_| handed_over.is_some());
-    let names = names.iter().chain(others);
-    Ok(names.map(|name| place.folder().join(name)).collect())
+    let names = names.into_iter().map(String::from).chain(handed);
+    let paths: Vec<PathBuf> = names.map(|name| place.folder().join(name)).collect();
+    if handed_over.is_some() {
+        forget_old_jig(place.folder(), &paths);
+    }
+    Ok(paths)
+}
+
+/// Takes away the pieces of an earlier jig that this one does not have: they would be printed with it.
+fn forget_old_jig(place: &Path, written: &[PathBuf]) {
+    let folder = place.join(handover::jig::FOLDER);
+    let Ok(entries) = std::fs::read_dir(&folder) else {
+        return;
+    };
+    for path in entries.flatten().map(|entry| entry.path()) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if handover::jig::is_of_a_jig(&name) && !written.contains(&path) {
+            let _ = std::fs::remove_file(&path);
+        }
+    }
+    // Where nothing is left in it.
+    let _ = std::fs::remove_dir(&folder);
 }
 
 /// Writes the project that reproduces the run into a folder, for another one. What stands there under its name, which

@@ -9,11 +9,14 @@
 //! | `hapd_config.h` | pins, name and electric constants for the sketch |
 //! | `gauges.urdf` | a frame for each gauge on the robot's link |
 //! | `scene.glb` | the limb with its gauges, coloured by the error of touches, for any viewer |
+//! | `jig/*.stl`, `jig/jig.csv` | what presses the gauges to the wall, to be printed, and the order in which it is put together |
 //! | `zones.csv` | error, and what is not felt, at each vertex, in the link's frame |
 
 mod cards;
 mod document;
 mod drawing;
+pub mod jig;
+mod jig_pages;
 mod marks;
 mod scene;
 mod source;
@@ -52,10 +55,11 @@ pub fn files(
     design: &Design,
     provenance: &Provenance,
     format: Format,
-) -> Result<Vec<(&'static str, Vec<u8>)>, String> {
+) -> Result<Vec<(String, Vec<u8>)>, String> {
     let inner = Inner::of(inputs, design);
     let landmarks = workshop::landmarks(&inner);
     let source = Source {
+        jig: workshop::jig_of(inputs, &inner),
         wiring: wiring(inputs, &inner, &landmarks),
         name: name(provenance),
         inputs,
@@ -72,7 +76,7 @@ pub fn files(
     let header = workshop::header(&source.wiring, &source.name, board(inputs, design));
     let texts = [
         tables::wiring(&source.wiring),
-        tables::bill(&source.wiring),
+        tables::bill(source.bill()),
         header,
         workshop::urdf(&source.inner.gauges, &source.name, &link(provenance)),
         tables::zones(design),
@@ -81,7 +85,8 @@ pub fn files(
         .into_iter()
         .chain(texts.map(String::into_bytes));
     let files = files.chain([scene(&source)?]);
-    Ok(FILES.into_iter().zip(files).collect())
+    let named = FILES.into_iter().map(String::from).zip(files);
+    Ok(named.chain(jig::files(&source.jig)).collect())
 }
 
 /// The limb coloured by the mean error of touches around each place, where that was judged.

@@ -134,11 +134,7 @@ fn add_mesh(file: &mut NpzFile, of: &str, mesh: &TriMesh) -> std::io::Result<()>
     let name = format!("{of}_positions");
     file.add(&name, &[positions.len() / 3, 3], &positions)?;
     let corners = mesh.triangles().as_flattened();
-    file.add(
-        &format!("{of}_triangles"),
-        &[corners.len() / 3, 3],
-        corners,
-    )
+    file.add(&format!("{of}_triangles"), &[corners.len() / 3, 3], corners)
 }
 
 fn flat(vectors: &[DVec3]) -> Vec<f64> {
@@ -302,8 +298,13 @@ mod tests {
         }
         // Elements are there for whoever asks, and are the same.
         let gluing = crate::uncertainty::Gluing::EXACT;
-        let truth =
-            |of: &Sensing| of.reference(&inputs, &gluing, 0, &unwatched).unwrap().0.weights().to_vec();
+        let truth = |of: &Sensing| {
+            of.reference(&inputs, &gluing, 0, &unwatched)
+                .unwrap()
+                .0
+                .weights()
+                .to_vec()
+        };
         assert_eq!(truth(&first), truth(&second));
 
         // Whatever is otherwise is computed, and so is what is damaged.

@@ -87,15 +87,23 @@ impl Together {
 
     /// Whether every new file can take its place: from the moment they hold it is too late to ask.
     fn check_places(&self, begun: &Path) -> Result<(), FileError> {
-        let names = names(begun).map_err(|e| FileError::of(begun, &e))?;
-        let mut places = names.iter().map(|name| self.folder.join(name));
-        match places.find(|place| place.is_dir()) {
-            Some(place) => Err(FileError::broken(
-                &place,
-                "a file is to be written here, but this is a folder. Move it away, or choose another folder",
-            )),
-            None => Ok(()),
+        for name in names(begun).map_err(|e| FileError::of(begun, &e))? {
+            let (new, place) = (begun.join(&name), self.folder.join(&name));
+            if !new.is_dir() {
+                is_no_folder(&place)?;
+                continue;
+            }
+            if place.exists() && !place.is_dir() {
+                return Err(FileError::broken(
+                    &place,
+                    "a folder is to be made here, but this is a file. Move it away, or choose another folder",
+                ));
+            }
+            for inner in names(&new).map_err(|e| FileError::of(&new, &e))? {
+                is_no_folder(&place.join(inner))?;
+            }
         }
+        Ok(())
     }
 
     /// Puts every file that waits into its place.
@@ -107,8 +115,12 @@ impl Together {
             Err(e) => return Err(FileError::of(&ready, &e)),
         };
         for name in waiting {
-            let place = self.folder.join(&name);
-            fs::rename(ready.join(&name), &place).map_err(|e| FileError::of(&place, &e))?;
+            let (new, place) = (ready.join(&name), self.folder.join(&name));
+            if new.is_dir() {
+                put_all(&new, &place)?;
+            } else {
+                fs::rename(new, &place).map_err(|e| FileError::of(&place, &e))?;
+            }
             step();
         }
         // What waited must be in its place for good before nothing tells of it any more.
@@ -134,6 +146,30 @@ impl Together {
             },
         }
     }
+}
+
+/// Refuses a place for a file where a folder is.
+fn is_no_folder(place: &Path) -> Result<(), FileError> {
+    if place.is_dir() {
+        return Err(FileError::broken(
+            place,
+            "a file is to be written here, but this is a folder. Move it away, or choose another folder",
+        ));
+    }
+    Ok(())
+}
+
+/// Puts every file of a folder that waits into a folder beside the others, where others may lie already.
+fn put_all(ready: &Path, folder: &Path) -> Result<(), FileError> {
+    fs::create_dir_all(folder).map_err(|e| FileError::of(folder, &e))?;
+    for name in names(ready).map_err(|e| FileError::of(ready, &e))? {
+        let place = folder.join(&name);
+        fs::rename(ready.join(&name), &place).map_err(|e| FileError::of(&place, &e))?;
+        step();
+    }
+    sync_folder(folder)
+        .and_then(|()| fs::remove_dir(ready))
+        .map_err(|e| FileError::of(ready, &e))
 }
 
 /// The folder locked for this program; unlocked where a system or a network drive cannot lock folders.
@@ -173,10 +209,11 @@ mod tests {
     use super::super::atomic::tests::killed_at;
     use super::*;
 
-    const NAMES: [&str; 3] = ["a.csv", "b.json", "c.html"];
+    const NAMES: [&str; 4] = ["a.csv", "b.json", "c.html", "pieces/d.stl"];
 
     fn put(folder: &Path, text: &str) -> Result<(), FileError> {
         Together::claim(folder)?.replace(|new| {
+            fs::create_dir_all(new.join("pieces")).unwrap();
             NAMES
                 .iter()
                 .try_for_each(|name| atomic::write(&new.join(name), text.as_bytes()))
@@ -207,21 +244,24 @@ mod tests {
             let folder = with_old_files();
             let path = folder.path();
             let died = killed_at(at, || put(path, "new").unwrap());
-            let whole = ["old old old", "new new new"].contains(&found(path).as_str());
+            let whole = ["old old old old", "new new new new"].contains(&found(path).as_str());
             assert!(whole || path.join(READY).exists(), "step {at}");
             // Whoever comes next finds one or the other, and nothing of his own is gone.
             drop(Together::claim(path).unwrap());
             let after = found(path);
             assert!(
-                ["old old old", "new new new"].contains(&after.as_str()),
+                ["old old old old", "new new new new"].contains(&after.as_str()),
                 "step {at}: {after}"
             );
             assert!(!path.join(READY).exists());
             let own = fs::read_to_string(path.join("own.txt")).unwrap();
             assert_eq!(own, "the user's");
-            seen.push((whole, after == "new new new"));
+            seen.push((whole, after == "new new new new"));
             put(path, "next").unwrap();
-            assert_eq!((found(path).as_str(), count(path)), ("next next next", 4));
+            assert_eq!(
+                (found(path).as_str(), count(path)),
+                ("next next next next", 5)
+            );
             if !died {
                 break;
             }
@@ -257,7 +297,7 @@ mod tests {
         let said = failed.unwrap_err().to_string();
         let named = path.join("b.json").display().to_string();
         assert!(said.starts_with(&named), "{said}");
-        assert_eq!((found(path).as_str(), count(path)), ("old old old", 4));
+        assert_eq!((found(path).as_str(), count(path)), ("old old old old", 5));
         // A folder in the place of a file: nothing is replaced.
         fs::remove_file(path.join("c.html")).unwrap();
         fs::create_dir(path.join("c.html")).unwrap();

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::key::{MASK, Range, from};
+use super::key::{MASK, Range, SWITCH, from};
 use super::keys::keys;
 use super::ranges::{FORCES, FRICTION, LENGTH, OFF_MM, ROOM};
 use super::value::{any, is_default};
@@ -93,6 +93,8 @@ keys! {
             "k of the paper's centre-of-mass filter: so many neighbours of a site";
         edge_radius_mm: f64 = 2.1, "mm", ROOM,
             "how far the centre of mass of these neighbours may lie from the site";
+        jig: bool = false, "", SWITCH,
+            "gauges go only where the arm of a printed jig gets to them, straight along a rod through the part";
         #[serde(skip_serializing_if = "Option::is_none")]
         painted: Option<String> = None, "", MASK,
             "gauges go only here: what was painted, an array in the NPZ file beside this one";

@@ -19,6 +19,7 @@ impl Session {
         self.refresh_confusions(attention);
         self.refresh_field(attention);
         self.refresh_walls(attention);
+        self.refresh_jig(attention);
         self.refresh_live();
         if !attention.hand {
             self.refresh_trade();

@@ -26,6 +26,8 @@ pub struct Attention {
     pub confusions: bool,
     /// What colours the part, where that takes a while.
     pub colours: Option<Colours>,
+    /// Somebody looks at the jig.
+    pub jig: bool,
     /// The place whose mistakes are looked at.
     pub pointed: Option<SurfacePoint>,
 }

@@ -36,6 +36,8 @@ pub enum Task {
     Confuse,
     /// A field that takes a while.
     Field,
+    /// What presses the gauges.
+    Jig,
     Measure,
     Picture,
     Save,
@@ -66,6 +68,7 @@ impl Task {
             Self::Advise => "Measure the walls".into(),
             Self::Trade => "Measure the trade".into(),
             Self::Field => "Compute the field".into(),
+            Self::Jig => "Plan the jig".into(),
             Self::Measure => "Measure".into(),
             Self::Picture => "Save the picture".into(),
             Self::Save => "Save".into(),

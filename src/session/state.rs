@@ -23,7 +23,8 @@ use super::slot::Slot;
 use super::wake::Wake;
 use crate::budget::{Budget, Quality};
 use crate::design::Advice;
-use crate::document::{Document, WallInputs};
+use crate::document::{Document, JigInputs, WallInputs};
+use crate::jig::Jig;
 use by_hand::ByHand;
 use confusions::Confusions;
 use drive::Drive;
@@ -44,6 +45,8 @@ pub struct Caches {
     pub confusions: Confusions,
     /// What is known of the part's walls.
     pub walls: Option<Slot<WallInputs, Arc<Advice>>>,
+    /// The jig for the chosen gauges.
+    pub jig: Option<Slot<JigInputs, Arc<Jig>>>,
     pub field: Option<FieldValues>,
     pub distance: Option<Slot<Ends, f64>>,
     pub trade: Trade,

@@ -98,6 +98,7 @@ fn look_at(command: Command, ask: &mut Ask<'_>, scene: &Scene) {
             // What was begun in a view that goes ends with it.
             view.gesture = Gesture::None;
         }
+        Command::Jig => view.jig_shown = !view.jig_shown,
         Command::Look(preset) => view.camera.look_from(preset),
         Command::Tool(tool) => view.take(tool),
         Command::Paint(layer) => {

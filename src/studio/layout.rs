@@ -10,7 +10,9 @@ use super::palette::{self, Palette};
 use super::recovery::Recovery;
 use super::trade::Dial;
 use super::view::{Pane, Stage, Tab};
-use super::{confusions, inspector, jobs, kept, legend, live, measure, overlay, results, trade};
+use super::{
+    confusions, inspector, jig, jobs, kept, legend, live, measure, overlay, results, trade,
+};
 
 /// What is typed in panels, and what is open over them.
 #[derive(Default)]
@@ -90,6 +92,7 @@ pub fn draw(look: Look<'_>, ui: &Ui, panes: &[(Pane, Rect)]) {
 
 fn draw_over(look: Look<'_>, ui: &Ui, pane: Pane, rect: Rect) {
     let painter = &ui.painter_at(rect);
+    jig::paint_jig(look, painter, pane);
     kept::paint_kept(look, painter, pane);
     confusions::paint_confusions(look, painter, pane);
     overlay::paint_gauges(look, painter, pane);
@@ -111,6 +114,7 @@ fn draw_over(look: Look<'_>, ui: &Ui, pane: Pane, rect: Rect) {
 pub fn picture(look: Look<'_>, ui: &Ui, rect: Rect, transparent: bool) {
     overlay::paint_limb(look, ui, rect, transparent);
     let painter = &ui.painter_at(rect);
+    jig::paint_jig(look, painter, Pane::Limb);
     kept::paint_kept(look, painter, Pane::Limb);
     overlay::paint_gauges(look, painter, Pane::Limb);
     overlay::paint_touch(look, painter, Pane::Limb);

@@ -100,7 +100,12 @@ fn view_menu(ask: &mut Ask<'_>, ui: &mut Ui) {
         ask.button(ui, command);
     }
     ui.separator();
-    for command in [Command::SeeThrough, Command::Section, Command::Unrolled] {
+    for command in [
+        Command::SeeThrough,
+        Command::Section,
+        Command::Unrolled,
+        Command::Jig,
+    ] {
         ask.button(ui, command);
     }
     ui.separator();

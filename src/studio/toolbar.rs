@@ -48,7 +48,12 @@ pub fn toolbar(ask: &mut Ask<'_>, scene: &Scene, ui: &mut Ui) {
                 field_controls(ask, scene, ui);
             });
             ui.horizontal_wrapped(|ui| {
-                for command in [Command::SeeThrough, Command::Section, Command::Unrolled] {
+                for command in [
+                    Command::SeeThrough,
+                    Command::Section,
+                    Command::Unrolled,
+                    Command::Jig,
+                ] {
                     ask.toggle(ui, command);
                 }
                 ui.separator();

@@ -42,6 +42,8 @@ pub struct View {
     pub section: Option<Section>,
     pub see_through: bool,
     pub unrolled_shown: bool,
+    /// Whether the jig is drawn.
+    pub jig_shown: bool,
     /// Middle of the flat view (m) and metres a point of the window; 0 until it was first shown.
     pub flat: (DVec2, f64),
     /// What is under way between pressing and letting go.
@@ -78,6 +80,7 @@ impl View {
             section: None,
             see_through: false,
             unrolled_shown: false,
+            jig_shown: false,
             flat: (DVec2::ZERO, 0.0),
             gesture: Gesture::None,
             hover: None,

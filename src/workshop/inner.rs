@@ -2,7 +2,9 @@
 
 use glam::DVec3;
 
+use crate::dataset::Site;
 use crate::design::{Design, Inputs};
+use crate::jig::Pressed;
 use crate::mesh::stance::Stance;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::PartModel;
@@ -31,6 +33,8 @@ pub struct Inner {
     pub mesh: TriMesh,
     /// Whether its normals look inwards.
     looks_in: bool,
+    /// From the surface that is computed with to the face (m).
+    depth: f64,
     /// Which way the part stands.
     pub stance: Stance,
     /// The chosen gauges.
@@ -46,7 +50,7 @@ impl Inner {
             PartModel::Solid => (true, 0.0),
             PartModel::Shell => (false, 0.5e-3 * inputs.project.part.thickness_mm),
         };
-        let mesh = inside(drawn, depth);
+        let mesh = drawn.offset(-depth);
         let dataset = &design.simulated.dataset;
         let gauges = (1..).zip(design.chosen()).map(|(number, &s)| {
             let site = &dataset.sites[s];
@@ -68,6 +72,7 @@ impl Inner {
         Self {
             mesh,
             looks_in,
+            depth,
             stance: inputs.stance(),
             gauges,
         }
@@ -102,8 +107,9 @@ impl Inner {
         });
         Self {
             gauges: gauges.collect(),
-            mesh: inside(part, depth),
+            mesh: part.offset(-depth),
             looks_in,
+            depth,
             stance: inputs.stance(),
         }
     }
@@ -114,8 +120,37 @@ impl Inner {
         Self {
             mesh,
             looks_in: false,
+            depth: 0.0,
             stance,
             gauges,
+        }
+    }
+
+    /// The gauges as a jig presses them.
+    #[must_use]
+    pub fn pressed(&self) -> Vec<Pressed> {
+        let of = |g: &Glued| Pressed {
+            number: g.number,
+            place: g.place,
+            out: g.out,
+            direction: g.direction,
+        };
+        self.gauges.iter().map(of).collect()
+    }
+
+    /// A gauge at a site of the design, as a jig presses it.
+    #[must_use]
+    pub fn site(&self, site: &Site) -> Pressed {
+        let out = if self.looks_in {
+            -site.normal
+        } else {
+            site.normal
+        };
+        Pressed {
+            number: 0,
+            place: site.position - out * self.depth,
+            out,
+            direction: site.direction,
         }
     }
 
@@ -132,11 +167,4 @@ impl Inner {
         let normal = self.mesh.facet_normal(triangle);
         if self.looks_in { -normal } else { normal }
     }
-}
-
-/// A surface moved against its normals (m).
-fn inside(mesh: &TriMesh, depth: f64) -> TriMesh {
-    let both = mesh.positions().iter().zip(mesh.vertex_normals());
-    let moved: Vec<DVec3> = both.map(|(p, n)| *p - *n * depth).collect();
-    TriMesh::from_checked(moved, mesh.triangles().to_vec())
 }

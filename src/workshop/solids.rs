@@ -4,18 +4,11 @@ use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3};
 
-/// Corners (m) and triangles, seen from outside.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Solid {
-    /// m.
-    pub positions: Vec<DVec3>,
-    /// Of these.
-    pub triangles: Vec<[u32; 3]>,
-}
+use crate::mesh::Facets;
 
 /// A plate of a size (m) whose middle is at a place.
 #[must_use]
-pub fn plate(place: DVec3, turn: &DMat3, size: DVec3) -> Solid {
+pub fn plate(place: DVec3, turn: &DMat3, size: DVec3) -> Facets {
     let corner = |k: u32| {
         let sign = |bit: u32| if k >> bit & 1 == 1 { 0.5 } else { -0.5 };
         place + *turn * (size * DVec3::new(sign(0), sign(1), sign(2)))
@@ -28,7 +21,7 @@ pub fn plate(place: DVec3, turn: &DMat3, size: DVec3) -> Solid {
         [0, 4, 6, 2],
         [1, 3, 7, 5],
     ];
-    Solid {
+    Facets {
         positions: (0..8).map(corner).collect(),
         triangles: faces
             .iter()
@@ -39,12 +32,12 @@ pub fn plate(place: DVec3, turn: &DMat3, size: DVec3) -> Solid {
 
 /// An arrow whose tip is at a place, pointing along `way`, of a length (m).
 #[must_use]
-pub fn arrow(tip: DVec3, way: DVec3, length: f64) -> Solid {
+pub fn arrow(tip: DVec3, way: DVec3, length: f64) -> Facets {
     const SIDES: u32 = 24;
     /// Along the arrow from its tip, and radius, over its length.
     const RINGS: [(f64, f64); 4] = [(0.35, 0.12), (0.35, 0.045), (1.0, 0.045), (1.0, 0.0)];
     let (u, v) = way.any_orthonormal_pair();
-    let mut solid = Solid {
+    let mut solid = Facets {
         positions: vec![tip],
         triangles: Vec::new(),
     };
@@ -76,24 +69,18 @@ pub fn arrow(tip: DVec3, way: DVec3, length: f64) -> Solid {
 mod tests {
     use super::*;
 
-    fn volume(solid: &Solid) -> f64 {
-        let p = |v: u32| solid.positions[v as usize];
-        let of = |t: &[u32; 3]| p(t[0]).dot(p(t[1]).cross(p(t[2]))) / 6.0;
-        solid.triangles.iter().map(of).sum()
-    }
-
     #[test]
     fn solids_look_outwards() {
         let turn = DMat3::from_rotation_x(0.4) * DMat3::from_rotation_z(1.1);
         let plate = plate(DVec3::new(1.0, 2.0, 3.0), &turn, DVec3::new(2.0, 3.0, 0.5));
-        assert!((volume(&plate) - 3.0).abs() < 1e-12, "{}", volume(&plate));
+        assert!((plate.volume() - 3.0).abs() < 1e-12, "{}", plate.volume());
         let arrow = arrow(DVec3::new(1.0, -2.0, 3.0), DVec3::new(0.6, 0.0, 0.8), 10.0);
         let cone = TAU / 2.0 * 1.44 * 3.5 / 3.0;
         let shaft = TAU / 2.0 * 0.2025 * 6.5;
         assert!(
-            (volume(&arrow) / (cone + shaft) - 1.0).abs() < 0.02,
+            (arrow.volume() / (cone + shaft) - 1.0).abs() < 0.02,
             "{}",
-            volume(&arrow)
+            arrow.volume()
         );
     }
 }

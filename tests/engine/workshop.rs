@@ -7,6 +7,7 @@ use std::process::Command;
 use glam::DVec3;
 use hapdef::io::mesh_file::read_mesh;
 use hapdef::mesh::repair::Repair;
+use hapdef::project::Unit;
 
 fn hapdef(folder: &Path, arguments: &[&str]) -> (bool, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_hapdef"))
@@ -124,6 +125,45 @@ fn check(folder: &Path, gauges: usize, half: f64, size: [f64; 2]) {
     assert_eq!(rows("wiring.csv"), gauges);
     assert!(rows("bill.csv") > 5 && rows("zones.csv") > 300);
     header(folder, gauges);
+    jig(&folder.join("jig"), gauges);
+}
+
+/// Every piece that the table names is there, closed, and of a size that can be printed; every gauge is on it.
+fn jig(folder: &Path, gauges: usize) {
+    let mut table = csv::Reader::from_path(folder.join("jig.csv")).unwrap();
+    let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
+    let (by_hand, pieces): (Vec<_>, Vec<_>) =
+        rows.iter().partition(|r| r[1].starts_with("by hand"));
+    let of = |kind: &str| pieces.iter().filter(|r| r[1].starts_with(kind)).count();
+    assert_eq!(of("ring-") + by_hand.len(), gauges);
+    assert_eq!((of("ring-"), of("rod-")), (of("pad-"), of("seat-")));
+    for row in &pieces {
+        let loaded = read_mesh(
+            &folder.join(&row[1]),
+            Some(Unit::Millimetre),
+            0,
+            Repair::default(),
+        )
+        .unwrap();
+        let (low, high) = loaded.mesh.bounds();
+        let size = (high - low) * 1e3;
+        assert!(
+            size.max_element() < 205.0 && size.min_element() > 1.5,
+            "{}: {size}",
+            &row[1]
+        );
+        assert!(low.z.abs() < 1e-9, "{} lies on the bed", &row[1]);
+        let report = &loaded.repairs;
+        let whole = (
+            report.boundary_edges,
+            report.non_manifold_edges,
+            report.bodies,
+        );
+        assert_eq!(whole, (0, 0, 1), "{}", &row[1]);
+        assert!(loaded.mesh.volume_enclosed() > 0.0, "{}", &row[1]);
+    }
+    let files = std::fs::read_dir(folder).unwrap().count();
+    assert_eq!(files, pieces.len() + 1, "and nothing of an older jig");
 }
 
 /// A compiler reads the sketch's settings.
@@ -149,6 +189,9 @@ fn header(folder: &Path, gauges: usize) {
 fn the_workshop_is_given_all_of_the_bundled_limb() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
+    // A piece of an older jig would be printed with the new ones.
+    std::fs::create_dir_all(here.join("d/jig")).unwrap();
+    std::fs::write(here.join("d/jig/ring-77.stl"), "").unwrap();
     let (made, said) = hapdef(here, &["design", "--quality", "draft", "--out", "d"]);
     assert!(made, "{said}");
     check(&here.join("d"), 10, 0.75, [210.0, 297.0]);

@@ -24,7 +24,7 @@ const ORDER: [&[&str]; 14] = [
         "wire",
     ],
     &["mesh"],
-    &["limb", "elasticity"],
+    &["limb", "elasticity", "jig"],
     &["dataset"],
     &["feasible", "regression"],
     &["learning", "pca"],
@@ -56,10 +56,11 @@ pub const OUTER: [(&str, &[&str]); 8] = [
 ];
 
 /// What shows and asks in the window. `studio/layout.rs` alone knows them all.
-const PANELS: [&str; 15] = [
+const PANELS: [&str; 16] = [
     "confusions",
     "dialogs",
     "inspector",
+    "jig",
     "jobs",
     "kept",
     "legend",

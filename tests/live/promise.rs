@@ -198,7 +198,9 @@ impl Designed {
     /// The project after known presses, made by hand, on the gauges of a workshop.
     fn calibrated(&self, seed: u64) -> PathBuf {
         let (sensing, gluing) = (&self.sensing, self.inputs.project.gluing());
-        let (truth, gains) = sensing.reference(&self.inputs, &gluing, seed, &unwatched).unwrap();
+        let (truth, gains) = sensing
+            .reference(&self.inputs, &gluing, seed, &unwatched)
+            .unwrap();
         let known = pressed_by_hand(sensing, (&truth, &gains), seed);
         let mut project = self.inputs.project.clone();
         let noise = vec![sensing.off.of_channel(); gains.len()];

@@ -580,6 +580,29 @@ fn the_expected_error_and_its_map_follow_the_hand() {
 }
 
 #[test]
+fn the_jig_is_drawn_in_the_limb_while_it_is_asked_for() {
+    let mut w = Window::open();
+    w.harness.run();
+    let before = w.picture();
+    w.key(Modifiers::NONE, egui::Key::J);
+    w.wait("the jig", 60, |s| s.session.jig().is_some());
+    let jig = w.session().jig().unwrap();
+    let arms: usize = jig.stacks.iter().map(|s| s.arms.len()).sum();
+    assert_eq!(arms + jig.left_out.len(), gauges(&w).len());
+    assert!(arms >= 8, "{arms}");
+    w.show("jig");
+    let shown = w.picture();
+    let both = before.pixels().zip(shown.pixels());
+    let changed = both.filter(|(a, b)| a != b).count();
+    assert!(changed > 3000, "{changed} pixels changed");
+    // Another set of gauges has another jig; without any there is none.
+    without_gauges(&mut w);
+    assert!(w.session().jig().is_none());
+    w.key(Modifiers::NONE, egui::Key::J);
+    assert!(!w.harness.state().view.jig_shown);
+}
+
+#[test]
 fn one_key_adds_the_gauge_that_helps_most() {
     let w = Window::open();
     assert!(!w.harness.state().enabled(Command::AddHelpful));

@@ -7,6 +7,7 @@ use glam::DVec3;
 use crate::budget::Watch;
 use crate::dataset::{Move, Site};
 use crate::design::filter::painted_sites;
+use crate::design::pressing::Pressing;
 use crate::design::{DesignError, Inputs, Simulated};
 use crate::elasticity::support::supported_vertices;
 use crate::feasible::{FeasibleInput, FeasibleRules, Surroundings, clearance, feasible_beside};
@@ -22,6 +23,8 @@ pub(super) struct Room<'a> {
     /// Where the sites of the lattice are (m), and how far from each other.
     lattice: Vec<DVec3>,
     pub(super) spacing: f64,
+    /// Where only what a jig gets to is asked for.
+    pressing: Option<Pressing>,
 }
 
 impl<'a> Room<'a> {
@@ -33,6 +36,7 @@ impl<'a> Room<'a> {
             clearance: clearance(&simulated.mesh, &held),
             lattice: sites.iter().map(|site| site.position).collect(),
             spacing: inputs.project.sites.spacing_mm * 1e-3,
+            pressing: Pressing::of(inputs, simulated),
             inputs,
             simulated,
         }
@@ -100,6 +104,7 @@ impl<'a> Room<'a> {
         let named = self.inputs.project.feasible.keep_out.as_ref();
         let painted = self.inputs.painted.as_ref().map(on);
         let kept_out = named.and_then(|name| self.inputs.masks.get(name)).map(on);
+        let jig = self.pressing.as_ref().map(|jig| jig.gets_to(gauges));
         let input = FeasibleInput {
             mesh: &self.simulated.mesh,
             supported: &[],
@@ -108,6 +113,7 @@ impl<'a> Room<'a> {
             surroundings,
             painted: painted.as_deref(),
             kept_out: kept_out.as_deref(),
+            jig: jig.as_deref(),
         };
         let found = feasible_beside(&input, &self.rules, &self.clearance, &self.lattice);
         found.verdicts.iter().map(Option::is_none).collect()

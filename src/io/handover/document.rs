@@ -1,7 +1,7 @@
 //! `report.pdf`.
 
 use super::source::Source;
-use super::{cards, drawing};
+use super::{cards, drawing, jig_pages};
 use crate::design::curves::{failure_ways, title_of};
 use crate::design::{BLIND, Design};
 use crate::io::report::{compared_n, part, settings};
@@ -12,9 +12,9 @@ const ASSEMBLY: [&str; 8] = [
     "Print the templates at 100 % and check the bar of 100 mm with a ruler. Cut out the patch of each gauge along its circle.",
     "Clean the inner face with the adhesive's cleaner. Lay each patch into the limb, printed side towards you, so that its blue lines lie on the edges of the wall, what hangs over folded around them, and prick its cross through or mark it with a pencil.",
     "Solder the cables to the gauges, number the plugs as in the table of the wiring, and measure each gauge's resistance.",
-    "Lay separating film on each pad, wool on it, and tape the gauge on top, its face towards the wall and its line along the marks.",
+    "Put the jig together, if there is one (below). Lay separating film on each pad, wool on it, and tape the gauge on top, its face towards the wall and its line along the pad or the marks.",
     "Mix the adhesive (M-Bond AE-10: 10 : 1.5 by weight), coat wall and gauges thinly.",
-    "Bring the pads in, the far gauges first, press them against the wall and tighten them; check each gauge against its marks.",
+    "Bring the pads in, by the jig or by hand, the far gauges first, press them against the wall and tighten them; check each gauge against its marks.",
     "Let it cure as the adhesive's maker says, take the pads out, and measure the resistances again.",
     "Trim each bridge to the middle of the converter's range, connect the board, and press near each gauge: its channel alone must move most.",
 ];
@@ -31,6 +31,7 @@ pub(super) fn sheets(source: &Source<'_>) -> Vec<Sheet> {
     for (k, step) in (1..).zip(ASSEMBLY) {
         flow.point(&format!("{k}."), step);
     }
+    jig_pages::all(&mut flow, source);
     flow.heading("The part");
     for line in part::lines(source.inputs, source.design, source.provenance) {
         flow.point("•", &line);
@@ -188,7 +189,7 @@ fn wiring(flow: &mut Flow, source: &Source<'_>) {
     ];
     flow.table(&names, &rows);
     flow.text("hapd_config.h beside this report goes into the sketch's folder: pins, board number, gain and supply are then those of this table.");
-    let bill = crate::workshop::bill(&source.wiring);
+    let bill = source.bill();
     let rows: Vec<Vec<String>> = bill.into_iter().map(Vec::from).collect();
     flow.table(&["To be bought", "Quantity", "About"], &rows);
 }

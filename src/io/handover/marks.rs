@@ -2,13 +2,12 @@
 
 use glam::DVec2;
 
+use crate::jig::FILM;
 use crate::paper::{Align, Face, Ink, Line, Sheet, Words};
 
 pub(super) const ACCENT: Ink = [0xd5, 0x5e, 0x00];
 pub(super) const INK: Ink = [0x1d, 0x24, 0x30];
 pub(super) const BLUE: Ink = [0x00, 0x72, 0xb2];
-/// What a gauge's film has around its grid (mm), along it (where its leads are) and across.
-const FILM: DVec2 = DVec2::new(3.3, 1.5);
 
 /// A gauge at full size, its grid `size` (length, width) and `along` on the sheet (mm); the film is around it.
 pub(super) fn gauge(sheet: &mut Sheet, at: DVec2, along: DVec2, size: DVec2, number: usize) {

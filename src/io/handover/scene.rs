@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use crate::colormap::ColorMap;
 use crate::io::glb::{Piece, write_scene};
-use crate::mesh::TriMesh;
-use crate::workshop::{Inner, Solid, arrow, frame, plate};
+use crate::mesh::{Facets, TriMesh};
+use crate::workshop::{Inner, arrow, frame, plate};
 
 const LIMB: [u8; 3] = [0xc9, 0xcd, 0xd3];
 const GAUGE: [u8; 3] = [0xd5, 0x5e, 0x00];
@@ -62,7 +62,7 @@ impl Scene<'_> {
     }
 }
 
-fn piece(name: &str, solid: Solid, colour: [u8; 3]) -> Piece {
+fn piece(name: &str, solid: Facets, colour: [u8; 3]) -> Piece {
     Piece {
         name: name.to_owned(),
         colours: vec![colour; solid.positions.len()],

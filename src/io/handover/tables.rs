@@ -2,7 +2,7 @@
 
 use crate::design::Design;
 use crate::io::table::Writing;
-use crate::workshop::{Wiring, bill as items};
+use crate::workshop::Wiring;
 
 /// A row a gauge.
 pub(super) fn wiring(wiring: &Wiring) -> String {
@@ -34,9 +34,9 @@ pub(super) fn wiring(wiring: &Wiring) -> String {
 }
 
 /// A row an item.
-pub(super) fn bill(wiring: &Wiring) -> String {
+pub(super) fn bill(items: Vec<[String; 3]>) -> String {
     let mut table = Writing::new(["item", "quantity", "about"]);
-    for item in items(wiring) {
+    for item in items {
         table.row(item);
     }
     table.text().clone()

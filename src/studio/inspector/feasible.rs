@@ -3,7 +3,7 @@
 use egui::Ui;
 
 use super::super::ask::Ask;
-use super::super::form::{count, number, rows};
+use super::super::form::{count, number, rows, switch};
 use crate::project::{FeasibleKeys, GaugeKeys, Project, ToleranceKeys};
 
 /// The settings of the feasible region.
@@ -113,5 +113,11 @@ fn feasible(ui: &mut Ui, project: &mut Project) {
         &mut project.feasible.edge_radius_mm,
         FeasibleKeys::edge_radius_mm(),
         0.05,
+    );
+    switch(
+        ui,
+        "Within a jig's reach",
+        &mut project.feasible.jig,
+        FeasibleKeys::jig(),
     );
 }

@@ -1,0 +1,184 @@
+//! Which arms sit on which rod, and whether all of them get in and out.
+
+use glam::{DVec2, DVec3};
+
+use super::arm::{Arm, Bodies};
+use super::convex::{meet, swept};
+use super::frame::{Entry, Frame};
+use super::reach::Reach;
+use super::rod::{Line, Site, cover};
+use super::sizes::Sizes;
+use super::slots::slots;
+use super::wall::{Pressed, Wall};
+use super::why::{LeftOut, Why};
+
+/// A rod with its arms, brought in together.
+#[derive(Clone, Debug)]
+pub struct Stack {
+    /// By which its pieces are named: a, b, …
+    pub letter: String,
+    /// The end that it comes in at.
+    pub entry: Entry,
+    /// Where its rod runs.
+    pub frame: Frame,
+    /// From the opening inwards.
+    pub arms: Vec<Arm>,
+    /// The rim of the opening about the rod (mm): the seat rests on it.
+    pub rim: Vec<DVec2>,
+    /// How far the seat stands off the rim, for what sticks out of the opening (mm).
+    pub lift: f64,
+}
+
+/// All that presses the gauges of a part.
+pub struct Jig {
+    /// Of its pieces.
+    pub sizes: Sizes,
+    /// What else its rods get to.
+    pub reach: Reach,
+    /// One after another: a second one for what does not fit beside the first, or comes in at the other end.
+    pub stacks: Vec<Stack>,
+    /// What must be pressed by hand.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A jig for gauges with a film of half these sizes (mm).
+#[must_use]
+pub fn plan(wall: Wall, gauges: &[Pressed], film: DVec2) -> Jig {
+    /// Rods, one after another.
+    const RODS: usize = 6;
+    let site = Site::new(wall, gauges, film);
+    let rods = cover(&site, gauges, RODS);
+    let reached = |number: usize| {
+        let mut arms = rods.iter().flat_map(|rod| &rod.arms);
+        arms.any(|arm| arm.number == number)
+    };
+    // What is said of the others is of the line that the most are reached on.
+    let line = rods.first().map(|rod| rod.line);
+    let line = line.or_else(|| site.lines().first().copied());
+    let left = gauges.iter().filter(|g| !reached(g.number));
+    let mut left_out = line.map_or(Vec::new(), |line| site.rod(line, left).left_out);
+    let mut stacks: Vec<Stack> = Vec::new();
+    let lines = rods.iter().map(|rod| rod.line).collect();
+    for rod in rods {
+        let (passes, refused) = passes(&site, rod.line, rod.arms);
+        left_out.extend(refused.iter().map(|arm| LeftOut {
+            number: arm.number,
+            why: Why::Arm,
+        }));
+        for arms in passes {
+            stacks.push(Stack {
+                letter: letter(stacks.len()),
+                entry: site.entry(rod.line),
+                frame: site.frame(rod.line),
+                rim: site.rim(rod.line),
+                lift: lift(&site.sizes, &arms),
+                arms,
+            });
+        }
+    }
+    left_out.sort_by_key(|left| left.number);
+    Jig {
+        sizes: site.sizes,
+        reach: Reach::of(site, lines),
+        stacks,
+        left_out,
+    }
+}
+
+/// a to z, and then a2, b2, …
+fn letter(k: usize) -> String {
+    const LETTERS: usize = 26;
+    let letter = char::from(b'a' + (k % LETTERS) as u8);
+    match k / LETTERS {
+        0 => letter.to_string(),
+        round => format!("{letter}{}", round + 1),
+    }
+}
+
+/// Arms that fit beside each other, in as few goes as a greedy search finds: each arm in the first that it fits into.
+/// Those come after them that do not even fit alone, with the seat in the way.
+fn passes(site: &Site, line: Line, arms: Vec<Arm>) -> (Vec<Vec<Arm>>, Vec<Arm>) {
+    let mut passes: Vec<Vec<Arm>> = Vec::new();
+    let mut refused = Vec::new();
+    for arm in arms {
+        let mut left = Some(arm);
+        for pass in &mut passes {
+            let Some(arm) = left.take() else { break };
+            let mut with = pass.clone();
+            with.push(arm.clone());
+            spread(&site.sizes, &mut with);
+            if fit(site, line, &with) {
+                *pass = with;
+            } else {
+                left = Some(arm);
+            }
+        }
+        if let Some(arm) = left {
+            let mut alone = vec![arm];
+            spread(&site.sizes, &mut alone);
+            if fit(site, line, &alone) {
+                passes.push(alone);
+            } else {
+                refused.extend(alone);
+            }
+        }
+    }
+    (passes, refused)
+}
+
+/// How far the seat must stand off the rim (mm).
+fn lift(sizes: &Sizes, arms: &[Arm]) -> f64 {
+    /// Between the seat and what sticks out (mm).
+    const SPARE: f64 = 1.0;
+    let out = arms.iter().map(|arm| arm.sticks_out(sizes));
+    let out = out.fold(0.0, f64::max);
+    if out > 0.0 { out + SPARE } else { 0.0 }
+}
+
+/// Makes room for rings on their rod.
+fn spread(sizes: &Sizes, arms: &mut [Arm]) {
+    let wanted: Vec<f64> = arms.iter().map(|a| a.pad.height).collect();
+    let lowest = sizes.ring / 2.0;
+    let found = slots(&wanted, lowest, sizes.ring, sizes.wall);
+    for (arm, slot) in arms.iter_mut().zip(found) {
+        arm.slot = slot;
+    }
+}
+
+/// Whether all arms (from the opening inwards) get in, are slid on one after another from the innermost, and have their
+/// pads pressed without meeting each other.
+fn fit(site: &Site, line: Line, arms: &[Arm]) -> bool {
+    /// How far a strut may rise over its length.
+    const STEEP: f64 = 1.2;
+    let sizes = &site.sizes;
+    let steep = arms.iter().any(|arm| {
+        let reach = (arm.guide(sizes)[0] - sizes.ring_radius()).max(1.0);
+        (arm.slot - arm.pad.height).abs() > STEEP * reach.max(sizes.ring)
+    });
+    if steep || arms.iter().any(|arm| site.gets_in(line, arm).is_err()) {
+        return false;
+    }
+    pairs(arms).all(|(a, b)| are_apart(sizes, a, b))
+}
+
+/// Whether two arms, the second farther in, stand beside each other and the first gets there after the second.
+fn are_apart(sizes: &Sizes, outer: &Arm, inner: &Arm) -> bool {
+    let pressed = |arm: &Arm| -> Bodies {
+        let [ring, strut, guide, pad] = arm.bodies(sizes, 0.0);
+        [ring, strut, guide, swept(&pad, arm.pad.out * -arm.travel)]
+    };
+    let (first, second) = (pressed(outer), pressed(inner));
+    let beside = !crossing(&first, &second);
+    let way = DVec3::NEG_Z * (inner.pad.height + 50.0);
+    let moving = outer.bodies(sizes, outer.travel).map(|b| swept(&b, way));
+    beside && !crossing(&moving, &inner.bodies(sizes, inner.travel))
+}
+
+/// Each two, the first nearer to the opening.
+fn pairs(arms: &[Arm]) -> impl Iterator<Item = (&Arm, &Arm)> {
+    (arms.iter().enumerate()).flat_map(|(k, a)| arms[k + 1..].iter().map(move |b| (a, b)))
+}
+
+fn crossing(some: &Bodies, others: &Bodies) -> bool {
+    some.iter().any(|a| others.iter().any(|b| meet(a, b)))
+}

@@ -1,0 +1,43 @@
+//! Whether a jig's arm gets to a place.
+
+use glam::DVec2;
+
+use super::rod::{Line, Site, cover};
+use super::wall::{Pressed, Wall};
+
+/// The rods that get to most of a part.
+pub struct Reach {
+    site: Site,
+    lines: Vec<Line>,
+}
+
+impl Reach {
+    /// Of a part on which gauges may sit at these places, with a film of half these sizes (mm).
+    #[must_use]
+    pub fn new(wall: Wall, places: &[Pressed], film: DVec2) -> Self {
+        /// Rods, one after another, and places that they are chosen by.
+        const RODS: usize = 3;
+        const PLACES: usize = 60;
+        let site = Site::new(wall, places, film);
+        let apart = places.len().div_ceil(PLACES).max(1);
+        let some: Vec<Pressed> = (0..)
+            .zip(places.iter().step_by(apart))
+            .map(|(number, place)| Pressed { number, ..*place })
+            .collect();
+        let rods = cover(&site, &some, RODS);
+        Self::of(site, rods.into_iter().map(|rod| rod.line).collect())
+    }
+
+    /// Of rods on these lines.
+    #[must_use]
+    pub fn of(site: Site, lines: Vec<Line>) -> Self {
+        Self { site, lines }
+    }
+
+    /// Whether an arm on one of the rods gets to a gauge.
+    #[must_use]
+    pub fn gets_to(&self, gauge: &Pressed) -> bool {
+        let mut lines = self.lines.iter();
+        lines.any(|&line| self.site.arm(line, gauge).is_ok())
+    }
+}
