@@ -244,11 +244,11 @@ impl Lab {
     fn accuracy(&self, text: &mut String) {
         let (finer, _) = self
             .sensing
-            .reference(&Gluing::EXACT, SEED, &unwatched)
+            .reference(&self.inputs, &Gluing::EXACT, SEED, &unwatched)
             .expect("the truth");
         let (built, gains) = self
             .sensing
-            .reference(&Gluing::default(), SEED, &unwatched)
+            .reference(&self.inputs, &Gluing::default(), SEED, &unwatched)
             .expect("the truth");
         let _ = writeln!(
             text,

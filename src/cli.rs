@@ -25,6 +25,7 @@ pub mod spared;
 pub mod study;
 pub mod trade;
 pub mod train;
+mod train_update;
 
 use std::path::PathBuf;
 

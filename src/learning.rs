@@ -20,13 +20,17 @@ pub mod nearest;
 pub mod portable;
 pub mod ridge;
 pub mod score;
+pub mod still;
 pub mod svr;
 pub mod targets;
 pub mod train;
+pub mod update;
 mod walk;
 
 pub use estimator::{Answer, TouchEstimator};
 pub use family::Family;
 pub use lessons::{LearningError, Lessons};
 pub use score::Scores;
+pub use still::Still;
 pub use train::{Asked, Trained, train};
+pub use update::{Updated, update};

@@ -10,7 +10,7 @@ use super::spared::Spared;
 use super::{out, train};
 use crate::io::table::Writing;
 use crate::io::{atomic, touch_file};
-use crate::learning::{Answer, Scores};
+use crate::learning::{Answer, Scores, Still};
 
 #[derive(Args, Debug, Clone)]
 pub struct PredictArgs {
@@ -46,6 +46,7 @@ pub fn run(args: &PredictArgs) -> anyhow::Result<()> {
     }
     let answers = file.estimator.find(&data.x);
     let scores = Scores::of(&answers, &data.targets, &data.forces);
+    let still = Still::of(&file.estimator, &answers, &data.targets);
     if let Some(path) = &args.out {
         atomic::write(path, table(&answers).as_bytes())?;
     }
@@ -60,11 +61,14 @@ pub fn run(args: &PredictArgs) -> anyhow::Result<()> {
             "coverage": scores.coverage,
             "force_error_n": scores.force_error_n,
             "by_force": scores.by_force,
+            "holds": still.map(|s| s.holds()),
+            "holds_probability": still.map(|s| s.probability),
             "notes": notes,
         });
         return out::line(&summary.to_string());
     }
-    train::print_scores(&scores, answers.len())
+    train::print_scores(&scores, answers.len())?;
+    still.map_or(Ok(()), |still| out::line(&still.words()))
 }
 
 fn table(answers: &[Answer]) -> String {

@@ -11,6 +11,7 @@ use super::out;
 use super::progress::Bar;
 use super::ranges::whole;
 use super::spared::Spared;
+use super::train_update;
 use crate::io::fingerprint::Fingerprint;
 use crate::io::{bench_folder, cpu_seconds, touch_file};
 use crate::learning::score::ForceRow;
@@ -54,6 +55,10 @@ pub struct TrainArgs {
     /// The estimator (.hapdtouch).
     #[arg(long)]
     pub out: PathBuf,
+    /// Bring this estimator (.hapdtouch) up to date by a few new presses, instead of learning anew: gain and rest of each
+    /// channel are fitted, as far as presses that are left out say that it helps.
+    #[arg(long, conflicts_with_all = ["estimator", "train_touches"])]
+    pub update: Option<PathBuf>,
     /// What turns readings into places.
     #[arg(long, value_enum, default_value_t)]
     pub estimator: FamilyArg,
@@ -82,9 +87,25 @@ pub struct TrainArgs {
 /// A message in the user's terms.
 pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     Spared::of_data(&args.data.data, args.data.touches.as_deref())
+        .and(
+            "the estimator that is brought up to date",
+            args.update.as_deref(),
+        )
         .check_result("--out", Some(&args.out))?;
     let (data, mut notes) = args.data.load()?;
     let groups = args.groups(&data)?;
+    if let Some(old) = &args.update {
+        let asked = train_update::Asked {
+            old,
+            out: &args.out,
+            seed: args.seed,
+            json: args.json,
+            fingerprint: fingerprint(&data),
+        };
+        return in_pool(args.threads, || {
+            train_update::run(&asked, &args.data, (&data, &groups), &notes)
+        });
+    }
     let asked = Asked {
         family: args.estimator.family(),
         seed: args.seed,
@@ -166,6 +187,7 @@ impl TrainArgs {
             test: trained.scores.clone(),
             limb: None,
             board: None,
+            update: None,
         }
     }
 }

@@ -244,13 +244,15 @@ impl Kept {
         Some(AsDrawn {
             map: Arc::new(maps.next()?),
             changes: [maps.next()?, maps.next()?, maps.next()?],
-            tip: match with_tip {
-                true => Some(Arc::new(maps.next()?)),
-                false => None,
+            tip: if with_tip {
+                Some(Arc::new(maps.next()?))
+            } else {
+                None
             },
-            axes: match with_axes {
-                true => Some(Arc::new([maps.next()?, maps.next()?, maps.next()?])),
-                false => None,
+            axes: if with_axes {
+                Some(Arc::new([maps.next()?, maps.next()?, maps.next()?]))
+            } else {
+                None
             },
         })
     }

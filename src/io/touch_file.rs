@@ -24,7 +24,7 @@ use super::FileError;
 use super::npz::{Arrays, NpzFile};
 use crate::learning::TouchEstimator;
 
-pub use self::header::{Header, Origin};
+pub use self::header::{Header, Origin, Update};
 
 /// An estimator with what is known of it.
 #[derive(Clone, Debug, PartialEq)]

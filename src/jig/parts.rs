@@ -213,7 +213,7 @@ fn sleeve(sizes: &Sizes, stack: &Stack, k: usize) -> Option<Part> {
             raised: 0.4,
         };
         let sign = number(k + 1, &hand);
-        let at = DVec3::new(-radius + 0.2, 0.0, (from + to) / 2.0);
+        let at = DVec3::new(-radius + 0.2, 0.0, f64::midpoint(from, to));
         body = body.union(&placed(&sign, facing(DVec3::NEG_Y, DVec3::NEG_X), at));
     }
     Some(Part {
@@ -250,7 +250,7 @@ fn ring(sizes: &Sizes, arm: &Arm) -> Shape {
         raised: 0.5,
     };
     let sign = number(arm.number, &hand);
-    let middle = (from + to) / 2.0;
+    let middle = f64::midpoint(from, to);
     let signs = [-1.0, 1.0].map(|side| {
         let ways = facing(DVec3::X * -side, DVec3::Y * side);
         placed(&sign, ways, DVec3::new(middle, side * half, z))

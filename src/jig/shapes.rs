@@ -88,7 +88,7 @@ pub fn placed(shape: &Shape, [x, y, z]: [DVec3; 3], at: DVec3) -> Shape {
 pub fn closed(solid: &Facets) -> Shape {
     Shape::from_mesh_gl64(&MeshGL64 {
         num_prop: 3,
-        vert_properties: solid.positions.iter().flat_map(|p| p.to_array()).collect(),
+        vert_properties: solid.positions.iter().flat_map(DVec3::to_array).collect(),
         tri_verts: (solid.triangles.iter().flatten())
             .map(|&v| u64::from(v))
             .collect(),

@@ -53,6 +53,14 @@ fn of(face: &TriMesh, part: &TriMesh) -> Wall {
     }
 }
 
+/// The one that stands for all that hang together with one.
+fn root<K: Copy + Eq + std::hash::Hash>(of: &HashMap<K, K>, mut k: K) -> K {
+    while of[&k] != k {
+        k = of[&k];
+    }
+    k
+}
+
 /// Whether every edge has one facet on each side, and all facets hang together.
 fn is_one_closed_body(solid: &Facets) -> bool {
     let key = |v: u32| solid.positions[v as usize].to_array().map(f64::to_bits);
@@ -68,12 +76,6 @@ fn is_one_closed_body(solid: &Facets) -> bool {
     let paired = edges
         .iter()
         .all(|(&(a, b), n)| edges.get(&(b, a)) == Some(n));
-    fn root<K: Copy + Eq + std::hash::Hash>(of: &HashMap<K, K>, mut k: K) -> K {
-        while of[&k] != k {
-            k = of[&k];
-        }
-        k
-    }
     for &(a, b) in edges.keys() {
         let (a, b) = (root(&piece, a), root(&piece, b));
         piece.insert(a, b);
@@ -163,7 +165,7 @@ fn what_is_in_the_way_is_found_and_said() {
     };
     let (low, high) = mesh.bounds();
     let jig = plan(
-        of(&mesh, &across((low.z + high.z) / 2.0)),
+        of(&mesh, &across(f64::midpoint(low.z, high.z))),
         &whole,
         HALF_FILM,
     );
@@ -176,7 +178,7 @@ fn what_is_in_the_way_is_found_and_said() {
         for arm in &stack.arms {
             let z = whole[arm.number - 1].place.z;
             assert_eq!(
-                z < (low.z + high.z) / 2.0,
+                z < f64::midpoint(low.z, high.z),
                 stack.entry == Entry::Foot,
                 "{z}"
             );

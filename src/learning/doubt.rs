@@ -8,13 +8,18 @@
 
 use faer::Mat;
 
-use super::distance::nearest;
+use super::distance::{nearest, squared};
+use super::lessons::rows;
+use crate::regression::folds::evenly;
 use crate::statistics::{mean, quantile};
 
 /// Neighbours that say how far an answer is off.
 pub const NEAR: usize = 30;
 /// The share of answers that lie within the radius.
 pub const SHARE: f64 = 0.9;
+/// The mean error over the radius that [`SHARE`] of them lie within, of errors that are normal in two dimensions:
+/// √(π/2) over √(2 ln 10).
+pub const NORMAL_MEAN: f64 = 0.584;
 /// Touches nearer than this share of all know their surroundings.
 const USUAL: f64 = 0.95;
 /// Touches that are thought to be as far off as those learned from, beside those that were chosen by.
@@ -83,6 +88,27 @@ impl Doubt {
             self.factor * self.expected(&near)
         };
         (0..squared.nrows()).map(of).collect()
+    }
+
+    /// Errors of known touches (at these points, over the lengths) when they were left out, over the radius that would have been
+    /// given them: a sample, evenly drawn.
+    #[must_use]
+    pub fn known_ratios(&self, points: &Mat<f64>) -> Vec<f64> {
+        const SAMPLE: usize = 500;
+        let some = evenly(points.nrows(), SAMPLE);
+        let squared = squared(&rows(points, &some), points);
+        let mut ratios: Vec<f64> = (some.iter().enumerate())
+            .map(|(row, &t)| {
+                let others = (0..).zip(squared.row(row).iter().copied());
+                let near = nearest(others.filter(|&(i, _)| i != t), NEAR);
+                self.off[t].sqrt() / self.expected(&near).max(f64::MIN_POSITIVE)
+            })
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        let within = quantile(&ratios, SHARE)
+            .unwrap_or(1.0)
+            .max(f64::MIN_POSITIVE);
+        ratios.into_iter().map(|r| r / within).collect()
     }
 
     /// The root mean square error that is expected with these neighbours, nearest first.

@@ -34,6 +34,17 @@ pub enum LearningError {
         /// Places needed.
         least: usize,
     },
+    /// Too few presses to bring an estimator up to date by.
+    #[error(
+        "{} too few to bring an estimator up to date by: at least {least} are needed (presses at one place count once)",
+        plain::either(*.places, "place is", "places are")
+    )]
+    TooFewPresses {
+        /// Places there are.
+        places: usize,
+        /// Places needed.
+        least: usize,
+    },
     /// Fewer training touches than asked for.
     #[error(
         "--train-touches {asked}: eight tenths of the places have only {}",

@@ -12,6 +12,8 @@ pub enum Colours {
 }
 
 /// A look at the hands and eyes in front of a session. Without any, only what was commanded is computed.
+// Each is a fact of its own, in any combination.
+#[allow(clippy::struct_excessive_bools)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Attention {
     /// A hand is at the settings or on the part: what depends on them waits until it lets go.

@@ -460,6 +460,7 @@ pub fn trained(family: Family) -> Vec<u8> {
         test: learned.scores,
         limb: None,
         board: None,
+        update: None,
     };
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("m.hapdtouch");

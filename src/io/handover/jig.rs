@@ -1,6 +1,7 @@
 //! The jig's files: `jig/*.stl` to print, and `jig/jig.csv`, a row a piece in the order of assembly.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use glam::{DMat3, DVec3};
 
@@ -16,7 +17,8 @@ const KINDS: [&str; 5] = ["rod-", "seat-", "ring-", "pad-", "sleeve-"];
 /// Whether a file of a jig's folder is one that was written with some jig.
 #[must_use]
 pub fn is_of_a_jig(name: &str) -> bool {
-    let piece = KINDS.iter().any(|kind| name.starts_with(kind)) && name.ends_with(".stl");
+    let is_stl = Path::new(name).extension().is_some_and(|e| e == "stl");
+    let piece = KINDS.iter().any(|kind| name.starts_with(kind)) && is_stl;
     piece || name == "jig.csv"
 }
 
@@ -65,7 +67,7 @@ fn table(jig: &Jig, made: &[(&Stack, Vec<Part>)]) -> String {
             let mut row = vec![
                 step.to_string(),
                 format!("{}.stl", part.name),
-                stack.letter.to_string(),
+                stack.letter.clone(),
                 stack.entry.name().to_owned(),
             ];
             match arm {

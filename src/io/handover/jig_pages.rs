@@ -47,7 +47,8 @@ pub(super) fn all(flow: &mut Flow, source: &Source<'_>) {
         let number = left.number;
         let mut text = format!("Gauge {number} is pressed by hand: {words}.");
         if let Some(offer) = instead(source, number) {
-            text += &format!(" {offer}");
+            text.push(' ');
+            text += &offer;
         }
         flow.point("•", &text);
     }

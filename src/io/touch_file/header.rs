@@ -59,6 +59,22 @@ pub struct Origin {
     pub limb: Option<String>,
     /// The board, where it is known.
     pub board: Option<String>,
+    /// What it was brought up to date by, the last time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub update: Option<Update>,
+}
+
+/// New presses that an estimator was brought up to date by.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Update {
+    /// The name of the file of the data.
+    pub data: String,
+    /// Key of readings and places.
+    pub fingerprint: String,
+    /// How many there were.
+    pub presses: usize,
+    /// Mean error on them before (mm); that after it stands under `test`, each judged by the others.
+    pub before_mm: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

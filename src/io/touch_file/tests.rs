@@ -52,6 +52,7 @@ fn origin(trained: &Trained) -> Origin {
         test: trained.scores.clone(),
         limb: Some("finger".into()),
         board: None,
+        update: None,
     }
 }
 
