@@ -223,10 +223,9 @@ fn middle(face: &TriMesh, stance: Stance) -> DVec2 {
 /// Rods that together get to as many gauges as one after another can, each to the most that are left, at most so many.
 #[must_use]
 pub fn cover(site: &Site, gauges: &[Pressed], most: usize) -> Vec<Rod> {
-    let mut left: Vec<Pressed> = gauges.to_vec();
     let mut tried: Vec<Rod> = Vec::new();
     for line in site.lines() {
-        tried.push(site.rod(line, &left));
+        tried.push(site.rod(line, gauges));
         if tried.last().is_some_and(|rod| rod.left_out.is_empty()) {
             break;
         }
@@ -242,7 +241,6 @@ pub fn cover(site: &Site, gauges: &[Pressed], most: usize) -> Vec<Rod> {
             .cloned();
         let Some(best) = best else { break };
         let held = |number: usize| best.arms.iter().any(|a| a.number == number);
-        left.retain(|g| !held(g.number));
         for rod in &mut tried {
             rod.arms.retain(|a| !held(a.number));
         }
