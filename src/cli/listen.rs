@@ -112,7 +112,9 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     let pace = if args.fast { Pace::Fast } else { Pace::Real };
     let address = Address::parse(&args.port, args.baud, pace);
     // All that may be wrong is found before the model is computed.
-    spared(&loaded, &address).check("--csv", args.csv.as_deref())?;
+    let spared = spared(&loaded, &address);
+    spared.check("--csv", args.csv.as_deref())?;
+    spared.check("--mcap", args.mcap.as_deref())?;
     address.check().map_err(anyhow::Error::msg)?;
     let learned = learned(args, &loaded)?;
     let (commands, inbox) = channel();
@@ -207,7 +209,7 @@ pub(super) fn sensing_for(common: &Common, loaded: &LoadedProject) -> anyhow::Re
     let sensing = common.in_pool(|| {
         let watch = |p| bar.show(p);
         let budget = loaded.inputs.project.budget.budget();
-        let project = Some(&*loaded.path);
+        let project = (!loaded.bundled).then_some(&*loaded.path);
         Ok(kept_model::sensing(
             &loaded.inputs,
             project,

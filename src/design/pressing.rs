@@ -6,6 +6,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::{Inputs, Simulated};
+use crate::budget::unwatched;
 use crate::dataset::Site;
 use crate::jig::{FILM, Pressed, Reach, Wall};
 use crate::project::PartModel;
@@ -45,8 +46,9 @@ impl Pressing {
         let grid = DVec2::new(project.gauge.grid_length_mm, project.gauge.grid_width_mm);
         let sites = &simulated.dataset.sites[..simulated.lattice];
         let places: Vec<Pressed> = sites.iter().map(|s| pressed(s, looks_in, depth)).collect();
+        let reach = Reach::new(wall, &places, grid / 2.0 + FILM, &unwatched).ok()?;
         Some(Self {
-            reach: Reach::new(wall, &places, grid / 2.0 + FILM),
+            reach,
             looks_in,
             depth,
         })

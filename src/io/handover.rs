@@ -27,6 +27,7 @@ use self::source::Source;
 use super::bench_folder::limb_key;
 use super::mesh_file::urdf::link_of;
 use super::run::{Provenance, as_computed};
+use crate::budget::unwatched;
 use crate::design::{Design, Inputs};
 use crate::paper::{self, Format};
 use crate::plain::robust_top;
@@ -59,7 +60,7 @@ pub fn files(
     let inner = Inner::of(inputs, design);
     let landmarks = workshop::landmarks(&inner);
     let source = Source {
-        jig: workshop::jig_of(inputs, &inner),
+        jig: workshop::jig_of(inputs, &inner, &unwatched).map_err(|e| e.to_string())?,
         wiring: wiring(inputs, &inner, &landmarks),
         name: name(provenance),
         inputs,

@@ -11,6 +11,7 @@ use super::sizes::Sizes;
 use super::slots::slots;
 use super::wall::{Pressed, Wall};
 use super::why::{LeftOut, Why};
+use crate::budget::{Cancelled, Watch};
 
 /// A rod with its arms, brought in together.
 #[derive(Clone, Debug)]
@@ -42,12 +43,14 @@ pub struct Jig {
 }
 
 /// A jig for gauges with a film of half these sizes (mm).
-#[must_use]
-pub fn plan(wall: Wall, gauges: &[Pressed], film: DVec2) -> Jig {
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn plan(wall: Wall, gauges: &[Pressed], film: DVec2, watch: Watch) -> Result<Jig, Cancelled> {
     /// Rods, one after another.
     const RODS: usize = 6;
     let site = Site::new(wall, gauges, film);
-    let rods = cover(&site, gauges, RODS);
+    let rods = cover(&site, gauges, RODS, watch)?;
     let reached = |number: usize| {
         let mut arms = rods.iter().flat_map(|rod| &rod.arms);
         arms.any(|arm| arm.number == number)
@@ -77,12 +80,12 @@ pub fn plan(wall: Wall, gauges: &[Pressed], film: DVec2) -> Jig {
         }
     }
     left_out.sort_by_key(|left| left.number);
-    Jig {
+    Ok(Jig {
         sizes: site.sizes,
         reach: Reach::of(site, lines),
         stacks,
         left_out,
-    }
+    })
 }
 
 /// a to z, and then a2, b2, …

@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::rod::{Line, Site, cover};
 use super::wall::{Pressed, Wall};
+use crate::budget::{Cancelled, Watch};
 
 /// The rods that get to most of a part.
 pub struct Reach {
@@ -13,8 +14,15 @@ pub struct Reach {
 
 impl Reach {
     /// Of a part on which gauges may sit at these places, with a film of half these sizes (mm).
-    #[must_use]
-    pub fn new(wall: Wall, places: &[Pressed], film: DVec2) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn new(
+        wall: Wall,
+        places: &[Pressed],
+        film: DVec2,
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
         /// Rods, one after another, and places that they are chosen by.
         const RODS: usize = 3;
         const PLACES: usize = 60;
@@ -24,8 +32,9 @@ impl Reach {
             .zip(places.iter().step_by(apart))
             .map(|(number, place)| Pressed { number, ..*place })
             .collect();
-        let rods = cover(&site, &some, RODS);
-        Self::of(site, rods.into_iter().map(|rod| rod.line).collect())
+        let rods = cover(&site, &some, RODS, watch)?;
+        let lines = rods.into_iter().map(|rod| rod.line).collect();
+        Ok(Self::of(site, lines))
     }
 
     /// Of rods on these lines.

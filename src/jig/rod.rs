@@ -8,6 +8,7 @@ use super::frame::{Entry, Frame};
 use super::sizes::Sizes;
 use super::wall::{Pressed, Wall};
 use super::why::{LeftOut, Why};
+use crate::budget::{Cancelled, Watch, report};
 use crate::mesh::TriMesh;
 use crate::mesh::stance::Stance;
 
@@ -221,10 +222,20 @@ fn middle(face: &TriMesh, stance: Stance) -> DVec2 {
 }
 
 /// Rods that together get to as many gauges as one after another can, each to the most that are left, at most so many.
-#[must_use]
-pub fn cover(site: &Site, gauges: &[Pressed], most: usize) -> Vec<Rod> {
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn cover(
+    site: &Site,
+    gauges: &[Pressed],
+    most: usize,
+    watch: Watch,
+) -> Result<Vec<Rod>, Cancelled> {
     let mut tried: Vec<Rod> = Vec::new();
-    for line in site.lines() {
+    let lines = site.lines();
+    let count = lines.len();
+    for (k, line) in lines.into_iter().enumerate() {
+        report(watch, "Looking for a rod", k, count)?;
         tried.push(site.rod(line, gauges));
         if tried.last().is_some_and(|rod| rod.left_out.is_empty()) {
             break;
@@ -246,5 +257,5 @@ pub fn cover(site: &Site, gauges: &[Pressed], most: usize) -> Vec<Rod> {
         }
         rods.push(best);
     }
-    rods
+    Ok(rods)
 }

@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::shapes::closed;
 use super::*;
+use crate::budget::unwatched;
 use crate::limb::LimbSpec;
 use crate::mesh::stance::Stance;
 use crate::mesh::{Facets, TriMesh};
@@ -87,7 +88,7 @@ fn is_one_closed_body(solid: &Facets) -> bool {
 #[test]
 fn every_piece_is_one_closed_body_and_none_runs_into_another() {
     let (mesh, gauges) = limb();
-    let jig = plan(of(&mesh, &mesh), &gauges, HALF_FILM);
+    let jig = plan(of(&mesh, &mesh), &gauges, HALF_FILM, &unwatched).unwrap();
     assert!(jig.left_out.is_empty(), "{:?}", jig.left_out);
     let arms: Vec<usize> = jig
         .stacks
@@ -121,7 +122,7 @@ fn every_piece_is_one_closed_body_and_none_runs_into_another() {
 #[test]
 fn pads_press_gauges_where_they_belong() {
     let (mesh, gauges) = limb();
-    let jig = plan(of(&mesh, &mesh), &gauges, HALF_FILM);
+    let jig = plan(of(&mesh, &mesh), &gauges, HALF_FILM, &unwatched).unwrap();
     for stack in &jig.stacks {
         for arm in &stack.arms {
             let glued = gauges.iter().find(|g| g.number == arm.number).unwrap();
@@ -168,7 +169,9 @@ fn what_is_in_the_way_is_found_and_said() {
         of(&mesh, &across(f64::midpoint(low.z, high.z))),
         &whole,
         HALF_FILM,
-    );
+        &unwatched,
+    )
+    .unwrap();
     let entries: Vec<Entry> = jig.stacks.iter().map(|s| s.entry).collect();
     assert!(
         entries.contains(&Entry::Foot) && entries.contains(&Entry::Top),
@@ -194,7 +197,7 @@ fn what_is_in_the_way_is_found_and_said() {
     let mut triangles = shut.triangles().to_vec();
     triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|v| v + first)));
     shut = TriMesh::from_checked(positions, triangles);
-    let jig = plan(of(&mesh, &shut), &whole, HALF_FILM);
+    let jig = plan(of(&mesh, &shut), &whole, HALF_FILM, &unwatched).unwrap();
     assert!(jig.stacks.is_empty());
     let numbers: Vec<usize> = jig.left_out.iter().map(|l| l.number).collect();
     assert_eq!(numbers, (1..=whole.len()).collect::<Vec<_>>());
@@ -211,7 +214,7 @@ fn gauges_that_are_too_near_to_each_other_are_pressed_in_turn() {
         place: first.place + DVec3::Z * 4e-3,
         ..first
     };
-    let jig = plan(of(&mesh, &mesh), &[first, second], HALF_FILM);
+    let jig = plan(of(&mesh, &mesh), &[first, second], HALF_FILM, &unwatched).unwrap();
     assert_eq!(jig.stacks.len(), 2);
     assert!(jig.left_out.is_empty());
 }
@@ -219,7 +222,7 @@ fn gauges_that_are_too_near_to_each_other_are_pressed_in_turn() {
 #[test]
 fn what_a_filter_lets_through_is_reached() {
     let (mesh, gauges) = limb();
-    let reach = Reach::new(of(&mesh, &mesh), &gauges, HALF_FILM);
+    let reach = Reach::new(of(&mesh, &mesh), &gauges, HALF_FILM, &unwatched).unwrap();
     assert!(gauges.iter().all(|g| reach.gets_to(g)));
     // A gauge on a wall that looks along the axis cannot be pressed from it.
     let tilted = Pressed {

@@ -7,7 +7,7 @@ use super::jobs::Task;
 use super::slot::{Slot, current, take_in};
 use super::state::Session;
 use crate::jig::Jig;
-use crate::job::Reporter;
+use crate::job::{Reporter, Stop};
 use crate::workshop::{Inner, jig_of};
 
 impl Session {
@@ -29,9 +29,11 @@ impl Session {
             return;
         }
         let snapshot = self.document.inputs();
-        let work = move |_: &Reporter| {
+        let work = move |r: &Reporter| {
+            let watch = |progress| r.report(progress);
             let inner = Inner::of_project(&snapshot);
-            Ok(Arc::new(jig_of(&snapshot, &inner)))
+            let jig = jig_of(&snapshot, &inner, &watch).map_err(|_| Stop::Cancelled)?;
+            Ok(Arc::new(jig))
         };
         self.jobs
             .start(Task::Jig, inputs, work, |s, inputs, value| {

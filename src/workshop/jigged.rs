@@ -5,13 +5,16 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use super::inner::Inner;
+use crate::budget::{Cancelled, Watch};
 use crate::design::Inputs;
 use crate::jig::{FILM, Jig, Wall, plan};
 use crate::project::PartModel;
 
 /// Of gauges on an inner face. Of a shell that face is in the way, of a solid all of its surface.
-#[must_use]
-pub fn jig_of(inputs: &Inputs, inner: &Inner) -> Jig {
+///
+/// # Errors
+/// [`Cancelled`] when the watch asks for it.
+pub fn jig_of(inputs: &Inputs, inner: &Inner, watch: Watch) -> Result<Jig, Cancelled> {
     let face = Arc::new(inner.mesh.clone());
     let keys = &inputs.project.gauge;
     let grid = DVec2::new(keys.grid_length_mm, keys.grid_width_mm);
@@ -23,5 +26,5 @@ pub fn jig_of(inputs: &Inputs, inner: &Inner) -> Jig {
         face,
         stance: inner.stance,
     };
-    plan(wall, &inner.pressed(), grid / 2.0 + FILM)
+    plan(wall, &inner.pressed(), grid / 2.0 + FILM, watch)
 }
