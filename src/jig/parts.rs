@@ -90,7 +90,7 @@ fn rod(sizes: &Sizes, stack: &Stack) -> Vec<Part> {
     // Lying on its flat.
     let laid = DMat3::from_rotation_y(FRAC_PI_2);
     let length = inner + HEAD - foot;
-    let pieces = (length / sizes.longest).ceil().max(1.0) as usize;
+    let pieces = (length / (sizes.longest - PEG)).ceil().max(1.0) as usize;
     let each = length / pieces as f64;
     let wide = 2.0 * sizes.ring_radius();
     let thin = Sizes {
@@ -156,19 +156,16 @@ fn seat(sizes: &Sizes, stack: &Stack) -> Part {
     ];
     let arrow: Vec<DVec3> = arrow
         .iter()
-        .flat_map(|p| [p.extend(low - 0.8), p.extend(low + 0.4)])
+        .flat_map(|p| [p.extend(low - 1.0), p.extend(low + 0.8)])
         .collect();
     let hub = cylinder(sizes.ring_radius() + sizes.wall, low, high);
-    let body = joined(spokes.into_iter().chain([hub, hull(&arrow)]).collect());
+    let body = joined(spokes.into_iter().chain([hub]).collect());
+    // Cut into its outside, which lies on the printer's bed.
+    let cut = shaft(sizes, sizes.play, low - 2.0, high + 1.0).union(&hull(&arrow));
     Part {
         name: format!("seat-{}", stack.letter),
-        solid: read(&body.difference(&shaft(sizes, sizes.play, low - 2.0, high + 1.0))),
-        laid: if stack.lift > 0.0 {
-            DMat3::IDENTITY
-        } else {
-            // The arrow up.
-            DMat3::from_rotation_x(2.0 * FRAC_PI_2)
-        },
+        solid: read(&body.difference(&cut)),
+        laid: DMat3::IDENTITY,
     }
 }
 

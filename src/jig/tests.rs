@@ -231,3 +231,28 @@ fn what_a_filter_lets_through_is_reached() {
     };
     assert!(!reach.gets_to(&tilted));
 }
+
+#[test]
+fn a_rod_that_is_too_long_for_the_printer_comes_in_pieces() {
+    let (mesh, gauges) = limb();
+    let wall = of(&mesh, &mesh);
+    let mut jig = plan(wall, &gauges, HALF_FILM, &unwatched).unwrap();
+    jig.sizes.longest = 60.0;
+    for stack in &jig.stacks {
+        let mut rods = parts(&jig, stack);
+        rods.retain(|part| part.name.starts_with("rod-"));
+        assert!(rods.len() > 2, "{}", rods.len());
+        for rod in &rods {
+            assert!(is_one_closed_body(&rod.solid), "{}", rod.name);
+            let along = rod.solid.positions.iter().map(|p| p.z);
+            let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), z| (l.min(z), h.max(z)));
+            assert!(high - low <= 60.0, "{}: {}", rod.name, high - low);
+        }
+        for pair in rods.windows(2) {
+            let [one, other] = [&pair[0], &pair[1]].map(|part| closed(&part.solid));
+            assert!(one.intersection(&other).volume() < 0.05);
+            // The peg reaches into the next piece.
+            assert!(one.min_gap(&other, 1.0) < 0.3);
+        }
+    }
+}

@@ -753,7 +753,7 @@ fn a_summary_tells_of_the_gauges_that_were_asked_for_and_other_files_are_left_al
         .map(|e| e.unwrap().file_name().into_string().unwrap())
         .collect();
     names.sort();
-    let files = "bill.csv dataset.npz design.hapdef.toml design.hapdef.toml.bak design.json gauges.urdf hapd_config.h notes.txt report.html report.pdf scene.glb sites.csv template.pdf wiring.csv zones.csv";
+    let files = "bill.csv dataset.npz design.hapdef.toml design.hapdef.toml.bak design.json gauges.urdf hapd_config.h jig notes.txt report.html report.pdf scene.glb sites.csv template.pdf wiring.csv zones.csv";
     assert_eq!(names.join(" "), files);
 }
 
