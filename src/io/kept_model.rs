@@ -70,8 +70,12 @@ fn key(inputs: &Inputs, budget: &Budget) -> String {
     let mut project = inputs.project.clone();
     project.part.mesh.clear();
     project.feasible.painted = None;
-    // What is heard, and what else was chosen, changes nothing.
-    project.live = LiveKeys::default();
+    // What is heard, and what else was chosen, changes nothing; but for what touches may push aside, which readings are
+    // known for or not.
+    project.live = LiveKeys {
+        friction_percent: project.live.friction_percent,
+        ..LiveKeys::default()
+    };
     project.kept.clear();
     let mut key = Fingerprint::default();
     key.add(FORMAT.to_le_bytes());
@@ -312,6 +316,10 @@ mod tests {
         // Whatever is otherwise is computed, and so is what is damaged.
         inputs.project.gauge.grid_length_mm *= 2.0;
         assert!(counted(&inputs, &project).1 > 0);
+        assert!(counted(&inputs, &project).1 == 0);
+        inputs.project.live.friction_percent += 20.0;
+        assert!(counted(&inputs, &project).1 > 0);
+        inputs.project.live.stiffness_percent += 5.0;
         assert!(counted(&inputs, &project).1 == 0);
         let path = path_beside(&project);
         let whole = std::fs::read(&path).unwrap();
