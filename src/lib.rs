@@ -46,7 +46,7 @@
 //! of a board into touches, [`live`].
 //!
 //! SI units throughout (m, N, Pa, strain as a ratio), except in [`project`], whose fields carry the units of their
-//! names. The core (everything but `io`, `job`, `link`, `document`, `render`, `session`, `cli` and `studio`) is pure: no
+//! names. The core (everything but `io`, `job`, `link`, `document`, `render`, `test_bed`, `varied`, `session`, `cli` and `studio`) is pure: no
 //! file, no clock, no thread of its own, no global random state.
 
 // Every public item of the core says what it is: the compiler holds that. What lies around it is for the program alone.
@@ -101,7 +101,11 @@ mod statistics;
 pub mod studio;
 pub mod study;
 pub mod tally;
+#[allow(missing_docs)]
+pub mod test_bed;
 pub mod trade;
 pub mod uncertainty;
+#[allow(missing_docs)]
+pub mod varied;
 pub mod wire;
 pub mod workshop;

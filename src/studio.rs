@@ -5,6 +5,7 @@
 
 mod action;
 mod ask;
+mod bench;
 mod by_force;
 mod commands;
 mod confusions;
@@ -35,6 +36,7 @@ mod results;
 mod run;
 mod scene;
 mod stages;
+mod study;
 mod theme;
 mod toolbar;
 mod tools;
@@ -479,6 +481,7 @@ impl eframe::App for Studio {
     }
 
     fn on_exit(&mut self) {
+        self.session.leave_bench();
         // Whoever closes the window has saved, or said that it need not be.
         if let Some(recovery) = &mut self.kept.recovery {
             recovery.close();

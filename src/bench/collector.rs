@@ -22,6 +22,8 @@ pub enum News {
     Note(String),
     /// The sample that was given last belongs to a reading: it is to be written down.
     Keep,
+    /// A press begins: its number in the plan, or none where it is that which is pressed again and again.
+    Begun(Option<usize>),
     /// A press is over: its number, and why it is none if it is none.
     Press {
         /// In the plan, from 0.
@@ -31,8 +33,8 @@ pub enum News {
     },
     /// What the limb answered where it is pressed again and again, when it was pressed there for the first time.
     Answer(Answer),
-    /// So many presses that were over are none: they are made again.
-    Discarded(usize),
+    /// These presses that were over are none: they are made again.
+    Discarded(Vec<usize>),
     /// For people.
     Say(String),
 }

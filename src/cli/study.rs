@@ -68,8 +68,8 @@ fn plan(args: &PlanArgs) -> anyhow::Result<()> {
     let home = args.study.parent().unwrap_or(std::path::Path::new(""));
     // What no unit could use is found before anything is written.
     let bench = Bench::new(&study, home)?;
-    bench.check_axes(&study)?;
-    let folder = StudyFolder::plan(&args.out, &args.study, bench.fingerprint()?)?;
+    bench.base.check_axes(&study)?;
+    let folder = StudyFolder::plan(&args.out, &args.study, bench.base.fingerprint()?)?;
     if args.json {
         return out::line(&json!({ "folder": args.out, "units": folder.plan.units }).to_string());
     }

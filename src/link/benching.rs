@@ -1,6 +1,5 @@
 //! Drives a test-bed: a printer and a board at their ports, or both simulated in their own time.
 
-use std::sync::mpsc::Receiver as Inbox;
 use std::time::{Duration, Instant};
 
 use super::port::{Got, Port};
@@ -120,7 +119,7 @@ fn note(recorder: &mut Recorder, news: &News) {
     }
 }
 
-/// Presses a plan on a simulated bench, as fast as it can be computed.
+/// Presses a plan on a simulated bench, as fast as it can be computed. `orders` is asked for the next one at every look.
 ///
 /// # Errors
 /// When the recording can be written no more.
@@ -129,13 +128,27 @@ pub fn press_simulated(
     (mut printer, contact): (SimulatedPrinter, &Contact),
     mut board: SimulatedBoard,
     recorder: Recorder,
+    orders: &mut dyn FnMut() -> Option<BenchOrder>,
     mut tell: impl FnMut(News),
 ) -> Result<Ended, String> {
     let mut desk = Desk::new(recorder);
+    let mut paused = false;
     let (mut now_us, mut said, mut sent) = (0, Vec::new(), Vec::new());
     board.receive(&desk.greeting(), now_us, &mut sent);
     while collector.ended().is_none() {
         let mut out = Vec::new();
+        while let Some(order) = orders() {
+            paused = match order {
+                BenchOrder::Pause => true,
+                BenchOrder::Resume => false,
+                BenchOrder::Stop | BenchOrder::Kill => paused,
+            };
+            obey(collector, order, now_us, &mut out);
+        }
+        if paused {
+            // Its own time goes on, no faster than anybody's.
+            std::thread::sleep(Duration::from_micros(TURN_US));
+        }
         desk.board(&sent, now_us, collector, &mut out, &mut tell);
         let heard = std::mem::take(&mut said);
         collector.heard(&heard, now_us, &mut out, &mut |n| desk.hear(n, &mut tell));
@@ -158,7 +171,7 @@ pub fn press_simulated(
     desk.end(collector.ended().cloned())
 }
 
-/// Presses a plan with a printer and a board at their ports.
+/// Presses a plan with a printer and a board at their ports. `orders` is asked for the next one at every look.
 ///
 /// # Errors
 /// When a port cannot be opened, or the recording can be written no more.
@@ -166,7 +179,7 @@ pub fn press_at_ports(
     collector: &mut Collector,
     (printer, board): (&Address, &Address),
     recorder: Recorder,
-    orders: &Inbox<BenchOrder>,
+    orders: &mut dyn FnMut() -> Option<BenchOrder>,
     mut tell: impl FnMut(News),
 ) -> Result<Ended, String> {
     /// How long a machine that begins anew when its port is opened may take to do so.
@@ -184,7 +197,7 @@ pub fn press_at_ports(
     let mut asked = now();
     while collector.ended().is_none() {
         let mut out = Vec::new();
-        for order in orders.try_iter() {
+        while let Some(order) = orders() {
             obey(collector, order, now(), &mut out);
         }
         let bytes = got(&mut *board, &mut buffer);

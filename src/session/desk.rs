@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::state::bench::BenchDesk;
 use crate::link::BAUD;
 use crate::live::Estimator;
 
@@ -21,6 +22,8 @@ pub struct Desk {
     pub compare: bool,
     /// That known touches are pressed with (N).
     pub known_force_n: f64,
+    /// Of the test-bed.
+    pub bench: BenchDesk,
 }
 
 impl Default for Desk {
@@ -33,6 +36,7 @@ impl Default for Desk {
             estimator: Estimator::default(),
             compare: false,
             known_force_n: 10.0,
+            bench: BenchDesk::default(),
         }
     }
 }

@@ -239,7 +239,7 @@ impl Session {
         let quick = |task| {
             matches!(
                 task,
-                Task::Filter | Task::Field | Task::Expect | Task::Confuse
+                Task::Filter | Task::Field | Task::Expect | Task::Confuse | Task::UnitLimb
             )
         };
         let ended = self.end_jobs(|task| !quick(task));

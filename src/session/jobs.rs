@@ -47,6 +47,12 @@ pub enum Task {
     Train,
     Calibrate,
     Table,
+    /// Of the test-bed: a plan, and going through it.
+    PlanPresses,
+    Press,
+    /// Of a parameter study: its results, and the limb of a unit.
+    OpenStudy,
+    UnitLimb,
 }
 
 impl Task {
@@ -77,6 +83,10 @@ impl Task {
             Self::Train => "Train the estimators".into(),
             Self::Calibrate => "Calibrate".into(),
             Self::Table => "Write the table".into(),
+            Self::PlanPresses => "Plan the presses".into(),
+            Self::Press => "Press the limb".into(),
+            Self::OpenStudy => "Open the study".into(),
+            Self::UnitLimb => "Make the limb of a unit".into(),
         }
     }
 
@@ -107,6 +117,7 @@ impl Task {
                 | Self::Expect
                 | Self::Confuse
                 | Self::Field
+                | Self::UnitLimb
                 | Self::Measure
                 | Self::Save
         )

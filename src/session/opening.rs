@@ -51,9 +51,22 @@ impl Opened {
     }
 }
 
+impl Opened {
+    /// Of a file that belongs among the recent ones.
+    pub(super) fn of_file(self, path: PathBuf) -> Self {
+        Self {
+            file: Some(path),
+            ..self
+        }
+    }
+}
+
 impl Session {
     /// Reads a project in the background, and opens it when it is there.
-    fn open_with(&mut self, read: impl FnOnce(State) -> Result<Opened, Stop> + Send + 'static) {
+    pub(super) fn open_with(
+        &mut self,
+        read: impl FnOnce(State) -> Result<Opened, Stop> + Send + 'static,
+    ) {
         let before = self.document.state.clone();
         self.jobs.start(
             Task::Open,
@@ -143,6 +156,7 @@ impl Session {
         self.jobs = old.jobs.for_another_session();
         self.desk = old.desk;
         self.news = old.news;
+        self.study = old.study;
         self.show_estimator(self.desk.estimator);
     }
 

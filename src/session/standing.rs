@@ -21,11 +21,12 @@ pub enum Stage {
     Selection,
     Evaluation,
     Report,
+    Bench,
     Live,
 }
 
 impl Stage {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Part,
         Self::Supports,
         Self::Simulation,
@@ -34,6 +35,7 @@ impl Stage {
         Self::Selection,
         Self::Evaluation,
         Self::Report,
+        Self::Bench,
         Self::Live,
     ];
 
@@ -48,6 +50,7 @@ impl Stage {
             Self::Selection => "Selection",
             Self::Evaluation => "Evaluation",
             Self::Report => "Report",
+            Self::Bench => "Bench",
             Self::Live => "Live",
         }
     }
@@ -81,6 +84,7 @@ impl Session {
             Stage::Candidates => self.design_standing(Step::Reduce),
             Stage::Selection => self.design_standing(Step::Select),
             Stage::Evaluation => self.design_standing(Step::Evaluate),
+            Stage::Bench => self.bench_standing(),
             Stage::Live => self.live_standing(),
             Stage::Report if self.results.design.is_none() => Standing::Open,
             Stage::Report => match self.design_standing(Step::Evaluate) {
@@ -95,6 +99,22 @@ impl Session {
             _ if self.document.asks_for_another_part() => Standing::Stale,
             Some(why) => Standing::Failed(why.to_owned()),
             None => Standing::Current,
+        }
+    }
+
+    fn bench_standing(&self) -> Standing {
+        let runs = |task| self.jobs.runs(task);
+        if self.bench.goes_on() || runs(Task::Press) || runs(Task::PlanPresses) {
+            return Standing::Running;
+        }
+        let made = self
+            .bench
+            .look(|p| (p.made_and_failed()[0], p.states.len()));
+        match made {
+            None | Some((0, _)) => Standing::Open,
+            Some(_) if !self.plan_holds() => Standing::Stale,
+            Some((made, all)) if made == all => Standing::Current,
+            Some(_) => Standing::Draft,
         }
     }
 

@@ -1,6 +1,7 @@
 //! What a session consists of: an open project, what runs for it, and what is known of it. What is done with that stands
 //! in files of its own beside this one, each of which may use those that it builds on.
 
+pub mod bench;
 pub mod by_hand;
 pub mod confusions;
 pub mod drive;
@@ -9,6 +10,7 @@ pub mod fields;
 pub mod live;
 pub mod measure;
 pub mod results;
+pub mod study;
 pub mod touching;
 pub mod trade;
 
@@ -25,6 +27,7 @@ use crate::budget::{Budget, Quality};
 use crate::design::Advice;
 use crate::document::{Document, JigInputs, WallInputs};
 use crate::jig::Jig;
+use bench::Bench;
 use by_hand::ByHand;
 use confusions::Confusions;
 use drive::Drive;
@@ -33,6 +36,7 @@ use fields::FieldValues;
 use live::Live;
 use measure::Ends;
 use results::Results;
+use study::Study;
 use touching::Touching;
 use trade::Trade;
 
@@ -61,6 +65,9 @@ pub struct Session {
     pub results: Results,
     pub caches: Caches,
     pub live: Live,
+    pub bench: Bench,
+    /// Beside the project.
+    pub study: Study,
     pub drive: Drive,
     /// What stays when another project is opened.
     pub desk: Desk,
@@ -86,6 +93,8 @@ impl Session {
             results: Results::default(),
             caches: Caches::default(),
             live: Live::default(),
+            bench: Bench::default(),
+            study: Study::default(),
             drive: Drive::default(),
             desk: Desk::default(),
             news: News::default(),

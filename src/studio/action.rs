@@ -7,6 +7,7 @@ use super::nudge::next_site;
 use super::view::{Picture, View, Way};
 use crate::document::{Brush, Layer};
 use crate::io::examples::Example;
+use crate::link::BenchOrder;
 use crate::mesh::SurfacePoint;
 use crate::project::{ChosenSite, Project, Unit};
 use crate::session::{Desk, Ends, Mishap, Session, Task};
@@ -24,6 +25,7 @@ pub enum Action {
     Compute(Compute),
     File(FileAction),
     Board(BoardAction),
+    Bench(BenchAction),
     Desk(Box<Desk>),
     /// A message was read, by its number from zero.
     Dismiss(usize),
@@ -99,6 +101,8 @@ pub enum Compute {
     Press(SurfacePoint),
     LetGo,
     Distance(Ends),
+    /// The limb of a unit of the study.
+    LookAtUnit(usize),
     Cancel,
     End(Task),
 }
@@ -113,6 +117,10 @@ pub enum FileAction {
     Export(PathBuf),
     /// A recording as a table.
     WriteTable(PathBuf),
+    /// The results in a study's folder.
+    OpenStudy(PathBuf),
+    /// A unit of the study that is open, as a project.
+    OpenUnit(usize),
 }
 
 /// What concerns the board.
@@ -127,6 +135,13 @@ pub enum BoardAction {
     TakeKnown,
     Calibrate,
     CalibrateFromBoard,
+}
+
+/// What concerns the test-bed.
+pub enum BenchAction {
+    Plan,
+    Press,
+    Order(BenchOrder),
 }
 
 /// How an action can be taken back, or why not.
@@ -165,10 +180,13 @@ impl Action {
             | Self::Dismiss(_)
             | Self::Complain(_) => Undo::Harmless,
             Self::History(_) => Undo::History,
-            Self::File(FileAction::Open(..) | FileAction::Example(_) | FileAction::TakeInAgain) => {
-                Undo::AnotherProject
-            }
-            Self::File(_) | Self::Board(_) => Undo::Outside,
+            Self::File(
+                FileAction::Open(..)
+                | FileAction::Example(_)
+                | FileAction::TakeInAgain
+                | FileAction::OpenUnit(_),
+            ) => Undo::AnotherProject,
+            Self::File(_) | Self::Board(_) | Self::Bench(_) => Undo::Outside,
         }
     }
 
@@ -186,6 +204,7 @@ impl Action {
             Self::Compute(compute) => compute.apply(session),
             Self::File(action) => action.apply(session),
             Self::Board(action) => action.apply(session),
+            Self::Bench(action) => action.apply(session),
             Self::Desk(desk) => session.set_desk(*desk),
             Self::Dismiss(number) => session.news.dismiss(number),
             Self::Complain(what) => session.complain(what),
@@ -260,6 +279,7 @@ impl Compute {
             Self::Press(at) => session.press(at),
             Self::LetGo => session.let_go(),
             Self::Distance(ends) => session.measure(ends),
+            Self::LookAtUnit(unit) => session.look_at_unit(unit),
             Self::Cancel => session.cancel(),
             Self::End(task) => drop(session.end_jobs(|t| t == task)),
         }
@@ -275,6 +295,8 @@ impl FileAction {
             Self::SaveTo(path) => session.save_to(&path),
             Self::Export(folder) => session.export(folder),
             Self::WriteTable(recording) => session.write_table(&recording),
+            Self::OpenStudy(folder) => session.open_study(&folder),
+            Self::OpenUnit(unit) => session.open_unit(unit),
         }
     }
 }
@@ -291,6 +313,16 @@ impl BoardAction {
             Self::TakeKnown => session.take_known(),
             Self::Calibrate => session.start_calibration(),
             Self::CalibrateFromBoard => session.calibrate_from_board(),
+        }
+    }
+}
+
+impl BenchAction {
+    fn apply(self, session: &mut Session) {
+        match self {
+            Self::Plan => session.plan_presses(),
+            Self::Press => session.press_plan(),
+            Self::Order(order) => session.order_bench(order),
         }
     }
 }
@@ -334,6 +366,12 @@ impl From<FileAction> for Action {
 impl From<BoardAction> for Action {
     fn from(action: BoardAction) -> Self {
         Self::Board(action)
+    }
+}
+
+impl From<BenchAction> for Action {
+    fn from(action: BenchAction) -> Self {
+        Self::Bench(action)
     }
 }
 

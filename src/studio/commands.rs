@@ -39,6 +39,11 @@ pub enum Command {
     Tare,
     Record,
     Disconnect,
+    PlanPresses,
+    PressPlan,
+    PausePresses,
+    StopPresses,
+    HaltMachine,
     Pin,
     RemoveGauges,
     AddHelpful,
@@ -91,6 +96,11 @@ impl Command {
             Self::Tare => "Tare",
             Self::Record => "Record",
             Self::Disconnect => "Disconnect",
+            Self::PlanPresses => "Plan presses",
+            Self::PressPlan => "Press the plan",
+            Self::PausePresses => "Pause pressing",
+            Self::StopPresses => "Stop pressing",
+            Self::HaltMachine => "Halt the machine",
             Self::Follow => "Follow changes",
             Self::Pin => "Pin picked gauges",
             Self::RemoveGauges => "Remove picked gauges",
@@ -125,6 +135,7 @@ impl Command {
             Self::Stage(Stage::Selection) => "Go to selection",
             Self::Stage(Stage::Evaluation) => "Go to evaluation",
             Self::Stage(Stage::Report) => "Go to report",
+            Self::Stage(Stage::Bench) => "Go to bench",
             Self::Stage(Stage::Live) => "Go to live touch",
         }
     }
@@ -186,6 +197,19 @@ impl Command {
             Self::Tare => "Take what is read now for rest: nothing may touch the part",
             Self::Record => "Begin to record the raw counts of the board, or end it",
             Self::Disconnect => "Listen to the board no more",
+            Self::PlanPresses => {
+                "Choose where the machine presses, and see what it gets to; nothing moves"
+            }
+            Self::PressPlan => {
+                "Press what is left of the plan, and write down what the board reads"
+            }
+            Self::PausePresses => "Wait before the next press, or go on",
+            Self::StopPresses => {
+                "Stop what moves, take the tip back and end; what was pressed is kept"
+            }
+            Self::HaltMachine => {
+                "Emergency stop: halts the machine where it is (M112). The tip stays where it is"
+            }
             Self::Follow => "Compute anew what a change has made stale, a draft first; on or off",
             Self::Pin => "Selections must have a gauge there; pinned ones are let go",
             Self::RemoveGauges => "Take the picked gauges away",
@@ -242,6 +266,7 @@ impl Command {
             Self::SimulatedBoard => plain(Key::F7),
             Self::Tare => plain(Key::F8),
             Self::Record => plain(Key::F9),
+            Self::HaltMachine => shifted(Key::X),
             Self::Pin => plain(Key::P),
             Self::RemoveGauges => plain(Key::Delete),
             Self::AddHelpful => plain(Key::A),
@@ -282,6 +307,10 @@ impl Command {
             | Self::Example(_)
             | Self::Follow
             | Self::Disconnect
+            | Self::PlanPresses
+            | Self::PressPlan
+            | Self::PausePresses
+            | Self::StopPresses
             | Self::DarkLight
             | Self::Paint(_)
             | Self::Stage(_) => None,
@@ -319,6 +348,11 @@ impl Command {
             Self::Tare,
             Self::Record,
             Self::Disconnect,
+            Self::PlanPresses,
+            Self::PressPlan,
+            Self::PausePresses,
+            Self::StopPresses,
+            Self::HaltMachine,
             Self::Pin,
             Self::RemoveGauges,
             Self::AddHelpful,
@@ -352,6 +386,12 @@ pub fn enabled(session: &Session, view: &View, command: Command) -> bool {
         Command::GrowPaint | Command::ShrinkPaint => session.document.layer(view.layer).is_some(),
         Command::Cancel => session.busy(),
         Command::Tare | Command::Record | Command::Disconnect => session.live.is_connected(),
+        Command::PlanPresses | Command::PressPlan => {
+            !session.bench.goes_on() && !session.jobs.runs(Task::Press)
+        }
+        Command::PausePresses | Command::StopPresses | Command::HaltMachine => {
+            session.bench.goes_on()
+        }
         Command::Export => session.results.design.is_some(),
         Command::MeasureTrade => !session.jobs.runs(Task::Trade),
         Command::Keep => !session.document.state.project.selection.sites.is_empty(),
@@ -388,6 +428,7 @@ pub fn is_on(session: &Session, view: &View, command: Command) -> bool {
         Command::Section => view.section.is_some(),
         Command::Unrolled => view.unrolled_shown,
         Command::Jig => view.jig_shown,
+        Command::PausePresses => session.bench.paused && session.bench.goes_on(),
         Command::Tool(tool) => view.tool == tool,
         _ => false,
     }

@@ -2,7 +2,9 @@
 
 use egui::{Context, Theme, ViewportCommand};
 
-use super::action::{Action, BoardAction, Change, Compute, FileAction, History, LayerChange};
+use super::action::{
+    Action, BenchAction, BoardAction, Change, Compute, FileAction, History, LayerChange,
+};
 use super::ask::Ask;
 use super::commands::{Command, needs_part};
 use super::dialogs::Dialog;
@@ -10,6 +12,7 @@ use super::layout::Panels;
 use super::palette::Palette;
 use super::scene::Scene;
 use super::view::{Gesture, Stage, Tab, Tool};
+use crate::link::BenchOrder;
 
 /// By how much a key makes the brush wider.
 const BRUSH_STEP: f64 = 1.25;
@@ -108,6 +111,7 @@ fn look_at(command: Command, ask: &mut Ask<'_>, scene: &Scene) {
         Command::Stage(stage) => view.stage = stage,
         Command::Advise => view.stage = Stage::Part,
         Command::SimulatedBoard => view.stage = Stage::Live,
+        Command::PlanPresses | Command::PressPlan => view.stage = Stage::Bench,
         Command::MeasureTrade => view.tab = Tab::Trade,
         _ => {}
     }
@@ -145,6 +149,14 @@ fn asked_of_session(command: Command, ask: &mut Ask<'_>, panels: &Panels) -> Opt
         Command::Tare => BoardAction::Tare.into(),
         Command::Record => BoardAction::ToggleRecording(panels.live.record_to.clone()).into(),
         Command::Disconnect => BoardAction::Disconnect.into(),
+        Command::PlanPresses => BenchAction::Plan.into(),
+        Command::PressPlan => BenchAction::Press.into(),
+        Command::PausePresses if ask.session.bench.paused => {
+            BenchAction::Order(BenchOrder::Resume).into()
+        }
+        Command::PausePresses => BenchAction::Order(BenchOrder::Pause).into(),
+        Command::StopPresses => BenchAction::Order(BenchOrder::Stop).into(),
+        Command::HaltMachine => BenchAction::Order(BenchOrder::Kill).into(),
         Command::Follow => {
             let mut desk = ask.session.desk.clone();
             desk.follow = !desk.follow;

@@ -39,8 +39,8 @@ pub fn settings(ask: &mut Ask<'_>, ui: &mut Ui) {
         Stage::Selection => selection_form(ask, ui),
         Stage::Evaluation => evaluation_form(ask, ui),
         Stage::Report => ask.button(ui, Command::Export),
-        // It has a panel of its own.
-        Stage::Live => {}
+        // They have panels of their own.
+        Stage::Bench | Stage::Live => {}
     }
 }
 
@@ -55,6 +55,9 @@ fn purpose(stage: Stage) -> &'static str {
         Stage::Selection => "Which of the candidates get a gauge",
         Stage::Evaluation => "How well touches that nobody trained on are found",
         Stage::Report => "What a workshop needs to build it",
+        Stage::Bench => {
+            "A machine presses the limb at many places, and what the gauges read is written down"
+        }
         Stage::Live => "Where and how hard the part is touched, now",
     }
 }

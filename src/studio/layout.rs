@@ -3,15 +3,17 @@
 use egui::{Context, Rect, Ui};
 
 use super::ask::Ask;
+use super::bench;
 use super::dialogs::Dialogs;
 use super::live::LiveForm;
 use super::paint::Look;
 use super::palette::{self, Palette};
 use super::recovery::Recovery;
+use super::study::StudyView;
 use super::trade::Dial;
 use super::view::{Pane, Stage, Tab};
 use super::{
-    confusions, inspector, jig, jobs, kept, legend, live, measure, overlay, results, trade,
+    confusions, inspector, jig, jobs, kept, legend, live, measure, overlay, results, study, trade,
 };
 
 /// What is typed in panels, and what is open over them.
@@ -21,6 +23,7 @@ pub struct Panels {
     pub palette: Option<Palette>,
     pub dial: Dial,
     pub live: LiveForm,
+    pub study: StudyView,
 }
 
 impl Panels {
@@ -31,6 +34,7 @@ impl Panels {
             .show(ui, |ui| {
                 inspector::heading(ask.view.stage, ui);
                 match ask.view.stage {
+                    Stage::Bench => bench::bench_form(ask, ui),
                     Stage::Live => live::live_form(ask, &mut self.live, ui),
                     _ => inspector::settings(ask, ui),
                 }
@@ -50,6 +54,7 @@ impl Panels {
             Tab::Compare => kept::compare_tab(ask, ui),
             Tab::Reduction => results::reduction_plot(ask, ui),
             Tab::Trade => trade::trade_tab(ask, &mut self.dial, ui),
+            Tab::Study => study::study_tab(ask, &mut self.study, ui),
             Tab::Live => live::live_tab(ask, ui),
             Tab::Jobs => jobs::jobs_tab(ask, ui),
         }
@@ -93,6 +98,7 @@ pub fn draw(look: Look<'_>, ui: &Ui, panes: &[(Pane, Rect)]) {
 fn draw_over(look: Look<'_>, ui: &Ui, pane: Pane, rect: Rect) {
     let painter = &ui.painter_at(rect);
     jig::paint_jig(look, painter, pane);
+    bench::paint_bench(look, painter, pane);
     kept::paint_kept(look, painter, pane);
     confusions::paint_confusions(look, painter, pane);
     overlay::paint_gauges(look, painter, pane);
@@ -115,6 +121,7 @@ pub fn picture(look: Look<'_>, ui: &Ui, rect: Rect, transparent: bool) {
     overlay::paint_limb(look, ui, rect, transparent);
     let painter = &ui.painter_at(rect);
     jig::paint_jig(look, painter, Pane::Limb);
+    bench::paint_bench(look, painter, Pane::Limb);
     kept::paint_kept(look, painter, Pane::Limb);
     overlay::paint_gauges(look, painter, Pane::Limb);
     overlay::paint_touch(look, painter, Pane::Limb);

@@ -21,6 +21,8 @@ fn run_menu(ask: &mut Ask<'_>, ui: &mut Ui) {
     }
     ui.separator();
     for command in [
+        Command::PlanPresses,
+        Command::PressPlan,
         Command::SimulatedBoard,
         Command::Tare,
         Command::Record,

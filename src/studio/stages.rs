@@ -137,9 +137,21 @@ fn achieved(session: &Session, stage: Stage) -> Vec<String> {
         Stage::Selection => selection_lines(session),
         Stage::Evaluation => evaluation_lines(session),
         Stage::Report => Vec::new(),
+        Stage::Bench => bench_lines(session),
         Stage::Live if session.standing(Stage::Live) != Standing::Current => Vec::new(),
         Stage::Live => vec![live_in_words(session).0],
     }
+}
+
+fn bench_lines(session: &Session) -> Vec<String> {
+    let counted = session.bench.look(|p| {
+        let [made, failed] = p.made_and_failed();
+        let made = format!("{made} of {} presses", p.states.len());
+        std::iter::once(made)
+            .chain((failed > 0).then(|| format!("{failed} failed")))
+            .collect()
+    });
+    counted.unwrap_or_default()
 }
 
 fn part_lines(session: &Session) -> Vec<String> {

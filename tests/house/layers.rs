@@ -36,27 +36,38 @@ const ORDER: [&[&str]; 14] = [
     &["design", "study"],
     &["given", "trade", "parameter_study", "workshop"],
     &[
-        "io", "job", "link", "document", "render", "session", "cli", "studio",
+        "io", "job", "link", "document", "render", "test_bed", "varied", "session", "cli", "studio",
     ],
 ];
 
 /// Among the outer modules, who may use whom.
-pub const OUTER: [(&str, &[&str]); 8] = [
+pub const OUTER: [(&str, &[&str]); 10] = [
     ("io", &[]),
     ("job", &[]),
     ("link", &[]),
     ("render", &[]),
     ("document", &["io"]),
-    ("session", &["io", "job", "link", "document"]),
-    ("cli", &["io", "link", "document", "session"]),
+    ("test_bed", &["io", "link"]),
+    ("varied", &["io"]),
+    (
+        "session",
+        &["io", "job", "link", "document", "test_bed", "varied"],
+    ),
+    (
+        "cli",
+        &["io", "link", "document", "test_bed", "varied", "session"],
+    ),
     (
         "studio",
-        &["io", "job", "link", "document", "render", "session"],
+        &[
+            "io", "job", "link", "document", "render", "test_bed", "session",
+        ],
     ),
 ];
 
 /// What shows and asks in the window. `studio/layout.rs` alone knows them all.
-const PANELS: [&str; 16] = [
+const PANELS: [&str; 18] = [
+    "bench",
     "confusions",
     "dialogs",
     "inspector",
@@ -71,6 +82,7 @@ const PANELS: [&str; 16] = [
     "palette",
     "results",
     "stages",
+    "study",
     "toolbar",
     "trade",
 ];

@@ -6,8 +6,10 @@ mod window;
 
 mod axis_window;
 mod barrel;
+mod bench;
 mod session;
 mod solid_window;
 mod studio;
+mod study;
 mod trade;
 mod work;

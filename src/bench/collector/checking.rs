@@ -83,7 +83,8 @@ impl Collector {
         }
         tell(News::Note(format!("moved {why}")));
         let mut plan = VecDeque::from(std::mem::take(&mut self.check.since));
-        let doubted = plan.len();
+        let discarded: Vec<usize> = plan.iter().map(|(number, _)| *number).collect();
+        let doubted = discarded.len();
         let failed = std::mem::take(&mut self.check.failed);
         plan.extend(failed.into_iter().map(|(number, at, _)| (number, at)));
         self.failures = 0;
@@ -92,7 +93,7 @@ impl Collector {
         self.check.begun = false;
         if doubted > 0 {
             self.check.every = (doubted / 2).max(1);
-            tell(News::Discarded(doubted));
+            tell(News::Discarded(discarded));
         }
         doubted
     }

@@ -35,6 +35,8 @@ impl Collector {
             Some((number, _)) if !self.check.now => format!("press {number}"),
             _ => "check".into(),
         };
+        let number = self.plan.front().map(|(number, _)| *number);
+        tell(News::Begun(number.filter(|_| !self.check.now)));
         let (p, n) = (planned.at * 1e3, planned.normal);
         tell(News::Note(format!(
             "{what} {:.4} {:.4} {:.4} {:.5} {:.5} {:.5}",

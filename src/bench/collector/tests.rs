@@ -111,7 +111,7 @@ impl Bench<'_> {
                     number,
                     failed: None,
                 } => self.pressed.push((*number, self.place)),
-                News::Discarded(count) => self.pressed.truncate(self.pressed.len() - count),
+                News::Discarded(none) => self.pressed.truncate(self.pressed.len() - none.len()),
                 _ => {}
             }
         }

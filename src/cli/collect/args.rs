@@ -9,6 +9,7 @@ use crate::cli::common::Common;
 use crate::cli::ranges::{between, whole};
 use crate::design::Workshop;
 use crate::link::BAUD;
+use crate::test_bed::{Asked, Flaws};
 
 #[derive(Args, Debug, Clone)]
 pub struct CollectArgs {
@@ -86,4 +87,30 @@ pub struct FaultArgs {
     /// How far the limb really stands from where it should (mm, across the table).
     #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub askew: f64,
+}
+
+impl CollectArgs {
+    /// What is asked of the run.
+    pub(super) fn asked(&self) -> Asked {
+        let faults = &self.faults;
+        let flaws = || Flaws {
+            workshop: faults.workshop,
+            lose: faults.lose,
+            garble: faults.garble,
+            reset: faults.reset,
+            stall: faults.stall,
+            askew_mm: faults.askew,
+        };
+        Asked {
+            machine: self.machine.clone(),
+            places: self.places,
+            points: self.points.clone(),
+            step_mm: self.step,
+            depth_mm: self.depth,
+            force_n: self.force,
+            most_force_n: self.most_force,
+            check: self.check,
+            simulated: self.simulate.then(flaws),
+        }
+    }
 }

@@ -74,7 +74,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     );
     let bench = Bench::new(&folder.study, &folder.home())?;
     ensure!(
-        bench.fingerprint()? == folder.plan.base,
+        bench.base.fingerprint()? == folder.plan.base,
         "the base of the study has changed since it was planned: plan it anew into another folder"
     );
     let mut wanted = Vec::new();

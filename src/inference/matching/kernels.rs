@@ -82,61 +82,18 @@ wide! {
         for (((block, gluing_deviation), out), highest) in
             blocks.zip(scores.chunks_exact_mut(LANES)).zip(highest)
         {
-            let (mut s, mut d) = ([0.0_f32; LANES], [f32::MIN_POSITIVE; LANES]);
-            for (row, (&x, &w)) in block.chunks_exact(LANES).zip(reading.iter().zip(weights)) {
-                let trusted = if w > 0.0 { 1.0 } else { 0.0 };
-                for k in 0..LANES {
-                    s[k] += trusted * x * row[k];
-                    d[k] += trusted * row[k] * row[k];
+            let glued = Glued { templates: block, spreads: gluing_deviation, reading, weights, drift };
+            for (part, out) in out.chunks_exact_mut(PART).enumerate() {
+                let at = part * PART;
+                let mut force = glued.first_force(at, most);
+                for _ in 0..TURNS {
+                    let sums = glued.sums::<false>(at, &force);
+                    force = sums.force(most);
                 }
-            }
-            let mut force = [0.0_f32; LANES];
-            for k in 0..LANES {
-                force[k] = (s[k] / d[k]).max(0.0).min(most);
-            }
-            for turn in 0..=TURNS {
-                let (mut a, mut log) = ([0.0_f32; LANES], [0.0_f32; LANES]);
-                (s, d) = ([0.0_f32; LANES], [f32::MIN_POSITIVE; LANES]);
-                let (mut x_sum, mut g_sum) = ([0.0_f32; LANES], [0.0_f32; LANES]);
-                let mut w_sum = [0.0_f32; LANES];
-                let rows = block.chunks_exact(LANES).zip(gluing_deviation.chunks_exact(LANES));
-                for ((row, gluing_deviation), (&x, &w)) in rows.zip(reading.iter().zip(weights)) {
-                    let mut own = [0.0_f32; LANES];
-                    for k in 0..LANES {
-                        let off = force[k] * gluing_deviation[k];
-                        let wider = 1.0 + w * off * off;
-                        let w = w / wider;
-                        own[k] = w;
-                        s[k] += w * x * row[k];
-                        d[k] += w * row[k] * row[k];
-                        a[k] += w * x * x;
-                        log[k] += logarithm(wider);
-                    }
-                    if drift > 0.0 {
-                        for k in 0..LANES {
-                            x_sum[k] += own[k] * x;
-                            g_sum[k] += own[k] * row[k];
-                            w_sum[k] += own[k];
-                        }
-                    }
-                }
-                if drift > 0.0 {
-                    for k in 0..LANES {
-                        let wider = 1.0 + drift * w_sum[k];
-                        let taken = drift / wider;
-                        s[k] -= taken * x_sum[k] * g_sum[k];
-                        d[k] = (d[k] - taken * g_sum[k] * g_sum[k]).max(f32::MIN_POSITIVE);
-                        a[k] -= taken * x_sum[k] * x_sum[k];
-                        log[k] += logarithm(wider) - log_nothing;
-                    }
-                }
-                for k in 0..LANES {
-                    if turn == TURNS {
-                        let left = a[k] - force[k] * (2.0 * s[k] - force[k] * d[k]);
-                        out[k] = 0.5 * (nothing - left - log[k]);
-                    } else {
-                        force[k] = (s[k] / d[k]).max(0.0).min(most);
-                    }
+                let sums = glued.sums::<true>(at, &force);
+                for k in 0..PART {
+                    let left = sums.a[k] - force[k] * (2.0 * sums.s[k] - force[k] * sums.d[k]);
+                    out[k] = 0.5 * (nothing - left - (sums.log[k] - log_nothing));
                 }
             }
             *highest = f32::NEG_INFINITY;
@@ -144,5 +101,129 @@ wide! {
                 *highest = highest.max(out[k]);
             }
         }
+    }
+}
+
+/// Templates whose sums are held in registers at a time.
+const PART: usize = 32;
+const _: () = assert!(LANES.is_multiple_of(PART), "parts fill a block");
+
+/// A block of templates, what gluing spreads at each (a newton), and the reading that is compared with them.
+struct Glued<'a> {
+    templates: &'a [f32],
+    spreads: &'a [f32],
+    reading: &'a [f32],
+    weights: &'a [f32],
+    drift: f32,
+}
+
+/// Weighted sums of a part of a block: of reading times template, squares of templates, and, where they are asked for,
+/// squares of the reading and the logarithm of what variances have grown by.
+struct Sums {
+    s: [f32; PART],
+    d: [f32; PART],
+    a: [f32; PART],
+    log: [f32; PART],
+}
+
+impl Sums {
+    #[allow(
+        clippy::inline_always,
+        reason = "part of a loop that is compiled for several instruction sets"
+    )]
+    #[inline(always)]
+    fn force(&self, most: f32) -> [f32; PART] {
+        let mut force = [0.0; PART];
+        for k in 0..PART {
+            force[k] = (self.s[k] / self.d[k]).max(0.0).min(most);
+        }
+        force
+    }
+}
+
+#[allow(
+    clippy::inline_always,
+    reason = "parts of a loop that is compiled for several instruction sets"
+)]
+impl Glued<'_> {
+    /// The part of a channel's row that begins `at` a lane of the block.
+    #[inline(always)]
+    fn part(rows: &[f32], channel: usize, at: usize) -> &[f32; PART] {
+        let row = rows[channel * LANES + at..].first_chunk();
+        row.expect("blocks are whole")
+    }
+
+    /// The force that fits best where all channels are off alike.
+    #[inline(always)]
+    fn first_force(&self, at: usize, most: f32) -> [f32; PART] {
+        let mut sums = Sums {
+            s: [0.0; PART],
+            d: [f32::MIN_POSITIVE; PART],
+            a: [0.0; PART],
+            log: [0.0; PART],
+        };
+        for (channel, (&x, &w)) in self.reading.iter().zip(self.weights).enumerate() {
+            let trusted = if w > 0.0 { 1.0 } else { 0.0 };
+            let row = Self::part(self.templates, channel, at);
+            for k in 0..PART {
+                sums.s[k] += trusted * x * row[k];
+                sums.d[k] += trusted * row[k] * row[k];
+            }
+        }
+        sums.force(most)
+    }
+
+    /// The sums by the weights that a touch of these forces has.
+    #[inline(always)]
+    fn sums<const LAST: bool>(&self, at: usize, force: &[f32; PART]) -> Sums {
+        let (mut s, mut d) = ([0.0_f32; PART], [f32::MIN_POSITIVE; PART]);
+        let (mut a, mut log) = ([0.0_f32; PART], [0.0_f32; PART]);
+        let mut widened = [1.0_f32; PART];
+        let (mut x_sum, mut g_sum, mut w_sum) = ([0.0_f32; PART], [0.0_f32; PART], [0.0_f32; PART]);
+        let channels = self.reading.len();
+        for (channel, (&x, &w)) in self.reading.iter().zip(self.weights).enumerate() {
+            let row = Self::part(self.templates, channel, at);
+            let spread = Self::part(self.spreads, channel, at);
+            let mut own = [0.0_f32; PART];
+            for k in 0..PART {
+                let off = force[k] * spread[k];
+                let wider = 1.0 + w * off * off;
+                own[k] = w / wider;
+                let weighed = own[k] * row[k];
+                s[k] += weighed * x;
+                d[k] += weighed * row[k];
+                if LAST {
+                    a[k] += own[k] * x * x;
+                    widened[k] *= wider;
+                }
+            }
+            // A logarithm for two: of more, the product might leave the range.
+            if LAST && (channel % 2 == 1 || channel + 1 == channels) {
+                for k in 0..PART {
+                    log[k] += logarithm(widened[k]);
+                }
+                widened = [1.0; PART];
+            }
+            if self.drift > 0.0 {
+                for k in 0..PART {
+                    x_sum[k] += own[k] * x;
+                    g_sum[k] += own[k] * row[k];
+                    w_sum[k] += own[k];
+                }
+            }
+        }
+        if self.drift > 0.0 {
+            for k in 0..PART {
+                let wider = 1.0 + self.drift * w_sum[k];
+                let taken = self.drift / wider;
+                s[k] -= taken * x_sum[k] * g_sum[k];
+                d[k] = (d[k] - taken * g_sum[k] * g_sum[k]).max(f32::MIN_POSITIVE);
+                a[k] -= taken * x_sum[k] * x_sum[k];
+                if LAST {
+                    log[k] += logarithm(wider);
+                }
+            }
+        }
+        Sums { s, d, a, log }
     }
 }

@@ -29,12 +29,13 @@ pub enum Tab {
     Confusions,
     Reduction,
     Trade,
+    Study,
     Live,
     Jobs,
 }
 
 impl Tab {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Error,
         Self::Failures,
         Self::Compare,
@@ -42,6 +43,7 @@ impl Tab {
         Self::Confusions,
         Self::Reduction,
         Self::Trade,
+        Self::Study,
         Self::Live,
         Self::Jobs,
     ];
@@ -56,6 +58,7 @@ impl Tab {
             Self::Confusions => "Confusions",
             Self::Reduction => "Reduction",
             Self::Trade => "Trade",
+            Self::Study => "Study",
             Self::Live => "Strains",
             Self::Jobs => "Jobs",
         }

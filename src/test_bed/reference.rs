@@ -1,36 +1,35 @@
 //! Which place is pressed again and again: where the gauges see best whether the tip stands beside it.
 
+use std::path::Path;
+
 use glam::DVec3;
 
-use super::args::CollectArgs;
+use super::asked::Asked;
 use super::places::reached;
-use crate::bench::{Planned, Reference};
-use crate::design::Sensing;
+use crate::bench::{Machine, Mount, Planned, Reference};
+use crate::design::{Inputs, Sensing};
 use crate::elasticity::Touch;
 use crate::io::bench_folder;
-use crate::io::machine_file::MachineFile;
-use crate::io::project_file::LoadedProject;
 
 /// Places that are looked at for it.
 const CANDIDATES: usize = 200;
 
 /// The reference of a run; nothing where none is wanted, or no place answers to the gauges.
 pub(super) fn reference(
-    args: &CollectArgs,
-    loaded: &LoadedProject,
+    asked: &Asked,
+    folder: &Path,
+    inputs: &Inputs,
     sensing: &Sensing,
-    file: &MachineFile,
+    (machine, mount): (&Machine, &Mount),
 ) -> anyhow::Result<Option<Reference>> {
-    if args.check == 0 {
+    if asked.check == 0 {
         return Ok(None);
     }
-    let inputs = &loaded.inputs;
     let seed = inputs.project.budget.seed;
     let touches = sensing.touches(inputs, CANDIDATES, seed, true)?;
     let places: Vec<DVec3> = touches.iter().map(|t| t.position).collect();
-    let reach = reached(&places, loaded, sensing, file, &mut |_| {})?;
-    let radius = file.machine.tip_radius;
-    let tells = |planned: &Planned| tells(sensing, planned, radius);
+    let reach = reached(&places, sensing, machine, mount)?;
+    let tells = |planned: &Planned| tells(sensing, planned, machine.tip_radius);
     let scored = reach.presses.iter().map(|p| (tells(p), p));
     let best = scored.max_by(|a, b| a.0.total_cmp(&b.0));
     let Some((_, at)) = best.filter(|(change, _)| *change > 0.0) else {
@@ -38,8 +37,8 @@ pub(super) fn reference(
     };
     Ok(Some(Reference {
         at: *at,
-        every: args.check,
-        answer: bench_folder::read_answer(&args.out)?,
+        every: asked.check,
+        answer: bench_folder::read_answer(folder)?,
     }))
 }
 

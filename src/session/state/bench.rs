@@ -1,0 +1,211 @@
+//! A run of the test-bed: what is planned of it, how each press stands, and who gives it orders.
+
+use std::path::PathBuf;
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::bench::{Ended, News};
+use crate::document::SensingInputs;
+use crate::link::BenchOrder;
+use crate::test_bed::{Asked, Ready};
+
+/// What is typed at the bench, none of it a project's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BenchDesk {
+    pub asked: Asked,
+    /// Of the run: beside the project where it is empty.
+    pub folder: String,
+    /// The machine's file: the paper's bench where it is empty.
+    pub machine: String,
+    /// A table of places: even ones where it is empty.
+    pub points: String,
+    /// Ports of a real bench.
+    pub printer: String,
+    pub board: String,
+    pub printer_baud: u32,
+}
+
+impl Default for BenchDesk {
+    fn default() -> Self {
+        Self {
+            // Nothing moves that is not asked for by its port.
+            asked: Asked {
+                simulated: Some(crate::test_bed::Flaws::default()),
+                ..Asked::default()
+            },
+            folder: String::new(),
+            machine: String::new(),
+            points: String::new(),
+            printer: String::new(),
+            board: String::new(),
+            printer_baud: crate::link::BAUD,
+        }
+    }
+}
+
+/// What a plan is of.
+#[derive(Clone, PartialEq)]
+pub struct PlanInputs {
+    pub sensing: SensingInputs,
+    pub asked: Asked,
+    pub folder: PathBuf,
+}
+
+/// How a press stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PressState {
+    ToCome,
+    Now,
+    Made,
+    Failed(String),
+}
+
+/// A plan, and how far it has come.
+pub struct Pressing {
+    pub inputs: PlanInputs,
+    pub ready: Arc<Ready>,
+    /// In the order of its presses.
+    pub states: Vec<PressState>,
+    /// What was last said of it, the newest last.
+    pub said: Vec<String>,
+    /// Of what was pressed: that which is pressed again and again is pressed just now.
+    pub checking: bool,
+    /// Whether the tip may be anywhere but out of the way.
+    pub goes_on: bool,
+}
+
+impl Pressing {
+    /// How many words of it are kept.
+    const SAID: usize = 6;
+
+    pub(in crate::session) fn new(inputs: PlanInputs, ready: Arc<Ready>) -> Self {
+        let state = |number: &usize| {
+            if ready.done.contains(number) {
+                PressState::Made
+            } else {
+                PressState::ToCome
+            }
+        };
+        Self {
+            inputs,
+            states: ready.numbers.iter().map(state).collect(),
+            said: Vec::new(),
+            checking: false,
+            goes_on: false,
+            ready,
+        }
+    }
+
+    /// Presses that were made, and that failed.
+    #[must_use]
+    pub fn made_and_failed(&self) -> [usize; 2] {
+        let count =
+            |which: fn(&PressState) -> bool| self.states.iter().filter(|s| which(s)).count();
+        [
+            count(|s| *s == PressState::Made),
+            count(|s| matches!(s, PressState::Failed(_))),
+        ]
+    }
+
+    pub(in crate::session) fn say(&mut self, text: impl Into<String>) {
+        self.said.push(text.into());
+        if self.said.len() > Self::SAID {
+            self.said.remove(0);
+        }
+    }
+
+    fn set(&mut self, number: usize, state: PressState) {
+        // Numbers rise with the order of the presses.
+        if let Ok(k) = self.ready.numbers.binary_search(&number) {
+            self.states[k] = state;
+        }
+    }
+
+    /// Nothing is pressed just now.
+    fn let_go(&mut self) {
+        self.checking = false;
+        for state in &mut self.states {
+            if *state == PressState::Now {
+                *state = PressState::ToCome;
+            }
+        }
+    }
+
+    pub(in crate::session) fn hear(&mut self, news: News) {
+        match news {
+            News::Begun(number) => {
+                self.let_go();
+                match number {
+                    Some(number) => self.set(number, PressState::Now),
+                    None => self.checking = true,
+                }
+            }
+            News::Press { number, failed } => {
+                let state = failed.map_or(PressState::Made, PressState::Failed);
+                self.set(number, state);
+            }
+            News::Discarded(numbers) => {
+                for number in numbers {
+                    self.set(number, PressState::ToCome);
+                }
+            }
+            News::Say(text) => self.say(text),
+            News::Answer(_) | News::Note(_) | News::Keep => {}
+        }
+    }
+
+    pub(in crate::session) fn end(&mut self, ended: &Ended) {
+        self.let_go();
+        self.goes_on = false;
+        match ended {
+            Ended::Finished => self.say("all presses were tried"),
+            Ended::Stopped(why) => self.say(why),
+        }
+    }
+}
+
+/// The bench: its plan, shared with whoever goes through it, and who gives that orders.
+#[derive(Default)]
+pub struct Bench {
+    pub(in crate::session) pressing: Arc<Mutex<Option<Pressing>>>,
+    pub(in crate::session) orders: Option<Sender<BenchOrder>>,
+    pub paused: bool,
+}
+
+impl Bench {
+    pub(in crate::session) fn locked(&self) -> MutexGuard<'_, Option<Pressing>> {
+        locked(&self.pressing)
+    }
+
+    /// What is planned, and how far it has come.
+    #[must_use]
+    pub fn look<T>(&self, at: impl FnOnce(&Pressing) -> T) -> Option<T> {
+        self.locked().as_ref().map(at)
+    }
+
+    /// Whether a machine may be moving.
+    #[must_use]
+    pub fn goes_on(&self) -> bool {
+        self.look(|p| p.goes_on) == Some(true)
+    }
+
+    /// Tells whoever presses.
+    pub(in crate::session) fn order(&mut self, order: BenchOrder) {
+        match order {
+            BenchOrder::Pause => self.paused = true,
+            BenchOrder::Resume => self.paused = false,
+            BenchOrder::Stop | BenchOrder::Kill => {}
+        }
+        if let Some(orders) = &self.orders {
+            // Nobody is there any more to be told once it has ended.
+            let _ = orders.send(order);
+        }
+    }
+}
+
+/// What others have left of it, whatever befell them.
+pub(in crate::session) fn locked(
+    pressing: &Mutex<Option<Pressing>>,
+) -> MutexGuard<'_, Option<Pressing>> {
+    pressing.lock().unwrap_or_else(PoisonError::into_inner)
+}

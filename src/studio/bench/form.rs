@@ -1,0 +1,199 @@
+//! What is pressed and by what, and how that goes.
+
+use egui::{Color32, DragValue, RichText, TextEdit, Ui};
+
+use super::super::ask::Ask;
+use super::super::commands::Command;
+use super::super::form::{counted, quantity, rows};
+use super::super::theme;
+use crate::plain;
+use crate::session::{BenchDesk, PressState, Pressing};
+use crate::test_bed::{Asked, Flaws};
+
+/// Failed presses that are named.
+const NAMED: usize = 5;
+
+/// The settings, the orders, and what came of them.
+pub fn bench_form(ask: &mut Ask<'_>, ui: &mut Ui) {
+    let goes_on = ask.session.bench.goes_on();
+    ui.add_enabled_ui(!goes_on, |ui| {
+        ask.edit_desk(|desk| {
+            let baud = &mut desk.baud;
+            let desk = &mut desk.bench;
+            machine_rows(ui, desk, baud);
+            press_rows(ui, &mut desk.asked);
+            file_rows(ui, desk);
+        });
+    });
+    let folder = ask.session.bench_folder();
+    ui.weak(format!("Into {}", folder.display()));
+    ui.add_space(6.0);
+    ui.horizontal_wrapped(|ui| {
+        ask.button(ui, Command::PlanPresses);
+        ask.button(ui, Command::PressPlan);
+    });
+    ui.horizontal_wrapped(|ui| {
+        ask.button(ui, Command::PausePresses);
+        ask.button(ui, Command::StopPresses);
+    });
+    halt_button(ask, ui);
+    ui.add_space(6.0);
+    if ask.session.bench.look(|plan| progress(ui, plan)).is_none() {
+        ui.weak("Nothing is planned yet. “Plan presses” shows on the limb what the machine gets to; nothing moves before “Press the plan”");
+    } else if !ask.session.plan_holds() && !goes_on {
+        let text = "The plan is of other settings or gauges: plan anew";
+        ui.colored_label(theme::STALE, text);
+    }
+}
+
+/// The emergency stop, which must be found without looking for it.
+fn halt_button(ask: &mut Ask<'_>, ui: &mut Ui) {
+    let command = Command::HaltMachine;
+    let enabled = ask.enabled(command);
+    let mut text = RichText::new(command.name()).strong();
+    if enabled {
+        text = text.color(Color32::WHITE);
+    }
+    let mut button = egui::Button::new(text).min_size(egui::vec2(ui.available_width(), 30.0));
+    if enabled {
+        button = button.fill(Color32::from_rgb(176, 42, 48));
+    }
+    if let Some(shortcut) = command.shortcut() {
+        button = button.shortcut_text(ui.ctx().format_shortcut(&shortcut));
+    }
+    let button = ui
+        .add_enabled(enabled, button)
+        .on_hover_text(command.tooltip())
+        .on_disabled_hover_text(command.tooltip());
+    if button.clicked() {
+        ask.command(command);
+    }
+}
+
+fn machine_rows(ui: &mut Ui, desk: &mut BenchDesk, baud: &mut u32) {
+    rows(ui, "Machine", |ui| {
+        text_row(ui, "Machine file", &mut desk.machine, "the paper's bench");
+        let mut simulated = desk.asked.simulated.is_some();
+        let name = ui.label("Simulated");
+        ui.checkbox(&mut simulated, "")
+            .on_hover_text("Printer, limb as a workshop builds it, and board are computed, as fast as that goes")
+            .labelled_by(name.id)
+            .accessible_name("Simulated bench");
+        ui.end_row();
+        if simulated != desk.asked.simulated.is_some() {
+            desk.asked.simulated = simulated.then(Flaws::default);
+        }
+        if simulated {
+            return;
+        }
+        text_row(ui, "Printer", &mut desk.printer, "port or host:port");
+        baud_row(ui, "Printer's baud", &mut desk.printer_baud);
+        text_row(ui, "Board", &mut desk.board, "port or host:port");
+        baud_row(ui, "Board's baud", baud);
+    });
+}
+
+fn baud_row(ui: &mut Ui, label: &str, baud: &mut u32) {
+    let name = ui.label(label);
+    ui.add(DragValue::new(baud).range(300..=4_000_000).speed(100.0))
+        .labelled_by(name.id)
+        .on_hover_text("Native USB does not care");
+    ui.end_row();
+}
+
+fn text_row(ui: &mut Ui, label: &str, text: &mut String, hint: &str) {
+    let name = ui.label(label);
+    let field = TextEdit::singleline(text)
+        .desired_width(150.0)
+        .hint_text(hint);
+    ui.add(field).labelled_by(name.id);
+    ui.end_row();
+}
+
+fn press_rows(ui: &mut Ui, asked: &mut Asked) {
+    rows(ui, "Presses", |ui| {
+        counted(
+            ui,
+            "Places",
+            &mut asked.places,
+            1..=100_000,
+            "Evenly over what touches get to",
+        );
+        let mut length = |label, value: &mut f64, range, help| {
+            quantity(ui, label, value, range, 0.01, "mm", help);
+        };
+        length(
+            "Step",
+            &mut asked.step_mm,
+            0.01..=5.0,
+            "Between two readings",
+        );
+        length(
+            "Depth",
+            &mut asked.depth_mm,
+            0.01..=50.0,
+            "From where a place is first felt",
+        );
+        let mut force = |label, value: &mut f64, help| {
+            quantity(ui, label, value, 0.1..=1e4, 0.5, "N", help);
+        };
+        force("Enough", &mut asked.force_n, "The force that is enough");
+        force(
+            "At most",
+            &mut asked.most_force_n,
+            "The force at which the machine stops and takes its tip back",
+        );
+        counted(
+            ui,
+            "Check after",
+            &mut asked.check,
+            0..=100_000,
+            "Presses between two of one place that is pressed again and again, so that lost steps are noticed; 0 for never",
+        );
+    });
+}
+
+fn file_rows(ui: &mut Ui, desk: &mut BenchDesk) {
+    rows(ui, "Files", |ui| {
+        text_row(ui, "Places from", &mut desk.points, "even ones (or a .csv)");
+        text_row(ui, "Folder", &mut desk.folder, "presses");
+    });
+}
+
+/// What is planned, how far it has come, and what was said of it.
+fn progress(ui: &mut Ui, plan: &Pressing) {
+    let [made, failed] = plan.made_and_failed();
+    let all = plan.states.len();
+    let share = (made + failed) as f32 / all.max(1) as f32;
+    let words = if plan.checking {
+        format!("{made} of {all} presses · checking")
+    } else {
+        format!("{made} of {all} presses")
+    };
+    ui.add(egui::ProgressBar::new(share).text(words));
+    let wrapped = |ui: &mut Ui, text: String| {
+        ui.add(egui::Label::new(RichText::new(text).size(11.5).weak()).wrap());
+    };
+    for line in plan.ready.in_words() {
+        wrapped(ui, line);
+    }
+    wrapped(ui, plan.ready.checked_in_words());
+    for line in &plan.said {
+        ui.add(egui::Label::new(line).wrap());
+    }
+    let why = plan
+        .states
+        .iter()
+        .enumerate()
+        .filter_map(|(k, state)| match state {
+            PressState::Failed(why) => Some((k, why)),
+            _ => None,
+        });
+    for (k, why) in why.take(NAMED) {
+        ui.colored_label(theme::ERROR, format!("Press {}: {why}", k + 1));
+    }
+    if failed > NAMED {
+        let more = plain::either(failed - NAMED, "more press", "more presses");
+        ui.colored_label(theme::ERROR, format!("{more} failed"));
+    }
+}

@@ -1,0 +1,16 @@
+//! A run of the test-bed: what is asked for, made ready from a project, and gone on with where it was left.
+//!
+//! A [`Run`] is cheap: it says whether a folder can be begun in, or gone on with. What is pressed takes the model of the
+//! gauges ([`Ready`]); a [`Collector`](crate::bench::Collector) then goes through it at real ports ([`Ready::press_at`]) or
+//! on a simulated bench ([`Ready::press_simulated`]).
+
+mod asked;
+mod places;
+mod ready;
+mod reference;
+mod run;
+mod simulated;
+
+pub use asked::{Asked, Flaws};
+pub use ready::{Ready, pressed};
+pub use run::Run;

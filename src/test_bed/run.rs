@@ -1,0 +1,104 @@
+//! A run before its gauges are known: its machine, its settings, and whether its folder is of them.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::ensure;
+
+use super::asked::Asked;
+use crate::design::Inputs;
+use crate::io::bench_folder::{About, limb_key};
+use crate::io::machine_file::{self, MachineFile};
+use crate::io::source;
+
+/// What is to be pressed into a folder.
+pub struct Run {
+    pub(super) asked: Asked,
+    pub(super) folder: PathBuf,
+    pub(super) about: About,
+    pub(super) file: MachineFile,
+    /// Whether the folder holds a part of it already.
+    pub begun: bool,
+}
+
+impl Run {
+    /// Of a project, into a folder that is there.
+    ///
+    /// # Errors
+    /// A message in the user's terms: no gauges, a machine that cannot be read, limits that do not go together, or a folder
+    /// that something else was begun in.
+    pub fn new(asked: Asked, inputs: &Inputs, folder: &Path) -> anyhow::Result<Self> {
+        let (about, file) = about(&asked, inputs)?;
+        let before = About::read(folder)?;
+        if let Some(before) = &before {
+            same(before, &about, folder)?;
+        }
+        Ok(Self {
+            asked,
+            folder: folder.to_owned(),
+            about,
+            file,
+            begun: before.is_some(),
+        })
+    }
+}
+
+/// What is written of it, and its machine.
+fn about(asked: &Asked, inputs: &Inputs) -> anyhow::Result<(About, MachineFile)> {
+    let project = &inputs.project;
+    let gauges = project.selection.sites.len();
+    ensure!(
+        gauges > 0,
+        "the project has no gauges yet: choose them first (hapdef design)"
+    );
+    ensure!(
+        asked.force_n < asked.most_force_n,
+        "the force that is enough, {} N, must be less than that at which the machine stops, {} N",
+        asked.force_n,
+        asked.most_force_n
+    );
+    let (text, mut file) = if let Some(path) = &asked.machine {
+        (source::read_text(path)?, machine_file::read(path)?)
+    } else {
+        let file = machine_file::parse(machine_file::PAPER).map_err(anyhow::Error::msg)?;
+        (machine_file::PAPER.to_owned(), file)
+    };
+    if asked.simulated.is_some()
+        && let Some(sensor) = &mut file.machine.sensor
+    {
+        // The simulated board has its force sensor behind the gauges.
+        sensor.channel = gauges;
+    }
+    let settings = project.live.settings(gauges);
+    let about = About {
+        format: About::format(),
+        limb: limb_key(inputs),
+        machine: text,
+        seed: project.budget.seed,
+        step_mm: asked.step_mm,
+        depth_mm: asked.depth_mm,
+        force_n: asked.force_n,
+        most_force_n: asked.most_force_n,
+        channels: settings.channels,
+        gauge_factor: settings.chain.gauge_factor,
+        active_arms: settings.chain.active_arms,
+        simulated: asked.simulated.is_some(),
+    };
+    Ok((about, file))
+}
+
+/// A run is gone on with only as it was begun.
+fn same(before: &About, now: &About, folder: &Path) -> anyhow::Result<()> {
+    let what = if before.limb != now.limb {
+        "another limb or other gauges"
+    } else if before.machine != now.machine {
+        "another machine file"
+    } else if before != now {
+        "other settings (seed, step, depth, forces, channels, or simulated and not)"
+    } else {
+        return Ok(());
+    };
+    anyhow::bail!(
+        "{}: a run was begun there with {what}. Name another folder, or go on as it was begun",
+        folder.display()
+    )
+}

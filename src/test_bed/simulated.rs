@@ -1,0 +1,101 @@
+//! A simulated bench: printer, limb as a workshop builds it, and board.
+
+use glam::DVec3;
+
+use super::asked::Flaws;
+use super::ready::Ready;
+use crate::bench::{Collector, Contact, Ended, News, PrinterFaults, SimulatedPrinter};
+use crate::board::{Faults, Options, Script, SimulatedBoard};
+use crate::budget::Watch;
+use crate::design::DesignError;
+use crate::design::simulated_board::{gives_way, options, simulated};
+use crate::elasticity::Touch;
+use crate::link::{BenchOrder, press_simulated};
+
+/// Of the printer's faults, beside the project's.
+const SEED: u64 = 0xbe7c;
+
+/// A printer's frame with a force sensor on it: 50 N/mm.
+const MACHINE_GIVES: f64 = 2e-5;
+
+/// Presses what is left.
+pub(super) fn press(
+    ready: &Ready,
+    flaws: &Flaws,
+    collector: &mut Collector,
+    watch: Watch,
+    orders: &mut dyn FnMut() -> Option<BenchOrder>,
+    tell: impl FnMut(News),
+) -> anyhow::Result<Ended> {
+    let machine = &ready.machine;
+    let touches: Vec<Touch> = (ready.reach.presses.iter())
+        .map(|press| Touch {
+            position: press.at,
+            normal: press.normal,
+            force: 1.0,
+            tip_radius: machine.tip_radius,
+        })
+        .collect();
+    let (gives, board) = built(ready, flaws, &touches, watch)?;
+    let mut mount = ready.mount;
+    mount.shift += DVec3::new(1.0, 1.0, 0.0).normalize() * flaws.askew_mm * 1e-3;
+    let contact = Contact {
+        surface: &ready.sensing.drawn.map.mesh,
+        mount,
+        machine,
+        machine_gives: MACHINE_GIVES,
+        gives: touches.iter().map(|t| t.position).zip(gives).collect(),
+    };
+    let printer = printer(ready, flaws, collector.left());
+    let recorder = ready.recorder()?;
+    let bench = (printer, &contact);
+    press_simulated(collector, bench, board, recorder, orders, tell).map_err(anyhow::Error::msg)
+}
+
+/// How far the limb gives way at these touches (m/N), and the board that reads its gauges.
+fn built(
+    ready: &Ready,
+    flaws: &Flaws,
+    touches: &[Touch],
+    watch: Watch,
+) -> Result<(Vec<f64>, SimulatedBoard), DesignError> {
+    let (inputs, sensing) = (&ready.inputs, &*ready.sensing);
+    let gives = gives_way(inputs, sensing, touches, watch)?;
+    let options = Options {
+        tip_n: ready.machine.sensor.map(|s| s.newton_per_count),
+        ..options(inputs, sensing.gauges.len() + 1)
+    };
+    let board = simulated(
+        inputs,
+        sensing,
+        flaws.workshop,
+        Script::Held(None, 0),
+        ready.asked.most_force_n,
+        options,
+        Faults::default(),
+        watch,
+    )?;
+    Ok((gives, board))
+}
+
+fn printer(ready: &Ready, flaws: &Flaws, left: usize) -> SimulatedPrinter {
+    let faults = PrinterFaults {
+        lose: flaws.lose,
+        lose_answer: flaws.lose,
+        garble: flaws.garble,
+        garble_answer: flaws.garble,
+        reset: flaws.reset,
+        stall: flaws.stall,
+    };
+    let machine = &ready.machine;
+    let axes = [
+        Some(&machine.radial),
+        Some(&machine.along),
+        Some(&machine.rotary),
+        machine.lateral.as_ref(),
+    ];
+    let at = axes.into_iter().flatten().map(|axis| (axis.letter, 0.0));
+    // What goes wrong in one run of it is not what went wrong in the last.
+    let seed = ready.inputs.project.budget.seed;
+    SimulatedPrinter::new(at, faults, seed ^ SEED ^ ((left as u64) << 32))
+}

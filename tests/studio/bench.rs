@@ -1,0 +1,147 @@
+//! The stage “Bench” in the real window, on a simulated bench.
+#![cfg(feature = "studio")]
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use hapdef::budget::Quality;
+use hapdef::session::PressState;
+use hapdef::studio::{Stage, Standing};
+use hapdef::test_bed::pressed;
+
+use crate::window;
+use window::Window;
+
+const PLACES: usize = 24;
+
+/// The bundled limb at the bench, into a folder.
+fn at_the_bench(folder: &Path) -> Window {
+    let mut w = Window::open();
+    let session = w.session_mut();
+    session.document.state.project.budget.quality = Quality::Draft;
+    session.desk.bench.folder = folder.display().to_string();
+    session.desk.bench.asked.places = PLACES;
+    w.harness.run_ok();
+    w.stage("Bench");
+    w
+}
+
+fn made(w: &Window) -> usize {
+    w.session()
+        .bench
+        .look(|p| p.made_and_failed()[0])
+        .unwrap_or(0)
+}
+
+fn standing(w: &Window) -> Standing {
+    w.harness.state().standing(Stage::Bench)
+}
+
+#[test]
+fn a_run_is_planned_paused_stopped_and_gone_on_with() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("run");
+    let mut w = at_the_bench(&folder);
+    assert_eq!(standing(&w), Standing::Open);
+    w.press("Plan presses");
+    w.wait("the plan", 240, |s| s.session.bench.look(|_| ()).is_some());
+    let all = w.session().bench.look(|p| p.states.len()).unwrap();
+    assert!((PLACES * 2 / 3..=PLACES).contains(&all), "{all} places");
+    assert!(made(&w) == 0 && standing(&w) == Standing::Open);
+    w.show("bench-plan");
+
+    w.press("Press the plan");
+    w.wait("some presses", 240, |s| {
+        s.session.bench.look(|p| p.made_and_failed()[0] >= 5) == Some(true)
+    });
+    assert_eq!(standing(&w), Standing::Running);
+    w.press("Pause pressing");
+    // The one that goes on is ended, and none is begun.
+    w.wait("the pause", 60, |s| {
+        s.session
+            .bench
+            .look(|p| !p.checking && !p.states.contains(&PressState::Now))
+            == Some(true)
+    });
+    let before = made(&w);
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_millis(700) {
+        w.harness.step();
+    }
+    assert!(w.session().bench.goes_on() && made(&w) == before);
+    w.show("bench-paused");
+
+    w.press("Pause pressing");
+    w.wait("more presses", 60, |s| {
+        s.session.bench.look(|p| p.made_and_failed()[0] > before) == Some(true)
+    });
+    w.press("Stop pressing");
+    w.wait("the stop", 60, |s| !s.session.bench.goes_on() && !s.busy());
+    let said = w.session().bench.look(|p| p.said.join("; ")).unwrap();
+    assert!(said.contains("stopped by hand"), "{said}");
+    // What the folder holds is what the window believes, but for what was not checked yet.
+    let kept = pressed(&folder).unwrap().len();
+    assert!(
+        kept <= made(&w) && made(&w) < all,
+        "{kept} of {} of {all}",
+        made(&w)
+    );
+
+    w.press("Press the plan");
+    w.wait("all presses", 240, |s| {
+        !s.busy()
+            && s.session
+                .bench
+                .look(|p| p.made_and_failed()[0] == p.states.len())
+                == Some(true)
+    });
+    assert_eq!(pressed(&folder).unwrap().len(), all);
+    assert_eq!(standing(&w), Standing::Current);
+    w.show("bench-pressed");
+
+    // Other gauges are another run: it is not mixed into this one.
+    w.session_mut().document.state.project.selection.sites.pop();
+    w.harness.run_ok();
+    assert_eq!(standing(&w), Standing::Stale);
+    w.press("Plan presses");
+    w.wait("the refusal", 240, |s| !s.busy());
+    let news = &w.session().news.messages;
+    assert!(
+        news.iter().any(|m| m.text.contains("other gauges")),
+        "{news:?}"
+    );
+    assert_eq!(pressed(&folder).unwrap().len(), all);
+}
+
+#[test]
+fn the_emergency_stop_works_at_any_moment_and_leaving_takes_the_tip_back() {
+    let home = tempfile::tempdir().unwrap();
+    let mut w = at_the_bench(&home.path().join("run"));
+    w.press("Press the plan");
+    w.wait("a press", 240, |s| {
+        s.session.bench.goes_on() && {
+            s.session
+                .bench
+                .look(|p| p.states.contains(&PressState::Now))
+                == Some(true)
+        }
+    });
+    let keys = egui::Modifiers::COMMAND | egui::Modifiers::SHIFT;
+    w.key(keys, egui::Key::X);
+    w.wait("the halt", 30, |s| !s.session.bench.goes_on());
+    let said = w.session().bench.look(|p| p.said.join("; ")).unwrap();
+    assert!(said.contains("M112"), "{said}");
+    w.wait("the end of the job", 30, |s| !s.busy());
+
+    w.press("Press the plan");
+    w.wait("a press", 240, |s| {
+        s.session
+            .bench
+            .look(|p| p.states.contains(&PressState::Now))
+            == Some(true)
+    });
+    w.session_mut().leave_bench();
+    assert!(!w.session().bench.goes_on());
+    let said = w.session().bench.look(|p| p.said.join("; ")).unwrap();
+    assert!(said.contains("stopped by hand"), "{said}");
+}
