@@ -2,7 +2,7 @@
 //!
 //! A [`Run`] is cheap: it says whether a folder can be begun in, or gone on with. What is pressed takes the model of the
 //! gauges ([`Ready`]); a [`Collector`](crate::bench::Collector) then goes through it at real ports ([`Ready::press_at`]) or
-//! on a simulated bench ([`Ready::press_simulated`]).
+//! on a simulated bench ([`press_on_simulated`]).
 
 mod asked;
 mod places;
@@ -14,3 +14,4 @@ mod simulated;
 pub use asked::{Asked, Flaws};
 pub use ready::{Ready, pressed};
 pub use run::Run;
+pub use simulated::press_on_simulated;

@@ -18,7 +18,7 @@ use super::spared::Spared;
 use crate::bench::{Collector, Ended, News};
 use crate::link::{Address, BenchOrder, Pace};
 use crate::plain;
-use crate::test_bed::{Ready, Run, pressed};
+use crate::test_bed::{Ready, Run, press_on_simulated, pressed};
 
 /// Runs the command.
 ///
@@ -118,7 +118,7 @@ fn press(
         let bar = Bar::default();
         let pressing = || {
             let watch = |p| bar.show(p);
-            ready.press_simulated(collector, &watch, &mut || None, tell)
+            press_on_simulated(ready, collector, &watch, &mut || None, tell)
         };
         let ended = args.common.in_pool(pressing);
         bar.finish();

@@ -15,7 +15,7 @@ use crate::design::{Inputs, Sensing};
 use crate::io::kept_model;
 use crate::job::{Reporter, Stop};
 use crate::link::{Address, BenchOrder, Pace};
-use crate::test_bed::{Asked, Ready, Run};
+use crate::test_bed::{Asked, Ready, Run, press_on_simulated};
 
 impl Session {
     /// Chooses where is pressed, and shows it. Nothing moves.
@@ -247,5 +247,5 @@ fn press(
         return ready.press_at(&mut collector, (printer, board), &mut orders, tell);
     }
     let watch = |p| r.report(p);
-    ready.press_simulated(&mut collector, &watch, &mut orders, tell)
+    press_on_simulated(ready, &mut collector, &watch, &mut orders, tell)
 }

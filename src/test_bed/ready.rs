@@ -11,9 +11,7 @@ use super::asked::Asked;
 use super::places::{places, reached};
 use super::reference::reference;
 use super::run::Run;
-use super::simulated;
 use crate::bench::{Collector, Ended, Limits, Machine, Mount, News, Planned, Reach, Reference};
-use crate::budget::Watch;
 use crate::design::{Inputs, Sensing};
 use crate::io::bench_folder;
 use crate::link::{Address, BenchOrder, Recorder, bench_presses, press_at_ports};
@@ -168,21 +166,6 @@ impl Ready {
     ) -> anyhow::Result<Ended> {
         let recorder = self.recorder()?;
         press_at_ports(collector, ports, recorder, orders, tell).map_err(anyhow::Error::msg)
-    }
-
-    /// Presses on a simulated bench, as fast as that can be computed.
-    ///
-    /// # Errors
-    /// As for the model of the simulated board, or when the recording cannot be written.
-    pub fn press_simulated(
-        &self,
-        collector: &mut Collector,
-        watch: Watch,
-        orders: &mut dyn FnMut() -> Option<BenchOrder>,
-        tell: impl FnMut(News),
-    ) -> anyhow::Result<Ended> {
-        let flaws = self.asked.simulated.clone().unwrap_or_default();
-        simulated::press(self, &flaws, collector, watch, orders, tell)
     }
 
     /// In a few words, for people: what is pressed and what is left out, a line each.

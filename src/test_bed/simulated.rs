@@ -18,15 +18,19 @@ const SEED: u64 = 0xbe7c;
 /// A printer's frame with a force sensor on it: 50 N/mm.
 const MACHINE_GIVES: f64 = 2e-5;
 
-/// Presses what is left.
-pub(super) fn press(
+/// Presses what is left of a run on a simulated bench, as fast as that can be computed. `orders` is asked for the next one
+/// at every look.
+///
+/// # Errors
+/// As for the model of the simulated board, or when the recording cannot be written.
+pub fn press_on_simulated(
     ready: &Ready,
-    flaws: &Flaws,
     collector: &mut Collector,
     watch: Watch,
     orders: &mut dyn FnMut() -> Option<BenchOrder>,
     tell: impl FnMut(News),
 ) -> anyhow::Result<Ended> {
+    let flaws = &ready.asked.simulated.clone().unwrap_or_default();
     let machine = &ready.machine;
     let touches: Vec<Touch> = (ready.reach.presses.iter())
         .map(|press| Touch {

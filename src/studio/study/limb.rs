@@ -39,9 +39,14 @@ fn drawn(limb: &UnitLimb) -> Mesh {
     let up = eye.cross(right);
     let part = &limb.mesh;
     let (lower, upper) = part.bounds();
-    let (middle, size) = ((lower + upper) / 2.0, (upper - lower).length());
+    let middle = (lower + upper) / 2.0;
+    // What is seen of it fills the square.
+    let half = part.positions().iter().fold(f64::MIN_POSITIVE, |half, &p| {
+        let off = p - middle;
+        half.max(off.dot(right).abs()).max(off.dot(up).abs())
+    });
     let seen = |p: DVec3| {
-        let off = (p - middle) / size.max(f64::MIN_POSITIVE);
+        let off = (p - middle) / (2.04 * half);
         let at = pos2(0.5 + off.dot(right) as f32, 0.5 - off.dot(up) as f32);
         (at, off.dot(eye))
     };

@@ -3,15 +3,14 @@
 use egui::{Align2, Color32, FontId, Rect, Role, Sense, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2};
 
 use super::super::theme;
-use super::StudyView;
-use super::plot::{FRONT, KEPT, REST, key};
+use super::chosen::{FRONT, KEPT, REST, StudyView, key};
 use super::raster::{Canvas, pixels, show};
 use crate::session::{Column, OpenStudy};
 
 /// Lines that are drawn of those that are kept, and of the others.
 const MOST: [usize; 2] = [4000, 2000];
 /// Over and under the axes, for names and numbers.
-const ABOVE: f32 = 34.0;
+const ABOVE: f32 = 48.0;
 const BELOW: f32 = 18.0;
 const BESIDE: f32 = 34.0;
 /// Half of what an axis is taken hold of by (points).
@@ -54,7 +53,7 @@ pub fn parallel(
     if let Some(unit) = view.looked_at() {
         let corners = path(inner.size(), &heights(unit));
         let places = corners.into_iter().map(|at| inner.min + at).collect();
-        let line = Stroke::new(2.5, theme::CHOSEN);
+        let line = Stroke::new(2.5, ui.visuals().strong_text_color());
         ui.painter().add(egui::Shape::line(places, line));
     }
     let names = stagger(columns.len());
@@ -84,9 +83,14 @@ fn across(inner: Rect, k: usize, axes: usize) -> f32 {
     inner.left() + inner.width() * k as f32 / (axes - 1).max(1) as f32
 }
 
-/// Names of neighbours stand at two heights, so that they keep apart.
+/// Names of neighbours stand at three heights, so that they keep apart.
 fn stagger(count: usize) -> impl Iterator<Item = f32> {
-    (0..count).map(|k| if k % 2 == 0 { -20.0 } else { -6.0 })
+    (0..count).map(|k| [-34.0, -20.0, -6.0][k % 3])
+}
+
+/// The last word of a key: what it belongs to would leave no room.
+fn short(name: &str) -> &str {
+    name.rsplit('.').next().unwrap_or(name)
 }
 
 /// How far up an axis a value stands, as a share.
@@ -171,15 +175,30 @@ fn axis(
     } else if response.clicked() {
         view.ranges.remove(&column);
     }
-    let response = response.on_hover_text("Drag along it to keep a range, click to let all in");
+    let hovered = response.hovered();
+    response.on_hover_text("Drag along it to keep a range, click to let all in");
+    let range = view.ranges.get(&column).copied();
+    paint_axis(of, range, (inner, x, name_at), hovered, ui);
+}
+
+fn paint_axis(
+    of: &Column,
+    range: Option<[f64; 2]>,
+    (inner, x, name_at): (Rect, f32, f32),
+    hovered: bool,
+    ui: &Ui,
+) {
+    let Some([low, high]) = of.range() else {
+        return;
+    };
     let painter = ui.painter();
     let visuals = ui.visuals();
     let strong = visuals.text_color();
-    let width = if response.hovered() { 2.0 } else { 1.0 };
+    let width = if hovered { 2.0 } else { 1.0 };
     painter.vline(x, inner.y_range(), Stroke::new(width, strong));
-    if let Some([from, to]) = view.ranges.get(&column) {
+    if let Some([from, to]) = range {
         let y = |v: f64| inner.bottom() - ((v - low) / (high - low)) as f32 * inner.height();
-        let range = Rect::from_x_y_ranges(x - 5.0..=x + 5.0, y(*to)..=y(*from));
+        let range = Rect::from_x_y_ranges(x - 5.0..=x + 5.0, y(to)..=y(from));
         painter.rect(
             range,
             2.0,
@@ -194,7 +213,7 @@ fn axis(
     text(
         pos2(x, inner.top() + name_at),
         Align2::CENTER_BOTTOM,
-        of.name.clone(),
+        short(&of.name).to_owned(),
         11.0,
     );
     let end = |v: f64| {

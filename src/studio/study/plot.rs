@@ -1,18 +1,53 @@
 //! All designs by two of their figures.
 
-use egui::{Color32, ComboBox, Pos2, Rect, Role, Ui, Vec2, WidgetInfo, vec2};
-use egui_plot::{Plot, PlotImage, PlotPoint, PlotPoints, Points};
+use egui::{ComboBox, Pos2, Rect, Role, Ui, Vec2, WidgetInfo, vec2};
+use egui_plot::{Plot, PlotImage, PlotPoint, PlotPoints, PlotResponse, Points};
 
-use super::super::theme;
-use super::StudyView;
-use super::raster::{Key, pixels};
-use crate::session::OpenStudy;
+use super::chosen::{FRONT, KEPT, REST, StudyView, key};
+use super::raster::{Canvas, pixels};
+use crate::session::{Column, OpenStudy};
 
-pub const KEPT: Color32 = Color32::from_rgb(86, 180, 233);
-pub const FRONT: Color32 = Color32::from_rgb(230, 159, 0);
-pub const REST: Color32 = Color32::from_rgb(125, 133, 143);
 /// How near (points) the pointer must be to what it picks.
 const NEAR: f32 = 14.0;
+
+/// A range of two columns, and where units lie in it: shares from the upper left.
+struct Frame<'a> {
+    columns: [&'a Column; 2],
+    ranges: [[f64; 2]; 2],
+}
+
+impl Frame<'_> {
+    fn share(&self, unit: usize) -> Option<Vec2> {
+        let part = |k: usize| {
+            let [low, high] = self.ranges[k];
+            ((self.columns[k].values[unit] - low) / (high - low)) as f32
+        };
+        let at = vec2(part(0), 1.0 - part(1));
+        (at.x.is_finite() && at.y.is_finite()).then_some(at)
+    }
+
+    fn marks(&self, units: impl Iterator<Item = usize>) -> PlotPoints<'static> {
+        let at = |unit: usize| self.columns.map(|c| c.values[unit]);
+        units.map(at).collect()
+    }
+
+    /// Draws all designs; what is kept lies over what is not.
+    fn draw(&self, canvas: &mut Canvas, study: &OpenStudy, kept: &[bool]) {
+        let room = canvas.size();
+        for over in [false, true] {
+            for unit in (0..kept.len()).filter(|&unit| kept[unit] == over) {
+                let colour = match (over, study.collected.rows[unit].allowed) {
+                    (true, true) => KEPT,
+                    (true, false) => REST,
+                    (false, _) => REST.gamma_multiply(0.25),
+                };
+                if let Some(at) = self.share(unit) {
+                    canvas.dot(at * room, 3.0, colour);
+                }
+            }
+        }
+    }
+}
 
 /// The plot; the unit under the pointer. A click picks it.
 pub fn scatter(
@@ -22,56 +57,55 @@ pub fn scatter(
     ui: &mut Ui,
 ) -> Option<usize> {
     choices(view, study, ui);
-    let [x, y] = view.across.map(|k| &study.columns[k]);
-    let (Some(across), Some(up)) = (x.range().map(wider), y.range().map(wider)) else {
+    let columns = view.across.map(|k| &study.columns[k]);
+    let [Some(across), Some(up)] = columns.map(|c| c.range().map(wider)) else {
         ui.weak("No design has both figures yet");
         return None;
     };
+    let frame = Frame {
+        columns,
+        ranges: [across, up],
+    };
+    let shown = plot(view, (study, &frame), kept, ui);
+    let [x, y] = columns;
+    let name = format!("All designs: {} against {}", y.name, x.name);
+    shown
+        .response
+        .widget_info(|| WidgetInfo::labeled(Role::Figure, true, &name));
+    let found = shown.response.hover_pos().and_then(|pointer| {
+        let units = (0..kept.len()).filter(|&unit| kept[unit]);
+        nearest(pointer, *shown.transform.frame(), units, |unit| {
+            frame.share(unit)
+        })
+    });
+    if shown.response.clicked() {
+        view.picked = found;
+    }
+    found
+}
+
+/// The designs as a picture, and over it those that stand out.
+fn plot(
+    view: &mut StudyView,
+    (study, frame): (&OpenStudy, &Frame<'_>),
+    kept: &[bool],
+    ui: &mut Ui,
+) -> PlotResponse<()> {
     let size = ui.available_size() - vec2(0.0, 4.0);
     let key = key(view, study, pixels(ui.ctx(), size), &view.across, ui);
-    let share = |unit: usize| {
-        let part = |v: f64, [low, high]: [f64; 2]| ((v - low) / (high - low)) as f32;
-        let at = vec2(part(x.values[unit], across), 1.0 - part(y.values[unit], up));
-        (at.x.is_finite() && at.y.is_finite()).then_some(at)
-    };
-    let picture = view.dots.of(key, ui.ctx(), |canvas| {
-        let room = canvas.size();
-        // What is kept lies over what is not.
-        for over in [false, true] {
-            for unit in (0..kept.len()).filter(|&unit| kept[unit] == over) {
-                let allowed = study.collected.rows[unit].allowed;
-                let colour = match (over, allowed) {
-                    (true, true) => KEPT,
-                    (true, false) => REST,
-                    (false, _) => REST.gamma_multiply(0.25),
-                };
-                if let Some(at) = share(unit) {
-                    canvas.dot(at * room, 3.0, colour);
-                }
-            }
-        }
-    });
-    let centre = PlotPoint::new(
+    let draw = |canvas: &mut Canvas| frame.draw(canvas, study, kept);
+    let picture = view.dots.of(key, ui.ctx(), draw).id();
+    let [across, up] = frame.ranges;
+    let middle = PlotPoint::new(
         f64::midpoint(across[0], across[1]),
         f64::midpoint(up[0], up[1]),
     );
-    let image = PlotImage::new(
-        "designs",
-        picture.id(),
-        centre,
-        Vec2::new((across[1] - across[0]) as f32, (up[1] - up[0]) as f32),
-    );
-    let marks = |units: &mut dyn Iterator<Item = usize>| -> PlotPoints<'static> {
-        units.map(|unit| [x.values[unit], y.values[unit]]).collect()
-    };
-    let front =
-        marks(&mut (0..kept.len()).filter(|&u| kept[u] && study.collected.rows[u].on_front));
-    let shown = Plot::new("study")
+    let room = vec2((across[1] - across[0]) as f32, (up[1] - up[0]) as f32);
+    let strong = ui.visuals().strong_text_color();
+    Plot::new("study")
         .height(size.y)
-        .x_axis_label(x.name.clone())
-        .y_axis_label(y.name.clone())
-        .default_x_bounds(across[0], across[1])
-        .default_y_bounds(up[0], up[1])
+        .x_axis_label(frame.columns[0].name.clone())
+        .y_axis_label(frame.columns[1].name.clone())
         .show_x(false)
         .show_y(false)
         .label_formatter(|_| None)
@@ -83,29 +117,18 @@ pub fn scatter(
         .show(ui, |plot| {
             plot.set_plot_bounds_x(across[0]..=across[1]);
             plot.set_plot_bounds_y(up[0]..=up[1]);
-            plot.image(image);
-            plot.points(Points::new("front", front).color(FRONT).radius(4.0));
+            plot.image(PlotImage::new("designs", picture, middle, room));
+            let front = (0..kept.len()).filter(|&u| kept[u] && study.collected.rows[u].on_front);
+            plot.points(
+                Points::new("front", frame.marks(front))
+                    .color(FRONT)
+                    .radius(4.0),
+            );
             for (unit, radius) in [(view.picked, 9.0), (view.hovered, 7.0)] {
-                if let Some(unit) = unit {
-                    let here = marks(&mut std::iter::once(unit));
-                    let ring = Points::new("looked at", here).color(theme::CHOSEN);
-                    plot.points(ring.radius(radius).filled(false));
-                }
+                let ring = Points::new("looked at", frame.marks(unit.into_iter()));
+                plot.points(ring.color(strong).radius(radius).filled(false));
             }
-        });
-    let name = format!("All designs: {} against {}", y.name, x.name);
-    shown
-        .response
-        .widget_info(|| WidgetInfo::labeled(Role::Figure, true, &name));
-    let frame = *shown.transform.frame();
-    let found = shown
-        .response
-        .hover_pos()
-        .and_then(|pointer| nearest(pointer, frame, (0..kept.len()).filter(|&u| kept[u]), share));
-    if shown.response.clicked() {
-        view.picked = found;
-    }
-    found
+        })
 }
 
 /// Which figures are across and up.
@@ -137,30 +160,8 @@ fn wider([low, high]: [f64; 2]) -> [f64; 2] {
     [low - room, high + room]
 }
 
-/// What a picture of these columns is of.
-pub fn key(
-    view: &StudyView,
-    study: &OpenStudy,
-    size: [usize; 2],
-    columns: &[usize],
-    ui: &Ui,
-) -> Key {
-    let ranges = view
-        .ranges
-        .iter()
-        .map(|(k, range)| (*k, range.map(f64::to_bits)));
-    let of = std::ptr::from_ref(study) as usize;
-    (
-        of,
-        size,
-        ranges.collect(),
-        columns.to_vec(),
-        ui.visuals().dark_mode,
-    )
-}
-
 /// The unit whose place (a share of the frame) is nearest to the pointer, where it is near.
-pub fn nearest(
+fn nearest(
     pointer: Pos2,
     frame: Rect,
     units: impl Iterator<Item = usize>,

@@ -7,7 +7,8 @@ use egui::{Grid, RichText, Sense, Ui, vec2};
 use super::super::action::FileAction;
 use super::super::ask::Ask;
 use super::super::theme;
-use super::{StudyView, open_row};
+use super::chosen::{FRONT, StudyView};
+use super::folder::open_row;
 use crate::plain;
 use crate::session::OpenStudy;
 
@@ -48,7 +49,7 @@ fn one(ask: &mut Ask<'_>, view: &mut StudyView, study: &OpenStudy, unit: usize, 
     ui.horizontal(|ui| {
         ui.strong(format!("Unit {unit}"));
         if study.collected.rows[unit].on_front {
-            ui.label(RichText::new("on the front").color(super::plot::FRONT));
+            ui.label(RichText::new("on the front").color(FRONT));
         }
         let button = egui::Button::new("Open as project");
         let button = ui
@@ -75,8 +76,11 @@ fn one(ask: &mut Ask<'_>, view: &mut StudyView, study: &OpenStudy, unit: usize, 
             .show(ui, |ui| {
                 let shown = study.columns.iter().filter(|c| c.is_axis || c.is_asked);
                 for column in shown {
-                    ui.label(RichText::new(&column.name).small().weak());
-                    ui.label(RichText::new(column.in_words(unit)).small().monospace());
+                    ui.label(RichText::new(&column.name).size(11.0).weak());
+                    ui.add(
+                        egui::Label::new(RichText::new(column.in_words(unit)).size(11.0))
+                            .truncate(),
+                    );
                     ui.end_row();
                 }
             });
@@ -87,8 +91,11 @@ fn one(ask: &mut Ask<'_>, view: &mut StudyView, study: &OpenStudy, unit: usize, 
             .spacing([8.0, 2.0])
             .show(ui, |ui| {
                 for column in study.columns.iter().filter(|c| !c.is_axis) {
-                    ui.label(RichText::new(&column.name).small());
-                    ui.label(RichText::new(column.in_words(unit)).small().monospace());
+                    ui.label(RichText::new(&column.name).size(11.0));
+                    ui.add(
+                        egui::Label::new(RichText::new(column.in_words(unit)).size(11.0))
+                            .truncate(),
+                    );
                     ui.end_row();
                 }
             });
