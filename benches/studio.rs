@@ -17,11 +17,13 @@ use hapdef::cli;
 use hapdef::design::{InHand, Inputs};
 use hapdef::document::Layer;
 use hapdef::io::project_file::LoadedProject;
+use hapdef::io::study_folder::{Cost, Outcome, StudyFolder};
 use hapdef::mesh::TriMesh;
+use hapdef::parameter_study::Points;
 use hapdef::plain::robust_top;
 use hapdef::project::{Kept, KeptError, Masks, Project};
 use hapdef::render::offscreen::{self, Canvas};
-use hapdef::studio::{Studio, Tool};
+use hapdef::studio::{Studio, Tab, Tool};
 use timing::{cpu_seconds, reference_seconds};
 
 const FILE: &str = "benches/studio.md";
@@ -119,6 +121,7 @@ fn main() {
     let state = offscreen::adapter().expect("an adapter: install mesa-vulkan-drivers");
     steps(&mut page, &state);
     overlay(&mut page, &state);
+    study(&mut page, &state);
     estimate(&mut page);
     in_hand(&mut page, reference);
     std::fs::write(FILE, &page).expect("the file can be written");
@@ -326,6 +329,81 @@ fn overlay(page: &mut String, state: &RenderState) {
         "\n50 000 triangles with something moving over them: {live:.1} ms a frame, against {whole:.1} ms where the scene is drawn anew each time: {:.1} times the rate (aim: twice).",
         whole / live
     );
+}
+
+/// A study of a hundred thousand designs: frames in which nothing happens, in which the pointer goes over the designs, and in
+/// which a range grows.
+fn study(page: &mut String, state: &RenderState) {
+    const UNITS: usize = 100_000;
+    let home = tempfile::tempdir().expect("a folder");
+    let folder = many_designs(home.path(), UNITS);
+    let mut window = Window::open(state, cli::bundled().expect("the bundled limb"));
+    window.studio.view.tab = Tab::Study;
+    let (cpu, clock) = (cpu_seconds(), Instant::now());
+    window.studio.session.open_study(&folder);
+    while window.studio.session.study.open().is_none() {
+        window.step();
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let read = clock.elapsed().as_secs_f64();
+    let still = milliseconds(60, |_| window.step());
+    let over = |k: usize| Pos2::new(270.0 + 4.0 * k as f32, 760.0);
+    let pointed = milliseconds(48, |k| {
+        window.hover(over(k));
+        window.step();
+    });
+    // Up along the first axis of the lines.
+    let along = |k: usize| Pos2::new(583.0, 840.0 - 2.0 * k as f32);
+    window.hover(along(0));
+    window.button(along(0), true);
+    let ranged = milliseconds(40, |k| {
+        window.hover(along(k + 2));
+        window.step();
+    });
+    window.button(along(42), false);
+    let _ = writeln!(
+        page,
+        "\nA study of {UNITS} designs in its tab: read in {read:.0} s ({:.0} processor s, in the background); a frame's steps take {still:.1} ms without an event, {pointed:.1} ms where the pointer goes over the designs, and {ranged:.0} ms where a range follows the pointer and all are drawn anew.",
+        cpu_seconds() - cpu
+    );
+}
+
+/// A folder with the results of so many units, which somebody made up.
+fn many_designs(home: &std::path::Path, units: usize) -> PathBuf {
+    let path = home.join("study.toml");
+    let text = format!(
+        "format = 1\ncombine = \"sobol\"\ncount = {units}\n[base]\nlimb = true\n[[axis]]\nkey = \"limb.thickness\"\nfrom = 1.0\nto = 3.0\n[[axis]]\nkey = \"touch.force_n\"\nfrom = 1.0\nto = 20.0\n[[axis]]\nkey = \"material.youngs_modulus_gpa\"\nfrom = 1.0\nto = 4.0\n[aim]\nminimize = [\"error_mm\", \"mass_g\"]\n"
+    );
+    std::fs::write(&path, text).expect("a study");
+    let folder = StudyFolder::plan(&home.join("run"), &path, "base".into()).expect("a plan");
+    let points = Points::of(&folder.study).expect("points");
+    for unit in 0..units {
+        let of = |k: usize| points.values(unit)[k].as_float().unwrap_or(0.0);
+        let figures = [
+            ("error_mm", of(1) / of(2)),
+            ("mass_g", of(0) * of(1).sqrt()),
+        ];
+        let outcome = Outcome {
+            version: folder.plan.version.clone(),
+            study: folder.plan.study.clone(),
+            base: folder.plan.base.clone(),
+            unit,
+            values: serde_json::Map::new(),
+            figures: figures
+                .map(|(name, value)| (name.to_owned(), Some(value)))
+                .to_vec(),
+            error: None,
+            cautions: Vec::new(),
+        };
+        let cost = Cost {
+            unit,
+            cpu_seconds: 1.0,
+            seconds: 1.0,
+            shared: false,
+        };
+        folder.write(&outcome, &cost).expect("a result");
+    }
+    folder.folder
 }
 
 /// What a hand that moves a gauge waits for: ten gauges at Draft.

@@ -28,9 +28,9 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
     let loaded = args.common.load()?;
     loaded.inputs.project.check()?;
     Spared::of(&loaded).check("--out", Some(&args.out))?;
+    let run = Run::new(args.asked(), &loaded.inputs, &args.out)?;
     let ports = ports(args)?;
     make_folder(&args.out)?;
-    let run = Run::new(args.asked(), &loaded.inputs, &args.out)?;
     let sensing = Arc::new(sensing_for(&args.common, &loaded)?);
     let ready = Ready::new(run, loaded.inputs, sensing)?;
     for line in ready.in_words() {

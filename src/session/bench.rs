@@ -95,6 +95,8 @@ impl Session {
     /// Takes the tip back and waits until it is, as the program ends: for a while, a machine may be gone.
     pub fn leave_bench(&mut self) {
         const WAIT: Duration = Duration::from_secs(15);
+        // What is only being made ready does not begin any more.
+        self.jobs.cancel(|task| task == Task::Press);
         self.bench.order(BenchOrder::Stop);
         let begun = Instant::now();
         while self.bench.goes_on() && begun.elapsed() < WAIT {

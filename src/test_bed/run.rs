@@ -21,7 +21,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// Of a project, into a folder that is there.
+    /// Of a project, into a folder, which need not be there yet.
     ///
     /// # Errors
     /// A message in the user's terms: no gauges, a machine that cannot be read, limits that do not go together, or a folder

@@ -17,6 +17,8 @@ pub struct Column {
     pub values: Vec<f64>,
     /// Where its values are words.
     pub words: Vec<String>,
+    /// The smallest and largest of its numbers, where it has any.
+    pub range: Option<[f64; 2]>,
     pub is_axis: bool,
     /// Whether it is to be as small as can be, or is required.
     pub is_asked: bool,
@@ -35,23 +37,15 @@ impl Column {
                 }) as f64
             })
         };
+        let values: Vec<f64> = values.iter().map(number).collect();
         Self {
-            values: values.iter().map(number).collect(),
+            range: range(&values),
+            values,
             name: name.to_owned(),
             words,
             is_axis: true,
             is_asked: false,
         }
-    }
-
-    /// The smallest and largest of its numbers.
-    #[must_use]
-    pub fn range(&self) -> Option<[f64; 2]> {
-        let finite = self.values.iter().copied().filter(|v| v.is_finite());
-        let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-            (low.min(v), high.max(v))
-        });
-        (low <= high).then_some([low, high])
     }
 
     /// A value as it is read.
@@ -65,6 +59,14 @@ impl Column {
             _ => crate::plain::digits(value),
         }
     }
+}
+
+fn range(values: &[f64]) -> Option<[f64; 2]> {
+    let finite = values.iter().copied().filter(|v| v.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+        (low.min(v), high.max(v))
+    });
+    (low <= high).then_some([low, high])
 }
 
 /// A study whose results are looked at.
@@ -85,11 +87,13 @@ impl OpenStudy {
         let aim = &collected.folder.study.aim;
         let figures = collected.names.iter().map(|name| {
             let value = |row: &crate::varied::Row| row.figures.get(name).copied();
+            let values: Vec<f64> = rows
+                .iter()
+                .map(|row| value(row).unwrap_or(f64::NAN))
+                .collect();
             Column {
-                values: rows
-                    .iter()
-                    .map(|row| value(row).unwrap_or(f64::NAN))
-                    .collect(),
+                range: range(&values),
+                values,
                 is_asked: aim.minimize.contains(name)
                     || aim.require.iter().any(|bound| bound.figure == *name),
                 name: name.clone(),
@@ -148,7 +152,7 @@ mod tests {
         let column = Column::of_axis("material", &values.iter().collect::<Vec<_>>());
         assert_eq!(column.values, [0.0, 1.0, 0.0]);
         assert_eq!(column.in_words(1), "pla");
-        assert_eq!(column.range(), Some([0.0, 1.0]));
+        assert_eq!(column.range, Some([0.0, 1.0]));
         let numbers = [Value::from(1.5), Value::from(3)];
         let column = Column::of_axis("wall", &numbers.iter().collect::<Vec<_>>());
         assert_eq!(

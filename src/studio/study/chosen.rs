@@ -58,7 +58,7 @@ impl StudyView {
                 .filter(|k| study.columns[*k].is_axis || asked(k))
                 .filter(|k| {
                     study.columns[*k]
-                        .range()
+                        .range
                         .is_some_and(|[low, high]| low < high)
                 })
                 .collect(),

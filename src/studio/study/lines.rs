@@ -95,7 +95,7 @@ fn short(name: &str) -> &str {
 
 /// How far up an axis a value stands, as a share.
 fn height(column: &Column, value: f64) -> Option<f32> {
-    let [low, high] = column.range()?;
+    let [low, high] = column.range?;
     let share = (value - low) / (high - low).max(f64::MIN_POSITIVE);
     value.is_finite().then_some(share as f32)
 }
@@ -150,7 +150,7 @@ fn axis(
     ui: &mut Ui,
 ) {
     let of = &study.columns[column];
-    let Some([low, high]) = of.range() else {
+    let Some([low, high]) = of.range else {
         return;
     };
     let hold = Rect::from_x_y_ranges(x - HOLD..=x + HOLD, inner.y_range());
@@ -188,7 +188,7 @@ fn paint_axis(
     hovered: bool,
     ui: &Ui,
 ) {
-    let Some([low, high]) = of.range() else {
+    let Some([low, high]) = of.range else {
         return;
     };
     let painter = ui.painter();

@@ -58,7 +58,7 @@ pub fn scatter(
 ) -> Option<usize> {
     choices(view, study, ui);
     let columns = view.across.map(|k| &study.columns[k]);
-    let [Some(across), Some(up)] = columns.map(|c| c.range().map(wider)) else {
+    let [Some(across), Some(up)] = columns.map(|c| c.range.map(wider)) else {
         ui.weak("No design has both figures yet");
         return None;
     };
