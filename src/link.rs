@@ -20,7 +20,7 @@ mod truths;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-pub use benching::{BenchOrder, press_at_ports, press_simulated};
+pub use benching::{BY_HAND, BenchOrder, press_at_ports, press_simulated};
 pub use host::{Doorway, Entrance, Hosted, host};
 #[cfg(feature = "mcap")]
 pub use mcap_log::McapLog;

@@ -407,6 +407,8 @@ impl Studio {
 
     /// Keys are commands while nothing is open over the panels.
     fn keys(&mut self, ctx: &Context) {
+        // The emergency stop works whatever is open.
+        self.asking(ctx, |ask, _, _, _| keys::halt(ctx, ask));
         let offers = (self.kept.recovery.as_ref()).is_some_and(recovery::Recovery::offers);
         if self.panels.is_covered() || offers {
             return;

@@ -118,11 +118,17 @@ fn press(
         let bar = Bar::default();
         let pressing = || {
             let watch = |p| bar.show(p);
-            press_on_simulated(ready, collector, &watch, &mut || None, tell)
+            let mut begun = false;
+            let mut orders = || {
+                // What was computed for it is there.
+                if !std::mem::replace(&mut begun, true) {
+                    bar.finish();
+                }
+                None
+            };
+            press_on_simulated(ready, collector, &watch, &mut orders, tell)
         };
-        let ended = args.common.in_pool(pressing);
-        bar.finish();
-        ended?
+        args.common.in_pool(pressing)?
     };
     Ok((ended, failed))
 }

@@ -22,6 +22,8 @@ pub enum BenchOrder {
     Kill,
 }
 
+/// How a run ends that somebody has stopped, and whose tip is back.
+pub const BY_HAND: &str = "it was stopped by hand";
 /// Simulated time between two looks (µs).
 const TURN_US: u64 = 5000;
 /// Samples a second that a board is asked for: readings are means over a sixth of a second.
@@ -230,7 +232,7 @@ fn obey(collector: &mut Collector, order: BenchOrder, now_us: u64, out: &mut Vec
     match order {
         BenchOrder::Pause => collector.pause(true),
         BenchOrder::Resume => collector.pause(false),
-        BenchOrder::Stop => collector.stop("it was stopped by hand", now_us, out),
+        BenchOrder::Stop => collector.stop(BY_HAND, now_us, out),
         BenchOrder::Kill => collector.kill(out),
     }
 }

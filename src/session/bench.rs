@@ -8,13 +8,13 @@ use std::time::{Duration, Instant};
 use super::jobs::{Task, stop};
 use super::slot::Slot;
 use super::state::Session;
-use super::state::bench::{PlanInputs, Pressing, locked};
+use super::state::bench::{Held, PlanInputs, Pressing, locked};
 use crate::bench::{Collector, Ended, News};
 use crate::budget::{Budget, Progress};
 use crate::design::{Inputs, Sensing};
 use crate::io::kept_model;
 use crate::job::{Reporter, Stop};
-use crate::link::{Address, BenchOrder, Pace};
+use crate::link::{Address, BY_HAND, BenchOrder, Pace};
 use crate::test_bed::{Asked, Ready, Run, press_on_simulated};
 
 impl Session {
@@ -24,14 +24,20 @@ impl Session {
             return;
         };
         let inputs = begin.inputs.clone();
-        let work = move |r: &Reporter| begin.ready(r);
+        let held = Held::new(&self.bench.plans);
+        let work = move |r: &Reporter| {
+            let _held = held;
+            begin.ready(r)
+        };
         self.jobs.start(
             Task::PlanPresses,
             inputs,
             work,
             |s, inputs, (sensing, ready)| {
                 s.keep_sensing(&inputs, &sensing);
-                *s.bench.locked() = Some(Pressing::new(inputs, ready));
+                if !s.bench.goes_on() {
+                    *s.bench.locked() = Some(Pressing::new(inputs, ready));
+                }
             },
         );
     }
@@ -54,22 +60,22 @@ impl Session {
         self.bench.paused = false;
         let pressing = Arc::clone(&self.bench.pressing);
         let inputs = begin.inputs.clone();
+        let held = Held::new(&self.bench.runs);
         let work = move |r: &Reporter| {
+            let _held = held;
             let (sensing, ready) = begin.ready(r)?;
-            let mut plan = Pressing::new(begin.inputs, Arc::clone(&ready));
-            plan.goes_on = true;
+            let plan = Pressing::new(begin.inputs, Arc::clone(&ready));
             *locked(&pressing) = Some(plan);
             let ended = press(&ready, ports.as_ref(), &inbox, &pressing, r);
-            let how = match &ended {
-                Ok(ended) => ended.clone(),
-                Err(why) => Ended::Stopped(format!("{why:#}")),
-            };
+            let stopped = |why: &anyhow::Error| Ended::Stopped(format!("{why:#}"));
+            let how = ended.as_ref().map_or_else(stopped, Ended::clone);
             if let Some(plan) = locked(&pressing).as_mut() {
                 plan.end(&how);
             }
             match how {
-                Ended::Finished => Ok(sensing),
-                Ended::Stopped(why) => Err(Stop::Failed(why)),
+                // Whoever stopped it need not be told that it is none.
+                Ended::Stopped(why) if why != BY_HAND => Err(Stop::Failed(why)),
+                _ => Ok(sensing),
             }
         };
         self.jobs
@@ -140,8 +146,8 @@ impl Session {
             self.complain("There are no gauges yet: press “Select gauges”, or place them with the tool “Gauges”");
             return None;
         }
-        if self.bench.goes_on() {
-            self.complain("A run goes on: stop it before another one is begun");
+        if !self.bench.is_free() {
+            self.complain("A run goes on, or is planned: stop it before another one is begun");
             return None;
         }
         Some(Begin {

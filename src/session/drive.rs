@@ -242,7 +242,8 @@ impl Session {
                 Task::Filter | Task::Field | Task::Expect | Task::Confuse | Task::UnitLimb
             )
         };
-        let ended = self.end_jobs(|task| !quick(task));
+        // A run at the bench has a stop of its own.
+        let ended = self.end_jobs(|task| !quick(task) && task != Task::Press);
         if !ended.is_empty() {
             self.tell(format!("Cancelled: {}", ended.join(", ")));
         }

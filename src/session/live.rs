@@ -70,6 +70,10 @@ impl Session {
     /// Listens to a board, once the model of the gauges is there.
     pub fn connect(&mut self, text: &str) {
         let address = Address::parse(text.trim(), self.desk.baud, Pace::Real);
+        let pressed = self.desk.bench.asked.simulated.is_none() && self.bench.goes_on();
+        if pressed && !address.is_recording() {
+            return self.complain("A run goes on at the bench, and only one may listen to a board: stop pressing first");
+        }
         self.disconnect();
         self.live.target = Some(Target::Board(address));
         self.go_on_connecting();

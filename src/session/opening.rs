@@ -171,6 +171,11 @@ impl Session {
                 "The project was changed while the file was read, and nothing was opened: open it again",
             );
         }
+        if self.bench.goes_on() {
+            return self.complain(
+                "A run goes on at the bench, and nothing was opened: stop pressing, then open it again",
+            );
+        }
         if self.is_saving_twice() {
             // What waits to be saved would be the new project, in the old one's place.
             return self.complain(

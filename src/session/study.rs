@@ -32,15 +32,26 @@ impl Session {
             let read = || -> anyhow::Result<OpenStudy> {
                 let folder = StudyFolder::open(&path)?;
                 let base = Base::new(&folder.study, &folder.home())?;
-                Ok(OpenStudy::new(Collected::of(folder, &watch)?, base))
+                let same = base.fingerprint()? == folder.plan.base;
+                Ok(OpenStudy::new(Collected::of(folder, &watch)?, base, same))
             };
             read().map_err(failed)
         };
         self.jobs
             .start(Task::OpenStudy, folder.to_owned(), work, |s, _, study| {
                 s.study.limb = None;
+                if !study.is_of_base {
+                    s.tell("The study's base has changed since it was planned: limbs and projects of its units are of the base as it is now, and their figures of the one that was");
+                }
                 s.study.open = Some(Arc::new(study));
             });
+    }
+
+    /// Whether the limb of a unit is still to be made. One at a time: a pointer passes over many.
+    #[must_use]
+    pub fn needs_limb(&self, unit: usize) -> bool {
+        let known = self.study.limb().is_some_and(|limb| limb.unit == unit);
+        !known && !self.jobs.runs(Task::UnitLimb) && self.jobs.is_new(Task::UnitLimb, &unit)
     }
 
     /// Makes the limb of a unit, to be looked at.
@@ -48,9 +59,7 @@ impl Session {
         let Some(study) = self.study.open().map(Arc::clone) else {
             return;
         };
-        if self.study.limb().is_some_and(|limb| limb.unit == unit)
-            || !self.jobs.is_new(Task::UnitLimb, &unit)
-        {
+        if !self.needs_limb(unit) {
             return;
         }
         let work = move |_: &Reporter| {

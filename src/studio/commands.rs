@@ -190,7 +190,9 @@ impl Command {
             Self::Advise => {
                 "Measure the walls, say whether shell or solid fits, and what each would cost"
             }
-            Self::Cancel => "Stop whatever is being computed",
+            Self::Cancel => {
+                "Stop whatever is being computed; a run at the bench has a stop of its own"
+            }
             Self::SimulatedBoard => {
                 "Live touch without hardware: a truth with finer elements, and gauges as a workshop glues them"
             }
@@ -386,9 +388,7 @@ pub fn enabled(session: &Session, view: &View, command: Command) -> bool {
         Command::GrowPaint | Command::ShrinkPaint => session.document.layer(view.layer).is_some(),
         Command::Cancel => session.busy(),
         Command::Tare | Command::Record | Command::Disconnect => session.live.is_connected(),
-        Command::PlanPresses | Command::PressPlan => {
-            !session.bench.goes_on() && !session.jobs.runs(Task::Press)
-        }
+        Command::PlanPresses | Command::PressPlan => session.bench.is_free(),
         Command::PausePresses | Command::StopPresses | Command::HaltMachine => {
             session.bench.goes_on()
         }

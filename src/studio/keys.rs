@@ -24,3 +24,14 @@ pub fn shortcuts(ctx: &Context, ask: &mut Ask<'_>) {
         }
     }
 }
+
+/// Gives the emergency stop, where its key was pressed.
+pub fn halt(ctx: &Context, ask: &mut Ask<'_>) {
+    let command = Command::HaltMachine;
+    if let Some(shortcut) = command.shortcut()
+        && ask.enabled(command)
+        && ctx.input_mut(|i| i.consume_shortcut(&shortcut))
+    {
+        ask.command(command);
+    }
+}

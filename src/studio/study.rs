@@ -28,6 +28,12 @@ pub fn study_tab(ask: &mut Ask<'_>, view: &mut StudyView, ui: &mut Ui) {
     let Some(study) = ask.session.study.open().map(Arc::clone) else {
         return nothing_open(ask, view, ui);
     };
+    if study.columns.is_empty() {
+        return empty(
+            ui,
+            "The study has no axis, and nothing of it was computed yet",
+        );
+    }
     view.follow(&study);
     let kept: Vec<bool> = (0..study.collected.rows.len())
         .map(|unit| view.keeps(&study, unit))
@@ -52,7 +58,10 @@ pub fn study_tab(ask: &mut Ask<'_>, view: &mut StudyView, ui: &mut Ui) {
             });
     });
     view.hovered = hovered;
-    if let Some(unit) = view.looked_at() {
+    if let Some(unit) = view
+        .looked_at()
+        .filter(|&unit| ask.session.needs_limb(unit))
+    {
         ask.act(Compute::LookAtUnit(unit));
     }
 }

@@ -6,7 +6,7 @@ use anyhow::ensure;
 
 use super::asked::Asked;
 use crate::design::Inputs;
-use crate::io::bench_folder::{About, limb_key};
+use crate::io::bench_folder::{self, About, limb_key};
 use crate::io::machine_file::{self, MachineFile};
 use crate::io::source;
 
@@ -29,6 +29,9 @@ impl Run {
     pub fn new(asked: Asked, inputs: &Inputs, folder: &Path) -> anyhow::Result<Self> {
         let (about, file) = about(&asked, inputs)?;
         let before = About::read(folder)?;
+        // A plan of which nothing was pressed yet gives way to another one.
+        let pressed = before.is_some() && !bench_folder::parts(folder)?.is_empty();
+        let before = before.filter(|_| pressed);
         if let Some(before) = &before {
             same(before, &about, folder)?;
         }

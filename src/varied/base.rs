@@ -149,7 +149,8 @@ impl Base {
         Ok(project_file::load_text(&path, &table.to_string())?)
     }
 
-    /// Writes a unit as a project of this name into a folder, with its mesh where that is in no file; its path.
+    /// Writes a unit as a project of this name into a folder, with its mesh where that is in no file, unless it is there
+    /// already; its path.
     ///
     /// # Errors
     /// What cannot be had of these values, or cannot be written.
@@ -160,8 +161,13 @@ impl Base {
         folder: &Path,
         name: &str,
     ) -> anyhow::Result<PathBuf> {
+        let path = folder.join(format!("{name}.hapdef.toml"));
+        if path.exists() {
+            // Somebody may have worked on it since.
+            return Ok(path);
+        }
         let loaded = self.project(study, values)?;
-        let (inputs, path) = (&loaded.inputs, folder.join(format!("{name}.hapdef.toml")));
+        let inputs = &loaded.inputs;
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         let mut project = inputs.project.clone();
         project.part.mesh = match &self.from {

@@ -49,6 +49,19 @@ fn a_run_is_planned_paused_stopped_and_gone_on_with() {
     assert!((PLACES * 2 / 3..=PLACES).contains(&all), "{all} places");
     assert!(made(&w) == 0 && standing(&w) == Standing::Open);
     w.show("bench-plan");
+    // As long as nothing was pressed, another plan takes its place; and none is pressed while one is made.
+    w.session_mut().desk.bench.asked.places = PLACES / 2;
+    w.session_mut().plan_presses();
+    w.session_mut().press_plan();
+    w.wait("the other plan", 60, |s| !s.busy());
+    let fewer = w.session().bench.look(|p| p.states.len()).unwrap();
+    assert!(fewer <= PLACES / 2 && !w.session().bench.goes_on());
+    let news = &w.session().news.messages;
+    assert!(
+        news.iter().any(|m| m.text.contains("or is planned")),
+        "{news:?}"
+    );
+    w.session_mut().desk.bench.asked.places = PLACES;
 
     w.press("Press the plan");
     w.wait("some presses", 240, |s| {
@@ -126,12 +139,15 @@ fn the_emergency_stop_works_at_any_moment_and_leaving_takes_the_tip_back() {
                 == Some(true)
         }
     });
+    // Whatever is open.
+    w.key(egui::Modifiers::COMMAND, egui::Key::K);
     let keys = egui::Modifiers::COMMAND | egui::Modifiers::SHIFT;
     w.key(keys, egui::Key::X);
     w.wait("the halt", 30, |s| !s.session.bench.goes_on());
     let said = w.session().bench.look(|p| p.said.join("; ")).unwrap();
     assert!(said.contains("M112"), "{said}");
     w.wait("the end of the job", 30, |s| !s.busy());
+    w.key(egui::Modifiers::NONE, egui::Key::Escape);
 
     w.press("Press the plan");
     w.wait("a press", 240, |s| {

@@ -109,7 +109,8 @@ impl CollectArgs {
             depth_mm: self.depth,
             force_n: self.force,
             most_force_n: self.most_force,
-            check: self.check,
+            // What only is planned is pressed nowhere.
+            check: if self.plan_only { 0 } else { self.check },
             simulated: self.simulate.then(flaws),
         }
     }

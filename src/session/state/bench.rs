@@ -1,6 +1,7 @@
 //! A run of the test-bed: what is planned of it, how each press stands, and who gives it orders.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -70,8 +71,8 @@ pub struct Pressing {
     pub said: Vec<String>,
     /// Of what was pressed: that which is pressed again and again is pressed just now.
     pub checking: bool,
-    /// Whether the tip may be anywhere but out of the way.
-    pub goes_on: bool,
+    /// How many of them are made, and how many failed: asked at every look of whoever presses.
+    counts: [usize; 2],
 }
 
 impl Pressing {
@@ -86,12 +87,14 @@ impl Pressing {
                 PressState::ToCome
             }
         };
+        let states: Vec<PressState> = ready.numbers.iter().map(state).collect();
+        let made = states.iter().filter(|s| **s == PressState::Made).count();
         Self {
             inputs,
-            states: ready.numbers.iter().map(state).collect(),
+            states,
             said: Vec::new(),
             checking: false,
-            goes_on: false,
+            counts: [made, 0],
             ready,
         }
     }
@@ -99,12 +102,7 @@ impl Pressing {
     /// Presses that were made, and that failed.
     #[must_use]
     pub fn made_and_failed(&self) -> [usize; 2] {
-        let count =
-            |which: fn(&PressState) -> bool| self.states.iter().filter(|s| which(s)).count();
-        [
-            count(|s| *s == PressState::Made),
-            count(|s| matches!(s, PressState::Failed(_))),
-        ]
+        self.counts
     }
 
     pub(in crate::session) fn say(&mut self, text: impl Into<String>) {
@@ -117,6 +115,17 @@ impl Pressing {
     fn set(&mut self, number: usize, state: PressState) {
         // Numbers rise with the order of the presses.
         if let Ok(k) = self.ready.numbers.binary_search(&number) {
+            let counted = |state: &PressState| match state {
+                PressState::Made => Some(0),
+                PressState::Failed(_) => Some(1),
+                PressState::ToCome | PressState::Now => None,
+            };
+            if let Some(kind) = counted(&self.states[k]) {
+                self.counts[kind] -= 1;
+            }
+            if let Some(kind) = counted(&state) {
+                self.counts[kind] += 1;
+            }
             self.states[k] = state;
         }
     }
@@ -156,7 +165,6 @@ impl Pressing {
 
     pub(in crate::session) fn end(&mut self, ended: &Ended) {
         self.let_go();
-        self.goes_on = false;
         match ended {
             Ended::Finished => self.say("all presses were tried"),
             Ended::Stopped(why) => self.say(why),
@@ -170,6 +178,26 @@ pub struct Bench {
     pub(in crate::session) pressing: Arc<Mutex<Option<Pressing>>>,
     pub(in crate::session) orders: Option<Sender<BenchOrder>>,
     pub paused: bool,
+    /// Whether a run is made ready or pressed: until its thread has ended, whatever has become of its job.
+    pub(in crate::session) runs: Arc<AtomicBool>,
+    /// Likewise, a plan.
+    pub(in crate::session) plans: Arc<AtomicBool>,
+}
+
+/// Something goes on as long as this is held.
+pub(in crate::session) struct Held(Arc<AtomicBool>);
+
+impl Held {
+    pub fn new(what: &Arc<AtomicBool>) -> Self {
+        what.store(true, Ordering::SeqCst);
+        Self(Arc::clone(what))
+    }
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        self.0.store(false, Ordering::SeqCst);
+    }
 }
 
 impl Bench {
@@ -183,10 +211,16 @@ impl Bench {
         self.locked().as_ref().map(at)
     }
 
-    /// Whether a machine may be moving.
+    /// Whether a machine may be moving, or soon will.
     #[must_use]
     pub fn goes_on(&self) -> bool {
-        self.look(|p| p.goes_on) == Some(true)
+        self.runs.load(Ordering::SeqCst)
+    }
+
+    /// Whether another run or plan may begin.
+    #[must_use]
+    pub fn is_free(&self) -> bool {
+        !self.goes_on() && !self.plans.load(Ordering::SeqCst)
     }
 
     /// Tells whoever presses.

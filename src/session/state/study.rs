@@ -75,10 +75,12 @@ pub struct OpenStudy {
     /// Axes first, then figures.
     pub columns: Vec<Column>,
     pub(in crate::session) base: Base,
+    /// Whether that is still what the study was planned from.
+    pub(in crate::session) is_of_base: bool,
 }
 
 impl OpenStudy {
-    pub(in crate::session) fn new(collected: Collected, base: Base) -> Self {
+    pub(in crate::session) fn new(collected: Collected, base: Base, is_of_base: bool) -> Self {
         let rows = &collected.rows;
         let axes = collected.keys().enumerate().map(|(k, key)| {
             let values: Vec<&Value> = rows.iter().map(|row| &row.values[k]).collect();
@@ -104,6 +106,7 @@ impl OpenStudy {
         Self {
             columns: axes.chain(figures).collect(),
             base,
+            is_of_base,
             collected,
         }
     }

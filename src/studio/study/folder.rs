@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use egui::{TextEdit, Ui};
 
-use super::super::action::FileAction;
+use super::super::action::{Compute, FileAction};
 use super::super::ask::Ask;
-use super::super::commands::Command;
 use super::chosen::StudyView;
 use crate::session::Task;
 
@@ -26,7 +25,9 @@ pub fn open_row(ask: &mut Ask<'_>, view: &mut StudyView, ui: &mut Ui) {
         }
         if ask.session.jobs.runs(Task::OpenStudy) {
             ui.spinner();
-            ask.button(ui, Command::Cancel);
+            if ui.button("Stop reading").clicked() {
+                ask.act(Compute::End(Task::OpenStudy));
+            }
         }
     });
 }

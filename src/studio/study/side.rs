@@ -10,7 +10,7 @@ use super::super::theme;
 use super::chosen::{FRONT, StudyView};
 use super::folder::open_row;
 use crate::plain;
-use crate::session::OpenStudy;
+use crate::session::{OpenStudy, Task};
 
 /// Of the picture of a limb.
 const PICTURE: f32 = 116.0;
@@ -67,7 +67,9 @@ fn one(ask: &mut Ask<'_>, view: &mut StudyView, study: &OpenStudy, unit: usize, 
     ui.horizontal_top(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(PICTURE, PICTURE), Sense::hover());
         // The one before stays until this one is there.
-        if let Some(limb) = ask.session.study.limb() {
+        let waits = ask.session.jobs.runs(Task::UnitLimb);
+        let limb = ask.session.study.limb();
+        if let Some(limb) = limb.filter(|limb| limb.unit == unit || waits) {
             view.thumbnail.show(limb, rect, ui);
         }
         Grid::new("unit")
