@@ -140,7 +140,11 @@ fn wear(path: &Path) -> String {
         };
         let found = update(&old.estimator, &lessons, 0, &unwatched).expect("enough presses");
         let seconds = cpu_seconds() - before;
-        let still = Still::of(&old.estimator, &old.estimator.find(&x), &places);
+        let still = Still::of(
+            &old.estimator.known_ratios(),
+            &old.estimator.find(&x),
+            &places,
+        );
         let (x, places, _) = some(&worn, &data, judged);
         let score = |of: &hapdef::learning::TouchEstimator| Scores::of(&of.find(&x), &places, &[]);
         let (was, now) = (score(&old.estimator), score(&found.estimator));

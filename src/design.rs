@@ -29,6 +29,8 @@ mod sensing;
 mod shortage;
 mod simulate;
 pub mod simulated_board;
+mod taught;
+mod training;
 mod walled;
 
 use glam::DVec3;
@@ -61,6 +63,8 @@ pub use self::refine::refine;
 pub use self::sensing::*;
 pub use self::shortage::*;
 pub use self::simulate::*;
+pub use self::taught::*;
+pub use self::training::*;
 pub use self::walled::*;
 
 /// Why a stage ended without a result.

@@ -9,6 +9,7 @@ pub mod map;
 pub mod matching;
 pub mod measured;
 pub mod region;
+pub mod remainder;
 pub mod several;
 pub mod trained;
 
@@ -21,5 +22,6 @@ pub use map::ResponseMap;
 pub use matching::{Contact, Errors, Matching};
 pub use measured::MeasuredMatching;
 pub use region::Region;
+pub use remainder::Remainder;
 pub use several::{Kind, Several, Touches};
 pub use trained::{Features, Lessons, Trained};

@@ -18,6 +18,7 @@ pub mod outlet;
 pub mod points;
 pub mod project_file;
 pub mod report;
+pub mod response_maps;
 pub mod run;
 pub mod scatter;
 pub mod source;

@@ -28,7 +28,7 @@ pub mod update;
 mod walk;
 
 pub use estimator::{Answer, TouchEstimator};
-pub use family::Family;
+pub use family::{ByModel, Family, Method};
 pub use lessons::{LearningError, Lessons};
 pub use score::Scores;
 pub use still::Still;

@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::common::make_folder;
 use super::out;
+use crate::design::Learned;
 use crate::io::touch_file;
 use crate::io::touch_source::{AGREES_MM, FILES, Source};
 use crate::learning::portable::Precision;
@@ -60,18 +61,24 @@ const DUE: usize = 512 * 1024;
 /// A message in the user's terms.
 pub fn run(args: &ExportCArgs) -> anyhow::Result<()> {
     let file = touch_file::read(&args.model)?;
-    let touches = file.estimator.place.points.nrows();
+    let Learned::Regression(estimator) = &file.estimator else {
+        anyhow::bail!(
+            "{}: matching with a model of the part runs in `hapdef listen`, and on no board yet. Train a regression (hapdef train without --project)",
+            args.model.display()
+        );
+    };
+    let touches = estimator.place.points.nrows();
     ensure!(
         touches <= MOST_TOUCHES,
         "the estimator knows {touches} touches, and a board's table at most {MOST_TOUCHES}: train it on fewer (--train-touches)"
     );
     make_folder(&args.out)?;
-    let source = Source::new(&file.estimator, args.precision.asked());
+    let source = Source::new(estimator, args.precision.asked());
     let origin = &file.header.origin;
     let about = format!(
-        "Touch from readings, by hapdef {}: {:?}, trained on {} touches of {}, {:.2} mm off on touches of no training.",
+        "Touch from readings, by hapdef {}: {}, trained on {} touches of {}, {:.2} mm off on touches of no training.",
         env!("CARGO_PKG_VERSION"),
-        origin.estimator,
+        origin.estimator.name(),
         origin.train_touches,
         plain::quote(&origin.data),
         origin.test.mean_mm

@@ -19,7 +19,7 @@ use super::common::Common;
 use super::ranges::between;
 use super::spared::Spared;
 use super::{out, progress::Bar};
-use crate::design::Sensing;
+use crate::design::{Learned, Sensing};
 use crate::io::bench_folder::limb_key;
 use crate::io::project_file::LoadedProject;
 use crate::io::run::Provenance;
@@ -122,7 +122,8 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     output.log = mcap_log(args, &loaded)?;
     let recorder = args.record.as_deref().map(Recorder::create).transpose();
     let recorder = recorder.map_err(anyhow::Error::msg)?;
-    let listener = Listener::new(address, pipeline(args, &loaded)?)
+    let pipeline = pipeline(args, &loaded, output.learned.as_ref())?;
+    let listener = Listener::new(address, pipeline)
         .at_rate(args.rate)
         .recording(recorder);
 
@@ -226,8 +227,17 @@ pub(super) fn obey_stdin(commands: Sender<Command>) {
     from_stdin(commands, say);
 }
 
-fn pipeline(args: &ListenArgs, loaded: &LoadedProject) -> anyhow::Result<Pipeline> {
+/// What finds touches: by the map that presses have taught, which needs no model any more, or by that of the project.
+fn pipeline(
+    args: &ListenArgs,
+    loaded: &LoadedProject,
+    learned: Option<&TouchFile>,
+) -> anyhow::Result<Pipeline> {
     let project = &loaded.inputs.project;
+    if let Some(Learned::Matching(taught)) = learned.map(|file| &file.estimator) {
+        let settings = taught.settings(project.live.settings(taught.channels()));
+        return Ok(Pipeline::new(taught.model(), settings));
+    }
     let sensing = sensing_for(&args.common, loaded)?;
     let gauges = sensing.gauges.len();
     let settings = project.live.settings(gauges);
@@ -375,8 +385,11 @@ impl Output {
         self.last_us = Some(update.time_us);
         self.log(update)?;
         let line = match &self.learned {
-            Some(learned) => line::learned(update, &learned.estimator),
-            None => line::of(update, self.estimator),
+            Some(TouchFile {
+                estimator: Learned::Regression(regression),
+                ..
+            }) => line::learned(update, regression),
+            _ => line::of(update, self.estimator),
         };
         if let Some((listener, clients)) = &mut self.served {
             while let Ok((client, _)) = listener.accept() {

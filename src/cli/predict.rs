@@ -46,7 +46,7 @@ pub fn run(args: &PredictArgs) -> anyhow::Result<()> {
     }
     let answers = file.estimator.find(&data.x);
     let scores = Scores::of(&answers, &data.targets, &data.forces);
-    let still = Still::of(&file.estimator, &answers, &data.targets);
+    let still = Still::of(&file.estimator.known_ratios(), &answers, &data.targets);
     if let Some(path) = &args.out {
         atomic::write(path, table(&answers).as_bytes())?;
     }

@@ -5,24 +5,30 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::common::Common;
+use super::common::{Common, QualityArg};
 use super::data::{DataArgs, Kept};
+use super::listen::sensing_for;
 use super::out;
 use super::progress::Bar;
 use super::ranges::whole;
 use super::spared::Spared;
 use super::train_update;
+use crate::design::{
+    Candidates, Learned, Outcome, PressLessons, Sensing, TeachingError, train_all,
+};
 use crate::io::fingerprint::Fingerprint;
+use crate::io::project_file::LoadedProject;
 use crate::io::{bench_folder, cpu_seconds, touch_file};
 use crate::learning::score::ForceRow;
-use crate::learning::{Asked, Family, Lessons, Scores, Trained, train};
+use crate::learning::{Asked, ByModel, Family, Lessons, Method, Scores};
 use crate::plain;
 use crate::regression::Grouping;
 use crate::study::Data;
+use crate::uncertainty::Pressing;
 
 /// What turns readings into places.
 #[derive(ValueEnum, Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum FamilyArg {
+pub enum MethodArg {
     /// The one that does best on touches that it has not learned from.
     #[default]
     Auto,
@@ -34,17 +40,24 @@ pub enum FamilyArg {
     KernelRidge,
     /// A Gaussian process with a length a channel.
     GaussianProcess,
+    /// Matching with the model of `--project`, whose gauges the presses calibrate.
+    Matching,
+    /// That, and what the presses show the model to be off by beside it, smooth over the surface.
+    MatchingRemainder,
 }
 
-impl FamilyArg {
-    fn family(self) -> Option<Family> {
-        match self {
-            Self::Auto => None,
-            Self::Svr => Some(Family::Svr),
-            Self::Nearest => Some(Family::Nearest),
-            Self::KernelRidge => Some(Family::KernelRidge),
-            Self::GaussianProcess => Some(Family::GaussianProcess),
-        }
+impl MethodArg {
+    /// The one that is meant; nothing where all are tried.
+    fn method(self) -> Option<Method> {
+        Some(match self {
+            Self::Auto => return None,
+            Self::Svr => Family::Svr.into(),
+            Self::Nearest => Family::Nearest.into(),
+            Self::KernelRidge => Family::KernelRidge.into(),
+            Self::GaussianProcess => Family::GaussianProcess.into(),
+            Self::Matching => Method::Model(ByModel::Matching),
+            Self::MatchingRemainder => Method::Model(ByModel::MatchingRemainder),
+        })
     }
 }
 
@@ -61,7 +74,17 @@ pub struct TrainArgs {
     pub update: Option<PathBuf>,
     /// What turns readings into places.
     #[arg(long, value_enum, default_value_t)]
-    pub estimator: FamilyArg,
+    pub estimator: MethodArg,
+    /// The project whose part was pressed, with its gauges: matching with its model is tried too. The bundled limb where no
+    /// file is named.
+    #[arg(long, value_name = "PROJECT", num_args = 0..=1, conflicts_with = "update")]
+    pub project: Option<Option<PathBuf>>,
+    /// How much to spend on the model: draft, standard or reference.
+    #[arg(long, requires = "project")]
+    pub quality: Option<QualityArg>,
+    /// The presses were made by hand: each is beside its place, and harder or lighter, by what the project says of a hand.
+    #[arg(long, requires = "project")]
+    pub by_hand: bool,
     /// Touches to learn from, drawn by the seed: a point of a learning curve. Eight tenths of the places when left out.
     #[arg(long, value_parser = whole(10, 1_000_000))]
     pub train_touches: Option<usize>,
@@ -106,32 +129,21 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
             train_update::run(&asked, &args.data, (&data, &groups), &notes)
         });
     }
-    let asked = Asked {
-        family: args.estimator.family(),
-        seed: args.seed,
-        train_touches: args.train_touches,
-    };
-    let bar = Bar::default();
     let before = cpu_seconds();
-    let trained = in_pool(args.threads, || {
-        let lessons = Lessons {
-            x: &data.x,
-            places_mm: &data.targets,
-            forces: &data.forces,
-            groups: &groups,
-        };
-        let watch = |p| bar.show(p);
-        args.data.named(train(&lessons, &asked, &watch))
-    });
-    bar.finish();
-    let trained = trained?;
+    let lessons = Lessons {
+        x: &data.x,
+        places_mm: &data.targets,
+        forces: &data.forces,
+        groups: &groups,
+    };
+    let (trained, limb) = trained(args, &lessons)?;
     let cpu = cpu_seconds() - before;
     for note in &trained.notes {
         out::say(&format!("note: {note}"));
     }
     notes.extend(trained.notes.iter().cloned());
     let origin = touch_file::Origin {
-        limb: bench_folder::key_in(&args.data.data, bench_folder::LIMB)?,
+        limb: limb.or(bench_folder::key_in(&args.data.data, bench_folder::LIMB)?),
         board: bench_folder::key_in(&args.data.data, bench_folder::BOARD)?,
         ..args.origin(&data, &trained)
     };
@@ -140,6 +152,74 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
         return out::line(&json_of(&trained, &notes, cpu).to_string());
     }
     print(&trained, cpu)
+}
+
+/// What was learned, and the key of the limb where there is a model of it.
+fn trained(args: &TrainArgs, lessons: &Lessons) -> anyhow::Result<(Outcome, Option<String>)> {
+    let method = args.estimator.method();
+    let asked = Asked {
+        family: match method {
+            Some(Method::Regression(family)) => Some(family),
+            _ => None,
+        },
+        seed: args.seed,
+        train_touches: args.train_touches,
+    };
+    let ways = match method {
+        None => ByModel::ALL.to_vec(),
+        Some(Method::Model(way)) => vec![way],
+        Some(Method::Regression(_)) => Vec::new(),
+    };
+    let part = args.part(!ways.is_empty() && method.is_some())?;
+    let bar = Bar::default();
+    let watch = |p| bar.show(p);
+    let mut notes = Vec::new();
+    let trained = in_pool(args.threads, || {
+        let presses = (part.as_ref()).map(|part| part.presses(lessons, args.by_hand));
+        let presses = match presses.transpose() {
+            Ok(presses) => presses,
+            // Where the model was asked for by name, nothing else will do.
+            Err(why) if method.is_some() => return args.data.named(Err(why)),
+            Err(why) => {
+                notes.push(format!("Matching is not tried: {why}."));
+                None
+            }
+        };
+        let candidates = Candidates {
+            regressions: !matches!(method, Some(Method::Model(_))),
+            model: presses.as_ref().map(|presses| (presses, &ways[..])),
+        };
+        args.data
+            .named(train_all(lessons, &asked, &candidates, &watch))
+    });
+    bar.finish();
+    let mut trained = trained?;
+    trained.notes.extend(notes);
+    Ok((trained, part.map(|part| part.limb)))
+}
+
+/// The part that was pressed, with its model.
+struct Part {
+    loaded: LoadedProject,
+    sensing: Sensing,
+    /// Its key.
+    limb: String,
+}
+
+impl Part {
+    fn presses<'a>(
+        &'a self,
+        lessons: &Lessons,
+        by_hand: bool,
+    ) -> Result<PressLessons<'a>, TeachingError> {
+        let project = &self.loaded.inputs.project;
+        let pressing = if by_hand {
+            project.uncertainty().pressing
+        } else {
+            Pressing::EXACT
+        };
+        PressLessons::new(&self.sensing, project, lessons, pressing)
+    }
 }
 
 /// Runs `work` on as many threads as were asked for.
@@ -173,7 +253,39 @@ impl TrainArgs {
         })
     }
 
-    fn origin(&self, data: &Data, trained: &Trained) -> touch_file::Origin {
+    /// The part of the project, where one is named.
+    fn part(&self, needed: bool) -> anyhow::Result<Option<Part>> {
+        let Some(project) = &self.project else {
+            anyhow::ensure!(
+                !needed,
+                "matching needs a model of the part that was pressed: name its project with --project"
+            );
+            return Ok(None);
+        };
+        let common = Common {
+            project: project.clone(),
+            quality: self.quality,
+            threads: self.threads,
+            ..Common::default()
+        };
+        let loaded = common.load()?;
+        loaded.inputs.project.check()?;
+        let limb = bench_folder::limb_key(&loaded.inputs);
+        let pressed = bench_folder::key_in(&self.data.data, bench_folder::LIMB)?;
+        anyhow::ensure!(
+            pressed.is_none_or(|pressed| pressed == limb),
+            "{}: these presses are of another limb, or of other gauges, than the project's",
+            plain::path(&self.data.data)
+        );
+        let sensing = sensing_for(&common, &loaded)?;
+        Ok(Some(Part {
+            loaded,
+            sensing,
+            limb,
+        }))
+    }
+
+    fn origin(&self, data: &Data, trained: &Outcome) -> touch_file::Origin {
         let name = self.data.data.file_name().unwrap_or_default();
         touch_file::Origin {
             data: name.to_string_lossy().into_owned(),
@@ -181,7 +293,7 @@ impl TrainArgs {
             touches: data.targets.len(),
             train_touches: trained.division.train.len(),
             seed: self.seed,
-            estimator: trained.family,
+            estimator: trained.method,
             validation_mm: trained.validation_mm,
             tried: trained.tried.clone(),
             test: trained.scores.clone(),
@@ -192,7 +304,7 @@ impl TrainArgs {
     }
 }
 
-fn json_of(trained: &Trained, notes: &[String], cpu_seconds: f64) -> serde_json::Value {
+fn json_of(trained: &Outcome, notes: &[String], cpu_seconds: f64) -> serde_json::Value {
     let Scores {
         mean_mm,
         median_mm,
@@ -201,11 +313,14 @@ fn json_of(trained: &Trained, notes: &[String], cpu_seconds: f64) -> serde_json:
         force_error_n,
         by_force,
     } = &trained.scores;
-    let force = trained.estimator.force.as_ref();
+    let (force, remainder) = match &trained.estimator {
+        Learned::Matching(taught) => (Some(trained.method), taught.known.remainder),
+        Learned::Regression(_) => (trained.force.map(Method::from), None),
+    };
     json!({
         "version": env!("CARGO_PKG_VERSION"),
-        "estimator": trained.family,
-        "force_estimator": force.map(|f| f.family),
+        "estimator": trained.method,
+        "force_estimator": force,
         "validation_mm": trained.validation_mm,
         "test_mm": mean_mm,
         "median_mm": median_mm,
@@ -216,6 +331,11 @@ fn json_of(trained: &Trained, notes: &[String], cpu_seconds: f64) -> serde_json:
         "validation_touches": trained.division.validation.len(),
         "test_touches": trained.division.test.len(),
         "channels": trained.estimator.channels(),
+        "remainder": remainder.map(|r| json!({
+            "share": r.share,
+            "length_mm": r.length * 1e3,
+            "scatter": r.scatter,
+        })),
         "by_force": by_force,
         "tried": trained.tried,
         "cpu_seconds": cpu_seconds,
@@ -223,17 +343,17 @@ fn json_of(trained: &Trained, notes: &[String], cpu_seconds: f64) -> serde_json:
     })
 }
 
-fn print(trained: &Trained, cpu_seconds: f64) -> anyhow::Result<()> {
+fn print(trained: &Outcome, cpu_seconds: f64) -> anyhow::Result<()> {
     for trial in &trained.tried {
         out::line(&format!(
-            "{:<17} {:>8.3} mm on the validation touches",
+            "{:<18} {:>8.3} mm on the validation touches",
             trial.estimator.name(),
             trial.validation_mm
         ))?;
     }
     out::line(&format!(
         "{} is taken: learned from {}, {cpu_seconds:.0} s of processor time",
-        trained.family.name(),
+        trained.method.name(),
         plain::either(trained.division.train.len(), "touch", "touches")
     ))?;
     print_scores(&trained.scores, trained.division.test.len())

@@ -7,6 +7,7 @@ use serde_json::json;
 use super::data::DataArgs;
 use super::out;
 use super::progress::Bar;
+use crate::design::Learned;
 use crate::io::touch_file::{self, Origin, Update};
 use crate::io::{bench_folder, cpu_seconds};
 use crate::learning::{Lessons, Still, Updated, update};
@@ -40,6 +41,12 @@ pub fn run(
     let file = touch_file::read(asked.old)?;
     let fits = file.check_channels(data.x.rows());
     args.named(fits.map_err(anyhow::Error::msg))?;
+    let Learned::Regression(old) = &file.estimator else {
+        anyhow::bail!(
+            "{}: this is matching by a map that presses have taught. Train it again with the new presses among the old ones (hapdef train --project)",
+            plain::path(asked.old)
+        );
+    };
     let origin = &file.header.origin;
     check_limb(origin, &args.data)?;
     let before = cpu_seconds();
@@ -51,11 +58,11 @@ pub fn run(
         groups,
     };
     let watch = |p| bar.show(p);
-    let found = args.named(update(&file.estimator, &lessons, asked.seed, &watch));
+    let found = args.named(update(old, &lessons, asked.seed, &watch));
     bar.finish();
     let found = found?;
-    let answers = file.estimator.find(&data.x);
-    let still = Still::of(&file.estimator, &answers, &data.targets);
+    let answers = old.find(&data.x);
+    let still = Still::of(&old.known_ratios(), &answers, &data.targets);
     let new = Origin {
         test: found.after.clone(),
         update: Some(Update {
@@ -66,7 +73,8 @@ pub fn run(
         }),
         ..origin.clone()
     };
-    touch_file::write(asked.out, new, &found.estimator)?;
+    let estimator = Learned::Regression(Box::new(found.estimator.clone()));
+    touch_file::write(asked.out, new, &estimator)?;
     if asked.json {
         let cpu = cpu_seconds() - before;
         return out::line(&json_of(&found, still, notes, cpu).to_string());

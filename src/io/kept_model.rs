@@ -22,11 +22,11 @@ use glam::DVec3;
 use super::FileError;
 use super::fingerprint::Fingerprint;
 use super::npz::{Arrays, NpzFile};
+use super::response_maps::{self, Maps, flat, numbers, vectors};
 use crate::budget::{Budget, Watch};
 use crate::design::{self, Computed, DesignError, Inputs, Sensing};
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::inference::{AsDrawn, ResponseMap};
-use crate::mesh::TriMesh;
 use crate::project::LiveKeys;
 
 /// Of the file.
@@ -101,48 +101,16 @@ fn write(path: &Path, key: &str, of: &Computed) -> Result<(), FileError> {
         file.add("scalars", &[2], &[of.element_mm, of.strain_percent])?;
         let gauges: Vec<f64> = of.gauges.iter().flat_map(numbers_of).collect();
         file.add("gauges", &[of.gauges.len(), OF_A_GAUGE], &gauges)?;
-        add_mesh(&mut file, "pressed", &of.sensitivity.mesh)?;
+        response_maps::add_mesh(&mut file, "pressed", &of.sensitivity.mesh)?;
         let weights = flat(of.sensitivity.weights());
         let vertices = of.sensitivity.mesh.positions().len();
         file.add("weights", &[vertices, of.gauges.len(), 3], &weights)?;
-        add_drawn(&mut file, &of.drawn)?;
+        let drawn = &of.drawn;
+        let own: Vec<&ResponseMap> = [&*drawn.map].into_iter().chain(&drawn.changes).collect();
+        response_maps::add(&mut file, &own, drawn.tip.as_deref(), drawn.axes.as_deref())?;
         Ok(file)
     };
     build().map_err(|e| FileError::of(path, &e))?.save(path)
-}
-
-fn add_drawn(file: &mut NpzFile, drawn: &AsDrawn) -> std::io::Result<()> {
-    add_mesh(file, "map", &drawn.map.mesh)?;
-    let asked = [drawn.tip.is_some(), drawn.axes.is_some()].map(u8::from);
-    file.add("asked", &[2], &asked)?;
-    let maps: Vec<&ResponseMap> = [&*drawn.map]
-        .into_iter()
-        .chain(&drawn.changes)
-        .chain(drawn.tip.as_deref())
-        .chain(drawn.axes.iter().flat_map(|axes| axes.iter()))
-        .collect();
-    let readings: Vec<f64> = maps
-        .iter()
-        .flat_map(|m| m.values().iter().copied())
-        .collect();
-    let nodes = drawn.map.values().len() / drawn.map.channels().max(1);
-    file.add(
-        "readings",
-        &[maps.len(), nodes, drawn.map.channels()],
-        &readings,
-    )
-}
-
-fn add_mesh(file: &mut NpzFile, of: &str, mesh: &TriMesh) -> std::io::Result<()> {
-    let positions = flat(mesh.positions());
-    let name = format!("{of}_positions");
-    file.add(&name, &[positions.len() / 3, 3], &positions)?;
-    let corners = mesh.triangles().as_flattened();
-    file.add(&format!("{of}_triangles"), &[corners.len() / 3, 3], corners)
-}
-
-fn flat(vectors: &[DVec3]) -> Vec<f64> {
-    vectors.iter().flat_map(DVec3::to_array).collect()
 }
 
 fn numbers_of(gauge: &Gauge) -> [f64; OF_A_GAUGE] {
@@ -165,20 +133,20 @@ fn numbers_of(gauge: &Gauge) -> [f64; OF_A_GAUGE] {
 
 /// What lies there, where it has this key and is whole.
 fn read(path: &Path, key: &str) -> Option<Computed> {
-    let mut from = Kept(Arrays::open(path).ok()?);
-    let bytes = from.numbers("key", &[key.len()])?;
+    let mut from = Arrays::open(path).ok()?;
+    let bytes = numbers(&mut from, "key", &[key.len()])?;
     let same = bytes.iter().map(|&b| b as u8).eq(key.bytes());
     if !same {
         return None;
     }
-    let scalars = from.numbers("scalars", &[2])?;
-    let gauges = from.0.numbers("gauges").ok()?;
+    let scalars = numbers(&mut from, "scalars", &[2])?;
+    let gauges = from.numbers("gauges").ok()?;
     let [count, OF_A_GAUGE] = gauges.shape[..] else {
         return None;
     };
-    let pressed = from.mesh("pressed")?;
-    let weights = from.numbers("weights", &[pressed.positions().len(), count, 3])?;
-    let drawn = from.drawn(count)?;
+    let pressed = response_maps::mesh(&mut from, "pressed")?;
+    let weights = numbers(&mut from, "weights", &[pressed.positions().len(), count, 3])?;
+    let drawn = drawn(&mut from, count)?;
     Some(Computed {
         gauges: gauges
             .values
@@ -203,63 +171,15 @@ fn gauge_of(numbers: &[f64]) -> Gauge {
     }
 }
 
-fn vectors(numbers: &[f64]) -> Vec<DVec3> {
-    numbers.chunks_exact(3).map(DVec3::from_slice).collect()
-}
-
-/// Arrays of which nothing is asked but that they are what was written.
-struct Kept(Arrays);
-
-impl Kept {
-    /// Finite numbers of a shape.
-    fn numbers(&mut self, name: &str, shape: &[usize]) -> Option<Vec<f64>> {
-        let array = self.0.numbers(name).ok()?;
-        let sound = array.shape == shape && array.values.iter().all(|v| v.is_finite());
-        sound.then_some(array.values)
-    }
-
-    fn mesh(&mut self, of: &str) -> Option<Arc<TriMesh>> {
-        let positions = self.0.numbers(&format!("{of}_positions")).ok()?;
-        let triangles = self.0.numbers(&format!("{of}_triangles")).ok()?;
-        let of_threes = |shape: &[usize]| matches!(shape, [n, 3] if *n > 0);
-        if !of_threes(&positions.shape) || !of_threes(&triangles.shape) {
-            return None;
-        }
-        let vertices = positions.shape[0];
-        let sound = triangles.values.iter().all(|&v| (v as usize) < vertices)
-            && positions.values.iter().all(|v| v.is_finite());
-        let corners = |t: &[f64]| [t[0] as u32, t[1] as u32, t[2] as u32];
-        sound.then(|| {
-            let triangles = triangles.values.chunks_exact(3).map(corners).collect();
-            Arc::new(TriMesh::from_checked(vectors(&positions.values), triangles))
-        })
-    }
-
-    fn drawn(&mut self, gauges: usize) -> Option<AsDrawn> {
-        let mesh = self.mesh("map")?;
-        let asked = self.numbers("asked", &[2])?;
-        let (with_tip, with_axes) = (asked[0] > 0.0, asked[1] > 0.0);
-        let maps = 4 + usize::from(with_tip) + 3 * usize::from(with_axes);
-        let nodes = mesh.positions().len() + mesh.edges().len();
-        let readings = self.numbers("readings", &[maps, nodes, gauges])?;
-        let mut maps = readings
-            .chunks_exact((nodes * gauges).max(1))
-            .map(|values| ResponseMap::of(Arc::clone(&mesh), gauges, values.to_vec()));
-        Some(AsDrawn {
-            map: Arc::new(maps.next()?),
-            changes: [maps.next()?, maps.next()?, maps.next()?],
-            tip: if with_tip {
-                Some(Arc::new(maps.next()?))
-            } else {
-                None
-            },
-            axes: if with_axes {
-                Some(Arc::new([maps.next()?, maps.next()?, maps.next()?]))
-            } else {
-                None
-            },
-        })
-    }
+fn drawn(from: &mut Arrays, gauges: usize) -> Option<AsDrawn> {
+    let Maps { own, tip, axes } = response_maps::read(from, 4, gauges)?;
+    let [map, along, across, turned] = own.try_into().ok()?;
+    Some(AsDrawn {
+        map: Arc::new(map),
+        changes: [along, across, turned],
+        tip,
+        axes,
+    })
 }
 
 #[cfg(test)]

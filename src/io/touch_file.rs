@@ -14,39 +14,53 @@
 //! | `place_outputs` | touches × outputs | of the nearest |
 //! | `place_off` | touches | squared error where the touch was left out |
 //! | `force_…` | | the same, with one output |
+//!
+//! Version 2 is of matching by a map that presses have taught, in metres, newtons and strain:
+//!
+//! | array | shape | is |
+//! |---|---|---|
+//! | `header` | bytes | [`Header`] |
+//! | `map_positions`, `map_triangles` | × 3 | the surface that readings are known on |
+//! | `readings` | maps × nodes × channels | of a newton at the vertices and the middles of the edges: what it reads, how far off that may be, then by the tip's size (1) and along the axes (3) where `asked` has them |
+//! | `ratios` | touches | errors over the radius, of touches that nothing was learned from |
 
 mod arrays;
 mod header;
+mod taught_map;
 
 use std::path::Path;
 
 use super::FileError;
 use super::npz::{Arrays, NpzFile};
-use crate::learning::TouchEstimator;
+use crate::design::Learned;
 
+use self::header::By;
 pub use self::header::{Header, Origin, Update};
 
 /// An estimator with what is known of it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct TouchFile {
     /// Where it comes from and how well it does.
     pub header: Header,
     /// What answers.
-    pub estimator: TouchEstimator,
+    pub estimator: Learned,
 }
 
 /// Writes an estimator.
 ///
 /// # Errors
 /// [`FileError`] naming the file.
-pub fn write(path: &Path, origin: Origin, estimator: &TouchEstimator) -> Result<(), FileError> {
+pub fn write(path: &Path, origin: Origin, estimator: &Learned) -> Result<(), FileError> {
     let header = Header::new(origin, estimator);
     let text = serde_json::to_string(&header)
         .map_err(|e| FileError::broken(path, format!("the header cannot be written: {e}")))?;
     let build = || -> std::io::Result<NpzFile> {
         let mut file = NpzFile::default();
         file.add("header", &[text.len()], text.as_bytes())?;
-        arrays::add(&mut file, estimator)?;
+        match estimator {
+            Learned::Regression(estimator) => arrays::add(&mut file, estimator)?,
+            Learned::Matching(taught) => taught_map::add(&mut file, taught)?,
+        }
         Ok(file)
     };
     build().map_err(|e| FileError::of(path, &e))?.save(path)
@@ -66,7 +80,16 @@ pub fn read(path: &Path) -> Result<TouchFile, FileError> {
         ));
     }
     let header = Header::read(path, &found.numbers("header")?.values)?;
-    let estimator = arrays::read(path, &mut found, &header)?;
+    let estimator = match &header.by {
+        By::Regression(entry) => {
+            let estimator = arrays::read(path, &mut found, header.channels, entry)?;
+            Learned::Regression(Box::new(estimator))
+        }
+        By::Matching(known) => {
+            let taught = taught_map::read(path, &mut found, header.channels, known.matching)?;
+            Learned::Matching(Box::new(taught))
+        }
+    };
     Ok(TouchFile { header, estimator })
 }
 

@@ -51,6 +51,12 @@ impl TouchEstimator {
         self.inputs.channels()
     }
 
+    /// Errors over the radius, of touches that were learned from, when they were left out: a sample.
+    #[must_use]
+    pub fn known_ratios(&self) -> Vec<f64> {
+        self.doubt.known_ratios(&self.place.points)
+    }
+
     /// What readings (channels × touches, in the unit that was learned from) say, touch by touch.
     #[must_use]
     pub fn find(&self, x: &SignalMatrix) -> Vec<Answer> {

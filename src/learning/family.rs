@@ -70,6 +70,49 @@ impl Family {
     }
 }
 
+/// How readings become places: by a regression, or by matching with a model of the part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Method {
+    /// From the readings alone.
+    Regression(Family),
+    /// With a model.
+    Model(ByModel),
+}
+
+/// What presses teach a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ByModel {
+    /// How the gauges are glued.
+    Matching,
+    /// That, and a remainder, smooth over the surface.
+    MatchingRemainder,
+}
+
+impl ByModel {
+    /// Both; of two that do as well the first is taken.
+    pub const ALL: [Self; 2] = [Self::Matching, Self::MatchingRemainder];
+}
+
+impl Method {
+    /// As in files and options.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Regression(family) => family.name(),
+            Self::Model(ByModel::Matching) => "matching",
+            Self::Model(ByModel::MatchingRemainder) => "matching-remainder",
+        }
+    }
+}
+
+impl From<Family> for Method {
+    fn from(family: Family) -> Self {
+        Self::Regression(family)
+    }
+}
+
 /// What a search found.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Settings {

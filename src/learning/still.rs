@@ -1,7 +1,8 @@
 //! Whether a skin still is what an estimator was trained on, from a few presses.
 
 use super::doubt::NORMAL_MEAN;
-use super::estimator::{Answer, TouchEstimator};
+use super::estimator::Answer;
+use crate::regression::tune::distances;
 use crate::statistics::mean;
 
 /// What a few presses say.
@@ -21,31 +22,21 @@ pub struct Still {
 pub const DOUBTED: f64 = 0.01;
 
 impl Still {
-    /// Of answers to presses at true places (mm). Errors over what is expected of each are compared with those of the
-    /// touches that were learned from, when they were left out, by their ranks (H. B. Mann and D. R. Whitney 1947): no
-    /// distribution is assumed. Nothing where fewer than five presses are there.
+    /// Of answers to presses at true places (mm). Errors over the radius of each are compared with `known` ones, of
+    /// touches that were left out when the estimator learned, by their ranks (H. B. Mann and D. R. Whitney 1947): no
+    /// distribution is assumed. Nothing where fewer than five of either are there.
     #[must_use]
-    pub fn of(
-        estimator: &TouchEstimator,
-        answers: &[Answer],
-        places_mm: &[[f64; 3]],
-    ) -> Option<Self> {
+    pub fn of(known: &[f64], answers: &[Answer], places_mm: &[[f64; 3]]) -> Option<Self> {
         const LEAST: usize = 5;
-        if answers.len() < LEAST {
+        if answers.len().min(known.len()) < LEAST {
             return None;
         }
-        let known = estimator.doubt.known_ratios(&estimator.place.points);
-        let over: Vec<f64> = (answers.iter().zip(places_mm))
-            .map(|(a, p)| {
-                let squares = (0..3).map(|k| (a.place_mm[k] - p[k]).powi(2));
-                squares.sum::<f64>().sqrt() / a.radius_mm.max(f64::MIN_POSITIVE)
-            })
-            .collect();
+        let over = over_radius(answers, places_mm);
         Some(Self {
             presses: over.len(),
             outside: over.iter().filter(|&&r| r > 1.0).count(),
             over_expected: mean(&over) / NORMAL_MEAN,
-            probability: as_large(&over, &known),
+            probability: as_large(&over, known),
         })
     }
 
@@ -75,6 +66,15 @@ impl Still {
             )
         }
     }
+}
+
+/// How far answers are from the true places (mm), over the radius of each.
+#[must_use]
+pub fn over_radius(answers: &[Answer], places_mm: &[[f64; 3]]) -> Vec<f64> {
+    let said: Vec<[f64; 3]> = answers.iter().map(|a| a.place_mm).collect();
+    let errors = distances(&said, places_mm);
+    let over = |(e, a): (&f64, &Answer)| e / a.radius_mm.max(f64::MIN_POSITIVE);
+    errors.iter().zip(answers).map(over).collect()
 }
 
 /// The probability of ranks as high as those of `new` among `known`, where both are drawn alike: one-sided, by the normal

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::distance::among;
 use super::doubt::Doubt;
 use super::estimator::{ForceEstimator, TouchEstimator};
-use super::family::{Family, Settings};
+use super::family::{Family, Method, Settings};
 use super::inputs::Inputs;
 use super::lessons::{Division, Known, LearningError, Lessons, lengths};
 use super::machine::Machine;
@@ -47,11 +47,11 @@ pub struct Trained {
     pub notes: Vec<String>,
 }
 
-/// How a family did.
+/// How a method did.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
-    /// The family.
-    pub estimator: Family,
+    /// The method.
+    pub estimator: Method,
     /// Mean error on the validation touches (mm).
     pub validation_mm: f64,
 }
@@ -104,7 +104,7 @@ pub fn train(lessons: &Lessons, asked: &Asked, watch: Watch) -> Result<Trained, 
         tried: tried
             .iter()
             .map(|t| Trial {
-                estimator: t.0,
+                estimator: t.0.into(),
                 validation_mm: t.1 * size,
             })
             .collect(),

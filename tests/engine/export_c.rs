@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use hapdef::dataset::SignalMatrix;
+use hapdef::design::Learned;
 use hapdef::io::touch_file;
 use hapdef::learning::{Family, TouchEstimator};
 use serde_json::Value;
@@ -80,7 +81,9 @@ fn c_answers_as_the_program_does() {
             println!("{family:?} {said}\n{}", compiled_and_run(&out, &sources));
         }
         // The trials that are written along might share a fault with what they try: here are readings of our own.
-        let estimator = touch_file::read(&model).unwrap().estimator;
+        let Learned::Regression(estimator) = touch_file::read(&model).unwrap().estimator else {
+            panic!("{family:?} is a regression");
+        };
         own_readings(&estimator, &folder.path().join("double"));
     }
 }

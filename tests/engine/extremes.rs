@@ -128,7 +128,7 @@ fn the_ends_of_the_project_are_sound() {
 #[test]
 fn as_many_gauges_as_feasible_sites_and_one_more() {
     let mut inputs = limb();
-    inputs.project.sites.spacing_mm = 14.0;
+    inputs.project.sites.spacing_mm = 22.0;
     inputs.project.feasible.edge_neighbours = 0;
     let simulated = design::simulate(&inputs, &budget(), &unwatched).unwrap();
     let feasible = design::filter(&inputs, &simulated).sites().len();

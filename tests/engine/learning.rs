@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use hapdef::budget::unwatched;
 use hapdef::dataset::SignalMatrix;
 use hapdef::io::npz::NpzFile;
-use hapdef::learning::{Asked, Family, Lessons, Trained, train};
+use hapdef::learning::{Asked, Family, Lessons, Method, Trained, train};
 use hapdef::regression::Grouping;
 use serde_json::Value;
 
@@ -119,7 +119,7 @@ fn the_best_on_validation_is_taken_and_its_radius_holds() {
         trained
             .tried
             .iter()
-            .find(|t| t.estimator == family)
+            .find(|t| t.estimator == Method::from(family))
             .unwrap()
             .validation_mm
     };

@@ -9,6 +9,7 @@ use std::path::Path;
 use hapdef::budget::unwatched;
 use hapdef::cli::examples::Example;
 use hapdef::dataset::SignalMatrix;
+use hapdef::design::Outcome;
 use hapdef::io::glb::write_glb;
 use hapdef::io::touch_file::{self, Origin};
 use hapdef::io::trade_file::Record;
@@ -447,14 +448,16 @@ pub fn trained(family: Family) -> Vec<u8> {
         family: Some(family),
         ..Asked::default()
     };
-    let learned = train(&lessons, &asked, &unwatched).expect("enough to learn from");
+    let learned: Outcome = train(&lessons, &asked, &unwatched)
+        .expect("enough to learn from")
+        .into();
     let origin = Origin {
         data: "d.npz".into(),
         fingerprint: "0".into(),
         touches: TOUCHES,
         train_touches: learned.division.train.len(),
         seed: 0,
-        estimator: learned.family,
+        estimator: learned.method,
         validation_mm: learned.validation_mm,
         tried: learned.tried,
         test: learned.scores,

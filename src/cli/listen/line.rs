@@ -28,7 +28,7 @@ pub(super) fn of(update: &Update, estimator: Estimator) -> String {
     line
 }
 
-/// As [`of`], by an estimator that was learned from presses; its radius holds nine of ten places that it was tested on.
+/// As [`of`], by a regression that was learned from presses; its radius holds nine of ten places that it was tested on.
 pub(super) fn learned(update: &Update, estimator: &TouchEstimator) -> String {
     let mut line = format!("{{\"t_us\":{},", update.time_us);
     let strain = update.strain.as_ref().filter(|_| update.contact.is_some());

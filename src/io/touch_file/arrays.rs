@@ -4,7 +4,7 @@ use std::path::Path;
 
 use faer::Mat;
 
-use super::header::{Header, MachineEntry};
+use super::header::{MachineEntry, RegressionEntry};
 use crate::io::FileError;
 use crate::io::npz::{Arrays, NpzFile};
 use crate::learning::TouchEstimator;
@@ -64,10 +64,10 @@ fn add_matrix(file: &mut NpzFile, name: &str, of: &Mat<f64>) -> std::io::Result<
 pub fn read(
     path: &Path,
     arrays: &mut Arrays,
-    header: &Header,
+    channels: usize,
+    header: &RegressionEntry,
 ) -> Result<TouchEstimator, FileError> {
     let mut from = Checked { path, arrays };
-    let channels = header.channels;
     let inputs = Inputs {
         middle: from.list("channel_middle", Some(channels))?,
         spread: from.list("channel_spread", Some(channels))?,

@@ -4,16 +4,17 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::design::{Knowledge, Learned};
 use crate::io::FileError;
-use crate::learning::machine::{By, Machine};
+use crate::learning::machine::{self, Machine};
 use crate::learning::targets::{Frame, Scale};
 use crate::learning::train::Trial;
-use crate::learning::{Family, Scores, TouchEstimator, kernel::Kernel};
+use crate::learning::{Family, Method, Scores, TouchEstimator, kernel::Kernel};
 use crate::plain::quote;
 
 const FORMAT: &str = "hapdtouch";
-/// Of files that are written, and the only one that is read.
-const VERSION: u32 = 1;
+/// Of files of regressions, and of matching.
+const VERSIONS: [u32; 2] = [1, 2];
 /// The longest header that can be meant (bytes).
 const LONGEST: usize = 1 << 20;
 
@@ -28,6 +29,25 @@ pub struct Header {
     pub origin: Origin,
     /// How many channels a reading has.
     pub channels: usize,
+    #[serde(flatten)]
+    pub(super) by: By,
+}
+
+/// What answers, beside its arrays.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub(super) enum By {
+    Regression(Box<RegressionEntry>),
+    Matching(Box<MatchingEntry>),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct MatchingEntry {
+    pub(super) matching: Knowledge,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct RegressionEntry {
     pub(super) frame: FrameEntry,
     pub(super) place: MachineEntry,
     pub(super) doubt: DoubtEntry,
@@ -47,8 +67,8 @@ pub struct Origin {
     pub train_touches: usize,
     /// Of the division of the touches.
     pub seed: u64,
-    /// Its family.
-    pub estimator: Family,
+    /// How it answers.
+    pub estimator: Method,
     /// Mean error on the touches that it was chosen by (mm).
     pub validation_mm: f64,
     /// What else was tried.
@@ -114,30 +134,27 @@ struct First {
 }
 
 impl Header {
-    pub(super) fn new(origin: Origin, estimator: &TouchEstimator) -> Self {
-        let Frame { middle, axes, size } = &estimator.frame;
+    pub(super) fn new(origin: Origin, estimator: &Learned) -> Self {
+        let (version, by) = match estimator {
+            Learned::Regression(estimator) => {
+                let entry = RegressionEntry::new(estimator);
+                (VERSIONS[0], By::Regression(Box::new(entry)))
+            }
+            Learned::Matching(taught) => {
+                let matching = taught.known;
+                (
+                    VERSIONS[1],
+                    By::Matching(Box::new(MatchingEntry { matching })),
+                )
+            }
+        };
         Self {
             format: FORMAT.to_owned(),
-            version: VERSION,
+            version,
             program: env!("CARGO_PKG_VERSION").to_owned(),
             origin,
             channels: estimator.channels(),
-            frame: FrameEntry {
-                middle_mm: *middle,
-                axes: axes.clone(),
-                size_mm: *size,
-            },
-            place: entry(&estimator.place),
-            doubt: DoubtEntry {
-                usual: estimator.doubt.usual,
-                factor: estimator.doubt.factor,
-            },
-            force: estimator.force.as_ref().map(|force| ForceEntry {
-                estimator: force.family,
-                middle_n: force.scale.middle,
-                size_n: force.scale.size,
-                machine: entry(&force.machine),
-            }),
+            by,
         }
     }
 
@@ -160,10 +177,10 @@ impl Header {
                 quote(&first.format)
             )));
         }
-        if first.version != VERSION {
+        if !VERSIONS.contains(&first.version) {
             return Err(broken(&format!(
-                "it is of version {} of the format, and this program reads version {VERSION}. Train it again, or use the program that wrote it",
-                first.version
+                "it is of version {} of the format, and this program reads versions {} and {}. Train it again, or use the program that wrote it",
+                first.version, VERSIONS[0], VERSIONS[1]
             )));
         }
         let header: Self = parse(path, &text)?;
@@ -173,23 +190,48 @@ impl Header {
         Ok(header)
     }
 
-    /// That frames are frames.
+    /// That frames are frames, and spreads are spreads.
+    fn check(&self) -> Result<(), String> {
+        match &self.by {
+            By::Regression(entry) => entry.check(),
+            By::Matching(entry) => check_known(&entry.matching),
+        }
+    }
+}
+
+impl RegressionEntry {
+    fn new(estimator: &TouchEstimator) -> Self {
+        let Frame { middle, axes, size } = &estimator.frame;
+        Self {
+            frame: FrameEntry {
+                middle_mm: *middle,
+                axes: axes.clone(),
+                size_mm: *size,
+            },
+            place: entry(&estimator.place),
+            doubt: DoubtEntry {
+                usual: estimator.doubt.usual,
+                factor: estimator.doubt.factor,
+            },
+            force: estimator.force.as_ref().map(|force| ForceEntry {
+                estimator: force.family,
+                middle_n: force.scale.middle,
+                size_n: force.scale.size,
+                machine: entry(&force.machine),
+            }),
+        }
+    }
+
     fn check(&self) -> Result<(), String> {
         let axes = &self.frame.axes;
         if !(1..=3).contains(&axes.len()) {
             return Err(format!("places spread in {} directions", axes.len()));
         }
-        let positive = |what: &str, value: f64| {
-            if value.is_finite() && value >= 0.0 {
-                return Ok(());
-            }
-            Err(format!("{what} is {value:e}"))
-        };
-        positive("the size of the skin", self.frame.size_mm)?;
-        positive("the usual distance", self.doubt.usual)?;
-        positive("the factor of the radius", self.doubt.factor)?;
+        not_negative("the size of the skin", self.frame.size_mm)?;
+        not_negative("the usual distance", self.doubt.usual)?;
+        not_negative("the factor of the radius", self.doubt.factor)?;
         if let Some(force) = &self.force {
-            positive("the size of forces", force.size_n)?;
+            not_negative("the size of forces", force.size_n)?;
         }
         Ok(())
     }
@@ -203,6 +245,31 @@ impl Header {
     }
 }
 
+fn check_known(known: &Knowledge) -> Result<(), String> {
+    if known.noise <= 0.0 || known.most_force <= 0.0 {
+        return Err("readings have no noise, or nobody presses".to_owned());
+    }
+    for (what, value) in [
+        ("the noise", known.noise),
+        ("what the map leaves", known.relative),
+        ("the largest force", known.most_force),
+        ("the spread of the tip", known.tip),
+        ("the friction", known.friction),
+        ("the drift", known.drift),
+        ("the spread of the stiffness", known.stiffness),
+    ] {
+        not_negative(what, value)?;
+    }
+    Ok(())
+}
+
+fn not_negative(what: &str, value: f64) -> Result<(), String> {
+    if value.is_finite() && value >= 0.0 {
+        return Ok(());
+    }
+    Err(format!("{what} is {value:e}"))
+}
+
 impl ForceEntry {
     pub(super) fn scale(&self) -> Scale {
         Scale {
@@ -214,8 +281,8 @@ impl ForceEntry {
 
 fn entry(machine: &Machine) -> MachineEntry {
     match &machine.by {
-        By::Kernel { kernel, .. } => MachineEntry::Kernel(*kernel),
-        By::Nearest { count, .. } => MachineEntry::Nearest(*count),
+        machine::By::Kernel { kernel, .. } => MachineEntry::Kernel(*kernel),
+        machine::By::Nearest { count, .. } => MachineEntry::Nearest(*count),
     }
 }
 

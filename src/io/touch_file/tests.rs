@@ -1,10 +1,14 @@
 use std::path::Path;
+use std::sync::Arc;
 
 use super::{Origin, TouchFile, read, write};
 use crate::budget::unwatched;
 use crate::dataset::SignalMatrix;
+use crate::design::{Knowledge, Learned, Outcome, Taught};
+use crate::inference::ResponseMap;
 use crate::io::npz::NpzFile;
-use crate::learning::{Asked, Family, Lessons, Trained, train};
+use crate::learning::{Asked, Family, Lessons, train};
+use crate::mesh::TriMesh;
 
 /// Four channels that feel what is near them, on a flat skin, pressed at random.
 fn touched() -> (SignalMatrix, Vec<[f64; 3]>, Vec<f64>) {
@@ -23,7 +27,7 @@ fn touched() -> (SignalMatrix, Vec<[f64; 3]>, Vec<f64>) {
     (SignalMatrix::new(120, values.collect()), places, forces)
 }
 
-fn trained(family: Family) -> Trained {
+fn trained(family: Family) -> Outcome {
     let (x, places_mm, forces) = touched();
     let groups: Vec<usize> = (0..120).collect();
     let lessons = Lessons {
@@ -36,17 +40,17 @@ fn trained(family: Family) -> Trained {
         family: Some(family),
         ..Asked::default()
     };
-    train(&lessons, &asked, &unwatched).unwrap()
+    train(&lessons, &asked, &unwatched).unwrap().into()
 }
 
-fn origin(trained: &Trained) -> Origin {
+fn origin(trained: &Outcome) -> Origin {
     Origin {
         data: "d.npz".into(),
         fingerprint: "00".into(),
         touches: 120,
         train_touches: trained.division.train.len(),
         seed: 0,
-        estimator: trained.family,
+        estimator: trained.method,
         validation_mm: trained.validation_mm,
         tried: trained.tried.clone(),
         test: trained.scores.clone(),
@@ -69,12 +73,84 @@ fn an_estimator_comes_back_to_the_last_bit() {
         let trained = trained(family);
         write(&path, origin(&trained), &trained.estimator).unwrap();
         let TouchFile { header, estimator } = read(&path).unwrap();
-        assert_eq!(estimator, trained.estimator);
+        let (Learned::Regression(read), Learned::Regression(written)) =
+            (&estimator, &trained.estimator)
+        else {
+            panic!("another kind came back");
+        };
+        assert_eq!(read, written);
         assert_eq!(header.origin, origin(&trained));
         let (x, ..) = touched();
         assert_eq!(estimator.find(&x), trained.estimator.find(&x));
         assert!(estimator.find(&x)[0].force_n.is_some());
     }
+}
+
+/// Matching on one triangle.
+fn taught() -> Learned {
+    const CHANNELS: usize = 4;
+    let corners = [
+        glam::DVec3::ZERO,
+        glam::DVec3::X * 0.01,
+        glam::DVec3::Y * 0.01,
+    ];
+    let (mesh, _) = TriMesh::new(&corners, &[[0, 1, 2]], 0).unwrap();
+    let mesh = Arc::new(mesh);
+    let map = |size: f64, by: f64| {
+        let value = |k: usize| size * (1.1 + (by * (k + 1) as f64).sin());
+        let values = (0..6 * CHANNELS).map(value).collect();
+        ResponseMap::of(Arc::clone(&mesh), CHANNELS, values)
+    };
+    Learned::Matching(Box::new(Taught {
+        map: Arc::new(map(1e-5, 1.7)),
+        own: Arc::new(map(1e-7, 2.3)),
+        tip: Some(Arc::new(map(1e-4, 0.3))),
+        axes: Some(Arc::new([0.4, 0.5, 0.6].map(|by| map(1e-5, by)))),
+        known: Knowledge {
+            noise: 1e-7,
+            relative: 0.01,
+            most_force: 60.0,
+            tip: 5e-4,
+            friction: 0.25,
+            drift: 1e-7,
+            stiffness: 0.1,
+            remainder: None,
+        },
+        ratios: vec![0.25, 0.5, 1.5],
+    }))
+}
+
+#[test]
+fn matching_comes_back_to_the_last_bit_and_what_is_damaged_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.hapdtouch");
+    let (x, ..) = touched();
+    // As strains.
+    let values = x.values().iter().map(|v| v * 1e-5).collect();
+    let x = SignalMatrix::new(x.columns(), values);
+    let estimator = taught();
+    let origin = origin(&trained(Family::Nearest));
+    write(&path, origin.clone(), &estimator).unwrap();
+    let file = read(&path).unwrap();
+    assert_eq!(file.header.origin, origin);
+    assert_eq!(file.estimator.find(&x), estimator.find(&x));
+    assert_eq!(file.estimator.known_ratios(), estimator.known_ratios());
+    let first = std::fs::read(&path).unwrap();
+    write(&path, origin.clone(), &file.estimator).unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), first);
+
+    let Learned::Matching(mut broken) = estimator else {
+        unreachable!()
+    };
+    broken.known.friction = -1.0;
+    write(&path, origin.clone(), &Learned::Matching(broken.clone())).unwrap();
+    assert!(refused(&path).contains("the friction is -1"));
+    broken.known.friction = 0.0;
+    let mut values = broken.own.values().to_vec();
+    values[3] = -1e-9;
+    broken.own = Arc::new(ResponseMap::of(Arc::clone(&broken.map.mesh), 4, values));
+    write(&path, origin, &Learned::Matching(broken)).unwrap();
+    assert!(refused(&path).contains("map of readings is damaged"));
 }
 
 #[test]

@@ -1,0 +1,165 @@
+//! Training on presses of a part that there is a model of: regressions and matching learn from the same touches, are chosen by
+//! the same others, and the last word is said on the same third ones.
+
+use super::taught::{PressLessons, Taught};
+use crate::budget::Watch;
+use crate::dataset::SignalMatrix;
+use crate::learning::lessons::Division;
+use crate::learning::still::over_radius;
+use crate::learning::train::Trial;
+use crate::learning::{
+    Answer, Asked, ByModel, Family, LearningError, Lessons, Method, Scores, TouchEstimator,
+    Trained, train,
+};
+use crate::regression::tune::distances;
+use crate::statistics::mean;
+
+/// An estimator that was learned.
+#[derive(Clone)]
+pub enum Learned {
+    /// From readings alone.
+    Regression(Box<TouchEstimator>),
+    /// With a model of the part.
+    Matching(Box<Taught>),
+}
+
+impl std::fmt::Debug for Learned {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let kind = match self {
+            Self::Regression(_) => "Regression",
+            Self::Matching(_) => "Matching",
+        };
+        write!(f, "{kind} of {} channels", self.channels())
+    }
+}
+
+impl Learned {
+    /// How many channels a reading has.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        match self {
+            Self::Regression(estimator) => estimator.channels(),
+            Self::Matching(taught) => taught.channels(),
+        }
+    }
+
+    /// Errors over the radius, of touches that were left out when it learned.
+    #[must_use]
+    pub fn known_ratios(&self) -> Vec<f64> {
+        match self {
+            Self::Regression(estimator) => estimator.known_ratios(),
+            Self::Matching(taught) => taught.ratios.clone(),
+        }
+    }
+
+    /// What readings (channels × touches, in the unit that was learned from) say, touch by touch.
+    #[must_use]
+    pub fn find(&self, x: &SignalMatrix) -> Vec<Answer> {
+        match self {
+            Self::Regression(estimator) => estimator.find(x),
+            Self::Matching(taught) => taught.find(x),
+        }
+    }
+}
+
+/// What came of a training.
+pub struct Outcome {
+    /// The estimator that was chosen.
+    pub estimator: Learned,
+    /// How it answers.
+    pub method: Method,
+    /// What finds forces, where they were learned by a regression.
+    pub force: Option<Family>,
+    /// Every method's error on the validation touches.
+    pub tried: Vec<Trial>,
+    /// On the test touches.
+    pub scores: Scores,
+    /// Mean error on the validation touches (mm).
+    pub validation_mm: f64,
+    /// Who was learned from, chosen by and judged on.
+    pub division: Division,
+    /// What a reader must know, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Who is tried.
+pub struct Candidates<'a> {
+    /// Regressions: the one that is asked for, or all.
+    pub regressions: bool,
+    /// Matching in these ways, by presses of a part that there is a model of.
+    pub model: Option<(&'a PressLessons<'a>, &'a [ByModel])>,
+}
+
+/// Trains on measured touches; of all candidates the one is taken that does best on the validation touches.
+///
+/// # Errors
+/// [`LearningError`] for touches that nothing can be learned from, or when the watch asks for a stop.
+pub fn train_all(
+    lessons: &Lessons,
+    asked: &Asked,
+    candidates: &Candidates,
+    watch: Watch,
+) -> Result<Outcome, LearningError> {
+    let alone = (candidates.regressions).then(|| train(lessons, asked, watch));
+    let mut best: Option<Outcome> = alone.transpose()?.map(Into::into);
+    let Some((presses, ways)) = candidates.model else {
+        return best.ok_or(LearningError::Singular);
+    };
+    let division = Division::draw(lessons.groups, asked.seed, asked.train_touches)?;
+    let of = |touches: &[usize]| -> Vec<[f64; 3]> {
+        touches.iter().map(|&t| lessons.places_mm[t]).collect()
+    };
+    let truth = of(&division.validation);
+    let mut tried = best.as_ref().map_or(Vec::new(), |b| b.tried.clone());
+    for &way in ways {
+        let mut taught = presses.teach(&division.train, way, watch)?;
+        let answers = taught.find(&lessons.x.select_columns(&division.validation));
+        let validation_mm = mean_error(&answers, &truth);
+        taught.ratios = over_radius(&answers, &truth);
+        let method = Method::Model(way);
+        tried.push(Trial {
+            estimator: method,
+            validation_mm,
+        });
+        if best
+            .as_ref()
+            .is_some_and(|b| b.validation_mm <= validation_mm)
+        {
+            continue;
+        }
+        let forces: Vec<f64> = division.test.iter().map(|&t| lessons.forces[t]).collect();
+        let answers = taught.find(&lessons.x.select_columns(&division.test));
+        best = Some(Outcome {
+            scores: Scores::of(&answers, &of(&division.test), &forces),
+            estimator: Learned::Matching(Box::new(taught)),
+            method,
+            force: None,
+            tried: Vec::new(),
+            validation_mm,
+            division: division.clone(),
+            notes: best.map_or(Vec::new(), |b| b.notes),
+        });
+    }
+    let best = best.ok_or(LearningError::Singular)?;
+    Ok(Outcome { tried, ..best })
+}
+
+fn mean_error(answers: &[Answer], places_mm: &[[f64; 3]]) -> f64 {
+    let said: Vec<[f64; 3]> = answers.iter().map(|a| a.place_mm).collect();
+    mean(&distances(&said, places_mm))
+}
+
+impl From<Trained> for Outcome {
+    fn from(trained: Trained) -> Self {
+        Self {
+            force: trained.estimator.force.as_ref().map(|f| f.family),
+            estimator: Learned::Regression(Box::new(trained.estimator)),
+            method: trained.family.into(),
+            tried: trained.tried,
+            scores: trained.scores,
+            validation_mm: trained.validation_mm,
+            division: trained.division,
+            notes: trained.notes,
+        }
+    }
+}
