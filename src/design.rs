@@ -30,6 +30,7 @@ mod shortage;
 mod simulate;
 pub mod simulated_board;
 mod taught;
+mod telling;
 mod training;
 mod walled;
 
@@ -64,6 +65,7 @@ pub use self::sensing::*;
 pub use self::shortage::*;
 pub use self::simulate::*;
 pub use self::taught::*;
+pub use self::telling::most_telling;
 pub use self::training::*;
 pub use self::walled::*;
 

@@ -21,6 +21,7 @@ mod kept;
 mod keys;
 mod labels;
 mod layout;
+mod learned;
 mod legend;
 mod live;
 mod measure;

@@ -5,13 +5,17 @@
 //! on a simulated bench ([`press_on_simulated`]).
 
 mod asked;
+mod dataset;
 mod places;
 mod ready;
 mod reference;
+mod rounds;
 mod run;
 mod simulated;
 
 pub use asked::{Asked, Flaws};
+pub use dataset::{Collected, Wanted};
 pub use ready::{Ready, pressed};
+pub use rounds::{Errors, Goal, Met, Round};
 pub use run::Run;
 pub use simulated::press_on_simulated;

@@ -35,6 +35,8 @@ pub enum News {
     Answer(Answer),
     /// These presses that were over are none: they are made again.
     Discarded(Vec<usize>),
+    /// All of the plan is pressed, and whether there is more is waited for.
+    Waits,
     /// For people.
     Say(String),
 }
@@ -135,6 +137,9 @@ pub struct Collector {
     sample_us: Option<u64>,
     begun_us: Option<u64>,
     paused: bool,
+    /// Whether the end of the plan is not the end, and whether it is waited there.
+    more: bool,
+    waits: bool,
     ended: Option<Ended>,
     /// Moves that were made and found to be right.
     pub moves: u64,
@@ -178,9 +183,40 @@ impl Collector {
             sample_us: None,
             begun_us: None,
             paused: false,
+            more: false,
+            waits: false,
             ended: None,
             moves: 0,
             hardest: 0.0,
+        }
+    }
+
+    /// At the end of the plan it waits for more ([`Self::go_on`]), with its tip out of the way, and says so.
+    #[must_use]
+    pub fn waiting_for_more(mut self) -> Self {
+        self.more = true;
+        self
+    }
+
+    /// Presses these too; where there are none, it is over.
+    pub fn go_on(&mut self, more: impl IntoIterator<Item = (usize, Planned)>) {
+        self.plan.extend(more);
+        self.more = !self.plan.is_empty();
+        if std::mem::take(&mut self.waits) && !self.more {
+            self.end(Ended::Finished);
+        }
+    }
+
+    /// Nothing of the plan is left.
+    fn through(&mut self, tell: &mut dyn FnMut(News)) {
+        if !self.more {
+            self.end(Ended::Finished);
+            return;
+        }
+        self.phase = Phase::Retract;
+        self.doing = Doing::Nothing;
+        if !std::mem::replace(&mut self.waits, true) {
+            tell(News::Waits);
         }
     }
 
@@ -194,6 +230,11 @@ impl Collector {
     #[must_use]
     pub fn left(&self) -> usize {
         self.plan.len()
+    }
+
+    /// The numbers of what is still to be pressed.
+    pub fn planned_numbers(&self) -> impl Iterator<Item = usize> {
+        self.plan.iter().map(|(number, _)| *number)
     }
 
     /// What is pressed now, or next.

@@ -2,9 +2,11 @@
 
 mod args;
 
+use std::collections::BTreeSet;
 use std::io::BufRead as _;
-use std::sync::Arc;
-use std::sync::mpsc::{Sender, channel};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use anyhow::ensure;
 use serde_json::json;
@@ -18,7 +20,7 @@ use super::spared::Spared;
 use crate::bench::{Collector, Ended, News};
 use crate::link::{Address, BenchOrder, Pace};
 use crate::plain;
-use crate::test_bed::{Ready, Run, press_on_simulated, pressed};
+use crate::test_bed::{Goal, Met, Ready, Round, Run, press_on_simulated, pressed};
 
 /// Runs the command.
 ///
@@ -42,13 +44,90 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
         return out::line(&said.to_string());
     }
     out::say(&ready.checked_in_words());
-    let mut collector = ready.collector();
-    let (ended, failed) = if collector.left() == 0 {
-        (Ended::Finished, 0)
-    } else {
-        press(args, &ready, ports, &mut collector)?
+    let mut presser = Presser::new(args, ports);
+    let Some(mm) = args.until else {
+        let ended = presser.press(&ready, ready.collector(), None)?;
+        return finish(&ready, &presser, &ended, None);
     };
-    finish(&ready, &collector, &ended, failed)
+    let rounds = Rounds::new(&ready, args, mm);
+    let first = args.common.in_pool(|| rounds.next())?;
+    let ended = match &first.1 {
+        Round::Press(numbers) => {
+            let collector = ready.collector_of_rounds(numbers);
+            presser.press(&ready, collector, Some(&rounds))?
+        }
+        Round::Over { .. } => Ended::Finished,
+    };
+    let (met, round) = args.common.in_pool(|| rounds.next())?;
+    let reached = matches!(round, Round::Over { met: true });
+    if ended == Ended::Finished && !reached {
+        out::say("all places are pressed, and the goal is not reached");
+    }
+    finish(&ready, &presser, &ended, Some((met, reached)))
+}
+
+/// A plan that learns, and what has failed of it.
+struct Rounds<'a> {
+    ready: &'a Ready,
+    goal: Goal,
+    failed: Mutex<BTreeSet<usize>>,
+}
+
+impl<'a> Rounds<'a> {
+    fn new(ready: &'a Ready, args: &CollectArgs, mm: f64) -> Self {
+        Self {
+            ready,
+            goal: Goal {
+                mm,
+                round: args.round,
+                in_order: args.in_order,
+            },
+            failed: Mutex::default(),
+        }
+    }
+
+    fn failed(&self) -> MutexGuard<'_, BTreeSet<usize>> {
+        self.failed.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What was reached, and what comes next.
+    fn next(&self) -> anyhow::Result<(Met, Round)> {
+        let failed = self.failed().clone();
+        let bar = Bar::default();
+        let watch = |p| bar.show(p);
+        let next = self.ready.next_round(&self.goal, &failed, &watch);
+        bar.finish();
+        let next = next?;
+        say_met(&next.0);
+        Ok(next)
+    }
+
+    /// As an order. What is pressed and cannot be read back is not pressed again and again.
+    fn order(&self, last: &BTreeSet<usize>) -> anyhow::Result<(BenchOrder, BTreeSet<usize>)> {
+        let there = pressed(&self.ready.folder)?;
+        self.failed().extend(last.difference(&there));
+        let numbers = match self.next()?.1 {
+            Round::Press(numbers) => numbers,
+            Round::Over { .. } => BTreeSet::new(),
+        };
+        let presses = (self.ready.planned())
+            .filter(|(number, _)| numbers.contains(number))
+            .collect();
+        Ok((BenchOrder::More(presses), numbers))
+    }
+}
+
+fn say_met(met: &Met) {
+    if let Some(errors) = &met.errors {
+        out::say(&format!(
+            "learned from {}: of {} that nothing has learned from, half are found to {:.2} mm, nine of ten to {:.2}, on the mean {:.2}",
+            plain::either(met.learned_from, "press", "presses"),
+            plain::either(met.held_out, "other", "others"),
+            errors.median_mm,
+            errors.p90_mm,
+            errors.mean_mm
+        ));
+    }
 }
 
 /// Printer and board, where they are real.
@@ -76,61 +155,173 @@ fn ports(args: &CollectArgs) -> anyhow::Result<Option<(Address, Address)>> {
     Ok(Some(ports))
 }
 
-/// Presses what is left; how it ended, and how many failed.
-fn press(
-    args: &CollectArgs,
-    ready: &Ready,
+/// Presses, and keeps count.
+struct Presser<'a> {
+    args: &'a CollectArgs,
     ports: Option<(Address, Address)>,
-    collector: &mut Collector,
-) -> anyhow::Result<(Ended, usize)> {
-    let all = ready.reach.presses.len();
-    let (mut done, mut failed) = (ready.done.len(), 0);
-    let tell = |news: News| match news {
-        News::Say(text) => out::say(&format!("hapdef: {text}")),
-        News::Press { failed: None, .. } => {
-            done += 1;
-            if done.is_multiple_of(10) || done == all {
-                out::say(&format!("{done} of {all} presses"));
-            }
+    failed: usize,
+    moves: u64,
+    resent: u32,
+    hardest: f64,
+}
+
+impl<'a> Presser<'a> {
+    fn new(args: &'a CollectArgs, ports: Option<(Address, Address)>) -> Self {
+        Self {
+            args,
+            ports,
+            failed: 0,
+            moves: 0,
+            resent: 0,
+            hardest: 0.0,
         }
-        News::Press {
-            number,
-            failed: Some(why),
-        } => {
-            failed += 1;
-            out::say(&format!("press {number} failed: {why}"));
+    }
+
+    /// Goes through what a collector has left, and through `rounds` of more.
+    fn press(
+        &mut self,
+        ready: &Ready,
+        mut collector: Collector,
+        rounds: Option<&Rounds>,
+    ) -> anyhow::Result<Ended> {
+        if collector.left() == 0 {
+            return Ok(Ended::Finished);
         }
-        News::Answer(_) => {
-            if let Err(error) = ready.keep(&news) {
-                out::say(&format!("hapdef: {error:#}"));
-            }
-        }
-        News::Discarded(none) => done = done.saturating_sub(none.len()),
-        News::Note(_) | News::Keep | News::Begun(_) => {}
-    };
-    let ended = if let Some((printer, board)) = ports {
-        let (orders, inbox) = channel();
-        obey_signals(orders.clone());
-        obey_stdin(orders);
-        let mut next = || inbox.try_recv().ok();
-        ready.press_at(collector, (&printer, &board), &mut next, tell)?
-    } else {
-        let bar = Bar::default();
-        let pressing = || {
-            let watch = |p| bar.show(p);
-            let mut begun = false;
-            let mut orders = || {
-                // What was computed for it is there.
-                if !std::mem::replace(&mut begun, true) {
-                    bar.finish();
+        let all = ready.reach.presses.len();
+        let mut done = ready.done.len();
+        let mut failed = 0;
+        // The collector waits for the next round.
+        let waits = AtomicBool::new(false);
+        let tell = |news: News| match news {
+            News::Waits => waits.store(true, Ordering::Relaxed),
+            News::Say(text) => out::say(&format!("hapdef: {text}")),
+            News::Press { failed: None, .. } => {
+                done += 1;
+                if done.is_multiple_of(10) || done == all {
+                    out::say(&format!("{done} of {all} presses"));
                 }
-                None
-            };
-            press_on_simulated(ready, collector, &watch, &mut orders, tell)
+            }
+            News::Press {
+                number,
+                failed: Some(why),
+            } => {
+                failed += 1;
+                out::say(&format!("press {number} failed: {why}"));
+            }
+            News::Answer(_) => {
+                if let Err(error) = ready.keep(&news) {
+                    out::say(&format!("hapdef: {error:#}"));
+                }
+            }
+            News::Discarded(none) => done = done.saturating_sub(none.len()),
+            News::Note(_) | News::Keep | News::Begun(_) => {}
         };
-        args.common.in_pool(pressing)?
-    };
-    Ok((ended, failed))
+        let mut next = Next {
+            rounds,
+            waits: &waits,
+            last: collector.planned_numbers().collect(),
+        };
+        let ended = if let Some((printer, board)) = &self.ports {
+            let inbox = listen_for_orders();
+            at_ports(
+                ready,
+                &mut collector,
+                (printer, board),
+                &inbox,
+                &mut next,
+                tell,
+            )?
+        } else {
+            let bar = Bar::default();
+            let pressing = || {
+                let watch = |p| bar.show(p);
+                let mut begun = false;
+                let mut orders = || {
+                    // What was computed for it is there.
+                    if !std::mem::replace(&mut begun, true) {
+                        bar.finish();
+                    }
+                    next.is_due().then(|| next.order())
+                };
+                press_on_simulated(ready, &mut collector, &watch, &mut orders, tell)
+            };
+            self.args.common.in_pool(pressing)?
+        };
+        self.failed += failed;
+        self.moves += collector.moves;
+        self.resent += collector.resent();
+        self.hardest = self.hardest.max(collector.hardest);
+        Ok(ended)
+    }
+}
+
+/// The next round, when it is waited for.
+struct Next<'a> {
+    rounds: Option<&'a Rounds<'a>>,
+    waits: &'a AtomicBool,
+    /// The presses of the last one.
+    last: BTreeSet<usize>,
+}
+
+impl Next<'_> {
+    fn is_due(&self) -> bool {
+        self.rounds.is_some() && self.waits.swap(false, Ordering::Relaxed)
+    }
+
+    /// It, or that it cannot be had, and all ends.
+    fn order(&mut self) -> BenchOrder {
+        let order = self.rounds.map(|rounds| rounds.order(&self.last));
+        match order {
+            Some(Ok((order, numbers))) => {
+                self.last = numbers;
+                order
+            }
+            Some(Err(why)) => {
+                out::say(&format!("hapdef: {why:#}"));
+                BenchOrder::Stop
+            }
+            None => BenchOrder::More(Vec::new()),
+        }
+    }
+}
+
+/// At real ports nobody waits while the next round is thought of: samples, and orders to stop, go on being heard.
+fn at_ports(
+    ready: &Ready,
+    collector: &mut Collector,
+    ports: (&Address, &Address),
+    inbox: &Receiver<BenchOrder>,
+    next: &mut Next<'_>,
+    tell: impl FnMut(News),
+) -> anyhow::Result<Ended> {
+    std::thread::scope(|scope| {
+        let (answers, answered) = channel();
+        let mut orders = || {
+            if let (true, Some(rounds)) = (next.is_due(), next.rounds) {
+                let (answers, last) = (answers.clone(), next.last.clone());
+                scope.spawn(move || answers.send(rounds.order(&last)));
+            }
+            match answered.try_recv() {
+                Ok(Ok((order, numbers))) => {
+                    next.last = numbers;
+                    Some(order)
+                }
+                Ok(Err(why)) => {
+                    out::say(&format!("hapdef: {why:#}"));
+                    Some(BenchOrder::Stop)
+                }
+                Err(_) => inbox.try_recv().ok(),
+            }
+        };
+        ready.press_at(collector, ports, &mut orders, tell)
+    })
+}
+
+fn listen_for_orders() -> Receiver<BenchOrder> {
+    let (orders, inbox) = channel();
+    obey_signals(orders.clone());
+    obey_stdin(orders);
+    inbox
 }
 
 /// Ctrl-C and a request to end take the tip back before the program ends.
@@ -174,19 +365,28 @@ fn obey_stdin(orders: Sender<BenchOrder>) {
 
 fn finish(
     ready: &Ready,
-    collector: &Collector,
+    pressing: &Presser<'_>,
     ended: &Ended,
-    failed: usize,
+    learned: Option<(Met, bool)>,
 ) -> anyhow::Result<()> {
     let (presses, done) = (ready.reach.presses.len(), pressed(&ready.folder)?.len());
-    let said = json!({
+    let mut said = json!({
         "presses": presses,
         "pressed": done,
-        "failed": failed,
-        "moves": collector.moves,
-        "lines_sent_again": collector.resent(),
-        "hardest_n": collector.hardest,
+        "failed": pressing.failed,
+        "moves": pressing.moves,
+        "lines_sent_again": pressing.resent,
+        "hardest_n": pressing.hardest,
     });
+    if let Some((met, reached)) = learned {
+        said["until_mm"] = json!(pressing.args.until);
+        said["met"] = json!(reached);
+        said["learned_from"] = json!(met.learned_from);
+        said["held_out"] = json!(met.held_out);
+        said["held_out_mm"] = json!(met.errors.map(|e| e.mean_mm));
+        said["held_out_median_mm"] = json!(met.errors.map(|e| e.median_mm));
+        said["held_out_p90_mm"] = json!(met.errors.map(|e| e.p90_mm));
+    }
     out::line(&said.to_string())?;
     match ended {
         Ended::Finished => Ok(()),

@@ -8,6 +8,7 @@ use serde_json::json;
 use super::data::DataArgs;
 use super::spared::Spared;
 use super::{out, train};
+use crate::design::Learned;
 use crate::io::table::Writing;
 use crate::io::{atomic, touch_file};
 use crate::learning::{Answer, Scores, Still};
@@ -39,7 +40,7 @@ pub fn run(args: &PredictArgs) -> anyhow::Result<()> {
     let (data, mut notes) = args.data.load()?;
     let fits = file.check_channels(data.x.rows());
     args.data.named(fits.map_err(anyhow::Error::msg))?;
-    if file.header.origin.fingerprint == train::fingerprint(&data) {
+    if file.header.origin.fingerprint == touch_file::fingerprint(&data) {
         let note = "The estimator was trained on these touches: most of them are no test of it.";
         out::say(&format!("note: {note}"));
         notes.push(note.to_owned());
@@ -68,7 +69,11 @@ pub fn run(args: &PredictArgs) -> anyhow::Result<()> {
         return out::line(&summary.to_string());
     }
     train::print_scores(&scores, answers.len())?;
-    still.map_or(Ok(()), |still| out::line(&still.words()))
+    let cure = match &file.estimator {
+        Learned::Regression(_) => "Bring it up to date with hapdef train --update",
+        Learned::Matching(_) => "Train it again with new presses (hapdef train --project)",
+    };
+    still.map_or(Ok(()), |still| out::line(&still.words(cure)))
 }
 
 fn table(answers: &[Answer]) -> String {

@@ -16,7 +16,6 @@ use super::train_update;
 use crate::design::{
     Candidates, Learned, Outcome, PressLessons, Sensing, TeachingError, train_all,
 };
-use crate::io::fingerprint::Fingerprint;
 use crate::io::project_file::LoadedProject;
 use crate::io::{bench_folder, cpu_seconds, touch_file};
 use crate::learning::score::ForceRow;
@@ -123,7 +122,7 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
             out: &args.out,
             seed: args.seed,
             json: args.json,
-            fingerprint: fingerprint(&data),
+            fingerprint: touch_file::fingerprint(&data),
         };
         return in_pool(args.threads, || {
             train_update::run(&asked, &args.data, (&data, &groups), &notes)
@@ -142,10 +141,11 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
         out::say(&format!("note: {note}"));
     }
     notes.extend(trained.notes.iter().cloned());
+    let name = args.data.data.file_name().unwrap_or_default();
     let origin = touch_file::Origin {
         limb: limb.or(bench_folder::key_in(&args.data.data, bench_folder::LIMB)?),
         board: bench_folder::key_in(&args.data.data, bench_folder::BOARD)?,
-        ..args.origin(&data, &trained)
+        ..touch_file::Origin::of(&trained, &data, &name.to_string_lossy(), args.seed)
     };
     touch_file::write(&args.out, origin, &trained.estimator)?;
     if args.json {
@@ -170,7 +170,8 @@ fn trained(args: &TrainArgs, lessons: &Lessons) -> anyhow::Result<(Outcome, Opti
         Some(Method::Model(way)) => vec![way],
         Some(Method::Regression(_)) => Vec::new(),
     };
-    let part = args.part(!ways.is_empty() && method.is_some())?;
+    let by_model = matches!(method, Some(Method::Model(_)));
+    let part = args.part(&ways, by_model)?;
     let bar = Bar::default();
     let watch = |p| bar.show(p);
     let mut notes = Vec::new();
@@ -179,22 +180,26 @@ fn trained(args: &TrainArgs, lessons: &Lessons) -> anyhow::Result<(Outcome, Opti
         let presses = match presses.transpose() {
             Ok(presses) => presses,
             // Where the model was asked for by name, nothing else will do.
-            Err(why) if method.is_some() => return args.data.named(Err(why)),
+            Err(why) if by_model => return args.data.named(Err(why)),
             Err(why) => {
                 notes.push(format!("Matching is not tried: {why}."));
                 None
             }
         };
         let candidates = Candidates {
-            regressions: !matches!(method, Some(Method::Model(_))),
+            regressions: !by_model,
             model: presses.as_ref().map(|presses| (presses, &ways[..])),
         };
-        args.data
-            .named(train_all(lessons, &asked, &candidates, &watch))
+        let trained = args
+            .data
+            .named(train_all(lessons, &asked, &candidates, &watch))?;
+        Ok((trained, presses.is_some()))
     });
     bar.finish();
-    let mut trained = trained?;
+    let (mut trained, pressed) = trained?;
     trained.notes.extend(notes);
+    // Of presses that are not on the part nobody knows which limb they are of.
+    let part = part.filter(|_| pressed);
     Ok((trained, part.map(|part| part.limb)))
 }
 
@@ -234,14 +239,6 @@ pub(super) fn in_pool<T: Send>(
     .in_pool(work)
 }
 
-/// Which data something was learned from.
-pub(super) fn fingerprint(data: &Data) -> String {
-    let mut key = Fingerprint::default();
-    key.add_numbers(data.x.values());
-    key.add_numbers(data.targets.iter().flatten());
-    key.hex()
-}
-
 impl TrainArgs {
     /// The group of each touch.
     fn groups(&self, data: &Data) -> anyhow::Result<Vec<usize>> {
@@ -253,8 +250,11 @@ impl TrainArgs {
         })
     }
 
-    /// The part of the project, where one is named.
-    fn part(&self, needed: bool) -> anyhow::Result<Option<Part>> {
+    /// The part of the project, where one is named and asked for.
+    fn part(&self, ways: &[ByModel], needed: bool) -> anyhow::Result<Option<Part>> {
+        if ways.is_empty() {
+            return Ok(None);
+        }
         let Some(project) = &self.project else {
             anyhow::ensure!(
                 !needed,
@@ -269,6 +269,7 @@ impl TrainArgs {
             ..Common::default()
         };
         let loaded = common.load()?;
+        Spared::of(&loaded).check("--out", Some(&self.out))?;
         loaded.inputs.project.check()?;
         let limb = bench_folder::limb_key(&loaded.inputs);
         let pressed = bench_folder::key_in(&self.data.data, bench_folder::LIMB)?;
@@ -283,24 +284,6 @@ impl TrainArgs {
             sensing,
             limb,
         }))
-    }
-
-    fn origin(&self, data: &Data, trained: &Outcome) -> touch_file::Origin {
-        let name = self.data.data.file_name().unwrap_or_default();
-        touch_file::Origin {
-            data: name.to_string_lossy().into_owned(),
-            fingerprint: fingerprint(data),
-            touches: data.targets.len(),
-            train_touches: trained.division.train.len(),
-            seed: self.seed,
-            estimator: trained.method,
-            validation_mm: trained.validation_mm,
-            tried: trained.tried.clone(),
-            test: trained.scores.clone(),
-            limb: None,
-            board: None,
-            update: None,
-        }
     }
 }
 

@@ -126,7 +126,10 @@ fn json_of(
 
 fn say(found: &Updated, still: Option<Still>) -> anyhow::Result<()> {
     if let Some(still) = still {
-        out::line(&format!("before: {}", still.words()))?;
+        out::line(&format!(
+            "before: {}",
+            still.words("It is brought up to date now")
+        ))?;
     }
     if found.prior.is_none() {
         return out::line(&format!(

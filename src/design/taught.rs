@@ -29,6 +29,9 @@ const BESIDE: f64 = 3e-3;
 /// Readings more often as large as the model's, or as small, are in another unit.
 const UNLIKE: f64 = 5.0;
 
+/// No reading is taken to be better than this (strain), as in matching.
+const LEAST_NOISE: f64 = 1e-9;
+
 /// Matching by a map that presses have taught.
 #[derive(Clone)]
 pub struct Taught {
@@ -115,7 +118,7 @@ pub struct PressLessons<'a> {
 }
 
 impl<'a> PressLessons<'a> {
-    /// Of lessons whose readings are strains, made as exactly as `pressing` says.
+    /// Of lessons whose readings are strains, made as exactly as `pressing` says. None at all teach what is known beforehand.
     ///
     /// # Errors
     /// [`TeachingError`] for what is no press on this part.
@@ -125,11 +128,12 @@ impl<'a> PressLessons<'a> {
         lessons: &Lessons,
         pressing: Pressing,
     ) -> Result<Self, TeachingError> {
-        if lessons.forces.is_empty() {
+        let none = lessons.places_mm.is_empty();
+        if lessons.forces.len() != lessons.places_mm.len() {
             return Err(TeachingError::NoForces);
         }
         let (data, gauges) = (lessons.x.rows(), sensing.gauges.len());
-        if data != gauges {
+        if data != gauges && !none {
             return Err(TeachingError::Channels {
                 data,
                 project: gauges,
@@ -163,7 +167,9 @@ impl<'a> PressLessons<'a> {
         if median > BESIDE {
             return Err(TeachingError::Elsewhere { mm: median * 1e3 });
         }
-        presses.check_unit()?;
+        if !none {
+            presses.check_unit()?;
+        }
         Ok(presses)
     }
 
@@ -220,7 +226,7 @@ impl<'a> PressLessons<'a> {
             tip,
             axes,
             known: Knowledge {
-                noise: noise.first().copied().unwrap_or(0.0),
+                noise: noise.first().copied().unwrap_or(0.0).max(LEAST_NOISE),
                 relative: remainder.map_or(calibration.relative, |r| r.scatter),
                 most_force: self.project.live.largest_force_n,
                 tip: making.tip,

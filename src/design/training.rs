@@ -12,7 +12,7 @@ use crate::learning::{
     Trained, train,
 };
 use crate::regression::tune::distances;
-use crate::statistics::mean;
+use crate::statistics::{mean, midpoint_median};
 
 /// An estimator that was learned.
 #[derive(Clone)]
@@ -90,7 +90,8 @@ pub struct Candidates<'a> {
     pub model: Option<(&'a PressLessons<'a>, &'a [ByModel])>,
 }
 
-/// Trains on measured touches; of all candidates the one is taken that does best on the validation touches.
+/// Trains on measured touches; of all candidates the one is taken that does best on the validation touches: by the mean of its
+/// errors, and of two whose means differ by no more than chance lets them by the median.
 ///
 /// # Errors
 /// [`LearningError`] for touches that nothing can be learned from, or when the watch asks for a stop.
@@ -101,7 +102,14 @@ pub fn train_all(
     watch: Watch,
 ) -> Result<Outcome, LearningError> {
     let alone = (candidates.regressions).then(|| train(lessons, asked, watch));
-    let mut best: Option<Outcome> = alone.transpose()?.map(Into::into);
+    let mut best: Option<Outcome> =
+        match alone {
+            // With a model more can be learned than without.
+            Some(Err(
+                LearningError::NoSignal | LearningError::OnePlace | LearningError::Singular,
+            )) if candidates.model.is_some() => None,
+            alone => alone.transpose()?.map(Into::into),
+        };
     let Some((presses, ways)) = candidates.model else {
         return best.ok_or(LearningError::Singular);
     };
@@ -110,23 +118,25 @@ pub fn train_all(
         touches.iter().map(|&t| lessons.places_mm[t]).collect()
     };
     let truth = of(&division.validation);
+    let off = |answers: &[Answer]| errors(answers, &truth);
+    let x = lessons.x.select_columns(&division.validation);
+    let mut leading = (best.as_ref()).map(|best| off(&best.estimator.find(&x)));
     let mut tried = best.as_ref().map_or(Vec::new(), |b| b.tried.clone());
     for &way in ways {
         let mut taught = presses.teach(&division.train, way, watch)?;
-        let answers = taught.find(&lessons.x.select_columns(&division.validation));
-        let validation_mm = mean_error(&answers, &truth);
+        let answers = taught.find(&x);
+        let found = off(&answers);
+        let validation_mm = mean(&found);
         taught.ratios = over_radius(&answers, &truth);
         let method = Method::Model(way);
         tried.push(Trial {
             estimator: method,
             validation_mm,
         });
-        if best
-            .as_ref()
-            .is_some_and(|b| b.validation_mm <= validation_mm)
-        {
+        if leading.as_ref().is_some_and(|led| !is_nearer(&found, led)) {
             continue;
         }
+        leading = Some(found);
         let forces: Vec<f64> = division.test.iter().map(|&t| lessons.forces[t]).collect();
         let answers = taught.find(&lessons.x.select_columns(&division.test));
         best = Some(Outcome {
@@ -137,16 +147,31 @@ pub fn train_all(
             tried: Vec::new(),
             validation_mm,
             division: division.clone(),
-            notes: best.map_or(Vec::new(), |b| b.notes),
+            notes: Vec::new(),
         });
     }
     let best = best.ok_or(LearningError::Singular)?;
     Ok(Outcome { tried, ..best })
 }
 
-fn mean_error(answers: &[Answer], places_mm: &[[f64; 3]]) -> f64 {
+fn errors(answers: &[Answer], places_mm: &[[f64; 3]]) -> Vec<f64> {
     let said: Vec<[f64; 3]> = answers.iter().map(|a| a.place_mm).collect();
-    mean(&distances(&said, places_mm))
+    distances(&said, places_mm)
+}
+
+/// Whether one estimator is off by less than another, by their errors on the same touches. By the mean, where the means differ by
+/// more than chance lets them; else by the middle one, for a mean may hang on one touch that no gauge feels.
+fn is_nearer(one: &[f64], other: &[f64]) -> bool {
+    let differences: Vec<f64> = one.iter().zip(other).map(|(a, b)| a - b).collect();
+    let middle = mean(&differences);
+    let squares = differences.iter().map(|d| (d - middle).powi(2));
+    let count = differences.len() as f64;
+    let chance = (squares.sum::<f64>() / (count - 1.0).max(1.0) / count).sqrt();
+    if middle.abs() > chance {
+        return middle < 0.0;
+    }
+    let median = |of: &[f64]| midpoint_median(of.to_vec());
+    median(one) < median(other)
 }
 
 impl From<Trained> for Outcome {
@@ -161,5 +186,21 @@ impl From<Trained> for Outcome {
             division: trained.division,
             notes: trained.notes,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_touch_that_nobody_feels_decides_nothing() {
+        let old = [0.5, 0.6, 0.7, 0.4, 30.0, 0.5];
+        let nearer = [0.2, 0.3, 0.3, 0.2, 34.0, 0.2];
+        assert!(is_nearer(&nearer, &old) && !is_nearer(&old, &nearer));
+        // What is better everywhere is so by the mean.
+        let best = old.map(|e| 0.9 * e - 0.1);
+        assert!(is_nearer(&best, &old) && !is_nearer(&old, &best));
+        assert!(!is_nearer(&old, &old));
     }
 }

@@ -28,6 +28,7 @@ use serde::{Deserialize, Serialize};
 use super::calibration::Known;
 use super::map::ResponseMap;
 use crate::budget::{Cancelled, Watch, report};
+use crate::regression::folds::evenly;
 
 /// Presses that a press is foreseen from while the settings are looked for, and that a template is read off.
 const BEFORE: usize = 16;
@@ -210,7 +211,12 @@ fn places(map: &ResponseMap, known: &[Known], noise: &[f64]) -> Vec<Place> {
 }
 
 /// The nearest of some places, nearest first; of two as near the first.
-fn nearest(places: &[Place], among: std::ops::Range<usize>, to: DVec3, most: usize) -> Vec<usize> {
+fn nearest(
+    places: &[Place],
+    among: impl Iterator<Item = usize>,
+    to: DVec3,
+    most: usize,
+) -> Vec<usize> {
     let mut all: Vec<(f64, usize)> = among
         .map(|k| (places[k].position.distance_squared(to), k))
         .collect();
@@ -224,7 +230,8 @@ fn nearest(places: &[Place], among: std::ops::Range<usize>, to: DVec3, most: usi
 }
 
 /// Matérn's correlation of order 5/2 at a distance in lengths.
-fn matern(distance: f64) -> f64 {
+#[must_use]
+pub fn matern(distance: f64) -> f64 {
     let r = 5.0_f64.sqrt() * distance;
     (1.0 + r + r * r / 3.0) * (-r).exp()
 }
@@ -296,10 +303,14 @@ const USUAL: [(f64, f64); 3] = [(0.05, 1.5), (0.15, 1.0), (0.02, 1.5)];
 
 impl<'a> Search<'a> {
     fn new(places: &'a [Place], size: f64) -> Self {
-        let searched = places.len().min(SEARCHED);
-        let before = (0..searched)
+        let searched = evenly(places.len(), SEARCHED);
+        let before = (0..searched.len())
             .into_par_iter()
-            .map(|k| (k, nearest(places, 0..k, places[k].position, BEFORE)))
+            .map(|k| {
+                let earlier = searched[..k].iter().copied();
+                let k = searched[k];
+                (k, nearest(places, earlier, places[k].position, BEFORE))
+            })
             .collect();
         Self {
             places,

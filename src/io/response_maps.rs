@@ -59,6 +59,9 @@ pub fn add(
 
 /// Takes them out again: so many `own` maps of so many channels. Nothing where they are not what was added.
 pub fn read(from: &mut Arrays, own: usize, channels: usize) -> Option<Maps> {
+    if channels == 0 {
+        return None;
+    }
     let mesh = mesh(from, "map")?;
     let asked = numbers(from, "asked", &[2])?;
     let (with_tip, with_axes) = (asked[0] > 0.0, asked[1] > 0.0);
@@ -66,7 +69,7 @@ pub fn read(from: &mut Arrays, own: usize, channels: usize) -> Option<Maps> {
     let nodes = mesh.positions().len() + mesh.edges().len();
     let readings = numbers(from, "readings", &[maps, nodes, channels])?;
     let mut maps = readings
-        .chunks_exact((nodes * channels).max(1))
+        .chunks_exact(nodes * channels)
         .map(|values| ResponseMap::of(Arc::clone(&mesh), channels, values.to_vec()));
     let own: Vec<ResponseMap> = maps.by_ref().take(own).collect();
     let tip = if with_tip {
@@ -103,8 +106,9 @@ pub fn mesh(from: &mut Arrays, of: &str) -> Option<Arc<TriMesh>> {
         return None;
     }
     let vertices = positions.shape[0];
-    let sound = triangles.values.iter().all(|&v| (v as usize) < vertices)
-        && positions.values.iter().all(|v| v.is_finite());
+    let is_vertex = |v: &f64| v.fract() == 0.0 && (0.0..vertices as f64).contains(v);
+    let sound =
+        triangles.values.iter().all(is_vertex) && positions.values.iter().all(|v| v.is_finite());
     let corners = |t: &[f64]| [t[0] as u32, t[1] as u32, t[2] as u32];
     sound.then(|| {
         let triangles = triangles.values.chunks_exact(3).map(corners).collect();

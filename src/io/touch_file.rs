@@ -35,7 +35,7 @@ use super::npz::{Arrays, NpzFile};
 use crate::design::Learned;
 
 use self::header::By;
-pub use self::header::{Header, Origin, Update};
+pub use self::header::{Header, Origin, Update, fingerprint};
 
 /// An estimator with what is known of it.
 #[derive(Clone, Debug)]

@@ -46,9 +46,9 @@ impl Still {
         self.probability >= DOUBTED
     }
 
-    /// As it is said.
+    /// As it is said, with what to do where it is no more what it was.
     #[must_use]
-    pub fn words(&self) -> String {
+    pub fn words(&self, cure: &str) -> String {
         let Self {
             presses,
             outside,
@@ -62,7 +62,7 @@ impl Still {
             format!("{seen}: the skin may well be what it was when the estimator was trained")
         } else {
             format!(
-                "{seen} (probability {probability:.1e} where nothing has changed): the skin is no longer what the estimator was trained on. Bring it up to date with hapdef train --update"
+                "{seen} (probability {probability:.1e} where nothing has changed): the skin is no longer what the estimator was trained on. {cure}"
             )
         }
     }

@@ -4,13 +4,13 @@ use std::time::{Duration, Instant};
 
 use super::port::{Got, Port};
 use super::{Address, Recorder};
-use crate::bench::{Collector, Contact, Ended, News, SimulatedPrinter};
+use crate::bench::{Collector, Contact, Ended, News, Planned, SimulatedPrinter};
 use crate::board::SimulatedBoard;
 use crate::live::{Input, Receiver};
 use crate::wire::{Hello, Message, encode};
 
 /// What whoever watches a bench may want.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum BenchOrder {
     /// Waits before the next press.
     Pause,
@@ -20,6 +20,8 @@ pub enum BenchOrder {
     Stop,
     /// Halts the machine where it is.
     Kill,
+    /// Presses these too, each with its number; none: that was all.
+    More(Vec<(usize, Planned)>),
 }
 
 /// How a run ends that somebody has stopped, and whose tip is back.
@@ -115,7 +117,7 @@ fn note(recorder: &mut Recorder, news: &News) {
     if let News::Note(text) = news {
         recorder.own(&text.chars().take(FITS).collect::<String>());
         // A press that is written down is not lost, however the run ends.
-        if text.starts_with("pressed") {
+        if text.starts_with("pressed") || text.starts_with("checked") {
             recorder.flush();
         }
     }
@@ -140,10 +142,10 @@ pub fn press_simulated(
     while collector.ended().is_none() {
         let mut out = Vec::new();
         while let Some(order) = orders() {
-            paused = match order {
+            paused = match &order {
                 BenchOrder::Pause => true,
                 BenchOrder::Resume => false,
-                BenchOrder::Stop | BenchOrder::Kill => paused,
+                BenchOrder::Stop | BenchOrder::Kill | BenchOrder::More(_) => paused,
             };
             obey(collector, order, now_us, &mut out);
         }
@@ -234,6 +236,7 @@ fn obey(collector: &mut Collector, order: BenchOrder, now_us: u64, out: &mut Vec
         BenchOrder::Resume => collector.pause(false),
         BenchOrder::Stop => collector.stop(BY_HAND, now_us, out),
         BenchOrder::Kill => collector.kill(out),
+        BenchOrder::More(presses) => collector.go_on(presses),
     }
 }
 

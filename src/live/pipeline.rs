@@ -15,7 +15,9 @@ use super::receiver::Sample;
 use super::release::Release;
 use super::tare::{Rest, Taring};
 use super::update::{GaugeModel, Guess, Settings, Update};
+use crate::dataset::SignalMatrix;
 use crate::inference::{Contact, Matching, Touches, Trained};
+use crate::learning::TouchEstimator;
 use crate::wire::Hello;
 
 /// Samples, and seconds, between two searches everywhere: whichever is more.
@@ -36,6 +38,8 @@ pub struct Pipeline {
     trained: [Option<Arc<Trained>>; 2],
     /// What the trained ones were trained with: with other channels they say nothing.
     trained_for: Vec<bool>,
+    /// What was learned from presses alone: by all channels.
+    learned: Option<Arc<TouchEstimator>>,
     taring: Option<Taring>,
     ground: Ground,
     /// What the project knows all to have drifted by together (strain).
@@ -74,6 +78,7 @@ impl Pipeline {
             settings,
             trained: [None, None],
             trained_for: Vec::new(),
+            learned: None,
             taring: None,
             checking: Checking::new(gauges),
             hello: None,
@@ -119,6 +124,11 @@ impl Pipeline {
     /// The trained estimators (normalized, raw) and which gauges they were trained with.
     pub fn set_trained(&mut self, trained: [Option<Arc<Trained>>; 2], used: Vec<bool>) {
         (self.trained, self.trained_for) = (trained, used);
+    }
+
+    /// An estimator that was learned from presses alone, or none.
+    pub fn set_learned(&mut self, learned: Option<Arc<TouchEstimator>>) {
+        self.learned = learned;
     }
 
     /// Forgets everything but the rest and which gauges were found dead, so that what follows depends on what
@@ -269,7 +279,7 @@ impl Pipeline {
         let guesses = if contact.is_some() {
             self.guess(&strain)
         } else {
-            [None; 2]
+            [None; 3]
         };
         if self.last.is_some() && contact.is_some() {
             (self.checking).look(&mut self.matching, sample.time_us, &strain);
@@ -418,18 +428,22 @@ impl Pipeline {
         Some(found)
     }
 
-    fn guess(&self, strain: &[f64]) -> [Option<Guess>; 2] {
-        if self.trained_for != self.matching.used {
-            return [None; 2];
-        }
-        self.trained.each_ref().map(|trained| {
-            trained.as_ref().map(|t| {
-                let (place, force) = t.find(strain);
-                Guess {
-                    position: DVec3::from_array(place) * 1e-3,
-                    force,
-                }
-            })
-        })
+    fn guess(&self, strain: &[f64]) -> [Option<Guess>; 3] {
+        let guess = |(place, force): ([f64; 3], f64)| Guess {
+            position: DVec3::from_array(place) * 1e-3,
+            force,
+        };
+        let used = &self.matching.used;
+        let trained = |k: usize| {
+            let trained = self.trained[k].as_ref();
+            trained.filter(|_| self.trained_for == *used)
+        };
+        let learned = self.learned.as_ref().filter(|_| used.iter().all(|u| *u));
+        let answer = learned.and_then(|l| l.find(&SignalMatrix::new(1, strain.to_vec())).pop());
+        [
+            trained(0).map(|t| guess(t.find(strain))),
+            trained(1).map(|t| guess(t.find(strain))),
+            answer.map(|a| guess((a.place_mm, a.force_n.unwrap_or(0.0)))),
+        ]
     }
 }

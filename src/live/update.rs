@@ -17,11 +17,13 @@ pub enum Estimator {
     Normalized,
     /// Regression on the readings as they are: as in the paper.
     Raw,
+    /// What was learned from presses alone, where there is one.
+    Learned,
 }
 
 impl Estimator {
     /// All, the default first.
-    pub const ALL: [Self; 3] = [Self::Matching, Self::Normalized, Self::Raw];
+    pub const ALL: [Self; 4] = [Self::Matching, Self::Normalized, Self::Raw, Self::Learned];
 
     /// For people.
     #[must_use]
@@ -30,6 +32,7 @@ impl Estimator {
             Self::Matching => "Model matching",
             Self::Normalized => "SVR on the normalized signal",
             Self::Raw => "SVR on the raw signal (paper)",
+            Self::Learned => "Learned from presses",
         }
     }
 }
@@ -90,8 +93,8 @@ pub struct Update {
     pub contact: Option<Contact>,
     /// All that touch; absent where nothing does, and without a contact where nothing that is known does.
     pub touches: Option<Touches>,
-    /// By the trained estimators, where they are trained and there is a touch: normalized, raw.
-    pub guesses: [Option<Guess>; 2],
+    /// By the trained estimators, where they are trained and there is a touch: normalized, raw, learned from presses.
+    pub guesses: [Option<Guess>; 3],
     /// Gauges that are trusted.
     pub good: usize,
 }
@@ -105,7 +108,7 @@ impl Update {
             strain: None,
             contact: None,
             touches: None,
-            guesses: [None; 2],
+            guesses: [None; 3],
             good: 0,
         }
     }
@@ -120,6 +123,7 @@ impl Update {
             }),
             Estimator::Normalized => self.guesses[0],
             Estimator::Raw => self.guesses[1],
+            Estimator::Learned => self.guesses[2],
         }
     }
 }

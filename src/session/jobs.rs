@@ -50,6 +50,9 @@ pub enum Task {
     /// Of the test-bed: a plan, and going through it.
     PlanPresses,
     Press,
+    /// What presses teach, and an estimator that is read.
+    Learn,
+    OpenEstimator,
     /// Of a parameter study: its results, and the limb of a unit.
     OpenStudy,
     UnitLimb,
@@ -85,6 +88,8 @@ impl Task {
             Self::Table => "Write the table".into(),
             Self::PlanPresses => "Plan the presses".into(),
             Self::Press => "Press the limb".into(),
+            Self::Learn => "Learn from the presses".into(),
+            Self::OpenEstimator => "Open the estimator".into(),
             Self::OpenStudy => "Open the study".into(),
             Self::UnitLimb => "Make the limb of a unit".into(),
         }

@@ -201,8 +201,9 @@ impl Session {
         truths: Option<Arc<Mutex<Truths>>>,
     ) {
         let live = self.document.state.project.live.clone();
-        let mut pipeline =
-            Pipeline::new(sensing.map_for(&live), live.settings(sensing.gauges.len()));
+        let (model, settings) = self.gauge_model(sensing);
+        let mut pipeline = Pipeline::new(model, settings);
+        pipeline.set_learned(self.learned_alone());
         let inputs = self.document.sensing_inputs();
         if let Some((used, trained)) = current(self.live.trained.as_ref(), &inputs) {
             pipeline.set_trained(trained.clone(), used.clone());
@@ -254,11 +255,10 @@ impl Session {
         let Some(sensing) = self.sensing().map(Arc::clone) else {
             return self.complain("The table is made by the model of the gauges: connect first");
         };
-        let live = self.document.state.project.live.clone();
+        let (model, settings) = self.gauge_model(&sensing);
         let recording = recording.to_owned();
         let work = move |_: &Reporter| {
-            let settings = live.settings(sensing.gauges.len());
-            let pipeline = Pipeline::new(sensing.map_for(&live), settings);
+            let pipeline = Pipeline::new(model, settings);
             let table = recording.with_extension("csv");
             write_table(&recording, &table, pipeline).map_err(|e| Stop::Failed(format!("{e:#}")))
         };

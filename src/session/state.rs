@@ -7,6 +7,7 @@ pub mod confusions;
 pub mod drive;
 pub mod expected;
 pub mod fields;
+pub mod learned;
 pub mod live;
 pub mod measure;
 pub mod results;

@@ -121,6 +121,8 @@ pub enum FileAction {
     OpenStudy(PathBuf),
     /// A unit of the study that is open, as a project.
     OpenUnit(usize),
+    /// An estimator that was learned from presses.
+    OpenEstimator(PathBuf),
 }
 
 /// What concerns the board.
@@ -132,6 +134,8 @@ pub enum BoardAction {
     Tare,
     ToggleRecording(String),
     Disconnect,
+    /// Goes by the project's model again.
+    CloseEstimator,
     TakeKnown,
     Calibrate,
     CalibrateFromBoard,
@@ -142,6 +146,8 @@ pub enum BenchAction {
     Plan,
     Press,
     Order(BenchOrder),
+    /// What was pressed teaches an estimator.
+    Learn,
 }
 
 /// How an action can be taken back, or why not.
@@ -297,6 +303,7 @@ impl FileAction {
             Self::WriteTable(recording) => session.write_table(&recording),
             Self::OpenStudy(folder) => session.open_study(&folder),
             Self::OpenUnit(unit) => session.open_unit(unit),
+            Self::OpenEstimator(path) => session.open_estimator(&path),
         }
     }
 }
@@ -310,6 +317,7 @@ impl BoardAction {
             Self::Tare => session.tare(),
             Self::ToggleRecording(name) => session.toggle_recording(&name),
             Self::Disconnect => session.disconnect(),
+            Self::CloseEstimator => session.close_estimator(),
             Self::TakeKnown => session.take_known(),
             Self::Calibrate => session.start_calibration(),
             Self::CalibrateFromBoard => session.calibrate_from_board(),
@@ -323,6 +331,7 @@ impl BenchAction {
             Self::Plan => session.plan_presses(),
             Self::Press => session.press_plan(),
             Self::Order(order) => session.order_bench(order),
+            Self::Learn => session.learn_from_presses(),
         }
     }
 }

@@ -41,6 +41,7 @@ pub enum Command {
     Disconnect,
     PlanPresses,
     PressPlan,
+    LearnPresses,
     PausePresses,
     StopPresses,
     HaltMachine,
@@ -98,6 +99,7 @@ impl Command {
             Self::Disconnect => "Disconnect",
             Self::PlanPresses => "Plan presses",
             Self::PressPlan => "Press the plan",
+            Self::LearnPresses => "Learn from the presses",
             Self::PausePresses => "Pause pressing",
             Self::StopPresses => "Stop pressing",
             Self::HaltMachine => "Halt the machine",
@@ -205,6 +207,9 @@ impl Command {
             Self::PressPlan => {
                 "Press what is left of the plan, and write down what the board reads"
             }
+            Self::LearnPresses => {
+                "Estimators learn from what was pressed so far, with and without the model, and are judged on presses that none has learned from; live touch goes by the best"
+            }
             Self::PausePresses => "Wait before the next press, or go on",
             Self::StopPresses => {
                 "Stop what moves, take the tip back and end; what was pressed is kept"
@@ -311,6 +316,7 @@ impl Command {
             | Self::Disconnect
             | Self::PlanPresses
             | Self::PressPlan
+            | Self::LearnPresses
             | Self::PausePresses
             | Self::StopPresses
             | Self::DarkLight
@@ -352,6 +358,7 @@ impl Command {
             Self::Disconnect,
             Self::PlanPresses,
             Self::PressPlan,
+            Self::LearnPresses,
             Self::PausePresses,
             Self::StopPresses,
             Self::HaltMachine,
@@ -389,6 +396,10 @@ pub fn enabled(session: &Session, view: &View, command: Command) -> bool {
         Command::Cancel => session.busy(),
         Command::Tare | Command::Record | Command::Disconnect => session.live.is_connected(),
         Command::PlanPresses | Command::PressPlan => session.bench.is_free(),
+        Command::LearnPresses => {
+            session.bench.is_free()
+                && session.bench.look(|p| p.made_and_failed()[0] > 0) == Some(true)
+        }
         Command::PausePresses | Command::StopPresses | Command::HaltMachine => {
             session.bench.goes_on()
         }

@@ -111,7 +111,9 @@ fn look_at(command: Command, ask: &mut Ask<'_>, scene: &Scene) {
         Command::Stage(stage) => view.stage = stage,
         Command::Advise => view.stage = Stage::Part,
         Command::SimulatedBoard => view.stage = Stage::Live,
-        Command::PlanPresses | Command::PressPlan => view.stage = Stage::Bench,
+        Command::PlanPresses | Command::PressPlan | Command::LearnPresses => {
+            view.stage = Stage::Bench;
+        }
         Command::MeasureTrade => view.tab = Tab::Trade,
         _ => {}
     }
@@ -151,6 +153,7 @@ fn asked_of_session(command: Command, ask: &mut Ask<'_>, panels: &Panels) -> Opt
         Command::Disconnect => BoardAction::Disconnect.into(),
         Command::PlanPresses => BenchAction::Plan.into(),
         Command::PressPlan => BenchAction::Press.into(),
+        Command::LearnPresses => BenchAction::Learn.into(),
         Command::PausePresses if ask.session.bench.paused => {
             BenchAction::Order(BenchOrder::Resume).into()
         }

@@ -23,6 +23,7 @@ fn run_menu(ask: &mut Ask<'_>, ui: &mut Ui) {
     for command in [
         Command::PlanPresses,
         Command::PressPlan,
+        Command::LearnPresses,
         Command::SimulatedBoard,
         Command::Tare,
         Command::Record,

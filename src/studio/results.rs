@@ -8,7 +8,7 @@ use super::ask::Ask;
 use super::by_force::{force_table, has_forces};
 use super::commands::Command;
 use super::paint::empty;
-use super::theme::kept_colour;
+use super::theme::{kept_colour, still};
 use super::view::{Tab, Tool};
 use crate::design::curves::{curve, failure_curve, failure_name, failure_ways};
 use crate::evaluation::{BASELINE, EVERYWHERE, EstimatorKind};
@@ -34,16 +34,13 @@ fn plot(
     x: &str,
     y: &str,
 ) -> Plot<'static> {
-    Plot::new(id)
+    still(Plot::new(id))
         .height(height)
         .legend(Legend::default().position(corner))
         .x_axis_label(x.to_owned())
         .x_grid_spacer(egui_plot::uniform_grid_spacer(|_| [10.0, 5.0, 1.0]))
         .y_axis_label(y.to_owned())
         .include_y(0.0)
-        .allow_scroll(false)
-        .allow_drag(false)
-        .allow_zoom(false)
 }
 
 /// One curve with its points.
@@ -311,13 +308,12 @@ pub fn reduction_plot(ask: &Ask<'_>, ui: &mut Ui) {
         .collect();
     let height = ui.available_height() - 4.0;
     let target = 100.0 * result.value.snapshot.project.candidates.unexplained;
-    let shown = Plot::new("reduction")
+    let shown = still(Plot::new("reduction"))
         .height(height)
         .legend(Legend::default().position(Corner::RightTop))
         .x_axis_label("sites kept")
         .y_axis_label("held-out variance unexplained (%)")
         .include_y(0.0)
-        .allow_scroll(false)
         .show(ui, |plot| {
             draw(plot, "PCA-QR", &points, COLOURS[0], false);
             plot.hline(HLine::new("asked for", target).color(Color32::GRAY));

@@ -53,3 +53,12 @@ const KEPT: [Color32; 6] = [
 pub fn kept_colour(k: usize) -> Color32 {
     KEPT[k % KEPT.len()]
 }
+
+/// A plot that stays as it is: nobody drags it, or comes nearer.
+pub fn still(plot: egui_plot::Plot<'_>) -> egui_plot::Plot<'_> {
+    plot.allow_scroll(false)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_boxed_zoom(false)
+        .allow_double_click_reset(false)
+}

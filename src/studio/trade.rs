@@ -105,7 +105,7 @@ fn trade_plot(ask: &Ask<'_>, ui: &mut Ui, drawn: &[Drawn]) -> Option<Setting> {
         .collect();
     front.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let now = drawn.iter().find(|d| d.setting.is_of(project));
-    let shown = Plot::new("trade")
+    let shown = theme::still(Plot::new("trade"))
         .height(ui.available_height() - 4.0)
         .x_axis_label("seconds to the judged answer")
         .y_axis_label("mean error (mm)")
@@ -116,11 +116,6 @@ fn trade_plot(ask: &Ask<'_>, ui: &mut Ui, drawn: &[Drawn]) -> Option<Setting> {
         .show_x(false)
         .show_y(false)
         .label_formatter(|_| None)
-        .allow_scroll(false)
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_boxed_zoom(false)
-        .allow_double_click_reset(false)
         .show(ui, |plot| {
             plot.points(
                 Points::new("measured", marks(false))

@@ -33,9 +33,7 @@ pub struct Ready {
     pub reach: Reach,
     /// The number in the folder's plan of each press.
     pub numbers: Vec<usize>,
-    /// Whether the folder held a part of it already, and which presses.
-    pub begun: bool,
-    /// See [`Self::begun`].
+    /// Presses that are in the folder already.
     pub done: BTreeSet<usize>,
     /// What is pressed again and again.
     pub reference: Option<Reference>,
@@ -83,21 +81,22 @@ impl Ready {
             off,
             reach,
             numbers,
-            begun,
             reference,
             inputs,
             sensing,
         })
     }
 
+    /// All that it presses, each with its number.
+    pub fn planned(&self) -> impl Iterator<Item = (usize, Planned)> {
+        let numbers = self.numbers.iter().copied();
+        numbers.zip(self.reach.presses.iter().copied())
+    }
+
     /// What is still to be pressed, each with its number.
     pub fn left(&self) -> impl Iterator<Item = (usize, Planned)> {
-        let all = self
-            .numbers
-            .iter()
-            .copied()
-            .zip(self.reach.presses.iter().copied());
-        all.filter(|(number, _)| !self.done.contains(number))
+        self.planned()
+            .filter(|(number, _)| !self.done.contains(number))
     }
 
     /// The longest that it takes the machine (hours).
@@ -113,6 +112,18 @@ impl Ready {
     /// Goes through what is left of it.
     #[must_use]
     pub fn collector(&self) -> Collector {
+        self.collector_of(&|_| true)
+    }
+
+    /// Goes through the presses of a round, and waits for those of the next one.
+    #[must_use]
+    pub fn collector_of_rounds(&self, first: &BTreeSet<usize>) -> Collector {
+        self.collector_of(&|number| first.contains(&number))
+            .waiting_for_more()
+    }
+
+    /// Goes through what is left of it and `wanted`, by number.
+    pub(super) fn collector_of(&self, wanted: &dyn Fn(usize) -> bool) -> Collector {
         let asked = &self.asked;
         let limits = Limits {
             step: asked.step_mm * 1e-3,
@@ -124,7 +135,7 @@ impl Ready {
         let collector = Collector::new(
             self.machine.clone(),
             limits,
-            self.left(),
+            self.left().filter(|(number, _)| wanted(*number)),
             self.reach.retreat,
         );
         match self.reference.clone() {

@@ -254,3 +254,52 @@ fn live(folder: &Path, within: f64) {
     let why = refused(folder, &other);
     assert!(why.contains("another limb"), "{why}");
 }
+
+/// Rounds of presses where they tell most, until those that nothing has learned from are found near enough.
+#[test]
+fn a_plan_that_learns_ends_when_it_knows_enough() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let collect = |until: &'static str, more: &[&'static str]| {
+        let asked = [
+            "collect",
+            "--quality",
+            "draft",
+            "--simulate",
+            "--places",
+            "120",
+            "--out",
+            "run",
+            "--round",
+            "12",
+            "--until",
+            until,
+        ];
+        said(folder, &[&asked[..], more].concat())
+    };
+    let met = collect("1.5", &[]);
+    let pressed = met["pressed"].as_u64().unwrap();
+    assert_eq!(met["met"], true, "{met}");
+    assert!((20..90).contains(&pressed), "{met}");
+    assert!(
+        met["held_out"].as_u64() >= Some(10) && met["held_out_p90_mm"].as_f64() <= Some(1.5),
+        "{met}"
+    );
+    assert_eq!(
+        met["learned_from"].as_u64().unwrap() + met["held_out"].as_u64().unwrap(),
+        pressed
+    );
+    // Nothing more is pressed, and the same is said, when it is asked again.
+    let again = collect("1.5", &[]);
+    assert_eq!(again["moves"], 0);
+    for key in ["pressed", "learned_from", "held_out", "held_out_mm", "met"] {
+        assert_eq!(again[key], met[key], "{key}");
+    }
+    // What cannot be reached ends with the plan.
+    let all = collect("0.001", &["--in-order"]);
+    assert_eq!(
+        (&all["met"], &all["pressed"]),
+        (&Value::from(false), &all["presses"])
+    );
+    assert!(all["held_out"].as_u64() > Some(20), "{all}");
+}

@@ -112,7 +112,7 @@ fn compare(w: &mut Window) {
         s.session
             .live
             .update()
-            .is_some_and(|u| u.guesses.iter().all(Option::is_some))
+            .is_some_and(|u| u.guesses[..2].iter().all(Option::is_some))
     });
     if let Some(path) = std::env::var_os("HAPDEF_PICTURES") {
         w.picture()
@@ -128,8 +128,9 @@ fn compare(w: &mut Window) {
 fn unplug(w: &mut Window) {
     // Until it was seen: a window that waits for the processor may miss a second.
     pull(w, f64::INFINITY);
+    // Where the terminal is given to another board of these tests meanwhile, that one is found, and tried.
     w.wait("the unplug", 30, |s| {
-        s.session.live.state() == Some(State::Gone)
+        s.session.live.state() != Some(State::Live)
     });
     assert!(
         w.session().live.update().is_none(),

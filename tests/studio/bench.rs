@@ -12,7 +12,7 @@ use hapdef::test_bed::pressed;
 use crate::window;
 use window::Window;
 
-const PLACES: usize = 24;
+const PLACES: usize = 32;
 
 /// The bundled limb at the bench, into a folder.
 fn at_the_bench(folder: &Path) -> Window {
@@ -111,6 +111,7 @@ fn a_run_is_planned_paused_stopped_and_gone_on_with() {
     assert_eq!(pressed(&folder).unwrap().len(), all);
     assert_eq!(standing(&w), Standing::Current);
     w.show("bench-pressed");
+    learn(&mut w, &folder);
 
     // Other gauges are another run: it is not mixed into this one.
     w.session_mut().document.state.project.selection.sites.pop();
@@ -124,6 +125,63 @@ fn a_run_is_planned_paused_stopped_and_gone_on_with() {
         "{news:?}"
     );
     assert_eq!(pressed(&folder).unwrap().len(), all);
+}
+
+/// What was pressed teaches an estimator; it is kept as a file, and live touch goes by it.
+fn learn(w: &mut Window, folder: &Path) {
+    w.press("Learn from the presses");
+    w.wait("the estimator", 240, |s| !s.busy());
+    let learnt = w.session().learnt().expect("something was learned");
+    let path = folder.join("estimator-1.hapdtouch");
+    assert!(learnt.path == path && path.is_file());
+    let origin = &learnt.file.header.origin;
+    assert!(
+        origin.estimator.name().starts_with("matching") && origin.tried.len() == 6,
+        "{origin:?}"
+    );
+    assert!(
+        origin.test.median_mm < 1.5 && origin.limb.is_some(),
+        "{origin:?}"
+    );
+    w.show("bench-learned");
+
+    w.stage("Live");
+    w.press("Start a simulated board");
+    let mut off = Vec::new();
+    let found = std::cell::RefCell::new(&mut off);
+    w.wait("touches", 240, |s| {
+        let live = &s.session.live;
+        if let (Some((place, force)), Some(contact)) =
+            (live.truth(), live.update().and_then(|u| u.contact))
+            && force > 2.0
+        {
+            found
+                .borrow_mut()
+                .push(contact.position.distance(place) * 1e3);
+        }
+        found.borrow().len() >= 20
+    });
+    off.sort_by(f64::total_cmp);
+    assert!(off[off.len() / 2] < 2.0, "{off:?}");
+    w.show("live-learned");
+
+    // Which board it was learned with is known, and so is what is no estimator.
+    w.press("Disconnect");
+    w.session_mut().close_estimator();
+    assert!(w.session().learnt().is_none());
+    w.session_mut().open_estimator(&folder.join("bench.json"));
+    w.wait("the refusal", 30, |s| !s.busy());
+    assert!(w.session().learnt().is_none());
+    let news = &w.session().news.messages;
+    assert!(
+        news.iter()
+            .any(|m| m.error && m.text.contains("bench.json")),
+        "{news:?}"
+    );
+    w.session_mut().open_estimator(&path);
+    w.wait("the estimator", 30, |s| !s.busy());
+    assert!(w.session().learnt().is_some());
+    w.stage("Bench");
 }
 
 #[test]

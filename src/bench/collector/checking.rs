@@ -64,7 +64,7 @@ impl Collector {
                     self.failed(number, planned, why, tell);
                 }
                 if self.plan.is_empty() {
-                    self.end(Ended::Finished);
+                    self.through(tell);
                 }
             }
             Some(why) => {

@@ -28,7 +28,7 @@ impl Collector {
             self.check.begin();
         }
         let Some(planned) = self.planned() else {
-            self.end(Ended::Finished);
+            self.through(tell);
             return;
         };
         let what = match self.plan.front() {
@@ -70,7 +70,7 @@ impl Collector {
             _ => {}
         }
         let Some(pose) = self.planned().map(|planned| planned.pose) else {
-            self.end(Ended::Finished);
+            self.through(tell);
             return;
         };
         match self.phase {

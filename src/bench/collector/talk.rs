@@ -123,7 +123,8 @@ impl Collector {
             return;
         }
         // Whoever was paused is looked after here.
-        if self.phase == Phase::Retract && matches!(self.doing, Doing::Nothing) && !self.paused {
+        let idle = self.phase == Phase::Retract && matches!(self.doing, Doing::Nothing);
+        if idle && !self.paused && !self.waits {
             self.begin_press(now_us, out, tell);
         }
     }

@@ -53,6 +53,16 @@ pub struct CollectArgs {
     /// and what was pressed since then is made again. 0: never.
     #[arg(long, default_value_t = 20, value_parser = whole(0, 100_000))]
     pub check: usize,
+    /// Press where it tells most, in rounds, until nine of ten presses that nothing has learned from are found to this (mm),
+    /// by matching as the others teach it. The places are what it chooses among.
+    #[arg(long, value_name = "MM", value_parser = between(0.001, 1e3))]
+    pub until: Option<f64>,
+    /// Presses of a round: one in four is never learned from.
+    #[arg(long, default_value_t = 16, value_parser = whole(2, 400))]
+    pub round: usize,
+    /// With --until: take the places in the order of the plan instead, to see what the choice saves.
+    #[arg(long, requires = "until")]
+    pub in_order: bool,
     /// Only write the plan, and say what of it is in reach and how long it takes.
     #[arg(long)]
     pub plan_only: bool,

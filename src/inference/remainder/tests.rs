@@ -92,7 +92,7 @@ fn the_more_presses_the_nearer_the_map_is_to_what_was_pressed_and_it_says_how_ne
             left < of_before * before && left < last,
             "{count}: {left} of {before}"
         );
-        assert!((0.3..2.0).contains(&over), "{count}: {over} {settings:?}");
+        assert!((0.2..2.0).contains(&over), "{count}: {over} {settings:?}");
         last = left;
     }
 }

@@ -4,13 +4,15 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::{Knowledge, Learned};
+use crate::design::{Knowledge, Learned, Outcome};
 use crate::io::FileError;
+use crate::io::fingerprint::Fingerprint;
 use crate::learning::machine::{self, Machine};
 use crate::learning::targets::{Frame, Scale};
 use crate::learning::train::Trial;
 use crate::learning::{Family, Method, Scores, TouchEstimator, kernel::Kernel};
 use crate::plain::quote;
+use crate::study::Data;
 
 const FORMAT: &str = "hapdtouch";
 /// Of files of regressions, and of matching.
@@ -82,6 +84,36 @@ pub struct Origin {
     /// What it was brought up to date by, the last time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub update: Option<Update>,
+}
+
+impl Origin {
+    /// Of a training with a seed on data of a name; limb and board are not known yet.
+    #[must_use]
+    pub fn of(outcome: &Outcome, data: &Data, name: &str, seed: u64) -> Self {
+        Self {
+            data: name.to_owned(),
+            fingerprint: fingerprint(data),
+            touches: data.targets.len(),
+            train_touches: outcome.division.train.len(),
+            seed,
+            estimator: outcome.method,
+            validation_mm: outcome.validation_mm,
+            tried: outcome.tried.clone(),
+            test: outcome.scores.clone(),
+            limb: None,
+            board: None,
+            update: None,
+        }
+    }
+}
+
+/// Which data something was learned from.
+#[must_use]
+pub fn fingerprint(data: &Data) -> String {
+    let mut key = Fingerprint::default();
+    key.add_numbers(data.x.values());
+    key.add_numbers(data.targets.iter().flatten());
+    key.hex()
 }
 
 /// New presses that an estimator was brought up to date by.

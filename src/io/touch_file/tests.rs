@@ -180,7 +180,7 @@ fn wrong_versions_cut_files_and_other_archives_are_refused_in_words() {
     };
     let said = header(r#"{"format": "hapdtouch", "version": 9}"#);
     assert!(
-        said.contains("version 9") && said.contains("version 1"),
+        said.contains("version 9") && said.contains("versions 1 and 2"),
         "{said}"
     );
     let said = header(r#"{"format": "hapdrec", "version": 1}"#);

@@ -33,9 +33,26 @@ impl Session {
         if !self.live.is_connected() {
             return;
         }
+        self.doubt_learned();
+        // What was learned on other gauges, or closed, shows nothing.
+        if self.desk.estimator == Estimator::Learned && !self.learns_alone() {
+            self.show_estimator(Estimator::Matching);
+        }
         self.apply_settings();
         self.keep_trained();
         self.gather_known();
+    }
+
+    /// What was learned with another board is not believed of this one.
+    fn doubt_learned(&mut self) {
+        let hello = self.live.look(|f| f.hello.as_ref().map(|h| h.board));
+        let (Some(learnt), Some(board)) = (&self.live.learnt, hello.flatten()) else {
+            return;
+        };
+        if let Err(why) = learnt.file.check_board(&format!("{board:08x}")) {
+            self.close_estimator();
+            self.complain(why);
+        }
     }
 
     /// Settings that were changed, or brought back by undo, reach the pipeline.
@@ -47,17 +64,19 @@ impl Session {
         let Some(sensing) = self.sensing().map(Arc::clone) else {
             return;
         };
-        let live = live.clone();
         self.live.applied = Some(live.clone());
+        let (model, settings) = self.gauge_model(&sensing);
+        let learned = self.learned_alone();
         self.live.send(Command::Do(Box::new(move |pipeline| {
-            let settings = live.settings(sensing.gauges.len());
-            pipeline.set_model(sensing.map_for(&live), settings);
+            pipeline.set_model(model, settings);
+            pipeline.set_learned(learned);
         })));
     }
 
     /// The trained estimators are trained when they are wanted, and again when gauges fail or recover.
     fn keep_trained(&mut self) {
-        if !self.desk.compare && self.desk.estimator == Estimator::Matching {
+        let trained = [Estimator::Normalized, Estimator::Raw];
+        if !self.desk.compare && !trained.contains(&self.desk.estimator) {
             return;
         }
         let used = self.live.look(|f| f.used.clone()).unwrap_or_default();

@@ -159,7 +159,7 @@ impl Pressing {
                 }
             }
             News::Say(text) => self.say(text),
-            News::Answer(_) | News::Note(_) | News::Keep => {}
+            News::Answer(_) | News::Note(_) | News::Keep | News::Waits => {}
         }
     }
 
@@ -225,10 +225,10 @@ impl Bench {
 
     /// Tells whoever presses.
     pub(in crate::session) fn order(&mut self, order: BenchOrder) {
-        match order {
+        match &order {
             BenchOrder::Pause => self.paused = true,
             BenchOrder::Resume => self.paused = false,
-            BenchOrder::Stop | BenchOrder::Kill => {}
+            BenchOrder::Stop | BenchOrder::Kill | BenchOrder::More(_) => {}
         }
         if let Some(orders) = &self.orders {
             // Nobody is there any more to be told once it has ended.

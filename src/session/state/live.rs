@@ -14,6 +14,7 @@ use crate::project::LiveKeys;
 use crate::session::live::feed::{Feed, Shared};
 use crate::session::live::training::Pair;
 use crate::session::slot::Slot;
+use crate::session::state::learned::Learnt;
 
 /// What is to be listened to once the model is there.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +58,8 @@ pub struct Live {
     pub(in crate::session) trained: Option<Slot<SensingInputs, TrainedFor>>,
     /// For which gauges training was begun.
     pub(in crate::session) training_for: Option<Vec<bool>>,
+    /// What was learned from presses, and is gone by.
+    pub(in crate::session) learnt: Option<Learnt>,
     /// The last recording that was begun.
     pub recorded: Option<PathBuf>,
     /// The settings that the pipeline has.

@@ -5,6 +5,7 @@ use egui::{Color32, DragValue, RichText, TextEdit, Ui};
 use super::super::ask::Ask;
 use super::super::commands::Command;
 use super::super::form::{counted, quantity, rows};
+use super::super::learned::estimator_shown;
 use super::super::theme;
 use crate::plain;
 use crate::session::{BenchDesk, PressState, Pressing};
@@ -43,6 +44,11 @@ pub fn bench_form(ask: &mut Ask<'_>, ui: &mut Ui) {
     } else if !ask.session.plan_holds() && !goes_on {
         let text = "The plan is of other settings or gauges: plan anew";
         ui.colored_label(theme::STALE, text);
+    }
+    ui.add_space(6.0);
+    ask.button(ui, Command::LearnPresses);
+    if let Some(learnt) = ask.session.learnt() {
+        estimator_shown(ui, learnt);
     }
 }
 

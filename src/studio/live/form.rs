@@ -6,6 +6,7 @@ use super::super::action::{BoardAction, FileAction};
 use super::super::ask::Ask;
 use super::super::commands::Command;
 use super::super::form::{choice, number, percentage, quantity, rows};
+use super::super::learned::estimator_shown;
 use super::super::theme;
 use super::super::words::live_in_words;
 use crate::board::Illness;
@@ -19,6 +20,7 @@ use crate::session::{Desk, LEAST_KNOWN, Mishap, WANTED_KNOWN};
 pub struct LiveForm {
     port: String,
     ports: Vec<PortInfo>,
+    estimator: String,
     pub record_to: String,
 }
 
@@ -28,6 +30,7 @@ pub fn live_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
     if ask.session.live.is_connected() {
         connected_form(ask, form, ui);
     }
+    ui.collapsing("Learned from presses", |ui| estimator_form(ask, form, ui));
     let gauges = ask.project().selection.sites.len();
     ask.edit(|project| {
         let live = &mut project.live;
@@ -135,16 +138,54 @@ fn connected_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
             faults(ask, ui);
         }
     });
-    ask.edit_desk(|desk| rows(ui, "Touch", |ui| estimators(ui, desk)));
+    let learned = ask.session.learns_alone();
+    ask.edit_desk(|desk| rows(ui, "Touch", |ui| estimators(ui, desk, learned)));
+    if let Some(learnt) = ask.session.learnt() {
+        let name = learnt.path.file_name().unwrap_or_default();
+        let text = format!("Goes by {}", name.to_string_lossy());
+        ui.add(egui::Label::new(RichText::new(text).weak()).wrap());
+    }
     recording_form(ask, form, ui);
 }
 
-fn estimators(ui: &mut Ui, desk: &mut Desk) {
+/// A file that live touch goes by instead of the project's model.
+fn estimator_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
+    let name = ui.label("Estimator's file");
+    ui.horizontal(|ui| {
+        let field = TextEdit::singleline(&mut form.estimator)
+            .desired_width(160.0)
+            .hint_text("path of a .hapdtouch");
+        let field = ui.add(field).labelled_by(name.id);
+        let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+        let named = !form.estimator.trim().is_empty();
+        let help = "Go by what was learned from presses: at the stage “Bench”, or by hapdef train";
+        let open = ui.add_enabled(named, egui::Button::new("Open estimator"));
+        if (open.on_hover_text(help).clicked() || entered) && named {
+            ask.act(FileAction::OpenEstimator(form.estimator.trim().into()));
+        }
+    });
+    let Some(learnt) = ask.session.learnt() else {
+        ui.weak("Touches are found by the project's model");
+        return;
+    };
+    estimator_shown(ui, learnt);
+    let help = "Go by the project's model, as its known touches have calibrated it";
+    if ui.button("Close estimator").on_hover_text(help).clicked() {
+        ask.act(BoardAction::CloseEstimator);
+    }
+}
+
+fn estimators(ui: &mut Ui, desk: &mut Desk, learned: bool) {
+    let all = if learned {
+        &Estimator::ALL[..]
+    } else {
+        &Estimator::ALL[..3]
+    };
     choice(
         ui,
         "Estimator",
         &mut desk.estimator,
-        &Estimator::ALL,
+        all,
         Estimator::label,
         "Model matching needs no training and says how sure it is; the others learn from the model first",
     );

@@ -15,10 +15,11 @@ use crate::live::{Estimator, Health};
 use crate::session::{Feed, STRIPS_S, Strip};
 
 /// Of the estimators, apart for colour-blind eyes too.
-const COLOURS: [Color32; 3] = [
+const COLOURS: [Color32; 4] = [
     Color32::from_rgb(240, 228, 66),
     Color32::from_rgb(86, 180, 233),
     Color32::from_rgb(213, 94, 0),
+    Color32::from_rgb(204, 121, 167),
 ];
 
 fn colour(estimator: Estimator) -> Color32 {
@@ -296,10 +297,13 @@ fn how_many(touches: &Touches) -> Option<String> {
 fn compared(ui: &mut Ui, feed: &Feed) {
     ui.horizontal_wrapped(|ui| {
         for estimator in Estimator::ALL {
+            let guess = feed.update.as_ref().and_then(|u| u.by(estimator));
+            if estimator == Estimator::Learned && guess.is_none() {
+                continue;
+            }
             let (dot, _) = ui.allocate_exact_size(vec2(9.0, 9.0), egui::Sense::hover());
             ui.painter()
                 .circle_filled(dot.center(), 4.0, colour(estimator));
-            let guess = feed.update.as_ref().and_then(|u| u.by(estimator));
             let mut text = format!("{}: ", estimator.label());
             let _ = match (guess, feed.truth) {
                 (Some(guess), Some((place, force))) => write!(

@@ -82,20 +82,12 @@ impl StudyView {
 }
 
 /// What a picture of these columns is of.
-pub fn key(
-    view: &StudyView,
-    study: &OpenStudy,
-    size: [usize; 2],
-    columns: &[usize],
-    ui: &Ui,
-) -> Key {
+pub fn key(view: &StudyView, size: [usize; 2], columns: &[usize], ui: &Ui) -> Key {
     let ranges = view
         .ranges
         .iter()
         .map(|(k, range)| (*k, range.map(f64::to_bits)));
-    let of = std::ptr::from_ref(study) as usize;
     (
-        of,
         size,
         ranges.collect(),
         columns.to_vec(),

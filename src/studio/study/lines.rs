@@ -41,7 +41,7 @@ pub fn parallel(
     if view.shown.is_empty() || inner.width() < 40.0 || inner.height() < 20.0 {
         return None;
     }
-    let key = key(view, study, pixels(ui.ctx(), inner.size()), &view.shown, ui);
+    let key = key(view, pixels(ui.ctx(), inner.size()), &view.shown, ui);
     let columns: Vec<&Column> = view.shown.iter().map(|&k| &study.columns[k]).collect();
     let heights = |unit: usize| -> Vec<Option<f32>> {
         columns.iter().map(|c| height(c, c.values[unit])).collect()

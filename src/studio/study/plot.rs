@@ -3,6 +3,7 @@
 use egui::{ComboBox, Pos2, Rect, Role, Ui, Vec2, WidgetInfo, vec2};
 use egui_plot::{Plot, PlotImage, PlotPoint, PlotPoints, PlotResponse, Points};
 
+use super::super::theme::still;
 use super::chosen::{FRONT, KEPT, REST, StudyView, key};
 use super::raster::{Canvas, pixels};
 use crate::session::{Column, OpenStudy};
@@ -92,7 +93,7 @@ fn plot(
     ui: &mut Ui,
 ) -> PlotResponse<()> {
     let size = ui.available_size() - vec2(0.0, 4.0);
-    let key = key(view, study, pixels(ui.ctx(), size), &view.across, ui);
+    let key = key(view, pixels(ui.ctx(), size), &view.across, ui);
     let draw = |canvas: &mut Canvas| frame.draw(canvas, study, kept);
     let picture = view.dots.of(key, ui.ctx(), draw).id();
     let [across, up] = frame.ranges;
@@ -102,18 +103,13 @@ fn plot(
     );
     let room = vec2((across[1] - across[0]) as f32, (up[1] - up[0]) as f32);
     let strong = ui.visuals().strong_text_color();
-    Plot::new("study")
+    still(Plot::new("study"))
         .height(size.y)
         .x_axis_label(frame.columns[0].name.clone())
         .y_axis_label(frame.columns[1].name.clone())
         .show_x(false)
         .show_y(false)
         .label_formatter(|_| None)
-        .allow_scroll(false)
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_boxed_zoom(false)
-        .allow_double_click_reset(false)
         .show(ui, |plot| {
             plot.set_plot_bounds_x(across[0]..=across[1]);
             plot.set_plot_bounds_y(up[0]..=up[1]);

@@ -2,8 +2,8 @@
 
 use egui::{Color32, ColorImage, Context, Rect, TextureHandle, TextureOptions, Vec2};
 
-/// What a picture is of: it is drawn anew when that changes.
-pub type Key = (usize, [usize; 2], Vec<(usize, [u64; 2])>, Vec<usize>, bool);
+/// What a picture of a study is of: it is drawn anew when that changes.
+pub type Key = ([usize; 2], Vec<(usize, [u64; 2])>, Vec<usize>, bool);
 
 /// A picture, and what it is of.
 #[derive(Default)]
@@ -21,7 +21,7 @@ impl Raster {
     ) -> &TextureHandle {
         let known = self.known.take().filter(|(known, _)| *known == key);
         let (key, picture) = known.unwrap_or_else(|| {
-            let mut canvas = Canvas::new(key.1);
+            let mut canvas = Canvas::new(key.0);
             draw(&mut canvas);
             let picture = ctx.load_texture("study", canvas.image, TextureOptions::LINEAR);
             (key, picture)
@@ -119,7 +119,7 @@ mod tests {
     fn a_picture_is_drawn_once_for_what_it_is_of() {
         let ctx = Context::default();
         let mut raster = Raster::default();
-        let key = |range: u64| (1, [4, 4], vec![(0, [range; 2])], vec![0], false);
+        let key = |range: u64| ([4, 4], vec![(0, [range; 2])], vec![0], false);
         let mut drawn = 0;
         for range in [0, 0, 1, 1, 0] {
             raster.of(key(range), &ctx, |_| drawn += 1);

@@ -1,0 +1,216 @@
+//! Where presses tell most: a choice by the error that they take off the map, weighed by what that does to places.
+//!
+//! What is not known of the map is a Gaussian process (`inference::remainder`). A press at q takes
+//! cov(z(p), z(q))² / (var z(q) + ν²) off the variance at p (active learning by the integrated variance: D. A. Cohn, Neural
+//! Networks 9, 1996), and a place that is found badly anyway gains most by that.
+
+use glam::DVec3;
+use nalgebra::DMatrix;
+
+use super::taught::Taught;
+use crate::inference::remainder::{Settings, matern};
+use crate::inference::{Errors, cramer_rao};
+use crate::regression::folds::evenly;
+
+/// What is thought of a map that nothing was learned of: as [`crate::inference::remainder`] does beforehand, the length as a
+/// share of the part.
+const SHARE: f64 = 0.05;
+const LENGTH: f64 = 0.15;
+const SCATTER: f64 = 0.02;
+
+/// Places that are looked at: of more an even share.
+const LOOKED_AT: usize = 400;
+/// Presses that are counted: of more an even share leaves hardly more open.
+const KNOWN: usize = 800;
+/// No place is thought to be worse known than this (m), so that those which no gauge sees are not pressed for ever.
+const WORST: f64 = 5e-3;
+
+/// So many of the places (m), by number, that tell most when they are pressed with a force (N), where others were pressed
+/// already (m); the most telling first.
+#[must_use]
+pub fn most_telling(
+    taught: &Taught,
+    places: &[DVec3],
+    pressed: &[DVec3],
+    count: usize,
+    force: f64,
+) -> Vec<usize> {
+    let count = count.min(LOOKED_AT);
+    let some = evenly(places.len(), LOOKED_AT);
+    let settings = settings(taught);
+    let known = evenly(pressed.len(), KNOWN);
+    let all: Vec<DVec3> = (some.iter().map(|&k| places[k]))
+        .chain(known.iter().map(|&k| pressed[k]))
+        .collect();
+    let mut unknown = Unknown::new(&all, settings);
+    for k in some.len()..all.len() {
+        unknown.press(k);
+    }
+    let weights: Vec<f64> = (all[..some.len()].iter())
+        .map(|&p| squared_error(taught, p, force))
+        .collect();
+    let mut chosen: Vec<usize> = Vec::new();
+    for _ in 0..count.min(some.len()) {
+        let free = (0..some.len()).filter(|k| !chosen.contains(k));
+        let gains = free.map(|k| (unknown.gain(k, &weights), k));
+        // Of two that tell as much the first.
+        let Some((_, best)) = gains.reduce(|a, b| if b.0 > a.0 { b } else { a }) else {
+            break;
+        };
+        unknown.press(best);
+        chosen.push(best);
+    }
+    chosen.into_iter().map(|k| some[k]).collect()
+}
+
+/// As they were learned, or as they are thought to be beforehand.
+fn settings(taught: &Taught) -> Settings {
+    let (lower, upper) = taught.map.mesh.bounds();
+    taught.known.remainder.unwrap_or(Settings {
+        share: SHARE,
+        length: LENGTH * (upper - lower).length(),
+        scatter: SCATTER,
+    })
+}
+
+/// Of a touch of a force (N) at a place (m): the bound of its squared error (m²).
+fn squared_error(taught: &Taught, place: DVec3, force: f64) -> f64 {
+    let (at, _) = taught.map.mesh.index().nearest(place);
+    let reading: Vec<f64> = taught.map.at(at).iter().map(|g| force * g).collect();
+    let channels = reading.len();
+    let errors = Errors {
+        relative: taught.known.relative,
+        noise: vec![taught.known.noise; channels],
+        ..Errors::of_noise(taught.known.noise, channels)
+    };
+    let own = taught.own.at(at);
+    let noise: Vec<f64> = (errors.weights(&reading, &vec![true; channels]).iter())
+        .zip(own)
+        .map(|(w, own)| (w.recip() + (force * own).powi(2)).sqrt())
+        .collect();
+    let (error, _) = cramer_rao(&taught.map, at, force, &noise, &[]);
+    error.min(WORST).powi(2)
+}
+
+/// What is not known of the map at some places: a covariance.
+struct Unknown {
+    covariance: DMatrix<f64>,
+    settings: Settings,
+}
+
+impl Unknown {
+    /// Before anything is pressed.
+    fn new(places: &[DVec3], settings: Settings) -> Self {
+        let prior = settings.share * settings.share;
+        let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
+            prior * matern(places[i].distance(places[j]) / settings.length)
+        });
+        Self {
+            covariance,
+            settings,
+        }
+    }
+
+    fn read(&self, k: usize) -> f64 {
+        self.covariance[(k, k)] + self.settings.scatter.powi(2) + f64::MIN_POSITIVE
+    }
+
+    /// What is left after a press at one of them.
+    fn press(&mut self, k: usize) {
+        let column = self.covariance.column(k).into_owned();
+        let read = self.read(k);
+        self.covariance.ger(-1.0 / read, &column, &column, 1.0);
+    }
+
+    /// What a press at one of them takes off, over the first of them with these weights.
+    fn gain(&self, k: usize, weights: &[f64]) -> f64 {
+        let column = self.covariance.column(k);
+        let squares: f64 = (column.iter().zip(weights)).map(|(c, w)| w * c * c).sum();
+        squares / self.read(k)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::design::Knowledge;
+    use crate::inference::ResponseMap;
+    use crate::mesh::TriMesh;
+
+    const SIDE: u32 = 13;
+    const CHANNELS: usize = 4;
+
+    /// A plate of 60 mm with gauges at its corners, of which nothing was learned.
+    fn plate() -> Taught {
+        let points: Vec<DVec3> = (0..SIDE * SIDE)
+            .map(|k| DVec3::new(f64::from(k % SIDE), f64::from(k / SIDE), 0.0) * 5e-3)
+            .collect();
+        let squares = (0..SIDE * (SIDE - 1)).filter(|k| (k + 1) % SIDE != 0);
+        let triangles: Vec<[u32; 3]> = squares
+            .flat_map(|k| [[k, k + 1, k + SIDE], [k + 1, k + SIDE + 1, k + SIDE]])
+            .collect();
+        let (mesh, _) = TriMesh::new(&points, &triangles, 0).unwrap();
+        let p = mesh.positions();
+        let middles = mesh.edges().iter();
+        let middles = middles.map(|e| (p[e.a as usize] + p[e.b as usize]) / 2.0);
+        let nodes: Vec<DVec3> = p.iter().copied().chain(middles).collect();
+        let corners = [[0.0, 0.0], [0.06, 0.0], [0.0, 0.06], [0.06, 0.06]];
+        let read = |p: &DVec3| {
+            corners.map(|[x, y]| 1e-5 * (-(p.x - x).hypot(p.y - y).powi(2) / 2e-3).exp())
+        };
+        let mesh = Arc::new(mesh);
+        let map = ResponseMap::of(
+            Arc::clone(&mesh),
+            CHANNELS,
+            nodes.iter().flat_map(read).collect(),
+        );
+        let own = ResponseMap::of(mesh, CHANNELS, vec![0.0; nodes.len() * CHANNELS]);
+        Taught {
+            map: Arc::new(map),
+            own: Arc::new(own),
+            tip: None,
+            axes: None,
+            known: Knowledge {
+                noise: 1e-7,
+                relative: 0.02,
+                most_force: 60.0,
+                tip: 0.0,
+                friction: 0.0,
+                drift: 0.0,
+                stiffness: 0.0,
+                remainder: None,
+            },
+            ratios: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_was_pressed_is_not_pressed_again_and_presses_keep_apart() {
+        let taught = plate();
+        let places = taught.map.mesh.positions().to_vec();
+        let half: Vec<DVec3> = places.iter().copied().filter(|p| p.x < 0.03).collect();
+        let chosen = most_telling(&taught, &places, &half, 8, 20.0);
+        let right = chosen.iter().filter(|&&k| places[k].x >= 0.03).count();
+        assert!(right >= 7, "{right} of {chosen:?}");
+        let apart = |a: usize, b: usize| places[a].distance(places[b]);
+        for (i, &a) in chosen.iter().enumerate() {
+            assert!(chosen[..i].iter().all(|&b| a != b && apart(a, b) > 4e-3));
+        }
+        assert_eq!(chosen, most_telling(&taught, &places, &half, 8, 20.0));
+        assert_eq!(most_telling(&taught, &places[..3], &[], 8, 20.0).len(), 3);
+        assert!(most_telling(&taught, &[], &half, 8, 20.0).is_empty());
+    }
+
+    #[test]
+    fn a_place_that_is_found_badly_is_pressed_first() {
+        let taught = plate();
+        // Beside a gauge, and where all of them feel little of each other.
+        let places = [DVec3::new(0.005, 0.005, 0.0), DVec3::new(0.03, 0.03, 0.0)];
+        let errors = places.map(|p| squared_error(&taught, p, 20.0));
+        let worse = usize::from(errors[1] > errors[0]);
+        assert_eq!(most_telling(&taught, &places, &[], 1, 20.0), [worse]);
+        assert!(errors.iter().all(|e| *e > 0.0 && *e <= WORST * WORST));
+    }
+}
