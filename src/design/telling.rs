@@ -1,8 +1,9 @@
 //! Where presses tell most: a choice by the error that they take off the map, weighed by what that does to places.
 //!
 //! What is not known of the map is a Gaussian process (`inference::remainder`). A press at q takes
-//! cov(z(p), z(q))² / (var z(q) + ν²) off the variance at p (active learning by the integrated variance: D. A. Cohn, Neural
-//! Networks 9, 1996), and a place that is found badly anyway gains most by that.
+//! cov(z(p), z(q))² / (var z(q) + ν² + n(q)) off the variance at p, n being what the noise of the reading leaves of it (active
+//! learning by the integrated variance: D. A. Cohn, Neural Networks 9, 1996). A place counts by how much of its error the map is
+//! to blame for: where no gauge feels much, no press makes it better.
 
 use glam::DVec3;
 use nalgebra::DMatrix;
@@ -42,12 +43,12 @@ pub fn most_telling(
     let all: Vec<DVec3> = (some.iter().map(|&k| places[k]))
         .chain(known.iter().map(|&k| pressed[k]))
         .collect();
-    let mut unknown = Unknown::new(&all, settings);
+    let mut unknown = Unknown::new(taught, &all, settings, force);
     for k in some.len()..all.len() {
         unknown.press(k);
     }
     let weights: Vec<f64> = (all[..some.len()].iter())
-        .map(|&p| squared_error(taught, p, force))
+        .map(|&p| blamed_on_map(taught, p, force, &settings))
         .collect();
     let mut chosen: Vec<usize> = Vec::new();
     for _ in 0..count.min(some.len()) {
@@ -73,13 +74,20 @@ fn settings(taught: &Taught) -> Settings {
     })
 }
 
-/// Of a touch of a force (N) at a place (m): the bound of its squared error (m²).
-fn squared_error(taught: &Taught, place: DVec3, force: f64) -> f64 {
+/// What the map is to blame for, of the squared error (m²) of a touch of a force (N) at a place (m).
+fn blamed_on_map(taught: &Taught, place: DVec3, force: f64, settings: &Settings) -> f64 {
+    let Settings { share, scatter, .. } = *settings;
+    squared_error(taught, place, force, share.hypot(scatter))
+        - squared_error(taught, place, force, scatter)
+}
+
+/// The bound of the squared error (m²) of a touch of a force (N) at a place (m), where the map is off by a share of the reading.
+fn squared_error(taught: &Taught, place: DVec3, force: f64, relative: f64) -> f64 {
     let (at, _) = taught.map.mesh.index().nearest(place);
     let reading: Vec<f64> = taught.map.at(at).iter().map(|g| force * g).collect();
     let channels = reading.len();
     let errors = Errors {
-        relative: taught.known.relative,
+        relative,
         noise: vec![taught.known.noise; channels],
         ..Errors::of_noise(taught.known.noise, channels)
     };
@@ -95,24 +103,31 @@ fn squared_error(taught: &Taught, place: DVec3, force: f64) -> f64 {
 /// What is not known of the map at some places: a covariance.
 struct Unknown {
     covariance: DMatrix<f64>,
-    settings: Settings,
+    /// Variance of what a press at each of them has for itself.
+    own: Vec<f64>,
 }
 
 impl Unknown {
     /// Before anything is pressed.
-    fn new(places: &[DVec3], settings: Settings) -> Self {
+    fn new(taught: &Taught, places: &[DVec3], settings: Settings, force: f64) -> Self {
         let prior = settings.share * settings.share;
         let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
             prior * matern(places[i].distance(places[j]) / settings.length)
         });
+        let own = |&place: &DVec3| {
+            let reading = taught.map.at(taught.map.mesh.index().nearest(place).0);
+            let squares: f64 = reading.iter().map(|g| (force * g).powi(2)).sum();
+            let read = squares / reading.len().max(1) as f64;
+            settings.scatter.powi(2) + taught.known.noise.powi(2) / read.max(f64::MIN_POSITIVE)
+        };
         Self {
+            own: places.iter().map(own).collect(),
             covariance,
-            settings,
         }
     }
 
     fn read(&self, k: usize) -> f64 {
-        self.covariance[(k, k)] + self.settings.scatter.powi(2) + f64::MIN_POSITIVE
+        self.covariance[(k, k)] + self.own[k] + f64::MIN_POSITIVE
     }
 
     /// What is left after a press at one of them.
@@ -204,13 +219,14 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_is_found_badly_is_pressed_first() {
+    fn a_place_that_the_map_finds_badly_is_pressed_first() {
         let taught = plate();
         // Beside a gauge, and where all of them feel little of each other.
         let places = [DVec3::new(0.005, 0.005, 0.0), DVec3::new(0.03, 0.03, 0.0)];
-        let errors = places.map(|p| squared_error(&taught, p, 20.0));
-        let worse = usize::from(errors[1] > errors[0]);
+        let settings = settings(&taught);
+        let blamed = places.map(|p| blamed_on_map(&taught, p, 20.0, &settings));
+        let worse = usize::from(blamed[1] > blamed[0]);
         assert_eq!(most_telling(&taught, &places, &[], 1, 20.0), [worse]);
-        assert!(errors.iter().all(|e| *e > 0.0 && *e <= WORST * WORST));
+        assert!(blamed.iter().all(|e| *e > 0.0 && *e <= WORST * WORST));
     }
 }

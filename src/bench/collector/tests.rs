@@ -390,6 +390,41 @@ fn steps_that_a_motor_loses_are_noticed_and_their_presses_made_again() {
     );
 }
 
+#[test]
+fn rounds_of_presses_are_one_run_and_its_end_is_waited_for() {
+    let case = Case::new();
+    let all: Vec<(usize, Planned)> = case.collector(9).plan.into_iter().collect();
+    let reference = Reference {
+        at: all[4].1,
+        every: 20,
+        answer: None,
+    };
+    for checked in [false, true] {
+        let mut bench = case.bench(PrinterFaults::default());
+        let mut collector = case.collector(9).waiting_for_more();
+        collector.plan.truncate(3);
+        if checked {
+            collector = collector.checked_at(reference.clone());
+        }
+        let waits = |news: &[News]| news.iter().filter(|n| **n == News::Waits).count();
+        let first = bench.run(&mut collector, 600.0);
+        assert_eq!((done(&first), waits(&first)), (vec![0, 1, 2], 1));
+        // Nothing moves, and it is not said again.
+        let (moves, idle) = (collector.moves, bench.run(&mut collector, 5.0));
+        assert!(collector.ended().is_none() && collector.moves == moves && idle.is_empty());
+        collector.go_on(all[3..].iter().copied());
+        let second = bench.run(&mut collector, 1200.0);
+        assert_eq!((done(&second), waits(&second)), ((3..9).collect(), 1));
+        let off = farthest(&all, &bench.pressed);
+        assert!(off < 1e-3, "{off}");
+        // What was pressed is believed before more is asked for.
+        let sure = |news: &[News]| news.contains(&News::Note("checked".into()));
+        assert!(!checked || (sure(&first) && sure(&second)));
+        collector.go_on([]);
+        assert_eq!(collector.ended(), Some(&Ended::Finished));
+    }
+}
+
 /// The farthest that a place was pressed from where it should have been (m).
 fn farthest(wanted: &[(usize, Planned)], pressed: &[(usize, DVec3)]) -> f64 {
     let off = pressed.iter().map(|(number, place)| {
