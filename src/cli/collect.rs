@@ -58,8 +58,14 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
         }
         Round::Over { .. } => Ended::Finished,
     };
-    let (met, round) = args.common.in_pool(|| rounds.next())?;
-    let reached = matches!(round, Round::Over { met: true });
+    let (met, reached) = match (&ended, rounds.last()) {
+        (Ended::Finished, Some(last)) => last,
+        // It was stopped on the way.
+        _ => {
+            let (met, round) = args.common.in_pool(|| rounds.next())?;
+            (met, round == Round::Over { met: true })
+        }
+    };
     if ended == Ended::Finished && !reached {
         out::say("all places are pressed, and the goal is not reached");
     }
@@ -71,6 +77,8 @@ struct Rounds<'a> {
     ready: &'a Ready,
     goal: Goal,
     failed: Mutex<BTreeSet<usize>>,
+    /// What was reached when it was looked at last, and whether that is the goal.
+    last: Mutex<Option<(Met, bool)>>,
 }
 
 impl<'a> Rounds<'a> {
@@ -83,7 +91,12 @@ impl<'a> Rounds<'a> {
                 in_order: args.in_order,
             },
             failed: Mutex::default(),
+            last: Mutex::default(),
         }
+    }
+
+    fn last(&self) -> Option<(Met, bool)> {
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn failed(&self) -> MutexGuard<'_, BTreeSet<usize>> {
@@ -97,9 +110,11 @@ impl<'a> Rounds<'a> {
         let watch = |p| bar.show(p);
         let next = self.ready.next_round(&self.goal, &failed, &watch);
         bar.finish();
-        let next = next?;
-        say_met(&next.0);
-        Ok(next)
+        let (met, round) = next?;
+        say_met(&met);
+        let last = Some((met, round == Round::Over { met: true }));
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = last;
+        Ok((met, round))
     }
 
     /// As an order. What is pressed and cannot be read back is not pressed again and again.

@@ -64,6 +64,7 @@ pub struct Errors {
 }
 
 /// What comes next.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Round {
     /// These presses, by number.
     Press(BTreeSet<usize>),

@@ -198,6 +198,8 @@ fn taught(folder: &Path, alone: f64) {
 fn live(folder: &Path, within: f64) {
     let script = "start_s,duration_s,x_mm,y_mm,z_mm,force_n\n3,1.5,22.5,22.5,60,15\n";
     std::fs::write(folder.join("s.csv"), script).unwrap();
+    // Of the call before.
+    let _ = std::fs::remove_file(folder.join("r.hapdrec"));
     let board = [
         "board",
         "--simulate",

@@ -268,7 +268,7 @@ impl Collector {
         }
         let over = self.plan.is_empty() && !self.check.is_due(0);
         if over {
-            self.end(Ended::Finished);
+            self.through(tell);
             return;
         }
         // The next look begins the next one, unless it is paused.
