@@ -58,13 +58,12 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
         }
         Round::Over { .. } => Ended::Finished,
     };
-    let (met, reached) = match (&ended, rounds.last()) {
-        (Ended::Finished, Some(last)) => last,
+    let (met, reached) = if let (Ended::Finished, Some(last)) = (&ended, rounds.last()) {
+        last
+    } else {
         // It was stopped on the way.
-        _ => {
-            let (met, round) = args.common.in_pool(|| rounds.next())?;
-            (met, round == Round::Over { met: true })
-        }
+        let (met, round) = args.common.in_pool(|| rounds.next())?;
+        (met, round == Round::Over { met: true })
     };
     if ended == Ended::Finished && !reached {
         out::say("all places are pressed, and the goal is not reached");
