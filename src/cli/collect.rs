@@ -58,17 +58,16 @@ pub fn run(args: &CollectArgs) -> anyhow::Result<()> {
         }
         Round::Over { .. } => Ended::Finished,
     };
-    let (met, reached) = if let (Ended::Finished, Some(last)) = (&ended, rounds.last()) {
-        last
-    } else {
-        // It was stopped on the way.
-        let (met, round) = args.common.in_pool(|| rounds.next())?;
-        (met, round == Round::Over { met: true })
-    };
-    if ended == Ended::Finished && !reached {
+    if let Ended::Stopped(_) = ended
+        && let Err(why) = args.common.in_pool(|| rounds.next())
+    {
+        out::say(&format!("hapdef: what was reached cannot be told: {why:#}"));
+    }
+    let learned = rounds.last();
+    if ended == Ended::Finished && learned.is_some_and(|(_, reached)| !reached) {
         out::say("all places are pressed, and the goal is not reached");
     }
-    finish(&ready, &presser, &ended, Some((met, reached)))
+    finish(&ready, &presser, &ended, learned)
 }
 
 /// A plan that learns, and what has failed of it.
@@ -290,13 +289,15 @@ impl Next<'_> {
                 self.last = numbers;
                 order
             }
-            Some(Err(why)) => {
-                out::say(&format!("hapdef: {why:#}"));
-                BenchOrder::Stop
-            }
+            Some(Err(why)) => BenchOrder::GiveUp(no_round(&why)),
             None => BenchOrder::More(Vec::new()),
         }
     }
+}
+
+/// Why a run ends before its goal.
+fn no_round(why: &anyhow::Error) -> String {
+    format!("the next presses cannot be chosen: {why:#}")
 }
 
 /// At real ports nobody waits while the next round is thought of: samples, and orders to stop, go on being heard.
@@ -320,10 +321,7 @@ fn at_ports(
                     next.last = numbers;
                     Some(order)
                 }
-                Ok(Err(why)) => {
-                    out::say(&format!("hapdef: {why:#}"));
-                    Some(BenchOrder::Stop)
-                }
+                Ok(Err(why)) => Some(BenchOrder::GiveUp(no_round(&why))),
                 Err(_) => inbox.try_recv().ok(),
             }
         };

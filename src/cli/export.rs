@@ -108,6 +108,7 @@ fn scene(args: &ExportArgs, loaded: &LoadedProject, inner: &Inner) -> anyhow::Re
         inner,
         grid_mm,
         touch: None,
+        run: None,
     };
     let Some(place) = args.touch else {
         return still.glb().map_err(anyhow::Error::msg);
@@ -143,6 +144,7 @@ fn scene(args: &ExportArgs, loaded: &LoadedProject, inner: &Inner) -> anyhow::Re
         inner: &gauges,
         touch: Some((shaken(touch.position), -touch.normal)),
         grid_mm,
+        run: None,
     }
     .glb()
     .map_err(anyhow::Error::msg)

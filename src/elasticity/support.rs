@@ -156,6 +156,23 @@ impl HeldPart {
             .all(|&v| self.members[v as usize] >> support & 1 == 1)
     }
 
+    /// Edges of the (cut) part that belong to a support beside no facet that does.
+    pub fn lines_of(&self, support: usize) -> impl Iterator<Item = &Edge> {
+        let belongs = move |v: u32| self.members[v as usize] >> support & 1 == 1;
+        let beside = move |edge: &Edge| {
+            let mut facets = edge.triangles.iter();
+            facets.any(|&t| self.facet_belongs(t, support))
+        };
+        let edges = self.mesh.edges().iter();
+        edges.filter(move |edge| belongs(edge.a) && belongs(edge.b) && !beside(edge))
+    }
+
+    /// Vertices of the (cut) part that belong to a support as none of their neighbours does.
+    pub fn spots_of(&self, support: usize) -> impl Iterator<Item = u32> {
+        let vertices = 0..self.mesh.positions().len() as u32;
+        vertices.filter(move |&v| self.alone(v) >> support & 1 == 1)
+    }
+
     /// What so many supports fasten the (cut) part to by a flat face.
     #[must_use]
     pub fn mounts(&self, supports: usize) -> Vec<Mount> {
@@ -183,13 +200,18 @@ impl HeldPart {
     /// Whether a vertex belongs to a support that none of its neighbours does.
     #[must_use]
     pub fn is_spot(&self, vertex: u32) -> bool {
+        self.alone(vertex) != 0
+    }
+
+    /// The supports that a vertex belongs to and none of its neighbours does.
+    fn alone(&self, vertex: u32) -> Members {
         let own = self.members[vertex as usize];
         let near = self.mesh.vertex_triangles()[vertex as usize]
             .iter()
             .flat_map(|&t| self.mesh.triangles()[t as usize])
             .filter(|&w| w != vertex)
             .fold(0, |any, w| any | self.members[w as usize]);
-        own & !near != 0
+        own & !near
     }
 }
 

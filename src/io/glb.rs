@@ -41,9 +41,9 @@ pub struct Piece {
 ///
 /// # Errors
 /// Only what serialization itself reports.
-pub fn write_scene(pieces: &[Piece], stance: Stance) -> Result<Vec<u8>, gltf::Error> {
+pub fn write_scene(pieces: &[Piece], stance: Stance, by: String) -> Result<Vec<u8>, gltf::Error> {
     let mut builder = Builder::new();
-    builder.root.asset.generator = Some("hapdef".into());
+    builder.root.asset.generator = Some(by);
     let material = builder.matt();
     let nodes: Vec<Index<json::Node>> = (pieces.iter())
         .map(|piece| {

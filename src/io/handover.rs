@@ -20,13 +20,14 @@ mod jig_pages;
 mod marks;
 mod scene;
 mod source;
+mod stamp;
 mod tables;
 mod templates;
 
 use self::source::Source;
 use super::bench_folder::limb_key;
 use super::mesh_file::urdf::link_of;
-use super::run::{Provenance, as_computed};
+use super::run::{Provenance, as_computed, run_key};
 use crate::budget::unwatched;
 use crate::design::{Design, Inputs};
 use crate::paper::{self, Format};
@@ -63,6 +64,7 @@ pub fn files(
         jig: workshop::jig_of(inputs, &inner, &unwatched).map_err(|e| e.to_string())?,
         wiring: wiring(inputs, &inner, &landmarks),
         name: name(provenance),
+        run: run_key(inputs, design),
         inputs,
         design,
         provenance,
@@ -87,7 +89,12 @@ pub fn files(
         .chain(texts.map(String::into_bytes));
     let files = files.chain([scene(&source)?]);
     let named = FILES.into_iter().map(String::from).zip(files);
-    Ok(named.chain(jig::files(&source.jig)).collect())
+    let all = named.chain(jig::files(&source.jig));
+    let stamped = all.map(|(name, bytes)| {
+        let bytes = stamp::of_run(&name, bytes, &source.run);
+        (name, bytes)
+    });
+    Ok(stamped.collect())
 }
 
 /// The limb coloured by the mean error of touches around each place, where that was judged.
@@ -108,6 +115,7 @@ fn scene(source: &Source<'_>) -> Result<Vec<u8>, String> {
         inner: &source.inner,
         grid_mm: [keys.grid_length_mm, keys.grid_width_mm],
         touch: None,
+        run: Some(&source.run),
     }
     .glb()
 }

@@ -249,14 +249,14 @@ fn tetrahedral(
     let mended = mended.map_err(|e| tetrahedra::at_origin(&e, &soup.origins))?;
     soup.notes.extend(mended.in_words());
     let (piece, mesh, bodies) = whole.body(body).map_err(|e| e.to_string())?;
-    let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
+    note_held_within(soup, &whole, &piece, &mesh);
     let groups = (soup.node_sets.iter())
         .map(|(name, nodes)| {
             let members: HashSet<[u64; 3]> = (whole.with_middles(nodes).iter())
-                .map(|&n| key(whole.nodes[n as usize]))
+                .map(|&n| bits(whole.nodes[n as usize]))
                 .collect();
             let mask: Vec<bool> = (mesh.positions().iter())
-                .map(|&p| members.contains(&key(p)))
+                .map(|&p| members.contains(&bits(p)))
                 .collect();
             (name.clone(), Arc::new(mask))
         })
@@ -270,6 +270,36 @@ fn tetrahedral(
         mesh: mesh.around(piece),
         found: Found::default(),
     })
+}
+
+/// A point as what tells it from all others; -0 is 0.
+fn bits(point: DVec3) -> [u64; 3] {
+    (point + DVec3::ZERO).to_array().map(f64::to_bits)
+}
+
+/// Notes the nodes of supports that lie inside a piece of the file's tetrahedra: a part is held on its surface.
+fn note_held_within(soup: &mut Soup, whole: &VolumeMesh, piece: &VolumeMesh, surface: &TriMesh) {
+    let supports: HashSet<&str> = (soup.said.supports.iter())
+        .filter_map(|s| s.vertices.as_deref())
+        .collect();
+    if supports.is_empty() {
+        return;
+    }
+    let places = |points: &[DVec3]| points.iter().map(|&p| bits(p)).collect::<HashSet<_>>();
+    let (of_piece, on_surface) = (places(&piece.nodes), places(surface.positions()));
+    let held = (soup.node_sets.iter()).filter(|(name, _)| supports.contains(&**name));
+    for (name, nodes) in held {
+        let places = nodes.iter().map(|&n| bits(whole.nodes[n as usize]));
+        let places: Vec<_> = places.filter(|p| of_piece.contains(p)).collect();
+        let inside = (places.iter()).filter(|p| !on_surface.contains(*p)).count();
+        if inside > 0 {
+            soup.notes.push(format!(
+                "{}: {inside} of its {} lie inside the part, where nothing is held: only its surface is",
+                plain::quote(name),
+                plain::count(places.len(), "node")
+            ));
+        }
+    }
 }
 
 /// Reads a GLB from memory: body 0, in metres.

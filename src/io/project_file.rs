@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use toml::de::{DeTable, DeValue};
+
 use super::mesh_file::{LoadedMesh, read_mesh};
 use super::npz::{NpzFile, read_mask};
 use super::{FileError, atomic, source};
@@ -146,8 +148,30 @@ pub fn parse(text: &str) -> Result<Project, String> {
         }
     }
     let project: Project = toml::from_str(text).map_err(|e| unreadable(text, &e))?;
-    project.check().map_err(|e| e.to_string())?;
+    project.check().map_err(|e| match line_of(text, &e.key) {
+        Some(line) => format!("line {line}: {e}"),
+        None => e.to_string(),
+    })?;
     Ok(project)
+}
+
+/// The line that a key stands in, by its path; nothing where it is left out, or where one of several tables of its name
+/// holds it.
+fn line_of(text: &str, path: &str) -> Option<usize> {
+    let root = DeTable::parse(text).ok()?;
+    let mut table = root.get_ref();
+    let mut names = path.split('.').peekable();
+    loop {
+        let (key, value) = table.get_key_value(names.next()?)?;
+        if names.peek().is_none() {
+            return Some(1 + lines_before(text.as_bytes(), key.span().start));
+        }
+        table = match value.get_ref() {
+            DeValue::Table(table) => table,
+            DeValue::Array(tables) if tables.len() == 1 => tables[0].get_ref().as_table()?,
+            _ => return None,
+        };
+    }
 }
 
 /// What is wrong in a project's text and where; not the line itself, which may be of any length.

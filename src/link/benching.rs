@@ -22,6 +22,8 @@ pub enum BenchOrder {
     Kill,
     /// Presses these too, each with its number; none: that was all.
     More(Vec<(usize, Planned)>),
+    /// Takes the tip back and ends, for this reason: what comes next cannot be had.
+    GiveUp(String),
 }
 
 /// How a run ends that somebody has stopped, and whose tip is back.
@@ -145,7 +147,10 @@ pub fn press_simulated(
             paused = match &order {
                 BenchOrder::Pause => true,
                 BenchOrder::Resume => false,
-                BenchOrder::Stop | BenchOrder::Kill | BenchOrder::More(_) => paused,
+                BenchOrder::Stop
+                | BenchOrder::Kill
+                | BenchOrder::More(_)
+                | BenchOrder::GiveUp(_) => paused,
             };
             obey(collector, order, now_us, &mut out);
         }
@@ -237,6 +242,7 @@ fn obey(collector: &mut Collector, order: BenchOrder, now_us: u64, out: &mut Vec
         BenchOrder::Stop => collector.stop(BY_HAND, now_us, out),
         BenchOrder::Kill => collector.kill(out),
         BenchOrder::More(presses) => collector.go_on(presses),
+        BenchOrder::GiveUp(why) => collector.stop(&why, now_us, out),
     }
 }
 

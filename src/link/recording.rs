@@ -43,6 +43,9 @@ impl Recorder {
     /// A message that says which file and why.
     pub fn create(path: &Path) -> Result<Self, String> {
         let file = File::create_new(path).map_err(|e| match e.kind() {
+            std::io::ErrorKind::AlreadyExists if path.is_dir() => {
+                format!("{}: this is a folder. Name a file in it", path.display())
+            }
             std::io::ErrorKind::AlreadyExists => format!(
                 "{}: there is a recording of this name already. Choose another",
                 path.display()

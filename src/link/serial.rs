@@ -1,6 +1,7 @@
 //! Serial ports: opened by serial2, listed by serialport.
 
 use std::io::ErrorKind;
+use std::path::Path;
 use std::time::Duration;
 
 use serial2::{SerialPort, Settings};
@@ -32,6 +33,10 @@ pub(super) fn open(path: &str, baud: u32) -> Result<Box<dyn Port>, String> {
             }
             ErrorKind::PermissionDenied => {
                 "this account may not open it: on Linux, add it to the group dialout"
+            }
+            _ if Path::new(path).is_dir() => "that is a folder: name a port or a recording",
+            _ if Path::new(path).is_file() => {
+                "that is a file: name a port, or a recording, whose name ends in .hapdrec"
             }
             _ => "check the cable, and that no other program holds the port",
         };

@@ -68,6 +68,8 @@ pub enum Doubt {
     Refused(Refusal),
     /// Rows of numbers with commas that may be decimal ones.
     Commas,
+    /// Rows of numbers in which this one, from 1, is none.
+    NoNumber(usize),
     /// Bytes that are neither frames nor rows of numbers.
     Neither,
     /// Frames, but no data among them.
@@ -82,7 +84,7 @@ impl Doubt {
     pub fn is_lasting(self) -> bool {
         match self {
             Self::Refused(why) => why.is_lasting(),
-            Self::Commas => true,
+            Self::Commas | Self::NoNumber(_) => true,
             Self::Neither | Self::NoData | Self::Changed => false,
         }
     }
@@ -94,6 +96,11 @@ impl Doubt {
             Self::Refused(why) => return why.in_words(),
             Self::Commas => {
                 "the board prints lines such as “1,5;2,5”, with commas beside another sign between the numbers: whether they are decimal commas cannot be told. Print decimal points, or one sign alone between the numbers"
+            }
+            Self::NoNumber(place) => {
+                return Some(format!(
+                    "the board prints lines whose number {place} is none (nan, inf or beyond 1e15): these lines are left out. See what ails that sensor, or print a count at the end of its range in its place: only its gauge is left out then"
+                ));
             }
             Self::Neither => {
                 "bytes come, but neither frames of the protocol nor lines of numbers: check the baud rate, and what the board prints"
@@ -178,6 +185,10 @@ impl Receiver {
             }
             Reading::Unclear => {
                 (*rows, *doubt) = (0, Some(Doubt::Commas));
+                traffic.refused += 1;
+            }
+            Reading::NoNumber(place) => {
+                *doubt = Some(Doubt::NoNumber(place));
                 traffic.refused += 1;
             }
             Reading::Other if *speech == Speech::Lines => traffic.refused += 1,

@@ -65,14 +65,17 @@ impl TriMesh {
     ) -> Result<TakenIn, MeshError> {
         check_raw(positions, triangles)?;
         let mut report = RepairReport::default();
-        let (numbers, points) = weld(positions, repair, &mut report);
+        let (mut numbers, points) = weld(positions, repair, &mut report);
         let renumbered = triangles.iter().map(|t| t.map(|v| numbers[v as usize]));
-        let whole = drop_degenerate(&points, renumbered, &mut report)?;
+        let mut whole = drop_degenerate(&points, renumbered, &mut report)?;
+        report.joined_vertices += repair::join_rounded(&points, &mut whole, &mut numbers);
         let kept = keep_body(&points, &whole, body, &mut report)?;
         let mut mesh = Self::of_body(kept.positions, kept.triangles, repair, &mut report);
         if report.boundary_edges > 0 {
             // Of the whole file: what is torn lies apart.
-            report.closes_within = repair::closing_weld(&points, &whole);
+            let torn = repair::torn(&points, &whole);
+            report.closes_within = torn.filter(|t| t.closes).map(|t| t.within);
+            report.torn = (torn.filter(|t| !t.closes)).map(|t| (t.within, t.sides));
             mesh.closes_within = report.closes_within;
         }
         Ok(TakenIn {

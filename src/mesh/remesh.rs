@@ -4,6 +4,7 @@
 //! edges, collapse short ones, turn edges towards equal angles, move vertices along the surface; with a
 //! size that varies over the surface and with feature lines kept.
 
+mod flip;
 mod working;
 
 use std::collections::HashSet;
@@ -13,6 +14,7 @@ use glam::DVec3;
 
 use super::surface::{Mobility, Surface};
 use super::{SurfacePoint, TriMesh};
+use flip::flip;
 use working::{Working, key};
 
 const ROUNDS: usize = 8;
@@ -24,8 +26,6 @@ const SHORT: f64 = 4.0 / 5.0;
 const SAGITTA: f64 = 0.11;
 /// Steps of the queues of edges: lengths over what is wanted that differ by less are the same but for rounding.
 const STEP: f64 = 1e-5;
-/// Opposite angles within this (rad) of half a turn are half a turn but for rounding: the edge stays.
-const LEVEL: f64 = 1e-5;
 /// Details smaller than this share of the wanted size are given up, feature lines among them.
 const TINY: f64 = 0.2;
 
@@ -225,7 +225,7 @@ fn collapse_anyhow(work: &mut Working, a: u32, b: u32) -> bool {
 
 /// The edge a–b of a flat triangle whose apex lies on it: the apex takes its place.
 fn give_to_apex(work: &mut Working, t: u32, a: u32, b: u32, apex: u32) -> bool {
-    let on = work.on_edge(a, b);
+    let on: Vec<u32> = work.on_edge(a, b).collect();
     let line = work.is_line(a, b);
     match on[..] {
         [_] => work.drop_triangle(t),
@@ -234,7 +234,7 @@ fn give_to_apex(work: &mut Working, t: u32, a: u32, b: u32, apex: u32) -> bool {
             let across = work.triangles[other as usize]
                 .into_iter()
                 .find(|&v| v != a && v != b);
-            let Some(d) = across.filter(|&d| d != apex && work.on_edge(apex, d).is_empty()) else {
+            let Some(d) = across.filter(|&d| d != apex && !work.is_edge(apex, d)) else {
                 return false;
             };
             work.flip(a, b, [t, other], [apex, d]);
@@ -288,7 +288,7 @@ fn collapse_short(work: &mut Working) {
     short.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
     for (_, a, b) in short {
         // Earlier collapses may have taken the edge, or made it long enough.
-        let there = !work.around[a as usize].is_empty() && !work.on_edge(a, b).is_empty();
+        let there = work.is_edge(a, b);
         if !there || work.length(a, b) >= SHORT * work.wanted(a, b) {
             continue;
         }
@@ -356,62 +356,6 @@ fn thinness(work: &Working, t: u32, moved: u32, to: DVec3) -> f64 {
         .map(|i| p[i].distance_squared(p[(i + 1) % 3]))
         .fold(0.0, f64::max);
     (p[1] - p[0]).cross(p[2] - p[0]).length() / longest.max(f64::MIN_POSITIVE)
-}
-
-/// Turns edges until no pair of triangles would have a larger smallest angle the other way.
-fn flip(work: &mut Working) {
-    const PASSES: usize = 6;
-    for _ in 0..PASSES {
-        let mut turned = 0;
-        for (a, b) in work.edges() {
-            if work.is_line(a, b) {
-                continue;
-            }
-            if let [s, t] = work.on_edge(a, b)[..] {
-                turned += usize::from(flip_edge(work, a, b, s, t));
-            }
-        }
-        if turned == 0 {
-            return;
-        }
-    }
-}
-
-fn flip_edge(work: &mut Working, a: u32, b: u32, s: u32, t: u32) -> bool {
-    let opposite = |t: u32| {
-        work.triangles[t as usize]
-            .into_iter()
-            .find(|&v| v != a && v != b)
-    };
-    let (Some(c), Some(d)) = (opposite(s), opposite(t)) else {
-        return false;
-    };
-    if c == d || !work.on_edge(c, d).is_empty() {
-        return false;
-    }
-    let [pa, pb, pc, pd] = [a, b, c, d].map(|v| work.position(v));
-    let angle = |at: DVec3, u: DVec3, v: DVec3| (u - at).angle_between(v - at);
-    // Delaunay on the surface: opposite angles of more than half a turn.
-    if angle(pc, pa, pb) + angle(pd, pa, pb) <= std::f64::consts::PI + LEVEL {
-        return false;
-    }
-    let (n, m) = (work.normal(s), work.normal(t));
-    let mean = n + m;
-    // After the turn: a, d, c and b, c, d in the winding of s.
-    let forward = {
-        let tri = work.triangles[s as usize];
-        (0..3).any(|i| tri[i] == a && tri[(i + 1) % 3] == b)
-    };
-    let sign = if forward { 1.0 } else { -1.0 };
-    let first = (pd - pa).cross(pc - pa) * sign;
-    let second = (pc - pb).cross(pd - pb) * sign;
-    let sound = |new: DVec3| new.dot(mean) > 0.5 * new.length() * mean.length();
-    let size = mean.length();
-    if !sound(first) || !sound(second) || first.length().min(second.length()) < 1e-6 * size {
-        return false;
-    }
-    work.flip(a, b, [s, t], [c, d]);
-    true
 }
 
 /// Moves vertices along the surface towards the middle of what surrounds them.

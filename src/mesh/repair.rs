@@ -62,17 +62,25 @@ pub(super) fn join_near(positions: &[DVec3], tolerance: f64) -> (Vec<u32>, Vec<D
     (renumber, kept)
 }
 
-/// The distance (m) within which vertices would have to be joined for an open surface to close: at most a thousandth
-/// of its middle edge, as torn seams are; nothing where that does not close it. (The mean edge of a mesh with one vertex
-/// far away is longer than the part.)
-pub(super) fn closing_weld(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
-    let tolerance = one_digit(middle_edge(positions, triangles)? / 1000.0);
+/// Open sides of a surface that lie along each other without being joined.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tear {
+    /// Vertices within so much (m) of each other would have to be joined.
+    pub within: f64,
+    /// How many sides lie so.
+    pub sides: usize,
+    /// Whether the surface closes then.
+    pub closes: bool,
+}
+
+/// Where an open surface is torn: its open sides would be edges if vertices within a thousandth of its middle edge were
+/// joined; nothing where none would. (The mean edge of a mesh with one vertex far away is longer than the part.)
+pub(super) fn torn(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<Tear> {
+    let within = one_digit(middle_edge(positions, triangles)? / 1000.0);
     let open = open_sides(triangles);
-    let mut vertices: Vec<u32> = open.iter().flatten().copied().collect();
-    vertices.sort_unstable();
-    vertices.dedup();
+    let vertices = ends_of(&open);
     let points: Vec<DVec3> = vertices.iter().map(|&v| positions[v as usize]).collect();
-    let (joined, kept) = join_near(&points, tolerance);
+    let (joined, kept) = join_near(&points, within);
     if kept.len() == points.len() {
         return None;
     }
@@ -83,7 +91,53 @@ pub(super) fn closing_weld(positions: &[DVec3], triangles: &[[u32; 3]]) -> Optio
             *sides.entry((a.min(b), a.max(b))).or_default() += 1;
         }
     }
-    sides.values().all(|&count| count == 2).then_some(tolerance)
+    let pairs = sides.values().filter(|&&count| count == 2).count();
+    (pairs > 0).then_some(Tear {
+        within,
+        sides: 2 * pairs,
+        closes: pairs == sides.len(),
+    })
+}
+
+/// Joins vertices of open sides that rounding has parted, as where a circle that ends where it began has 2 sin π for
+/// another zero: nobody tears a wall by a billionth of the part. `numbers` are those of the points that the file's
+/// vertices became. How many were joined.
+pub(super) fn join_rounded(
+    positions: &[DVec3],
+    triangles: &mut Vec<[u32; 3]>,
+    numbers: &mut [u32],
+) -> usize {
+    const ROUNDING: f64 = 1e-9;
+    let vertices = ends_of(&open_sides(triangles));
+    let points: Vec<DVec3> = vertices.iter().map(|&v| positions[v as usize]).collect();
+    let size = Bounds::around(positions.iter().copied()).size();
+    let (joined, kept) = join_near(&points, ROUNDING * size.length());
+    if kept.len() == points.len() {
+        return 0;
+    }
+    // The first of those that are joined stands for all.
+    let mut first = vec![u32::MAX; kept.len()];
+    for (&vertex, &point) in vertices.iter().zip(&joined) {
+        let first = &mut first[point as usize];
+        *first = (*first).min(vertex);
+    }
+    let stands_for = |v: u32| match vertices.binary_search(&v) {
+        Ok(place) => first[joined[place] as usize],
+        Err(_) => v,
+    };
+    for number in triangles.iter_mut().flatten().chain(numbers) {
+        *number = stands_for(*number);
+    }
+    triangles.retain(|[a, b, c]| a != b && b != c && c != a);
+    points.len() - kept.len()
+}
+
+/// The vertices of some sides, each once, rising.
+fn ends_of(sides: &[[u32; 2]]) -> Vec<u32> {
+    let mut vertices: Vec<u32> = sides.iter().flatten().copied().collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices
 }
 
 /// The median length of the triangles' sides; nothing where that is no length.
@@ -321,7 +375,28 @@ mod tests {
         assert!(mean(sides.collect()) > 100.0);
         let middle = middle_edge(&points, &triangles).unwrap();
         assert!((0.01..0.0142).contains(&middle), "{middle}");
-        assert_eq!(closing_weld(&points, &triangles), None);
+        assert_eq!(torn(&points, &triangles), None);
+    }
+
+    #[test]
+    fn what_rounding_has_parted_is_one() {
+        let (p, t) = open_box(1e-10);
+        let (mesh, report) = TriMesh::new(&p, &t, 0).unwrap();
+        assert_eq!((report.bodies, report.joined_vertices), (1, 12));
+        assert_eq!(mesh.boundary_edges().count(), 4);
+        assert_eq!(report.torn, None);
+    }
+
+    #[test]
+    fn a_seam_that_leaves_the_surface_open_is_told() {
+        let (p, t) = open_box(1e-4);
+        // Four walls around the bottom, all apart: eight sides below and eight upright ones, and four open at the top.
+        let (_, report) = TriMesh::new(&p, &t, 0).unwrap();
+        assert_eq!(report.torn, Some((1e-3, 16)));
+        assert_eq!(report.closes_within, None);
+        let words = report.in_words(0).unwrap();
+        assert!(words.contains("16 open edges"), "{words}");
+        assert!(words.contains("part.weld_mm = 1"), "{words}");
     }
 
     #[test]

@@ -29,6 +29,8 @@ pub struct RepairReport {
     pub slivers: usize,
     /// The mesh is open, but closes where vertices within so much (m) of each other are joined.
     pub closes_within: Option<f64>,
+    /// So many open edges would be joined where vertices within so much (m) of each other are, and others stay open.
+    pub torn: Option<(f64, usize)>,
     /// What the file holds that was left out, or that its reader does not know: whole sentences without a stop.
     pub notes: Vec<String>,
 }
@@ -81,6 +83,12 @@ impl RepairReport {
             parts.push(format!(
                 "{} open, and the mesh closes when vertices within {mm} mm are joined (part.weld_mm = {mm})",
                 plain::either(self.boundary_edges, "edge is", "edges are")
+            ));
+        }
+        if let Some((within, edges)) = self.torn {
+            let mm = plain::digits(within * 1e3);
+            parts.push(format!(
+                "{edges} open edges lie along each other and are not joined: the wall is torn there. Vertices within {mm} mm are joined by part.weld_mm = {mm}"
             ));
         }
         let changed = (!parts.is_empty()).then(|| parts.join(", "));

@@ -59,7 +59,7 @@ impl Selector for ExpectedError<'_> {
         certify_last(&expectation, request, &empty, &mut chosen)?;
         let losses = expectation.losses_note(&chosen.places)?;
         chosen.notes.extend(losses);
-        Ok(as_selection(pool, request, chosen))
+        as_selection(pool, request, chosen)
     }
 }
 
@@ -80,18 +80,27 @@ fn certify_last(
 }
 
 /// The selection, with what must be known of it.
-fn as_selection(pool: &Pool, request: &Request, chosen: Chosen) -> Selection {
+fn as_selection(
+    pool: &Pool,
+    request: &Request,
+    chosen: Chosen,
+) -> Result<Selection, PlacementError> {
     let Chosen { field, sets, .. } = chosen;
     let mut notes = field.constant_notes();
     notes.extend(chosen.notes);
     notes.extend(margin::ties(&sets, margin::TOLERANCE));
     let mut cautions = Vec::from_iter(unreached(&sets, request.constraints));
     let mut stop_reason = StopReason::Converged;
-    if let Some(why) = field.closed() {
-        cautions.push(shortage(&why, sets.len(), request.constraints.sensors));
-        stop_reason = StopReason::NoRoom;
+    match field.closed() {
+        Some(why) if sets.is_empty() => return Err(PlacementError::NoRoom { why }),
+        Some(why) => {
+            cautions.push(shortage(&why, sets.len(), request.constraints.sensors));
+            stop_reason = StopReason::NoRoom;
+        }
+        None if sets.is_empty() => return Err(PlacementError::NoSites),
+        None => {}
     }
-    Selection {
+    Ok(Selection {
         selector: SelectorKind::ExpectedError,
         criterion_unit: "mm expected error",
         pool: pool.sites.len(),
@@ -104,7 +113,7 @@ fn as_selection(pool: &Pool, request: &Request, chosen: Chosen) -> Selection {
             notes,
         },
         sets,
-    }
+    })
 }
 
 /// The expected error (mm) of a set of sites, and of each press.

@@ -88,6 +88,13 @@ pub fn from_components(
             None => PlacementError::NoSites,
         });
     }
+    if sets.is_empty() {
+        return Err(
+            no_room.map_or(PlacementError::NoSites, |why| PlacementError::NoRoom {
+                why,
+            }),
+        );
+    }
     Ok(Selection {
         selector: SelectorKind::PcaQr,
         criterion_unit: "share of variance beyond the components",

@@ -74,7 +74,7 @@ keys! {
             "which connected body of the file, 0 being the one with the largest surface";
         #[serde(default)]
         weld_mm: f64, "mm", ROOM,
-            "vertices nearer to each other than this are joined; 0 joins equal ones only";
+            "vertices nearer to each other than this are joined; 0 joins only those that rounding has parted";
         #[serde(default)]
         fill_holes_mm: f64, "mm", ROOM,
             "holes up to this far across are filled";

@@ -58,6 +58,7 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
     if question.groups.is_none() && places == data.targets.len() {
         notes.extend(clump_note(svr, &data.targets));
     }
+    notes.extend(judged.unfinished_note());
     Ok(Verdict {
         criteria_mm: judged.criteria_mm,
         fold_of_touch: folds.of_touches(),

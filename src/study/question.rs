@@ -116,6 +116,15 @@ pub(super) struct Judged {
     pub(super) failures: Vec<FailureRow>,
 }
 
+impl Judged {
+    /// That regressions ended before they were done.
+    pub(super) fn unfinished_note(&self) -> Option<String> {
+        let mut found = self.errors.iter().chain(&self.baseline);
+        let unfinished = found.any(|e| e.converged == Some(false));
+        unfinished.then(|| "Some regressions stopped at the effort allowed before they met their tolerance: errors and criterion are not what these sites can do. Allow more steps (--max-steps), or lower C.".into())
+    }
+}
+
 /// Which touches are learned from, and which are judged on.
 pub(super) struct Parts<'a> {
     pub(super) groups: &'a [usize],

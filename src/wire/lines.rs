@@ -11,6 +11,9 @@ pub enum Reading {
     /// Numbers with commas between some and another sign between others, as in “1,5;2,5”: two decimal commas or
     /// four numbers, nobody knows.
     Unclear,
+    /// A row of numbers but for this one (from 1), which is none that counts can be: “nan”, “inf”, or beyond all
+    /// bounds.
+    NoNumber(usize),
     /// Not a row of numbers, or not as many as in the lines before.
     Other,
 }
@@ -55,7 +58,7 @@ impl LineReader {
             return Reading::Other;
         };
         let Some(values) = numbers(text) else {
-            return Reading::Other;
+            return self.without_number(text);
         };
         if is_unclear(text) {
             return Reading::Unclear;
@@ -72,6 +75,18 @@ impl LineReader {
             }
         }
     }
+
+    /// What a line says that is no row of numbers: where rows of as many came before, that one of them is none.
+    fn without_number(&self, text: &str) -> Reading {
+        let words: Vec<&str> = words(text).collect();
+        // As sketches print what they cannot count: `Serial.print` has a word of its own beside the two of C.
+        let is_number = |word: &&str| word.parse::<f64>().is_ok() || *word == "ovf";
+        let is_row = self.channels == Some(words.len()) && words.iter().all(is_number);
+        match words.iter().position(|word| count(word).is_none()) {
+            Some(place) if is_row => Reading::NoNumber(place + 1),
+            _ => Reading::Other,
+        }
+    }
 }
 
 /// What stands between two numbers.
@@ -79,14 +94,19 @@ fn divides(c: char) -> bool {
     matches!(c, ',' | ';' | '\t' | ' ')
 }
 
-fn numbers(text: &str) -> Option<Vec<f64>> {
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(divides).filter(|word| !word.is_empty())
+}
+
+/// A number that a board may print.
+fn count(word: &str) -> Option<f64> {
     /// No count, and no clock that is printed beside the counts, is larger; squares of it are still finite.
     const LARGEST: f64 = 1e15;
-    let values: Option<Vec<f64>> = text
-        .split(divides)
-        .filter(|word| !word.is_empty())
-        .map(|word| word.parse().ok().filter(|v: &f64| v.abs() <= LARGEST))
-        .collect();
+    word.parse().ok().filter(|v: &f64| v.abs() <= LARGEST)
+}
+
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    let values: Option<Vec<f64>> = words(text).map(count).collect();
     values.filter(|v| !v.is_empty() && v.len() <= super::MOST_CHANNELS)
 }
 
@@ -129,6 +149,21 @@ mod tests {
             Reading::Other,
             values(&[-1500.0, 0.0, 2.0]),
             Reading::Other,
+            Reading::NoNumber(3),
+        ];
+        assert_eq!(said, expected);
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_found() {
+        let said = readings(b"nan,1\n1,2\novf,1\n1,-inf\n1e16,1\n1,2,nan\n1,no\n");
+        let expected = [
+            Reading::Other,
+            Reading::Values(vec![1.0, 2.0]),
+            Reading::NoNumber(1),
+            Reading::NoNumber(2),
+            Reading::NoNumber(1),
+            Reading::Other,
             Reading::Other,
         ];
         assert_eq!(said, expected);
@@ -146,7 +181,7 @@ mod tests {
             values(&[1000.0, 999.0, 1000.0]),
             values(&[7.0, 8.0, 9.0]),
             values(&[1.0, 2.0, 3.0]),
-            Reading::Other,
+            Reading::NoNumber(1),
         ];
         assert_eq!(kinds, expected);
     }

@@ -1,7 +1,8 @@
 //! How a solid is held: nodes that do not move, and facets of the true surface that are kept from moving.
 //!
 //! What a box holds is a volume, and the grid has planes along its sides: nodes of the cells inside are held as
-//! they are. What is painted is a piece of surface somewhere in its cells: stiff springs all over it hold it.
+//! they are. What is painted is a piece of surface, a line or a point somewhere in its cells: stiff springs all over
+//! it hold it.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +14,7 @@ use crate::elasticity::error::ElasticError;
 use crate::elasticity::solver::SymmetricMatrix;
 use crate::elasticity::system::HELD;
 use crate::elasticity::{DofSet, Material};
-use crate::mesh::{SurfacePoint, TriMesh};
+use crate::mesh::{Edge, SurfacePoint, TriMesh};
 
 /// What is held.
 #[derive(Clone, Debug, Default)]
@@ -38,6 +39,8 @@ struct Spring {
 const STIFF: f64 = 1e4;
 /// A facet is held at the points of this rule on each of its pieces, which are smaller than half an element.
 const RULE: [[f64; 3]; 3] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
+/// A line is held at the points of this rule (Gauss, two points) on each of its pieces, likewise.
+const LINE: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 impl Grip {
     /// Nothing held yet.
@@ -101,15 +104,66 @@ impl Grip {
                         (0..3).map(|k| weights[k] * piece[k][i]).sum()
                     }),
                 };
-                let point = mesh.point(at);
-                self.springs.push(Spring {
-                    point,
-                    shape: elements.shape(point, normal),
-                    held,
-                    stiffness: STIFF * material.youngs_modulus / size * area,
-                });
+                let stiffness = STIFF * material.youngs_modulus / size * area;
+                self.hold_point(elements, mesh.point(at), normal, held, stiffness);
             }
         }
+    }
+
+    /// Holds an edge of a surface with springs. `size` (m) is that of an element.
+    pub fn hold_edge(
+        &mut self,
+        elements: &dyn Elements,
+        mesh: &TriMesh,
+        edge: &Edge,
+        held: DofSet,
+        material: &Material,
+        size: f64,
+    ) {
+        let [a, b] = [edge.a, edge.b].map(|v| mesh.positions()[v as usize]);
+        let length = a.distance(b);
+        let pieces = (2.0 * length / size).ceil().clamp(1.0, 64.0) as usize;
+        let normal = mesh.facet_normal(edge.triangles[0]);
+        let stiffness = STIFF * material.youngs_modulus * length / (pieces * LINE.len()) as f64;
+        for piece in 0..pieces {
+            for along in LINE {
+                let point = a.lerp(b, (piece as f64 + along) / pieces as f64);
+                self.hold_point(elements, point, normal, held, stiffness);
+            }
+        }
+    }
+
+    /// Holds a vertex of a surface with a spring. `size` (m) is that of an element.
+    pub fn hold_vertex(
+        &mut self,
+        elements: &dyn Elements,
+        mesh: &TriMesh,
+        vertex: u32,
+        held: DofSet,
+        material: &Material,
+        size: f64,
+    ) {
+        let normal = mesh.facet_normal(mesh.vertex_triangles()[vertex as usize][0]);
+        let stiffness = STIFF * material.youngs_modulus * size;
+        let point = mesh.positions()[vertex as usize];
+        self.hold_point(elements, point, normal, held, stiffness);
+    }
+
+    /// `stiffness` in N/m; `normal` out of the surface there.
+    fn hold_point(
+        &mut self,
+        elements: &dyn Elements,
+        point: DVec3,
+        normal: DVec3,
+        held: DofSet,
+        stiffness: f64,
+    ) {
+        self.springs.push(Spring {
+            point,
+            shape: elements.shape(point, normal),
+            held,
+            stiffness,
+        });
     }
 
     /// Adds the springs to a stiffness.

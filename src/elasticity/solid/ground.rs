@@ -255,6 +255,18 @@ impl SolidGround {
         self.shape().size_for(unknowns)
     }
 
+    /// A word on supports that have no area: no displacement of an elastic solid under them is finite.
+    fn held_thinly(&self) -> Vec<String> {
+        let numbers = self.immersed.held_without_area();
+        let said = numbers.iter().map(|k| {
+            format!(
+                "Support {} holds the part along lines or at single points only: the smaller the elements are, the more gives way beside them. Hold a face, where that matters.",
+                k + 1
+            )
+        });
+        said.collect()
+    }
+
     /// What is worth a word about the cells of a model.
     #[must_use]
     pub fn cautions(&self, fineness: &Fineness) -> Vec<String> {
@@ -264,16 +276,14 @@ impl SolidGround {
         /// from which it is worth a word.
         const NARROW: f64 = 0.5;
         const WORTH: f64 = 0.01;
+        let mut notes = self.held_thinly();
         if let Some(own) = self.immersed.own() {
-            let what = if own.from_linear {
-                "The mesh's linear tetrahedra were given nodes at the middles of their edges: as they are they would be several times too stiff."
-            } else {
-                return Vec::new();
-            };
-            return vec![what.into()];
+            if own.from_linear {
+                notes.push("The mesh's linear tetrahedra were given nodes at the middles of their edges: as they are they would be several times too stiff.".into());
+            }
+            return notes;
         }
         let ratio = fineness.size / self.wall();
-        let mut notes = Vec::new();
         if ratio > LARGE {
             notes.push(format!(
                 "The cells ({:.2} mm) are {ratio:.1} times as large as thin walls are thick ({:.2} mm): choose a higher quality, or fewer touches.",

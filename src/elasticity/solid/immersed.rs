@@ -197,7 +197,8 @@ impl Immersed {
         SolidModel::new(surface, Box::new(elements), self.material, grip, watch)
     }
 
-    /// Holds the facets of a support with springs.
+    /// Holds the facets of a support with springs, and its lines and single points where it has no facets: a deck may
+    /// hold an edge, or three corners.
     fn spring(&self, grip: &mut Grip, on: &dyn Elements, number: usize, held: DofSet, size: f64) {
         let mesh = &self.held.mesh;
         for facet in 0..mesh.triangles().len() as u32 {
@@ -205,6 +206,24 @@ impl Immersed {
                 grip.hold_facet(on, mesh, facet, held, &self.material, size);
             }
         }
+        for edge in self.held.lines_of(number) {
+            grip.hold_edge(on, mesh, edge, held, &self.material, size);
+        }
+        for vertex in self.held.spots_of(number) {
+            grip.hold_vertex(on, mesh, vertex, held, &self.material, size);
+        }
+    }
+
+    /// The supports, by number, that hold the part along lines or at points only.
+    #[must_use]
+    pub fn held_without_area(&self) -> Vec<usize> {
+        let facets = 0..self.held.mesh.triangles().len() as u32;
+        let has_area = |&k: &usize| facets.clone().any(|t| self.held.facet_belongs(t, k));
+        let holds_some = |&k: &usize| {
+            self.held.lines_of(k).next().is_some() || self.held.spots_of(k).next().is_some()
+        };
+        let supports = 0..self.supports.len();
+        supports.filter(|k| !has_area(k) && holds_some(k)).collect()
     }
 
     fn grip(&self, cells: &FiniteCells, size: f64) -> Grip {

@@ -23,6 +23,8 @@ pub struct Scene<'a> {
     pub grid_mm: [f64; 2],
     /// Where it is touched (m), and which way the touch pushes.
     pub touch: Option<(DVec3, DVec3)>,
+    /// The key of the run that it is of.
+    pub run: Option<&'a str>,
 }
 
 impl Scene<'_> {
@@ -58,7 +60,8 @@ impl Scene<'_> {
             let length = 0.2 * (high - low).length();
             pieces.push(piece("touch", arrow(place, way, length), TOUCH));
         }
-        write_scene(&pieces, self.inner.stance).map_err(|e| e.to_string())
+        let by = (self.run).map_or("hapdef".into(), |run| format!("hapdef, run {run}"));
+        write_scene(&pieces, self.inner.stance, by).map_err(|e| e.to_string())
     }
 }
 

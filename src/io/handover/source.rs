@@ -16,6 +16,8 @@ pub(super) struct Source<'a> {
     pub wiring: Wiring,
     pub landmarks: Vec<Landmarks>,
     pub name: String,
+    /// The key of the run.
+    pub run: String,
     pub format: Format,
 }
 

@@ -25,7 +25,10 @@ pub(super) fn sheets(source: &Source<'_>) -> Result<Vec<Sheet>, String> {
         let at = DVec2::new(MARGIN, sheet.size.y - 7.0);
         sheet.say(
             at,
-            &format!("Templates for {}, 1 : 1, seen from inside", source.name),
+            &format!(
+                "Templates for {}, 1 : 1, seen from inside. Run {}",
+                source.name, source.run
+            ),
             2.8,
             Align::Left,
         );

@@ -13,6 +13,9 @@ use super::soup::Soup;
 use super::words::no_surface;
 use crate::{memory, plain};
 
+/// What copies a mesh without a node for each copy.
+const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+
 /// Reads all meshes of the scene; `folder` is where buffers that it names are looked for.
 pub fn read(bytes: &[u8], folder: Option<&Path>) -> Result<Soup, String> {
     if bytes.starts_with(b"glTF") {
@@ -30,11 +33,17 @@ pub fn read(bytes: &[u8], folder: Option<&Path>) -> Result<Soup, String> {
         visits: 0,
         without_area: 0,
         morphed: 0,
+        skinned: 0,
     };
     for node in scene.nodes() {
         walk.visit(&node, DMat4::IDENTITY, 0)?;
     }
     let others = document.scenes().len() - 1;
+    if document.extensions_used().any(|name| name == INSTANCING) {
+        let note =
+            format!("the copies that {INSTANCING} makes of a mesh are not read: it is taken once");
+        walk.soup.notes.push(note);
+    }
     Ok(walk.finish(others))
 }
 
@@ -83,6 +92,8 @@ struct Walk<'d> {
     /// Primitives of points and lines, and those with shapes to morph into.
     without_area: usize,
     morphed: usize,
+    /// Nodes whose mesh is posed by joints.
+    skinned: usize,
 }
 
 impl Walk<'_> {
@@ -98,6 +109,7 @@ impl Walk<'_> {
         self.visits += 1;
         let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4();
         if let Some(mesh) = node.mesh() {
+            self.skinned += usize::from(node.skin().is_some());
             let first = self.soup.triangles.len();
             for primitive in mesh.primitives() {
                 let place = format!("meshes[{}].primitives[{}]", mesh.index(), primitive.index());
@@ -198,10 +210,16 @@ impl Walk<'_> {
                     plain::either(self.morphed, "mesh", "meshes")
                 )
             }),
+            (self.skinned > 0).then(|| {
+                format!(
+                    "read as at rest: {} of the file with joints",
+                    plain::either(self.skinned, "mesh", "meshes")
+                )
+            }),
             (other_scenes > 0).then(|| {
                 format!(
-                    "{} of the file left out",
-                    plain::either(other_scenes, "other scene was", "other scenes were")
+                    "left out: {} of the file",
+                    plain::either(other_scenes, "other scene", "other scenes")
                 )
             }),
         ];

@@ -116,8 +116,13 @@ impl Arrays {
             return Err(FileError::broken(
                 &self.path,
                 format!(
-                    "the mask {asked} of {key} has {} values, but the part has {vertices} vertices, and takes one for each: it is of another mesh, or of the same mesh taken in otherwise (part.body, part.weld_mm). Paint it again, or give that support a box",
-                    mask.len()
+                    "the mask {asked} of {key} has {} values, but the part has {vertices} vertices, and takes one for each: it is of another mesh, or of the same mesh taken in otherwise (part.body, part.weld_mm). Paint it again{}",
+                    mask.len(),
+                    if key.starts_with("support") {
+                        ", or give that support a box"
+                    } else {
+                        ""
+                    }
                 ),
             ));
         }

@@ -164,7 +164,15 @@ fn a_newer_or_foreign_file_is_refused_with_the_remedy() {
         "{message}"
     );
     let negative = to_text(&full()).replace("force_n = 10.0", "force_n = -1.0");
-    assert!(parse(&negative).unwrap_err().contains("touch.force_n"));
+    let message = parse(&negative).unwrap_err();
+    let line = 1 + negative
+        .lines()
+        .position(|l| l.starts_with("force_n"))
+        .unwrap();
+    assert!(
+        message.starts_with(&format!("line {line}: touch.force_n ")),
+        "{message}"
+    );
 }
 
 #[test]

@@ -28,14 +28,19 @@ impl Listener {
         let read = self.pipeline.settings.channels.iter().max();
         let read = read.map_or(0, |highest| highest + 1);
         // Frames name their channels; of lines, nobody knows what a comma is.
-        if self.receiver.speaks_lines() && channels >= 2 * read.max(1) {
+        if self.receiver.speaks_lines() && channels > read {
             let gauges = self.pipeline.settings.channels.len();
             tell(SessionEvent::Message(&format!(
-                "the board prints {channels} numbers in a line, and {} only the first {read}. If its numbers have decimal commas, each is taken for two: print decimal points, or whole numbers",
+                "the board prints {channels} numbers in a line, and {} only the first {read}. {}",
                 if gauges == 1 {
                     "the gauge takes".to_owned()
                 } else {
                     format!("the {gauges} gauges take")
+                },
+                if channels >= 2 * read.max(1) {
+                    "If its numbers have decimal commas, each is taken for two: print decimal points, or whole numbers"
+                } else {
+                    "If a clock or another number stands before them, set “Channels of the gauges”, or channels in the project's table [live]"
                 }
             )));
         }

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use glam::DVec3;
 
+use crate::mesh::numbers::NumberSet;
 use crate::mesh::surface::{Mobility, Surface};
 use crate::mesh::{SurfacePoint, TriMesh};
 
@@ -34,7 +35,7 @@ pub struct Working<'s> {
     /// Triangles round each vertex.
     pub around: Vec<Vec<u32>>,
     /// Edges on feature lines, smaller vertex first.
-    pub lines: HashSet<(u32, u32)>,
+    pub lines: NumberSet<(u32, u32)>,
 }
 
 /// An edge by its vertices, the smaller number first.
@@ -113,12 +114,23 @@ impl<'s> Working<'s> {
     }
 
     /// Triangles on an edge.
-    pub fn on_edge(&self, a: u32, b: u32) -> Vec<u32> {
-        self.around[a as usize]
-            .iter()
-            .copied()
-            .filter(|&t| self.triangles[t as usize].contains(&b))
-            .collect()
+    pub fn on_edge(&self, a: u32, b: u32) -> impl Iterator<Item = u32> {
+        let around = self.around[a as usize].iter().copied();
+        around.filter(move |&t| self.triangles[t as usize].contains(&b))
+    }
+
+    /// Whether two vertices are the ends of an edge.
+    pub fn is_edge(&self, a: u32, b: u32) -> bool {
+        self.on_edge(a, b).next().is_some()
+    }
+
+    /// The two triangles on an edge; nothing where there are not just two.
+    pub fn pair_on_edge(&self, a: u32, b: u32) -> Option<[u32; 2]> {
+        let mut on = self.on_edge(a, b);
+        match (on.next(), on.next(), on.next()) {
+            (Some(s), Some(t), None) => Some([s, t]),
+            _ => None,
+        }
     }
 
     /// Unit normal times twice the area of a triangle with one vertex moved.
@@ -167,7 +179,8 @@ impl<'s> Working<'s> {
             size: size(position),
         });
         self.around.push(Vec::new());
-        for t in self.on_edge(a, b) {
+        let on: Vec<u32> = self.on_edge(a, b).collect();
+        for t in on {
             let tri = self.triangles[t as usize];
             let new = self.triangles.len() as u32;
             self.triangles.push(tri.map(|v| if v == a { m } else { v }));
@@ -217,7 +230,7 @@ impl<'s> Working<'s> {
             .iter()
             .filter(|v| near.binary_search(v).is_ok())
             .count();
-        common == self.on_edge(gone, kept).len()
+        common == self.on_edge(gone, kept).count()
     }
 
     /// Whether a triangle was taken out; the others keep their numbers.

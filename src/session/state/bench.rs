@@ -228,7 +228,7 @@ impl Bench {
         match &order {
             BenchOrder::Pause => self.paused = true,
             BenchOrder::Resume => self.paused = false,
-            BenchOrder::Stop | BenchOrder::Kill | BenchOrder::More(_) => {}
+            BenchOrder::Stop | BenchOrder::Kill | BenchOrder::More(_) | BenchOrder::GiveUp(_) => {}
         }
         if let Some(orders) = &self.orders {
             // Nobody is there any more to be told once it has ended.

@@ -72,14 +72,25 @@ pub struct Boundaries {
     /// Lines that move what they hold, or do not say degrees of freedom of displacement.
     others: usize,
     steps: usize,
+    /// Whether the step has begun anew with what is held.
+    anew: bool,
 }
 
 impl Boundaries {
-    /// Whether the lines after a keyword say what is held from the start or in the first step.
+    /// Whether the lines after a keyword say what is held from the start or in the first step. The first one of that
+    /// step with OP=NEW lets go all that was held before.
     #[must_use]
-    pub fn begin(&self, keyword: &Keyword) -> bool {
+    pub fn begin(&mut self, keyword: &Keyword) -> bool {
+        if self.steps > 1 {
+            return false;
+        }
+        let op = keyword.option("OP").unwrap_or_default();
+        if self.steps == 1 && op.eq_ignore_ascii_case("NEW") && !self.anew {
+            self.held.clear();
+            (self.others, self.anew) = (0, true);
+        }
         let kind = keyword.option("TYPE").unwrap_or_default().to_uppercase();
-        self.steps < 2 && (kind.is_empty() || kind == "DISPLACEMENT")
+        kind.is_empty() || kind == "DISPLACEMENT"
     }
 
     pub fn begin_step(&mut self) {
@@ -183,6 +194,25 @@ fn nodes_of(name: &str, places: &HashMap<u64, u32>, sets: &[NodeSet]) -> Vec<u32
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_step_may_begin_anew_with_what_is_held() {
+        let of = |op: &str| {
+            let mut said = Boundaries::default();
+            let boundary = |op: &str| Keyword::of(&format!("*BOUNDARY{op}"), 1);
+            for (step, op, line) in [(0, "", "1, 1, 3"), (1, op, "2, 1"), (0, op, "3, 2")] {
+                (0..step).for_each(|_| said.begin_step());
+                assert!(said.begin(&boundary(op)));
+                said.take(line, 1).unwrap();
+            }
+            said.begin_step();
+            assert!(!said.begin(&boundary(op)));
+            said.held.into_keys().collect::<Vec<_>>()
+        };
+        assert_eq!(of(""), ["1", "2", "3"]);
+        assert_eq!(of(", OP=MOD"), ["1", "2", "3"]);
+        assert_eq!(of(", op=new"), ["2", "3"]);
+    }
 
     #[test]
     fn what_is_held_may_be_said_in_many_ways() {

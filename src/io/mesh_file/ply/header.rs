@@ -89,25 +89,32 @@ impl Header {
                     form =
                         Some(known.ok_or_else(|| wrong("this form of a PLY file is not known"))?);
                 }
+                ["format", _, version] => {
+                    let said = format!("PLY of version {} is not known: 1.0 is", quote(version));
+                    return Err(wrong(&said));
+                }
                 ["element", name, count] => {
                     if elements.iter().any(|e| e.name == name) {
                         return Err(wrong(&format!("{} is announced twice", quote(name))));
                     }
-                    let count = count.parse::<usize>();
                     elements.push(Element {
                         name: name.to_owned(),
-                        count: count.map_err(|_| wrong("the number of elements is none"))?,
+                        count: count.parse().map_err(|_| {
+                            wrong(&format!("{} is no number of elements", quote(count)))
+                        })?,
                         properties: Vec::new(),
                     });
                 }
                 ["property", ..] => {
                     let element = elements.last_mut();
-                    let element =
-                        element.ok_or_else(|| wrong("a property comes after its element"))?;
-                    let property = property(&words[1..]);
-                    element
-                        .properties
-                        .push(property.ok_or_else(|| wrong("this property is not known"))?);
+                    let element = element
+                        .ok_or_else(|| wrong("a property stands before the first element"))?;
+                    let known = property(&words[1..]);
+                    let property = known.ok_or_else(|| {
+                        let said = quote(&words[1..].join(" "));
+                        wrong(&format!("the property {said} is not known"))
+                    })?;
+                    element.properties.push(property);
                 }
                 ["end_header"] => {
                     return Ok(Self {
