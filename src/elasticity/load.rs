@@ -73,19 +73,57 @@ pub fn nodal_forces(mesh: &TriMesh, touch: &Touch) -> NodalForces {
 #[must_use]
 pub fn pushed(mesh: &TriMesh, push: &Push) -> NodalForces {
     let mut shares: Vec<(u32, f64)> = Vec::new();
-    for (at, share) in pressure(mesh, &push.touch, f64::INFINITY) {
-        let corners = mesh.triangles()[at.triangle as usize];
-        let own = |(v, w): (u32, f64)| (w > 0.0).then_some((v, w * share));
-        shares.extend(corners.into_iter().zip(at.barycentric).filter_map(own));
+    let mut total = 0.0;
+    // What the corners of a facet take is added up there: a facet has hundreds of points under a tip.
+    let mut facet = (u32::MAX, [0.0; 3]);
+    let corners = |(t, sums): (u32, [f64; 3])| {
+        let corners = mesh.triangles()[t as usize].into_iter().zip(sums);
+        corners.filter(|(_, sum)| *sum > 0.0)
+    };
+    let at = each_point(mesh, &push.touch, f64::INFINITY, |at, share| {
+        if at.triangle != facet.0 {
+            if facet.0 != u32::MAX {
+                shares.extend(corners(facet));
+            }
+            facet = (at.triangle, [0.0; 3]);
+        }
+        for (sum, weight) in facet.1.iter_mut().zip(at.barycentric) {
+            *sum += weight * share;
+        }
+        total += share;
+    });
+    if total == 0.0 {
+        (facet, total) = ((at.triangle, at.barycentric), 1.0);
     }
+    shares.extend(corners(facet));
     let shares = merge(shares).into_iter();
-    shares.map(|(v, w)| (v, push.force * w)).collect()
+    shares.map(|(v, w)| (v, push.force * (w / total))).collect()
 }
 
 /// Points under the tip with their shares of its force; they sum to one. `apart` (m) is how far from each other
 /// they may be for the elements that feel them.
 #[must_use]
 pub fn pressure(mesh: &TriMesh, touch: &Touch, apart: f64) -> Vec<(SurfacePoint, f64)> {
+    let mut shares: Vec<(SurfacePoint, f64)> = Vec::new();
+    let at = each_point(mesh, touch, apart, |at, share| shares.push((at, share)));
+    let total: f64 = shares.iter().map(|s| s.1).sum();
+    if total == 0.0 {
+        return vec![(at, 1.0)];
+    }
+    for (_, share) in &mut shares {
+        *share /= total;
+    }
+    shares
+}
+
+/// Tells of the points under a tip with their shares of its force, facet by facet, times the same unknown number; none
+/// where the tip is smaller than the quadrature can see: a point force. The point of the surface that the tip is at.
+fn each_point(
+    mesh: &TriMesh,
+    touch: &Touch,
+    apart: f64,
+    mut tell: impl FnMut(SurfacePoint, f64),
+) -> SurfacePoint {
     let grain = apart.min(touch.tip_radius / PIECES_PER_RADIUS);
     let index = mesh.index();
     let (at, _) = index.nearest(touch.position);
@@ -94,22 +132,13 @@ pub fn pressure(mesh: &TriMesh, touch: &Touch, apart: f64) -> Vec<(SurfacePoint,
         radius: touch.tip_radius,
         grain,
     };
-    let mut shares: Vec<(SurfacePoint, f64)> = Vec::new();
     for t in index.triangles_near(tip.centre, tip.radius) {
         let seen = touch.tip_radius > FINEST * farthest(&mesh.corners(t));
         if seen && mesh.facet_normal(t).dot(touch.normal) > SAME_WALL {
-            integrate(mesh, t, &WHOLE, &tip, AT_ONCE, &mut shares);
+            integrate(mesh, t, &WHOLE, &tip, AT_ONCE, &mut tell);
         }
     }
-    let total: f64 = shares.iter().map(|s| s.1).sum();
-    if total == 0.0 {
-        // A tip smaller than the quadrature can see is a point force.
-        return vec![(at, 1.0)];
-    }
-    for (_, share) in &mut shares {
-        *share /= total;
-    }
-    shares
+    at
 }
 
 /// A part of a facet, by the barycentric coordinates of its corners.
@@ -158,7 +187,7 @@ impl Tip {
     }
 }
 
-/// Adds the pressure on a piece of a facet, split into equal pieces with the three-point rule on each: no more of them a
+/// Tells of the pressure on a piece of a facet, split into equal pieces with the three-point rule on each: no more of them a
 /// side than are taken at once.
 fn integrate(
     mesh: &TriMesh,
@@ -166,7 +195,7 @@ fn integrate(
     piece: &Piece,
     tip: &Tip,
     at_once: f64,
-    into: &mut Vec<(SurfacePoint, f64)>,
+    tell: &mut impl FnMut(SurfacePoint, f64),
 ) {
     let corners = mesh.corners(t);
     let point = |zeta: &[f64; 3]| -> DVec3 { (0..3).map(|i| corners[i] * zeta[i]).sum() };
@@ -179,7 +208,7 @@ fn integrate(
         if ends[0].distance(tip.centre) < tip.radius + longest {
             for quarter in pieces(2) {
                 let quarter = quarter.each_ref().map(|zeta| within(piece, zeta));
-                integrate(mesh, t, &quarter, tip, OF_A_QUARTER, into);
+                integrate(mesh, t, &quarter, tip, OF_A_QUARTER, tell);
             }
         }
         return;
@@ -197,7 +226,7 @@ fn integrate(
                     triangle: t,
                     barycentric: zeta,
                 };
-                into.push((at, (1.0 - r2).powi(2) * share));
+                tell(at, (1.0 - r2).powi(2) * share);
             }
         }
     }

@@ -324,6 +324,20 @@ mod tests {
         assert_eq!(all[0], Input::Sample(first));
     }
 
+    #[test]
+    fn lines_with_a_number_that_is_none_are_told_of_and_the_others_go_on() {
+        let mut receiver = Receiver::default();
+        let mut samples = 0;
+        let rows = "1,2\n".repeat(8) + &"1,nan\n".repeat(3);
+        receiver.push(rows.as_bytes(), 0, |_| samples += 1);
+        assert_eq!((samples, receiver.traffic.refused), (5, 3));
+        let words = receiver.doubt().and_then(Doubt::in_words).unwrap();
+        assert!(words.contains("number 2 is none"), "{words}");
+        assert!(receiver.doubt().is_some_and(Doubt::is_lasting));
+        receiver.push(b"1,2\n", 0, |_| samples += 1);
+        assert_eq!((samples, receiver.doubt()), (6, None));
+    }
+
     fn hello() -> Hello {
         Hello {
             version: 1,

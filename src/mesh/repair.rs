@@ -11,7 +11,7 @@ use crate::bounds::Bounds;
 /// Repairs that are asked for; without them only what must be is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Repair {
-    /// Vertices nearer to each other than this are joined (m); zero joins equal ones only.
+    /// Vertices nearer to each other than this are joined (m); zero joins only those that rounding has parted.
     pub weld: f64,
     /// Holes up to this far across are filled (m).
     pub fill_holes: f64,
@@ -100,21 +100,20 @@ pub(super) fn torn(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<Tear> 
 }
 
 /// Joins vertices of open sides that rounding has parted, as where a circle that ends where it began has 2 sin π for
-/// another zero: nobody tears a wall by a billionth of the part. `numbers` are those of the points that the file's
-/// vertices became. How many were joined.
+/// another zero: nobody tears a wall by a ten millionth of an edge. `numbers` are those of the points that the file's
+/// vertices became. How many were joined; none where a triangle would be lost by it.
 pub(super) fn join_rounded(
     positions: &[DVec3],
     triangles: &mut Vec<[u32; 3]>,
     numbers: &mut [u32],
 ) -> usize {
-    const ROUNDING: f64 = 1e-9;
+    const ROUNDING: f64 = 1e-7;
     let vertices = ends_of(&open_sides(triangles));
-    let points: Vec<DVec3> = vertices.iter().map(|&v| positions[v as usize]).collect();
-    let size = Bounds::around(positions.iter().copied()).size();
-    let (joined, kept) = join_near(&points, ROUNDING * size.length());
-    if kept.len() == points.len() {
+    let Some(edge) = middle_edge(positions, triangles).filter(|_| !vertices.is_empty()) else {
         return 0;
-    }
+    };
+    let points: Vec<DVec3> = vertices.iter().map(|&v| positions[v as usize]).collect();
+    let (joined, kept) = join_near(&points, ROUNDING * edge);
     // The first of those that are joined stands for all.
     let mut first = vec![u32::MAX; kept.len()];
     for (&vertex, &point) in vertices.iter().zip(&joined) {
@@ -125,10 +124,15 @@ pub(super) fn join_rounded(
         Ok(place) => first[joined[place] as usize],
         Err(_) => v,
     };
-    for number in triangles.iter_mut().flatten().chain(numbers) {
+    let whole: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(stands_for)).collect();
+    let is_lost = |&[a, b, c]: &[u32; 3]| a == b || b == c || c == a;
+    if kept.len() == points.len() || whole.iter().any(is_lost) {
+        return 0;
+    }
+    *triangles = whole;
+    for number in numbers {
         *number = stands_for(*number);
     }
-    triangles.retain(|[a, b, c]| a != b && b != c && c != a);
     points.len() - kept.len()
 }
 

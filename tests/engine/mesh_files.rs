@@ -479,6 +479,18 @@ fn strips_and_fans_are_triangles_and_points_are_said() {
 }
 
 #[test]
+fn what_a_gltf_makes_of_a_mesh_besides_is_noted() {
+    let (mut file, data) = gltf(&block(), &[0, 1, 2, 1, 3, 2], 4);
+    file["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    file["skins"] = json!([{ "joints": [0] }]);
+    file["nodes"][0]["skin"] = json!(0);
+    let loaded = beside(&file, &data).unwrap_or_else(|said| panic!("{said}"));
+    let notes = loaded.repairs.notes.join("; ");
+    assert!(notes.contains("EXT_mesh_gpu_instancing"), "{notes}");
+    assert!(notes.contains("1 mesh of the file with joints"), "{notes}");
+}
+
+#[test]
 fn accessors_that_cannot_be_right_are_refused() {
     let (p, indices) = (block(), [0, 1, 2, 1, 3, 2]);
     let change = |path: &[&str], value: Value| {

@@ -491,6 +491,14 @@ fn what_the_project_asks_of_a_choice_is_kept() {
             }
         }
     }
+    // What not even one gauge fits into is refused: a report of none would be handed on.
+    let mut poor = inputs.clone();
+    poor.project.selection.cost_budget = Some(0.1);
+    for kind in SelectorKind::ALL {
+        let none = design::select(&poor, &simulated, &reduced, kind, &budget, &unwatched);
+        let why = none.expect_err(kind.name()).to_string();
+        assert!(why.contains("raise the budget"), "{kind:?}: {why}");
+    }
     let choose = |inputs: &Inputs, kind| {
         design::select(inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap()
     };

@@ -260,3 +260,52 @@ fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
     println!("{:.1} % more", 100.0 * more);
     assert!(more.abs() < 0.08, "{upright} {oblique}");
 }
+
+#[test]
+fn an_edge_and_a_corner_hold_a_solid_too() {
+    // A beam of ten sides, fixed at its foot, pressed in its middle and propped at its head, where an edge or two corners
+    // are held: F L³ 7/768 E I there, in place of F L³ / 24 E I with a free head.
+    let (side, length) = (0.01, 0.1);
+    let part = block(DVec3::new(side, side, length), |p| p);
+    let foot = clamp(DVec3::splat(-1.0), DVec3::new(1.0, 1.0, 1e-9));
+    let at_head = |p: &DVec3| p.x > 0.5 * side && p.z > 0.5 * length;
+    let head: Vec<bool> = part.positions().iter().map(at_head).collect();
+    assert_eq!(head.iter().filter(|h| **h).count(), 2);
+    let one: Vec<bool> = (part.positions().iter())
+        .map(|p| at_head(p) && p.y > 0.5 * side)
+        .collect();
+    let held = |mask: &[bool]| Support {
+        region: Region::Vertices(std::sync::Arc::new(mask.to_vec())),
+        held: DofSet::DISPLACEMENTS,
+    };
+    let touch = Touch {
+        position: DVec3::new(side, side / 2.0, length / 2.0),
+        normal: DVec3::X,
+        force: 1.0,
+        tip_radius: 3e-3,
+    };
+    let moved = |supports: &[Support], place: DVec3, size: f64| {
+        let m = model(&part, RESIN, supports, &Fineness::of(size, side));
+        let u = m.system().solve_dofs(&m.load(&touch));
+        let at = [m.index().nearest(place).0];
+        m.observer(&at, Face::Outside).displacement_of(&m, &u)[0]
+    };
+    let across = DVec3::new(0.0, side / 2.0, length / 2.0);
+    let corner = DVec3::new(side, side, length);
+    let inertia = side.powi(4) / 12.0;
+    let unit = touch.force * length.powi(3) / (RESIN.youngs_modulus * inertia);
+    for size in [5e-3, 2.5e-3] {
+        let free = moved(std::slice::from_ref(&foot), across, size).length();
+        assert!((free / (unit / 24.0) - 1.0).abs() < 0.06, "{}", free / unit);
+        for (what, mask) in [("edge", &head), ("corner", &one)] {
+            let supports = [foot.clone(), held(mask)];
+            let propped = moved(&supports, across, size).length();
+            let stays = moved(&supports, corner, size).length();
+            println!("{what}, {size} m: {:.4} of free", propped / free);
+            // An edge that is held along the beam too keeps its head from turning a little: less than a prop alone.
+            let prop = 7.0 / 768.0 * 24.0;
+            assert!((0.5..1.15).contains(&(propped / free / prop)), "{what}");
+            assert!(stays < 2e-3 * free, "{what}: {stays} {free}");
+        }
+    }
+}

@@ -230,6 +230,12 @@ fn sites_are_judged_with_failures_and_a_baseline() {
             .all(|f| mean(f) >= mean(&failures[0]) * 0.99)
     );
     assert_eq!(answer["test_touches"].as_array().unwrap().len(), 23);
+    assert!(!notes(&answer).contains("--max-steps"));
+    // Regressions that were not let come to their end are no measure of the sites.
+    let data = data.to_str().unwrap();
+    let hurried = ["--sites", "3,9", "--max-steps", "1"];
+    let answer = json(&[&["evaluate", "--data", data][..], &hurried].concat());
+    assert!(notes(&answer).contains("--max-steps"), "{answer}");
 }
 
 #[test]
