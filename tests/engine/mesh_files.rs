@@ -479,6 +479,19 @@ fn strips_and_fans_are_triangles_and_points_are_said() {
 }
 
 #[test]
+fn strips_of_a_ply_are_read() {
+    let vertices = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 0 0\n2 1 0\n3 0 0\n";
+    let head = "ply\nformat ascii 1.0\nelement vertex 7\nproperty double x\nproperty double y\nproperty double z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+    // Two squares, and after a break a triangle beside them.
+    let loaded = read("ply", format!("{head}{vertices}10 0 1 2 3 -1 1 4 3 5 -1\n"));
+    assert!((loaded.mesh.area() - 2.0).abs() < 1e-12);
+    assert_eq!(loaded.repairs.flipped_triangles, 0);
+    assert!(loaded.repairs.notes.is_empty(), "{:?}", loaded.repairs);
+    let said = refused("ply", format!("{head}{vertices}4 0 1 2 7\n"));
+    assert!(said.contains("vertex 7"), "{said}");
+}
+
+#[test]
 fn what_a_gltf_makes_of_a_mesh_besides_is_noted() {
     let (mut file, data) = gltf(&block(), &[0, 1, 2, 1, 3, 2], 4);
     file["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);

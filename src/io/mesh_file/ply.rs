@@ -26,7 +26,25 @@ pub fn read(bytes: &[u8]) -> Result<Soup, String> {
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => read_vertices(element, &mut values, &mut soup)?,
-            "face" => small += read_faces(element, vertices, &mut values, &mut soup)?,
+            "face" => {
+                let mut faces = |list: &[f64], into: &mut Vec<[u32; 3]>| {
+                    let corners = corners(list, vertices)?;
+                    small += usize::from(corners.len() < 3);
+                    fan(&corners, into);
+                    Ok(())
+                };
+                read_faces(element, &mut values, &mut soup, &mut faces)?;
+            }
+            "tristrips" => {
+                let mut strips = |list: &[f64], into: &mut Vec<[u32; 3]>| {
+                    // A strip ends where a vertex is -1.
+                    for strip in list.split(|&v| v == -1.0) {
+                        strip_of(&corners(strip, vertices)?, into);
+                    }
+                    Ok(())
+                };
+                read_faces(element, &mut values, &mut soup, &mut strips)?;
+            }
             _ => {
                 pass_over(element, &mut values)?;
                 let what = format!("elements {}", quote(&element.name));
@@ -67,19 +85,21 @@ fn read_vertices(element: &Element, values: &mut Values, soup: &mut Soup) -> Res
     Ok(())
 }
 
-/// Faces as fans round their first corners; how many had no area to have.
+/// What makes triangles of a list of vertices.
+type Surface<'a> = &'a mut dyn FnMut(&[f64], &mut Vec<[u32; 3]>) -> Result<(), String>;
+
+/// The triangles of the lists of vertices that each of the elements has.
 fn read_faces(
     element: &Element,
-    vertices: usize,
     values: &mut Values,
     soup: &mut Soup,
-) -> Result<usize, String> {
+    triangles_of: Surface<'_>,
+) -> Result<(), String> {
     let corners_of = |name: &str| name == "vertex_indices" || name == "vertex_index";
     let lists = |k: &usize| element.properties[*k].count.is_some();
     let column = (0..element.properties.len())
         .find(|k| corners_of(&element.properties[*k].name) && lists(k))
         .ok_or("the faces of the PLY file have no list of vertex_indices")?;
-    let mut small = 0;
     for index in 0..element.count {
         values.begin(&element.name, index)?;
         for (k, property) in element.properties.iter().enumerate() {
@@ -88,21 +108,34 @@ fn read_faces(
                 continue;
             };
             let list = values.list(count, property.scalar)?;
-            if k != column {
-                continue;
-            }
-            let corners: Vec<u32> = (list.iter())
-                .map(|&v| corner(v, vertices).map_err(|said| values.wrong(&said)))
-                .collect::<Result<_, _>>()?;
-            small += usize::from(corners.len() < 3);
-            if let [first, rest @ ..] = &corners[..] {
-                let fan = rest.windows(2).map(|pair| [*first, pair[0], pair[1]]);
-                soup.triangles.extend(fan);
+            if k == column {
+                triangles_of(&list, &mut soup.triangles).map_err(|said| values.wrong(&said))?;
             }
         }
         values.finish()?;
     }
-    Ok(small)
+    Ok(())
+}
+
+/// Triangles round the first corner.
+fn fan(corners: &[u32], into: &mut Vec<[u32; 3]>) {
+    if let [first, rest @ ..] = corners {
+        into.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+    }
+}
+
+/// A triangle for each corner from the third on, every other one turned over. Strips go on through triangles without area.
+fn strip_of(corners: &[u32], into: &mut Vec<[u32; 3]>) {
+    for (k, corners) in corners.windows(3).enumerate() {
+        let [a, b, c] = [corners[0], corners[1], corners[2]];
+        if a != b && b != c && c != a {
+            into.push(if k % 2 == 0 { [a, b, c] } else { [b, a, c] });
+        }
+    }
+}
+
+fn corners(list: &[f64], vertices: usize) -> Result<Vec<u32>, String> {
+    list.iter().map(|&v| corner(v, vertices)).collect()
 }
 
 fn corner(value: f64, vertices: usize) -> Result<u32, String> {
