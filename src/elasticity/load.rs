@@ -187,8 +187,8 @@ impl Tip {
     }
 }
 
-/// Tells of the pressure on a piece of a facet, split into equal pieces with the three-point rule on each: no more of them a
-/// side than are taken at once.
+/// Tells of the pressure on a piece of a facet, split into equal pieces with the three-point rule on each: no more of
+/// them a side than are taken at once.
 fn integrate(
     mesh: &TriMesh,
     t: u32,

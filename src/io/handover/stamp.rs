@@ -23,7 +23,8 @@ pub(super) fn of_run(name: &str, bytes: Vec<u8>, run: &str) -> Vec<u8> {
 fn column(table: &str, run: &str) -> String {
     let cells = std::iter::once("run").chain(std::iter::repeat(run));
     let rows = table.lines().zip(cells);
-    rows.map(|(row, cell)| format!("{row},{cell}\n")).collect()
+    let rows: Vec<String> = rows.map(|(row, cell)| format!("{row},{cell}")).collect();
+    rows.join("\n") + "\n"
 }
 
 /// Nothing may stand before the declaration of XML.

@@ -9,6 +9,8 @@ use crate::mesh::numbers::NumberSet;
 
 /// Opposite angles within this (rad) of half a turn are half a turn but for rounding: the edge stays.
 const LEVEL: f64 = 1e-5;
+/// Passes over the mesh at most.
+const PASSES: usize = 6;
 
 /// Edges to be looked at, in the order that a pass over all edges of the mesh would have: an edge about which nothing
 /// has changed since the last look stays as it is, and is passed over.
@@ -42,7 +44,6 @@ impl Queue {
 
 /// Turns edges until no pair of triangles would have a larger smallest angle the other way.
 pub(super) fn flip(work: &mut Working) {
-    const PASSES: usize = 6;
     let mut queue = Queue {
         is_first: true,
         ..Queue::default()
@@ -132,4 +133,50 @@ fn verdict(work: &Working, [a, b]: [u32; 2], [s, t]: [u32; 2]) -> Verdict {
         return Verdict::Stays;
     }
     Verdict::Turns([s, t], [c, d])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::limb::LimbSpec;
+    use crate::mesh::remesh::split_long;
+    use crate::mesh::surface::Surface;
+
+    /// Every edge of the mesh, pass by pass; how many passes turned one.
+    fn plainly(work: &mut Working) -> usize {
+        for pass in 0..PASSES {
+            let mut queue = Queue::default();
+            for edge in work.edges() {
+                look(work, edge, &mut queue);
+            }
+            if queue.made.is_empty() {
+                return pass;
+            }
+        }
+        PASSES
+    }
+
+    #[test]
+    fn what_is_passed_over_would_not_have_turned() {
+        let (mesh, _) = LimbSpec::default().build().unwrap();
+        let surface = Surface::new(&Arc::new(mesh), |_| false, |_| false);
+        for size_mm in [1.3, 2.9, 7.0] {
+            let size = |p: DVec3| size_mm * 1e-3 * (1.0 + 4.0 * p.z);
+            let mut work = Working::new(&surface, &size);
+            split_long(&mut work, &size);
+            let mut other = Working::new(&surface, &size);
+            split_long(&mut other, &size);
+            let before = work.triangles.clone();
+            flip(&mut work);
+            let passes = plainly(&mut other);
+            assert!(work.triangles == other.triangles, "{size_mm} mm");
+            println!("{size_mm} mm: {passes} passes");
+            assert!(
+                passes > 1 && work.triangles != before,
+                "{size_mm} mm: {passes}"
+            );
+        }
+    }
 }
