@@ -3,6 +3,7 @@
 
 mod timing;
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -375,7 +376,9 @@ fn many_designs(home: &std::path::Path, units: usize) -> PathBuf {
         "format = 1\ncombine = \"sobol\"\ncount = {units}\n[base]\nlimb = true\n[[axis]]\nkey = \"limb.thickness\"\nfrom = 1.0\nto = 3.0\n[[axis]]\nkey = \"touch.force_n\"\nfrom = 1.0\nto = 20.0\n[[axis]]\nkey = \"material.youngs_modulus_gpa\"\nfrom = 1.0\nto = 4.0\n[aim]\nminimize = [\"error_mm\", \"mass_g\"]\n"
     );
     std::fs::write(&path, text).expect("a study");
-    let folder = StudyFolder::plan(&home.join("run"), &path, "base".into()).expect("a plan");
+    let base = "base".to_owned();
+    let folder = StudyFolder::plan(&home.join("run"), &path, base, BTreeMap::new());
+    let folder = folder.expect("a plan");
     let points = Points::of(&folder.study).expect("points");
     for unit in 0..units {
         let of = |k: usize| points.values(unit)[k].as_float().unwrap_or(0.0);

@@ -125,6 +125,9 @@ pub enum Quality {
     Reference,
 }
 
+/// Most triangles of the mesh that live touch knows the readings on: finer than a tip needs on all but large parts.
+pub const MAP_TRIANGLES: usize = 30_000;
+
 impl Quality {
     /// All, the cheapest first.
     pub const ALL: [Self; 3] = [Self::Draft, Self::Standard, Self::Reference];
@@ -172,6 +175,7 @@ impl Quality {
                 selection_candidates: 40,
                 expected_places: 320,
                 expected_presses: 96,
+                map_triangles: 12_000,
                 folds: 3,
                 tuning_touches: 300,
                 failure_subsets: 4,
@@ -198,6 +202,7 @@ impl Quality {
                 selection_candidates: 407,
                 expected_places: 1024,
                 expected_presses: 255,
+                map_triangles: MAP_TRIANGLES,
                 folds: 5,
                 tuning_touches: 1000,
                 failure_subsets: 12,
@@ -224,6 +229,7 @@ impl Quality {
                 selection_candidates: 1000,
                 expected_places: 1600,
                 expected_presses: 510,
+                map_triangles: MAP_TRIANGLES,
                 folds: 5,
                 tuning_touches: 1600,
                 failure_subsets: 252,
@@ -300,6 +306,8 @@ pub struct Budget {
     pub expected_places: usize,
     /// Presses that a choice by expected error is tried on.
     pub expected_presses: usize,
+    /// Most triangles of the mesh on which an evaluation knows what gauges read of touches anywhere.
+    pub map_triangles: usize,
     /// Folds of every cross-validation.
     pub folds: usize,
     /// Most touches that hyper-parameters are searched on.

@@ -1,5 +1,6 @@
 //! Live touch, without any port: from a board's bytes to a place on the part.
 
+mod blind;
 mod checking;
 mod counting;
 mod drift;
@@ -16,6 +17,7 @@ pub mod tare;
 mod tremble;
 mod update;
 
+pub use blind::LIGHT_N;
 pub use health::Health;
 pub use news::News;
 pub use pipeline::Pipeline;

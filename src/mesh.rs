@@ -248,18 +248,23 @@ impl TriMesh {
         (0..3).map(side).fold(0.0, f64::max)
     }
 
+    /// The point of the surface at a vertex; in the first triangle where none has it.
+    #[must_use]
+    pub fn vertex_point(&self, vertex: usize) -> SurfacePoint {
+        let around = &self.vertex_triangles[vertex];
+        let triangle = around.first().copied().unwrap_or(0);
+        let corners = self.triangles[triangle as usize];
+        SurfacePoint {
+            triangle,
+            barycentric: corners.map(|c| f64::from(u8::from(c as usize == vertex))),
+        }
+    }
+
     /// A point of the surface at each vertex, in order.
     #[must_use]
     pub fn vertex_points(&self) -> Vec<SurfacePoint> {
-        let at = |(v, around): (usize, &Vec<u32>)| {
-            let triangle = around.first().copied().unwrap_or(0);
-            let corners = self.triangles[triangle as usize];
-            SurfacePoint {
-                triangle,
-                barycentric: corners.map(|c| f64::from(u8::from(c as usize == v))),
-            }
-        };
-        self.vertex_triangles.iter().enumerate().map(at).collect()
+        let vertices = 0..self.vertex_triangles.len();
+        vertices.map(|v| self.vertex_point(v)).collect()
     }
 
     /// Height of a facet over its longest side.

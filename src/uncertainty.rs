@@ -22,6 +22,10 @@ use std::f64::consts::PI;
 
 use serde::Serialize;
 
+/// A touch that moves no gauge by more than so many deviations of its noise is blind: it is noticed less than every
+/// second time, if no more than three of a thousand readings at rest may be taken for a touch.
+pub const BLIND: f64 = 3.0;
+
 /// How far off a workshop glues a gauge (standard deviations).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gluing {

@@ -69,7 +69,8 @@ fn plan(args: &PlanArgs) -> anyhow::Result<()> {
     // What no unit could use is found before anything is written.
     let bench = Bench::new(&study, home)?;
     bench.base.check_axes(&study)?;
-    let folder = StudyFolder::plan(&args.out, &args.study, bench.base.fingerprint()?)?;
+    let (base, meshes) = (bench.base.fingerprint()?, bench.base.meshes(&study));
+    let folder = StudyFolder::plan(&args.out, &args.study, base, meshes)?;
     if args.json {
         return out::line(&json!({ "folder": args.out, "units": folder.plan.units }).to_string());
     }

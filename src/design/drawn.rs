@@ -124,10 +124,9 @@ fn as_drawn(all: &ResponseMap, gauges: usize) -> AsDrawn {
 }
 
 /// Edge length (m) of the mesh that readings are known on: fine enough for the tip, which smooths them, and
-/// no more than so many triangles.
-pub(super) fn map_size(ground: &Ground, tip_radius: f64) -> f64 {
+/// no more than about so many triangles.
+pub(super) fn map_size(ground: &Ground, tip_radius: f64, triangles: usize) -> f64 {
     const OF_THE_TIP: f64 = 0.32;
-    const TRIANGLES: f64 = 30_000.0;
-    let coarsest = (ground.area() / TRIANGLES / 0.433).sqrt();
+    let coarsest = (ground.area() / triangles as f64 / 0.433).sqrt();
     (OF_THE_TIP * tip_radius).max(coarsest)
 }

@@ -13,7 +13,7 @@ use super::as_built::{as_built, workshop_draw};
 use super::drawn::{drawn_on, map_size, proposed};
 use super::layout::{lay_out_sites, lay_out_touches, test_touches, touches_on};
 use super::{Built, DesignError, Ground, Inputs, Meshed, ground};
-use crate::budget::{Budget, Watch};
+use crate::budget::{Budget, MAP_TRIANGLES, Watch};
 use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
 use crate::elasticity::{Model, Touch};
@@ -103,7 +103,7 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
     let gauges = chosen_gauges(project, &*graded.model);
     let sensitivity = Sensitivity::new(&*graded.model, &gauges, watch)?;
     let tip_radius = project.tip().1;
-    let mesh = ground.of_size(map_size(&ground, tip_radius));
+    let mesh = ground.of_size(map_size(&ground, tip_radius, MAP_TRIANGLES));
     let strain_percent = graded.estimate.strain_percent;
     let off = (project.uncertainty()).with_elements(strain_percent);
     let tip = (tip_radius, &off.making_at_most());

@@ -153,13 +153,10 @@ impl Ground {
     /// The part in its canonical order, where it lies: what is drawn on it at random does not depend on its file.
     #[must_use]
     pub fn in_order(&self, part: &Arc<TriMesh>) -> Arc<TriMesh> {
-        let Some(own) = &self.own else {
-            return Arc::clone(part);
-        };
-        let given = |&v: &u32| part.positions()[v as usize];
-        let positions = own.numbers.iter().map(given).collect();
-        let triangles = own.mesh.triangles().to_vec();
-        Arc::new(TriMesh::from_checked(positions, triangles))
+        match &self.own {
+            Some(own) => own.where_it_lies(part),
+            None => Arc::clone(part),
+        }
     }
 
     /// Area of the surface (m²).

@@ -60,6 +60,19 @@ pub struct Support {
 }
 
 impl Support {
+    /// The same support of the part in the order of its canonical form, where it lies.
+    #[must_use]
+    pub fn in_order(&self, part: &Canonical) -> Self {
+        let region = match &self.region {
+            Region::Box(held) => Region::Box(*held),
+            Region::Vertices(mask) => Region::Vertices(Arc::new(part.in_order(mask))),
+        };
+        Self {
+            region,
+            held: self.held,
+        }
+    }
+
     /// The same support of the part in its canonical form.
     #[must_use]
     pub fn canonical(&self, part: &Canonical) -> Self {

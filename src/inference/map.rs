@@ -170,6 +170,22 @@ impl ResponseMap {
         Self::of(Arc::clone(&self.mesh), channels.len(), values)
     }
 
+    /// Share of the surface where a newton moves no channel by more than what it has to be moved by at `least` (strain);
+    /// nothing for channels that are not looked at.
+    #[must_use]
+    pub fn unfelt(&self, least: &[Option<f64>]) -> f64 {
+        let is_unfelt = |node: usize| {
+            let mut channels = self.node(node).iter().zip(least);
+            channels.all(|(reading, least)| least.is_none_or(|l| reading.abs() <= l))
+        };
+        let areas = self.areas.iter().enumerate();
+        let unfelt: f64 = areas
+            .filter(|(node, _)| is_unfelt(*node))
+            .map(|(_, a)| a)
+            .sum();
+        unfelt / self.areas.iter().sum::<f64>()
+    }
+
     /// Outward unit normals at all nodes.
     pub(super) fn normals(&self) -> Vec<DVec3> {
         node_normals(&self.mesh)

@@ -8,6 +8,7 @@
 //! | `results/000017.json` | what unit 17 found: the same bytes whoever computes it |
 //! | `costs/000017.json` | what that took |
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -27,6 +28,9 @@ pub struct Plan {
     pub study: String,
     /// Of the base project or mesh.
     pub base: String,
+    /// Of the files of the meshes that axes name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub meshes: BTreeMap<String, String>,
     /// The folder that the study's paths start from: relative to this one where it can be.
     pub from: String,
     /// How many there are, counted from 0.
@@ -102,7 +106,12 @@ impl StudyFolder {
     ///
     /// # Errors
     /// [`FileError`] where another study was planned there, or nothing can be written.
-    pub fn plan(folder: &Path, study_path: &Path, base: String) -> Result<Self, FileError> {
+    pub fn plan(
+        folder: &Path,
+        study_path: &Path,
+        base: String,
+        meshes: BTreeMap<String, String>,
+    ) -> Result<Self, FileError> {
         let (study, text) = read_study(study_path)?;
         let points = Points::of(&study).map_err(|why| FileError::broken(study_path, why))?;
         for inner in [RESULTS, COSTS, "logs"] {
@@ -119,15 +128,17 @@ impl StudyFolder {
             version: env!("CARGO_PKG_VERSION").into(),
             study: fingerprint(&text),
             base,
+            meshes,
             from: project_file::relative_to(&folder.join(PLAN), home),
             units: points.count(),
         };
         if folder.join(PLAN).exists() {
             let old = Self::open(folder)?;
-            if (&old.plan.study, &old.plan.base) != (&plan.study, &plan.base) {
+            let of = |p: &Plan| (p.study.clone(), p.base.clone(), p.meshes.clone());
+            if of(&old.plan) != of(&plan) {
                 return Err(FileError::broken(
                     folder,
-                    "another study was planned here, or this one from another base. Choose another folder",
+                    "another study was planned here, or this one from another base or other meshes. Choose another folder",
                 ));
             }
             return Ok(old);

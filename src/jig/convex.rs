@@ -41,6 +41,12 @@ impl Obstacle {
 /// Whether two bodies meet.
 #[must_use]
 pub fn meet(one: &[DVec3], other: &[DVec3]) -> bool {
+    // Most do not even where the boxes around them are looked at, which takes no hull.
+    if let (Some((a, b)), Some((c, d))) = (around(one), around(other))
+        && (b.cmplt(c).any() || d.cmplt(a).any())
+    {
+        return false;
+    }
     let hull = |points: &[DVec3]| ConvexPolyhedron::from_convex_hull(points);
     let (Some(one), Some(other)) = (hull(one), hull(other)) else {
         return false;
@@ -48,6 +54,12 @@ pub fn meet(one: &[DVec3], other: &[DVec3]) -> bool {
     let here = Pose::IDENTITY;
     let found = intersection_test(&here, &one, &here, &other).ok();
     found.is_none_or(|found| found.intersecting)
+}
+
+/// The least and the largest coordinates of points (mm).
+fn around(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
+    let of = |pick: fn(DVec3, DVec3) -> DVec3| points.iter().copied().reduce(pick);
+    of(DVec3::min).zip(of(DVec3::max))
 }
 
 /// All that a body passes on a straight way.

@@ -60,3 +60,19 @@ impl Port for Serial {
         let _ = self.0.write_all(bytes);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_port_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = |path: &Path| open(&path.to_string_lossy(), 115_200).err().unwrap();
+        assert!(refused(folder.path()).contains("that is a folder"));
+        let file = folder.path().join("a.txt");
+        std::fs::write(&file, "1,2,3\n").unwrap();
+        assert!(refused(&file).contains("that is a file: name a port, or a recording"));
+        assert!(refused(&folder.path().join("none")).contains("there is no such port"));
+    }
+}

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::blind::Blind;
 use super::checking::Checking;
 use super::counting::Counting;
 use super::feeling::{Feeling, Turn};
@@ -59,6 +60,7 @@ pub struct Pipeline {
     /// Whether a touch has come and gone since the tare, and left the rest where it was.
     proved: bool,
     news: Option<News>,
+    blind: Blind,
 }
 
 impl Pipeline {
@@ -91,6 +93,7 @@ impl Pipeline {
             release: Release::default(),
             proved: false,
             news: None,
+            blind: Blind::default(),
         }
     }
 
@@ -112,6 +115,7 @@ impl Pipeline {
         self.matching = model.matching(self.ground.noise.clone(), &self.settings);
         self.matching.used = used;
         self.counting = Counting::new(&self.matching);
+        self.blind.forget();
         self.allow_for_drift();
         self.last = None;
     }
@@ -168,6 +172,7 @@ impl Pipeline {
     fn take_rest(&mut self, rest: Rest, hum: Hum) {
         self.ground.take(rest, hum, &self.settings, self.rate);
         (self.taring, self.proved) = (None, false);
+        self.blind.forget();
         self.allow_for_drift();
     }
 
@@ -264,6 +269,8 @@ impl Pipeline {
             return nothing;
         };
         self.matching.used = self.checking.used();
+        let (blind, is_news) = self.blind.look(&self.matching, &self.ground.noise);
+        self.news = is_news.then_some(News::Blind(blind));
         self.feel(&strain);
         let (touches, explained) = if self.feeling.touching {
             self.find(sample.time_us, &strain)
@@ -295,6 +302,7 @@ impl Pipeline {
             touches,
             guesses,
             good: self.matching.used.iter().filter(|u| **u).count(),
+            blind: Some(blind),
             ..nothing
         }
     }

@@ -97,6 +97,8 @@ pub struct Update {
     pub guesses: [Option<Guess>; 3],
     /// Gauges that are trusted.
     pub good: usize,
+    /// Share of the surface on which these do not feel a touch of [`super::LIGHT_N`]; nothing before the tare.
+    pub blind: Option<f64>,
 }
 
 impl Update {
@@ -110,6 +112,7 @@ impl Update {
             touches: None,
             guesses: [None; 3],
             good: 0,
+            blind: None,
         }
     }
 

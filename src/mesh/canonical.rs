@@ -115,6 +115,16 @@ impl Canonical {
         }
     }
 
+    /// The part where it lies, in the order of its canonical form: what is laid or drawn on it by chance does not
+    /// depend on how its file numbers it.
+    #[must_use]
+    pub fn where_it_lies(&self, part: &TriMesh) -> Arc<TriMesh> {
+        let given = |&v: &u32| part.positions()[v as usize];
+        let positions = self.numbers.iter().map(given).collect();
+        let triangles = self.mesh.triangles().to_vec();
+        Arc::new(TriMesh::from_checked(positions, triangles))
+    }
+
     /// A mask of the part's vertices in the order of these.
     #[must_use]
     pub fn in_order(&self, mask: &[bool]) -> Vec<bool> {

@@ -83,6 +83,11 @@ impl Axis {
         }
     }
 
+    /// Those of its listed values that are words.
+    pub fn named(&self) -> impl Iterator<Item = &str> {
+        self.values.iter().flatten().filter_map(Value::as_str)
+    }
+
     /// Its values one after another; nothing where it has a span without a count, which only a sequence can fill.
     pub(super) fn listed(&self) -> Option<Vec<Value>> {
         if let Some(values) = &self.values {

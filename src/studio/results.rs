@@ -72,9 +72,10 @@ pub fn header(ask: &mut Ask<'_>, ui: &mut Ui) -> bool {
         if ask.session.design_holds() == Some(false) && ask.view.tab.is_of_design() {
             ui.colored_label(super::theme::STALE, "of settings that have changed since");
         }
+        // What matters most comes first: what follows is cut where there is no room.
+        doubt_label(ask, ui);
         by_hand_label(ask, ui);
         certificate_label(ask, ui);
-        doubt_label(ask, ui);
     });
     ui.separator();
     let any = ask.session.results.design.is_some()
@@ -108,7 +109,7 @@ fn doubt_label(ask: &Ask<'_>, ui: &mut Ui) {
     let numbers: Vec<&str> = doubts.iter().map(|d| d.number).collect();
     let words: Vec<&str> = doubts.iter().map(|d| d.words.as_str()).collect();
     let text = format!("not to be trusted: {}", numbers.join(", "));
-    ui.colored_label(super::theme::ERROR, text)
+    ui.add(cut(RichText::new(text).color(super::theme::ERROR)))
         .on_hover_text(words.join("\n"));
 }
 
@@ -124,9 +125,7 @@ fn certificate_label(ask: &Ask<'_>, ui: &mut Ui) {
     if let Some(words) = words.filter(|_| ask.view.tab.is_of_design() && ask.session.as_designed())
     {
         ui.separator();
-        // Cut rather than make the panel wider than the window.
-        let label = egui::Label::new(words).truncate();
-        ui.add(label).on_hover_text(ASSUMES);
+        ui.add(cut(words)).on_hover_text(ASSUMES);
     }
 }
 
@@ -150,7 +149,14 @@ fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
         format!("; as selected judged {:.2} mm", r.error_mm)
     });
     ui.separator();
-    ui.label(RichText::new(text + &beside).color(super::theme::TOUCHED));
+    ui.add(cut(
+        RichText::new(text + &beside).color(super::theme::TOUCHED)
+    ));
+}
+
+/// A label that is cut rather than make the panel wider than the window; the pointer on it shows all of it.
+fn cut(words: impl Into<egui::WidgetText>) -> egui::Label {
+    egui::Label::new(words).truncate()
 }
 
 /// What an estimate of gauges put by hand is of: not what a judge says, which is as drawn and at one force.
@@ -253,7 +259,7 @@ pub fn failure_plots(ask: &Ask<'_>, ui: &mut Ui) {
             let shown = plot(
                 id,
                 height,
-                Corner::RightBottom,
+                Corner::LeftTop,
                 "failed gauges",
                 "mean error (mm)",
             )

@@ -1,5 +1,6 @@
 //! The project of a unit: a study's base, varied along its axes.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use crate::io::opening::{bundled, open};
 use crate::io::project_file::{self, LoadedProject};
 use crate::io::study_folder::fingerprint;
 use crate::io::{atomic, glb, mesh_file, source};
-use crate::parameter_study::{ParameterStudy, Points, Subject};
+use crate::parameter_study::{Axis, ParameterStudy, Points, Subject};
 use crate::project::{Masks, Project};
 
 /// What the units of a study are made of.
@@ -66,6 +67,45 @@ impl Base {
         key.add(project_file::to_text(&loaded.inputs.project).bytes());
         key.add_part(&loaded.inputs);
         Ok(key.hex())
+    }
+
+    /// The meshes that axes name, each with a fingerprint of its file, for [`Self::check_meshes`]. What is not there is left
+    /// out: its units say so.
+    #[must_use]
+    pub fn meshes(&self, study: &ParameterStudy) -> BTreeMap<String, String> {
+        let axes = (study.axes.iter()).filter(|a| matches!(a.subject(), Ok(Subject::Mesh)));
+        let names: BTreeSet<String> = axes.flat_map(Axis::named).map(String::from).collect();
+        let keyed = |name: String| Some((self.mesh_key(&name)?, name));
+        let found = names.into_iter().filter_map(keyed);
+        found.map(|(key, name)| (name, key)).collect()
+    }
+
+    /// That the meshes of a unit are those that were `planned` with: another mesh under its name would give its figures
+    /// to it.
+    ///
+    /// # Errors
+    /// The mesh that is not.
+    pub fn check_meshes(
+        &self,
+        values: &[Value],
+        planned: &BTreeMap<String, String>,
+    ) -> anyhow::Result<()> {
+        for name in values.iter().filter_map(Value::as_str) {
+            let was = planned.get(name);
+            ensure!(
+                was.is_none() || self.mesh_key(name).as_ref() == was,
+                "{name}: the mesh has changed since the study was planned, or cannot be read any more: plan it anew into another folder"
+            );
+        }
+        Ok(())
+    }
+
+    /// Of the bytes of a mesh's file.
+    fn mesh_key(&self, name: &str) -> Option<String> {
+        let bytes = source::read(&self.home.join(name)).ok()?;
+        let mut key = crate::io::fingerprint::Fingerprint::default();
+        key.add(bytes);
+        Some(key.hex())
     }
 
     /// That every axis changes something that is there, by its first value; whether a value can be had is for the unit

@@ -290,6 +290,20 @@ fn the_same_part_is_read_from_every_deck() {
 }
 
 #[test]
+fn what_a_support_would_hold_within_the_part_is_noted() {
+    // The middle of a brick's diagonal.
+    let within = |p: &DVec3| *p == DVec3::ONE;
+    let number = 1 + bar().nodes.iter().position(within).unwrap();
+    let text = inp().replace("*MATERIAL", &format!("{number},\n*MATERIAL"));
+    let loaded = parsed("inp", text.as_bytes()).unwrap();
+    assert_eq!(
+        notes(&loaded),
+        "“FOOT”: 1 of its 10 nodes lie inside the part, where nothing is held: only its surface is"
+    );
+    assert_eq!(notes(&parsed("inp", inp().as_bytes()).unwrap()), "");
+}
+
+#[test]
 fn commands_may_stand_by_themselves() {
     let bar = bar();
     let mut text = String::from("/units,mpa $ *set,tid,4\net,tid,187 $ type,tid\nmat,2\n");

@@ -30,6 +30,7 @@ fn budget() -> Budget {
         selection_candidates: 8,
         tuning_touches: 60,
         svr_steps: 20_000,
+        map_triangles: 3000,
         ..Quality::Draft.budget()
     }
 }

@@ -266,6 +266,33 @@ fn what_cannot_be_meant_is_refused_by_its_name() {
 }
 
 #[test]
+fn a_mesh_that_has_changed_since_the_plan_is_not_taken_for_the_one_that_was_planned() {
+    let study = Study::new(&STUDY.replace(
+        "key = \"part.thickness_mm\"\nvalues = [1.5, 2.0]",
+        "key = \"mesh\"\nvalues = [\"limb.glb\", \"other.glb\", \"none.glb\"]",
+    ));
+    fs::copy(study.path("limb.glb"), study.path("other.glb")).unwrap();
+    assert!(study.plan("s").contains("9 units"));
+    let folder = study.text("s");
+    let mut bytes = fs::read(study.path("other.glb")).unwrap();
+    let last = bytes.len() - 2;
+    bytes[last] ^= 1;
+    fs::write(study.path("other.glb"), bytes).unwrap();
+    let said = refused(&["study", "run", &folder, "--unit", "3"]);
+    assert!(said.contains("other.glb: the mesh has changed"), "{said}");
+    // What never was there fails by its name alone, and the others go on.
+    done(&["study", "run", &folder, "--units", "0-0"]);
+    done(&["study", "run", &folder, "--units", "6-6"]);
+    let said = done(&["study", "collect", &folder]);
+    assert!(
+        said.contains("2 of 9 units computed, 1 failed, 7 missing"),
+        "{said}"
+    );
+    let said = refused(&["study", "plan", &study.text("study.toml"), "--out", &folder]);
+    assert!(said.contains("other meshes"), "{said}");
+}
+
+#[test]
 fn engines_get_a_script_and_one_command() {
     let study = Study::new(STUDY);
     study.plan("s");

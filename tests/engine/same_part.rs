@@ -8,6 +8,7 @@ use glam::DVec3;
 use hapdef::budget::{Budget, Limits, Quality, unwatched};
 use hapdef::design::{self, Inputs};
 use hapdef::elasticity::grade::Ground;
+use hapdef::elasticity::solid::ground::SolidGround;
 use hapdef::elasticity::support::Region;
 use hapdef::elasticity::{DofSet, ElasticError, Material, Section, Support, Touch};
 use hapdef::given::{self, GivenSite};
@@ -266,6 +267,43 @@ fn a_mask_holds_the_same_places_in_any_order() {
                 assert_eq!(held == DofSet::ALL, p.z < 8.001e-3, "{seed}: {p}");
             }
         }
+    }
+}
+
+#[test]
+fn a_solid_answers_the_same_in_any_order() {
+    let whole = crate::bench::solids::tube(0.012, 0.02, 0.05, 16);
+    let touch = Touch {
+        position: DVec3::new(0.0, 0.02, 0.04),
+        normal: DVec3::Y,
+        force: 10.0,
+        tip_radius: 4e-3,
+    };
+    let found = |seed: u64| {
+        let (positions, triangles) = reordered(&whole, seed);
+        let (part, _) = TriMesh::new(&positions, &triangles, 0).unwrap();
+        let mask = part.positions().iter().map(|p| p.z < 1e-9).collect();
+        let foot = Support {
+            region: Region::Vertices(Arc::new(mask)),
+            held: DofSet::ALL,
+        };
+        let told = |_: DVec3| None;
+        let ground = SolidGround::new(
+            &Arc::new(part),
+            SECTION.material,
+            &[foot],
+            &told,
+            &unwatched,
+        );
+        let ground = ground.unwrap();
+        let model = ground.model(&ground.fineness(8e-3), &unwatched).unwrap();
+        let moved = crate::bench::solids::under(&model, &touch);
+        (ground.whole.positions().to_vec(), moved)
+    };
+    let first = found(0);
+    assert!(first.1 > 1e-7, "{}", first.1);
+    for seed in 1..3 {
+        assert_eq!(found(seed), first, "{seed}");
     }
 }
 

@@ -173,6 +173,7 @@ fn touches_are_found_where_they_are() {
             keys,
             [
                 "area_radius_mm",
+                "blind_share",
                 "channels_ok",
                 "count",
                 "count_probability",

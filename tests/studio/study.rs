@@ -1,6 +1,7 @@
 //! The tab “Study” in the real window.
 #![cfg(feature = "studio")]
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use hapdef::io::study_folder::{Cost, Outcome, StudyFolder};
@@ -31,7 +32,8 @@ minimize = ["as_built_10n_mm", "mass_g"]
 fn found(home: &Path) -> StudyFolder {
     let path = home.join("study.toml");
     std::fs::write(&path, STUDY).unwrap();
-    let folder = StudyFolder::plan(&home.join("run"), &path, "base".into()).unwrap();
+    let folder = StudyFolder::plan(&home.join("run"), &path, "base".into(), BTreeMap::new());
+    let folder = folder.unwrap();
     let points = Points::of(&folder.study).unwrap();
     for unit in 0..folder.plan.units - 1 {
         let values = points.values(unit);

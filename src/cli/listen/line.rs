@@ -24,8 +24,7 @@ pub(super) fn of(update: &Update, estimator: Estimator) -> String {
         _ => line.push_str(NOTHING),
     }
     several(&mut line, update);
-    let _ = write!(line, ",\"channels_ok\":{}}}", update.good);
-    line
+    end(line, update)
 }
 
 /// As [`of`], by a regression that was learned from presses; its radius holds nine of ten places that it was tested on.
@@ -49,7 +48,17 @@ pub(super) fn learned(update: &Update, estimator: &TouchEstimator) -> String {
         None => line.push_str(NOTHING),
     }
     several(&mut line, update);
-    let _ = write!(line, ",\"channels_ok\":{}}}", update.good);
+    end(line, update)
+}
+
+/// What is said of the gauges themselves.
+fn end(mut line: String, update: &Update) -> String {
+    let blind = (update.blind).map_or("null".to_owned(), |share| format!("{share:.3}"));
+    let _ = write!(
+        line,
+        ",\"channels_ok\":{},\"blind_share\":{blind}}}",
+        update.good
+    );
     line
 }
 

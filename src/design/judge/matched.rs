@@ -83,7 +83,8 @@ impl ByMatching<'_> {
         let middle = &readings[self.forces.middle()];
         let model = self.simulated.model()?;
         let ground = Ground::of(&self.simulated.meshed);
-        let mesh = ground.of_size(map_size(&ground, self.tip_radius()));
+        let size = map_size(&ground, self.tip_radius(), self.budget.map_triangles);
+        let mesh = ground.of_size(size);
         let mut work = model.system().work();
         let (mut found, mut failures) = (Vec::new(), Vec::new());
         for group in groups(sets) {
@@ -229,13 +230,6 @@ struct Set<'a> {
     built: Matching,
 }
 
-/// Touch by touch the mean of the errors (mm) of several estimators; nothing of none.
-fn mean_of(all: impl Iterator<Item = Vec<f64>>) -> Option<Vec<f64>> {
-    let all: Vec<Vec<f64>> = all.collect();
-    let of = |touch: usize| mean(&all.iter().map(|errors| errors[touch]).collect::<Vec<_>>());
-    Some((0..all.first()?.len()).map(of).collect())
-}
-
 impl<'a> Set<'a> {
     fn new(trial: &'a ByMatching<'a>, everywhere: &Everywhere, candidate: &'a Candidate) -> Self {
         let channel = |row: &usize| Some(vec![(everywhere.rows.binary_search(row).ok()?, 1.0)]);
@@ -260,12 +254,9 @@ impl<'a> Set<'a> {
     /// What is found of the set at one force.
     fn found(&self, readings: &Readings, calibrated: &[Matching]) -> Matched {
         let rows = &self.candidate.rows;
+        let touches = &self.trial.reference.touches;
         let errors = |matching: &Matching, x: &SignalMatrix| {
-            errors_mm(
-                matching,
-                &x.select_rows(rows),
-                &self.trial.reference.touches,
-            )
+            errors_mm(matching, &x.select_rows(rows), touches)
         };
         Matched {
             selector: self.candidate.selector.clone(),
@@ -273,7 +264,8 @@ impl<'a> Set<'a> {
             force_n: readings.force_n,
             errors: errors(&self.drawn, &readings.drawn),
             built: errors(&self.built, &readings.built),
-            calibrated: mean_of(calibrated.iter().map(|m| errors(m, &readings.built))),
+            calibrated: (!calibrated.is_empty())
+                .then(|| taking_turns(calibrated, &readings.built.select_rows(rows), touches)),
             blind: self.trial.blind(rows, readings.force_n),
         }
     }
@@ -372,6 +364,21 @@ fn errors_mm(matching: &Matching, x: &SignalMatrix, touches: &[Touch]) -> Vec<f6
     };
     let touches = touches.par_iter().enumerate();
     touches.map_init(|| matching.clone(), error).collect()
+}
+
+/// As [`errors_mm`] by several estimators that take turns from touch to touch: the mean over the touches is that over
+/// the estimators too, and each touch is looked for once, so that errors spread as those of one estimator do.
+fn taking_turns(estimators: &[Matching], x: &SignalMatrix, touches: &[Touch]) -> Vec<f64> {
+    let mut errors = vec![0.0; touches.len()];
+    for (turn, matching) in estimators.iter().enumerate() {
+        let its: Vec<usize> = (turn..touches.len()).step_by(estimators.len()).collect();
+        let looked_for: Vec<Touch> = its.iter().map(|&t| touches[t]).collect();
+        let found = errors_mm(matching, &x.select_columns(&its), &looked_for);
+        for (touch, error) in its.into_iter().zip(found) {
+            errors[touch] = error;
+        }
+    }
+    errors
 }
 
 #[cfg(test)]

@@ -24,12 +24,24 @@ use crate::elasticity::error::ElasticError;
 use crate::elasticity::grade::even_size;
 use crate::elasticity::load::Touch;
 use crate::elasticity::{DofSet, Material, Support};
+use crate::mesh::canonical::Canonical;
 use crate::mesh::reach::{FINGERTIP, Reach};
 use crate::mesh::remesh::remesh;
 use crate::mesh::room::Room;
 use crate::mesh::surface::Surface;
 use crate::mesh::walls::{Side, Walls};
 use crate::mesh::{SurfacePoint, TriMesh, components};
+
+/// The part and its supports as if its file had numbered it in an order of its own; tetrahedra that came with it keep
+/// their numbers.
+fn in_order(part: &Arc<TriMesh>, supports: &[Support]) -> (Arc<TriMesh>, Vec<Support>) {
+    if part.volume().is_some() {
+        return (Arc::clone(part), supports.to_vec());
+    }
+    let own = Canonical::of(part);
+    let supports = supports.iter().map(|s| s.in_order(&own)).collect();
+    (own.where_it_lies(part), supports)
+}
 
 /// A closed part with its faces.
 pub struct SolidGround {
@@ -87,6 +99,7 @@ impl SolidGround {
         watch: Watch,
     ) -> Result<Self, ElasticError> {
         report(watch, "Measuring walls", 0, 1)?;
+        let (part, supports) = &in_order(part, supports);
         let immersed = Immersed::new(part, material, supports);
         encloses(part, &immersed)?;
         let held = &immersed.held;

@@ -65,8 +65,7 @@ impl Matching {
         }
         let mut modes: Vec<Mode> = Vec::with_capacity(STARTS);
         for start in starts {
-            let at = self.map.mesh.index().nearest(self.map.places[start]).0;
-            let mode = self.follow(measured, at, None);
+            let mode = self.follow(measured, self.map.mesh.vertex_point(start), None);
             // Two starts may end at the same place.
             let same = |m: &Mode| m.position.distance(mode.position) < 0.5 * self.map.spacing();
             if !modes.iter().any(same) {

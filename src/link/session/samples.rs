@@ -63,7 +63,7 @@ impl Listener {
         self.compare_channels(sample.counts.len(), tell);
         let update = self.pipeline.push(sample);
         if let Some(news) = self.pipeline.news() {
-            tell(SessionEvent::Message(news.in_words()));
+            tell(SessionEvent::Message(&news.in_words()));
         }
         // What nobody touches is soon computed, and would hide the rest.
         if update.contact.is_some() {

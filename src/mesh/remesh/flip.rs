@@ -134,3 +134,56 @@ fn verdict(work: &Working, [a, b]: [u32; 2], [s, t]: [u32; 2]) -> Verdict {
     }
     Verdict::Turns([s, t], [c, d])
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::mesh::TriMesh;
+    use crate::mesh::surface::Surface;
+
+    /// A square that is sheared so far that most of its edges are to be turned, some of them several times.
+    fn sheared() -> Surface {
+        const SIDE: u32 = 12;
+        let place = |k: u32| {
+            let (x, y) = (f64::from(k % SIDE), f64::from(k / SIDE));
+            DVec3::new(
+                x + 2.7 * y + 0.2 * (y * y).sin(),
+                y + 0.1 * x.cos(),
+                0.3 * (x - y).sin(),
+            )
+        };
+        let corners = (0..SIDE * (SIDE - 1)).filter(|k| (k + 1) % SIDE != 0);
+        let triangles =
+            corners.flat_map(|k| [[k, k + 1, k + SIDE], [k + 1, k + SIDE + 1, k + SIDE]]);
+        let places = (0..SIDE * SIDE).map(place).collect();
+        let mesh = TriMesh::from_checked(places, triangles.collect());
+        Surface::new(&Arc::new(mesh), |_| false, |_| false)
+    }
+
+    /// Looks at all edges in every pass; how many each of them turned.
+    fn in_plain_passes(work: &mut Working) -> [usize; PASSES] {
+        [(); PASSES].map(|()| {
+            let mut turned = 0;
+            for edge in work.edges() {
+                let mut queue = Queue::default();
+                look(work, edge, &mut queue);
+                turned += queue.made.len();
+            }
+            turned
+        })
+    }
+
+    #[test]
+    fn what_is_passed_over_would_not_have_been_turned() {
+        let surface = sheared();
+        let [mut quick, mut plain] = [(), ()].map(|()| Working::new(&surface, &|_| 1.0));
+        flip(&mut quick);
+        let turned = in_plain_passes(&mut plain);
+        println!("turned in each pass: {turned:?}");
+        assert!(turned[0] > 10 && turned[1] > 5, "{turned:?}");
+        assert_eq!(quick.triangles, plain.triangles);
+        assert_eq!(quick.around, plain.around);
+    }
+}

@@ -10,9 +10,7 @@ use super::scan;
 use super::scene::Scene;
 use crate::budget::{Cancelled, Watch, report};
 
-/// A touch that moves no gauge by more than so many deviations of its noise is blind: it is noticed less than every
-/// second time, if no more than three of a thousand readings at rest may be taken for a touch.
-pub const BLIND: f64 = 3.0;
+pub use crate::uncertainty::BLIND;
 
 /// A set of which one gauge is in hand. The others are taken in once; each place of the one that moves then costs no
 /// more than one gauge.
