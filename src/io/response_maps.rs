@@ -110,7 +110,14 @@ pub fn mesh(from: &mut Arrays, of: &str) -> Option<Arc<TriMesh>> {
     let sound =
         triangles.values.iter().all(is_vertex) && positions.values.iter().all(|v| v.is_finite());
     let corners = |t: &[f64]| [t[0] as u32, t[1] as u32, t[2] as u32];
-    sound.then(|| {
+    let mut taken = vec![false; vertices];
+    if sound {
+        for &v in &triangles.values {
+            taken[v as usize] = true;
+        }
+    }
+    // A vertex without a triangle lies nowhere on the surface.
+    taken.iter().all(|t| *t).then(|| {
         let triangles = triangles.values.chunks_exact(3).map(corners).collect();
         Arc::new(TriMesh::from_checked(vectors(&positions.values), triangles))
     })

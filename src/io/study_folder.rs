@@ -28,7 +28,7 @@ pub struct Plan {
     pub study: String,
     /// Of the base project or mesh.
     pub base: String,
-    /// Of the files of the meshes that axes name.
+    /// Of the files of the meshes that axes name; nothing of one that was not there.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub meshes: BTreeMap<String, String>,
     /// The folder that the study's paths start from: relative to this one where it can be.
@@ -134,8 +134,9 @@ impl StudyFolder {
         };
         if folder.join(PLAN).exists() {
             let old = Self::open(folder)?;
-            let of = |p: &Plan| (p.study.clone(), p.base.clone(), p.meshes.clone());
-            if of(&old.plan) != of(&plan) {
+            // Plans of before have no meshes.
+            let same_meshes = old.plan.meshes.is_empty() || old.plan.meshes == plan.meshes;
+            if (&old.plan.study, &old.plan.base) != (&plan.study, &plan.base) || !same_meshes {
                 return Err(FileError::broken(
                     folder,
                     "another study was planned here, or this one from another base or other meshes. Choose another folder",

@@ -8,35 +8,51 @@ pub const LIGHT_N: f64 = 3.0;
 /// Blind share that is worth a word, and by how much more it has to be for another.
 const MUCH: f64 = 0.1;
 
-/// The blind share, which is looked at again when another rest was taken or other gauges are trusted.
+/// A noise that is this many times what it was, or the inverse, is another one.
+const OTHER: f64 = 1.25;
+
+/// The blind share, which is looked at again when other gauges are trusted or their noise is another.
 #[derive(Default)]
 pub(super) struct Blind {
-    /// Gauges that it is of.
+    /// Gauges that it is of, and their noise (strain).
     used: Vec<bool>,
+    noise: Vec<f64>,
     share: Option<f64>,
     told: f64,
 }
 
 impl Blind {
-    /// After another rest, and with it another noise.
+    /// After another rest or model, and where a recording begins: what follows depends on what follows alone.
     pub fn forget(&mut self) {
         self.share = None;
     }
 
+    /// What was found, where it is still of these gauges and about this noise.
+    fn known(&self, used: &[bool], noise: &[f64]) -> Option<f64> {
+        let as_before = |(is, was): (&f64, &f64)| (was / OTHER..=was * OTHER).contains(is);
+        let same = self.used == used && noise.iter().zip(&self.noise).all(as_before);
+        self.share.filter(|_| same)
+    }
+
     /// Share of the surface, and whether that is news, by the noise of each gauge (strain).
     pub fn look(&mut self, matching: &Matching, noise: &[f64]) -> (f64, bool) {
-        if let Some(share) = self.share.filter(|_| self.used == matching.used) {
+        if let Some(share) = self.known(&matching.used, noise) {
             return (share, false);
         }
         self.used.clone_from(&matching.used);
+        self.noise.clear();
+        self.noise.extend(noise);
         let least = |(noise, used): (&f64, &bool)| used.then_some(BLIND * noise / LIGHT_N);
         let least: Vec<Option<f64>> = noise.iter().zip(&self.used).map(least).collect();
         let share = matching.map.unfelt(&least);
         self.share = Some(share);
         let is_news = share > self.told + MUCH;
-        if is_news {
-            self.told = share;
-        }
+        // What has become better is worth a word when it becomes as bad again.
+        self.told = if is_news {
+            share
+        } else {
+            self.told.min(share + MUCH)
+        };
         (share, is_news)
     }
 }
@@ -77,8 +93,10 @@ mod tests {
         near(blind.look(&matching, &noise), 0.5, true);
         matching.used[1] = true;
         near(blind.look(&matching, &noise), 1.0 / 6.0, false);
-        // Of a noise that hides all of it.
-        blind.forget();
-        near(blind.look(&matching, &[11e-6; 2]), 1.0, true);
+        // A noise that hides all of it, once it is clearly another; then as before, and again.
+        near(blind.look(&matching, &[11e-6; 2]), 1.0 / 6.0, false);
+        near(blind.look(&matching, &[12e-6; 2]), 1.0, true);
+        near(blind.look(&matching, &noise), 1.0 / 6.0, false);
+        near(blind.look(&matching, &[12e-6; 2]), 1.0, true);
     }
 }

@@ -140,6 +140,7 @@ impl Pipeline {
     pub fn begin_anew(&mut self) {
         self.checking.begin_anew();
         (self.last_time, self.rate) = (None, RATE);
+        self.blind.forget();
         self.ground.begin_anew(&self.settings, self.rate);
         self.allow_for_drift();
         self.end_touch();

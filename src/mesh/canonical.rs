@@ -122,7 +122,9 @@ impl Canonical {
         let given = |&v: &u32| part.positions()[v as usize];
         let positions = self.numbers.iter().map(given).collect();
         let triangles = self.mesh.triangles().to_vec();
-        Arc::new(TriMesh::from_checked(positions, triangles))
+        let mut mesh = TriMesh::from_checked(positions, triangles);
+        mesh.closes_within = part.closes_within;
+        Arc::new(mesh)
     }
 
     /// A mask of the part's vertices in the order of these.

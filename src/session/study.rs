@@ -32,7 +32,10 @@ impl Session {
             let read = || -> anyhow::Result<OpenStudy> {
                 let folder = StudyFolder::open(&path)?;
                 let base = Base::new(&folder.study, &folder.home())?;
-                let same = base.fingerprint()? == folder.plan.base;
+                // Plans of before have no meshes.
+                let meshes = &folder.plan.meshes;
+                let same = base.fingerprint()? == folder.plan.base
+                    && (meshes.is_empty() || base.meshes(&folder.study) == *meshes);
                 Ok(OpenStudy::new(Collected::of(folder, &watch)?, base, same))
             };
             read().map_err(failed)
@@ -41,7 +44,7 @@ impl Session {
             .start(Task::OpenStudy, folder.to_owned(), work, |s, _, study| {
                 s.study.limb = None;
                 if !study.is_of_base {
-                    s.tell("The study's base has changed since it was planned: limbs and projects of its units are of the base as it is now, and their figures of the one that was");
+                    s.tell("The study's base, or a mesh of its axes, has changed since it was planned: limbs and projects of its units are as these are now, and their figures as they were");
                 }
                 s.study.open = Some(Arc::new(study));
             });

@@ -69,43 +69,50 @@ impl Base {
         Ok(key.hex())
     }
 
-    /// The meshes that axes name, each with a fingerprint of its file, for [`Self::check_meshes`]. What is not there is left
-    /// out: its units say so.
+    /// The meshes that axes name, each with a fingerprint of its file, or nothing of one that is not there: for
+    /// [`Self::check_meshes`].
     #[must_use]
     pub fn meshes(&self, study: &ParameterStudy) -> BTreeMap<String, String> {
         let axes = (study.axes.iter()).filter(|a| matches!(a.subject(), Ok(Subject::Mesh)));
         let names: BTreeSet<String> = axes.flat_map(Axis::named).map(String::from).collect();
-        let keyed = |name: String| Some((self.mesh_key(&name)?, name));
-        let found = names.into_iter().filter_map(keyed);
+        let keyed = |name: String| (self.mesh_key(&name), name);
+        let found = names.into_iter().map(keyed);
         found.map(|(key, name)| (name, key)).collect()
     }
 
-    /// That the meshes of a unit are those that were `planned` with: another mesh under its name would give its figures
-    /// to it.
+    /// That those of these names that are meshes are what was `planned` with: figures of another mesh would stand under
+    /// its name.
     ///
     /// # Errors
     /// The mesh that is not.
-    pub fn check_meshes(
+    pub fn check_meshes<'a>(
         &self,
-        values: &[Value],
+        names: impl IntoIterator<Item = &'a str>,
         planned: &BTreeMap<String, String>,
     ) -> anyhow::Result<()> {
-        for name in values.iter().filter_map(Value::as_str) {
-            let was = planned.get(name);
+        for name in names {
             ensure!(
-                was.is_none() || self.mesh_key(name).as_ref() == was,
-                "{name}: the mesh has changed since the study was planned, or cannot be read any more: plan it anew into another folder"
+                planned
+                    .get(name)
+                    .is_none_or(|was| self.mesh_key(name) == *was),
+                "{name}: the mesh has changed since the study was planned (it was changed, has come, or cannot be read any more): plan it anew into another folder"
             );
         }
         Ok(())
     }
 
-    /// Of the bytes of a mesh's file.
-    fn mesh_key(&self, name: &str) -> Option<String> {
-        let bytes = source::read(&self.home.join(name)).ok()?;
+    /// Of the bytes of a mesh's file, and of those that a glTF names beside it.
+    fn mesh_key(&self, name: &str) -> String {
+        let path = self.home.join(name);
+        let Ok(bytes) = source::read(&path) else {
+            return String::new();
+        };
         let mut key = crate::io::fingerprint::Fingerprint::default();
+        for beside in named_by_gltf(&path, &bytes) {
+            key.add(source::read(&beside).unwrap_or_default());
+        }
         key.add(bytes);
-        Some(key.hex())
+        key.hex()
     }
 
     /// That every axis changes something that is there, by its first value; whether a value can be had is for the unit
@@ -244,6 +251,21 @@ impl Base {
                 said.replace(&format!("{}/", home.display()), "")
             })
     }
+}
+
+/// Files with the buffers of a glTF; none of any other file.
+fn named_by_gltf(path: &Path, bytes: &[u8]) -> Vec<PathBuf> {
+    let is_gltf = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("gltf"));
+    let parsed = is_gltf.then(|| serde_json::from_slice::<serde_json::Value>(bytes).ok());
+    let Some(gltf) = parsed.flatten() else {
+        return Vec::new();
+    };
+    let buffers = gltf["buffers"].as_array().into_iter().flatten();
+    let names = buffers.filter_map(|buffer| buffer["uri"].as_str());
+    let files = names.filter(|name| !name.starts_with("data:"));
+    files.map(|name| path.with_file_name(name)).collect()
 }
 
 /// The limb with its options, and then the project's keys.

@@ -203,6 +203,7 @@ fn replay(w: &mut Window, path: &Path, seen: &BTreeMap<u64, Update>) {
         };
         assert_eq!(update.contact, other.contact, "at {time} µs");
         assert_eq!(update.strain, other.strain);
+        assert_eq!(update.blind, other.blind);
         compared += 1;
         touches += usize::from(update.contact.is_some());
     }

@@ -1,5 +1,6 @@
 //! `hapdef study run`: units one after another, or several beside each other.
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -15,6 +16,7 @@ use crate::cli::ranges::whole;
 use crate::io::study_folder::{Cost, StudyFolder};
 use crate::parameter_study::Points;
 use crate::plain;
+use crate::varied::Base;
 
 #[derive(Args, Debug, Clone)]
 pub struct RunArgs {
@@ -83,6 +85,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
             wanted.push(unit);
         }
     }
+    check_meshes(&folder, &bench.base, &wanted)?;
     let there = last + 1 - first - wanted.len();
     if there > 0 {
         out::say(&format!(
@@ -91,6 +94,19 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         ));
     }
     Crew::new(args, &folder, wanted).work()
+}
+
+/// That the meshes of these units are those that the study was planned with.
+fn check_meshes(folder: &StudyFolder, base: &Base, units: &[usize]) -> anyhow::Result<()> {
+    if folder.plan.meshes.is_empty() {
+        return Ok(());
+    }
+    let points = Points::of(&folder.study).map_err(anyhow::Error::msg)?;
+    let values = units.iter().flat_map(|&unit| points.values(unit));
+    let names: BTreeSet<String> = values
+        .filter_map(|value| value.as_str().map(String::from))
+        .collect();
+    base.check_meshes(names.iter().map(String::as_str), &folder.plan.meshes)
 }
 
 /// Threads that compute units beside each other.

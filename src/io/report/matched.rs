@@ -49,7 +49,9 @@ pub(super) fn errors(page: &mut String, design: &Design) {
         let known = rounds.first().copied().unwrap_or_default();
         match rounds.len() {
             1 => format!("{known} known presses"),
-            many => format!("{known} known presses (the mean of {many} rounds of them)"),
+            many => {
+                format!("{known} known presses ({many} rounds of them take turns over the touches)")
+            }
         }
     });
     let _ = write!(
