@@ -1,5 +1,6 @@
 //! What the workshop and the robot are given, read by somebody else's readers: PDF, glTF, XML and a C compiler.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -136,7 +137,11 @@ fn jig(folder: &Path, gauges: usize) {
         rows.iter().partition(|r| r[1].starts_with("by hand"));
     let of = |kind: &str| pieces.iter().filter(|r| r[1].starts_with(kind)).count();
     assert_eq!(of("ring-") + by_hand.len(), gauges);
-    assert_eq!((of("ring-"), of("rod-")), (of("pad-"), of("seat-")));
+    assert_eq!(of("ring-"), of("pad-"));
+    // A rod that is longer than what can be printed comes in pieces, and stands in one seat.
+    let rods = pieces.iter().filter(|r| r[1].starts_with("rod-"));
+    let rods: BTreeSet<&str> = rods.filter_map(|r| r[1].split(['-', '.']).nth(1)).collect();
+    assert_eq!(rods.len(), of("seat-"));
     for row in &pieces {
         let loaded = read_mesh(
             &folder.join(&row[1]),
