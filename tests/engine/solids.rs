@@ -3,6 +3,7 @@
 
 use crate::bench;
 
+use bench::hexes::Bricks;
 use bench::solids::{Found, bent_tube, block, clamp, model, shell_of, slotted, strip, tube, under};
 use glam::{DQuat, DVec3};
 use hapdef::elasticity::observe::Face;
@@ -259,6 +260,38 @@ fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
     let more = oblique / upright - 1.0;
     println!("{:.1} % more", 100.0 * more);
     assert!(more.abs() < 0.08, "{upright} {oblique}");
+}
+
+#[test]
+fn a_face_in_the_border_of_a_box_is_held_beside_what_lies_in_it() {
+    // A block on a foot: the box ends where the foot meets the block's underside, which lies in it but for rounding.
+    let bricks = Bricks {
+        axes: [
+            vec![0.0, 0.008, 0.012, 0.02],
+            vec![0.0, 0.008, 0.012, 0.02],
+            vec![-0.002, 2e-16, 0.02],
+        ],
+        keep: |p| p.z > 0.0 || (p - DVec3::new(0.01, 0.01, p.z)).abs().max_element() < 0.002,
+        place: |p| p,
+    };
+    let part = bricks.surface();
+    let touch = Touch {
+        position: DVec3::new(0.02, 0.01, 0.015),
+        normal: DVec3::X,
+        force: 10.0,
+        tip_radius: 4e-3,
+    };
+    let moved = |top: f64| {
+        let foot = clamp(DVec3::splat(-1.0), DVec3::new(1.0, 1.0, top));
+        under(
+            &model(&part, RESIN, &[foot], &Fineness::of(4e-3, 0.02)),
+            &touch,
+        )
+    };
+    let (at, above, below) = (moved(0.0), moved(5e-4), moved(-5e-4));
+    println!("held at the underside {at:.2e}, above {above:.2e}, below {below:.2e}");
+    assert!((at / above - 1.0).abs() < 0.1, "{at} {above}");
+    assert!(below > 2.0 * at, "{below} {at}");
 }
 
 #[test]

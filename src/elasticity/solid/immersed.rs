@@ -17,6 +17,7 @@ use crate::elasticity::error::ElasticError;
 use crate::elasticity::support::{HeldPart, Region};
 use crate::elasticity::{DofSet, Material, Support};
 use crate::mesh::TriMesh;
+use crate::mesh::cut::ON_PLANE;
 use crate::mesh::inside::SignedDistance;
 use crate::mesh::volume::VolumeMesh;
 
@@ -214,6 +215,35 @@ impl Immersed {
         }
     }
 
+    /// Holds the faces of the part that lie in the border of a support's box (m), with all of the part beyond it: no
+    /// element within the box has them.
+    fn spring_on_border(
+        &self,
+        grip: &mut Grip,
+        on: &dyn Elements,
+        number: usize,
+        planes: Option<(DVec3, DVec3)>,
+        size: f64,
+    ) {
+        let Some((lower, upper)) = planes else {
+            return;
+        };
+        let mesh = &self.held.mesh;
+        let (least, most) = mesh.bounds();
+        let slack = ON_PLANE * (most - least).length();
+        let lies_in = |facet: u32, plane: DVec3| {
+            let off = mesh.corners(facet).map(|p| (p - plane).abs());
+            (0..3).any(|axis| off.iter().all(|off| off[axis] <= slack))
+        };
+        for facet in 0..mesh.triangles().len() as u32 {
+            let in_border = || lies_in(facet, lower) || lies_in(facet, upper);
+            if self.held.facet_belongs(facet, number) && in_border() {
+                let held = displacements(&self.supports[number]);
+                grip.hold_facet(on, mesh, facet, held, &self.material, size);
+            }
+        }
+    }
+
     /// The supports, by number, that hold the part along lines or at points only.
     #[must_use]
     pub fn held_without_area(&self) -> Vec<usize> {
@@ -239,6 +269,7 @@ impl Immersed {
                 let any = (0..cells.count()).any(|c| inside(cells.centre(c)).0 != 0);
                 if any {
                     grip.hold_elements(cells, inside);
+                    self.spring_on_border(&mut grip, cells, number, planes, size);
                 }
                 any
             };
