@@ -10,6 +10,7 @@ mod error;
 mod facets;
 pub mod flatten;
 pub mod geodesic;
+pub mod halve;
 pub mod inside;
 mod intake;
 pub mod locate;
@@ -69,6 +70,8 @@ pub struct TriMesh {
     mean_edge: f64,
     /// The tetrahedra that it is the surface of, where it came with them.
     volume: Option<Arc<VolumeMesh>>,
+    /// What it was before its long edges were halved.
+    given: Option<Arc<halve::Given>>,
     /// It is open, and closes where vertices of its file within so much (m) of each other are joined.
     closes_within: Option<f64>,
     /// Where its points are found, once somebody has asked; copies share it.
@@ -117,6 +120,7 @@ impl TriMesh {
             vertex_triangles,
             vertex_normals,
             volume: None,
+            given: None,
             closes_within: None,
             index: OnceLock::new(),
         }

@@ -115,6 +115,7 @@ impl Project {
                 weld_mm: 0.0,
                 fill_holes_mm: 0.0,
                 straighten_mm: part::defaults::straighten(),
+                halve_mm: 0.0,
                 elements: Elements::Graded,
                 model: PartModel::Shell,
                 thickness_mm: part::defaults::thickness(),

@@ -333,7 +333,7 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround, watch: Watch) -> Result<Advic
     let mut words = vec![
         format!(
             "The mesh is closed{}, with walls {} mm thick (a tenth thinner than {} mm, a tenth thicker than {} mm){} on a part {} mm across.",
-            open_edges(&inputs.part),
+            open_edges(inputs.part.as_given()),
             digits(wall_mm[1]),
             digits(wall_mm[0]),
             digits(wall_mm[2]),
@@ -370,7 +370,7 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround, watch: Watch) -> Result<Advic
 
 fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
     let project = &inputs.project;
-    let part = &inputs.part;
+    let part = inputs.part.as_given();
     let facets: Vec<u32> = (0..part.triangles().len() as u32).collect();
     let wall = project.part.thickness_mm;
     let radius = scope::radii(part, &facets, wall * 1e-3);

@@ -56,11 +56,11 @@ impl Finest {
         project.check()?;
         let ground = ground(inputs, watch)?;
         ground.check(project)?;
-        let layout = ground.site_layout(&inputs.part);
+        let layout = ground.site_layout();
         let places: Vec<DVec3> = (lay_out_sites(&layout, inputs)?.iter())
             .map(|&at| layout.point(at))
             .collect();
-        let surface = ground.touch_layout(&inputs.part);
+        let surface = ground.touch_layout();
         let sample = touches_on(&surface, inputs, GRADED_FOR, project.budget.seed, true)?;
         let coarse = ground.build(&sample, &places, &FINEST, watch)?.meshed;
         let (meshed, model) = coarse.reference_model(watch)?;

@@ -119,7 +119,7 @@ pub fn wide_tip(part: &TriMesh, tip_radius: f64) -> Option<String> {
 #[must_use]
 pub fn open_solid(inputs: &Inputs) -> Option<String> {
     let solid = inputs.project.part.model == PartModel::Solid;
-    let open = inputs.part.boundary_edges().count();
+    let open = inputs.part.as_given().boundary_edges().count();
     (solid && open > 0).then(|| {
         format!(
             "The part is taken as a solid, and {open} edges of its surface are open: what lies behind its holes and seams is a guess. Fill or join them (part.fill_holes_mm, part.weld_mm), or close them in the program that wrote it."
@@ -178,18 +178,18 @@ impl Ground {
     /// The mesh that sites are laid out on, the same for every quality: the part, or where its triangles are
     /// too thin to measure distances on, even ones on its surface; of a solid the inside.
     #[must_use]
-    pub fn site_layout(&self, part: &Arc<TriMesh>) -> Arc<TriMesh> {
+    pub fn site_layout(&self) -> Arc<TriMesh> {
         match self {
-            Self::Shell(shell) => even_enough(part, shell),
+            Self::Shell(shell) => even_enough(shell),
             Self::Solid(solid) => Arc::clone(&solid.inside),
         }
     }
 
     /// As [`Self::site_layout`], for touches.
     #[must_use]
-    pub fn touch_layout(&self, part: &Arc<TriMesh>) -> Arc<TriMesh> {
+    pub fn touch_layout(&self) -> Arc<TriMesh> {
         match self {
-            Self::Shell(shell) => even_enough(part, shell),
+            Self::Shell(shell) => even_enough(shell),
             Self::Solid(solid) => Arc::clone(&solid.outside),
         }
     }
@@ -348,7 +348,8 @@ impl Ground {
 }
 
 /// The part, or where too much of it lies in facets that distances cannot be measured on, even ones on its surface.
-fn even_enough(part: &Arc<TriMesh>, ground: &grade::Ground) -> Arc<TriMesh> {
+fn even_enough(ground: &grade::Ground) -> Arc<TriMesh> {
+    let part = ground.part();
     /// Share of the area that may lie in such facets.
     const SHARE: f64 = 0.02;
     let rim = part.boundary_vertices();
@@ -358,7 +359,7 @@ fn even_enough(part: &Arc<TriMesh>, ground: &grade::Ground) -> Arc<TriMesh> {
         .map(|t| part.facet_area(t))
         .sum();
     if unfit < SHARE * part.area() {
-        ground.in_order(part)
+        ground.in_order()
     } else {
         ground.even(LAYOUT).mesh
     }

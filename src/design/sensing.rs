@@ -129,8 +129,8 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
 fn laid(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<(Ground, Built), DesignError> {
     let ground = ground(inputs, watch)?;
     ground.check(&inputs.project)?;
-    let even = ground.site_layout(&inputs.part);
-    let touches = lay_out_touches(&ground.touch_layout(&inputs.part), inputs, budget)?;
+    let even = ground.site_layout();
+    let touches = lay_out_touches(&ground.touch_layout(), inputs, budget)?;
     let sites = lay_out_sites(&even, inputs)?;
     let places: Vec<DVec3> = sites.iter().map(|&at| even.point(at)).collect();
     let built = ground.build(&touches, &places, &budget.elements, watch)?;

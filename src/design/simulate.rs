@@ -130,11 +130,11 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     ground.check(project)?;
     check_required(inputs)?;
     check_foreseen(inputs, budget)?;
-    let layout = ground.site_layout(&inputs.part);
+    let layout = ground.site_layout();
     let sites = lay_out_sites(&layout, inputs)?;
     let count = project.touch.count.min(budget.touches);
     check_memory(sites.len(), count, project.gauge.signal)?;
-    let touches = lay_out_touches(&ground.touch_layout(&inputs.part), inputs, budget)?;
+    let touches = lay_out_touches(&ground.touch_layout(), inputs, budget)?;
     let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
     let built = ground.build(&touches, &places, &budget.elements, watch)?;
     let checks = Checks::of(&built);
@@ -232,7 +232,7 @@ pub fn simulate_again(
 ) -> Result<Simulated, DesignError> {
     let project = &inputs.project;
     project.check()?;
-    let layout = Ground::of(&last.meshed).site_layout(&inputs.part);
+    let layout = Ground::of(&last.meshed).site_layout();
     let sites = lay_out_sites(&layout, inputs)?;
     check_memory(
         sites.len(),

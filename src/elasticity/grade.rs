@@ -10,7 +10,7 @@ use super::load::Touch;
 use super::model::LoadCheck;
 use super::recover::facet_errors;
 use super::shell::check_held;
-use super::support::{DofSet, HeldPart, Support};
+use super::support::{DofSet, HeldPart, Support, geometry};
 use super::{ElasticError, Model as _, Section, ShellModel, scope};
 use crate::budget::{Elements, Watch, report};
 use crate::mesh::TriMesh;
@@ -22,6 +22,8 @@ use crate::mesh::surface::Surface;
 /// A part ready to have elements laid on it. They are laid on its canonical form, and then carried to where the part
 /// lies.
 pub struct Ground {
+    /// The part that elements are laid on.
+    part: Arc<TriMesh>,
     held: HeldPart,
     surface: Surface,
     section: Section,
@@ -81,9 +83,10 @@ impl Ground {
         supports: &[Support],
         as_given: bool,
     ) -> Self {
-        let own = (!as_given).then(|| Canonical::of(part));
+        let (part, supports) = geometry(part, supports);
+        let own = (!as_given).then(|| Canonical::of(&part));
         let held = match &own {
-            None => HeldPart::uncut(part, supports),
+            None => HeldPart::uncut(&part, &supports),
             Some(own) => {
                 let supports: Vec<Support> = supports.iter().map(|s| s.canonical(own)).collect();
                 HeldPart::new(&own.mesh, &supports)
@@ -91,6 +94,7 @@ impl Ground {
         };
         let surface = Surface::new(&held.mesh, |e| held.is_border(e), |v| held.is_spot(v));
         Self {
+            part,
             held,
             surface,
             section,
@@ -152,11 +156,17 @@ impl Ground {
 
     /// The part in its canonical order, where it lies: what is drawn on it at random does not depend on its file.
     #[must_use]
-    pub fn in_order(&self, part: &Arc<TriMesh>) -> Arc<TriMesh> {
+    pub fn in_order(&self) -> Arc<TriMesh> {
         match &self.own {
-            Some(own) => own.where_it_lies(part),
-            None => Arc::clone(part),
+            Some(own) => own.where_it_lies(&self.part),
+            None => Arc::clone(&self.part),
         }
+    }
+
+    /// The part that elements are laid on.
+    #[must_use]
+    pub fn part(&self) -> &Arc<TriMesh> {
+        &self.part
     }
 
     /// Area of the surface (m²).

@@ -286,7 +286,7 @@ impl SolidModel {
                 reaction[dof % 3] += force;
             }
         }
-        let (held, stored) = self.grip.reaction(u);
+        let (held, stored) = self.grip.reaction(u, |dof| self.system.is_held(dof));
         let twice_energy = internal.iter().zip(u).map(|(f, u)| f * u).sum::<f64>() + stored;
         let energy_error = if external == 0.0 && twice_energy == 0.0 {
             0.0 // pressed on the support itself

@@ -87,6 +87,26 @@ impl Support {
     }
 }
 
+/// What elements are laid on, with its supports: the part as it was given, or, where a support was painted on vertices
+/// that came from halving its edges, the part with these.
+#[must_use]
+pub fn geometry(part: &Arc<TriMesh>, supports: &[Support]) -> (Arc<TriMesh>, Vec<Support>) {
+    let given = |support: &Support| {
+        let region = match &support.region {
+            Region::Box(held) => Region::Box(*held),
+            Region::Vertices(mask) => Region::Vertices(Arc::new(part.given_mask(mask)?)),
+        };
+        Some(Support {
+            region,
+            held: support.held,
+        })
+    };
+    match supports.iter().map(given).collect() {
+        Some(supports) => (Arc::clone(part.as_given()), supports),
+        None => (Arc::clone(part), supports.to_vec()),
+    }
+}
+
 /// Supports that a vertex belongs to, one bit each.
 type Members = u128;
 /// The most supports a part may have.

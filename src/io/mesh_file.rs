@@ -32,6 +32,7 @@ use self::boundary::quietly;
 use self::soup::Soup;
 use super::{FileError, source};
 use crate::bounds::Bounds;
+use crate::mesh::halve::longest_wanted;
 use crate::mesh::repair::Repair;
 use crate::mesh::volume::VolumeMesh;
 use crate::mesh::{MeshError, RepairReport, TriMesh};
@@ -220,12 +221,35 @@ fn taken_in(
 fn surface(soup: &mut Soup, body: usize, repair: &Repair) -> Result<LoadedMesh, String> {
     let taken = TriMesh::taken_in(&soup.positions, &soup.triangles, body, repair);
     let taken = taken.map_err(|e: MeshError| e.to_string())?;
+    let groups = soup.masks(&taken.vertices, taken.mesh.positions().len());
+    let (given, mut repairs) = (taken.mesh.triangles().len(), taken.repairs);
+    let mesh = halved(taken.mesh, repair);
+    if mesh.triangles().len() > given {
+        repairs.halved_into = mesh.triangles().len();
+    }
+    let spread = |(name, mask): (String, Arc<Vec<bool>>)| {
+        let mask = mesh.mask_of(mask.to_vec()).map_or(mask, Arc::new);
+        (name, mask)
+    };
     Ok(LoadedMesh {
-        groups: soup.masks(&taken.vertices, taken.mesh.positions().len()),
-        mesh: taken.mesh,
-        repairs: taken.repairs,
+        groups: groups.into_iter().map(spread).collect(),
+        mesh,
+        repairs,
         found: Found::default(),
     })
+}
+
+/// The surface with its long edges halved, where that is asked for or needed.
+fn halved(mesh: TriMesh, repair: &Repair) -> TriMesh {
+    let longest = if repair.halve == 0.0 {
+        longest_wanted(&mesh)
+    } else {
+        Some(repair.halve)
+    };
+    match longest {
+        Some(longest) => mesh.halved(longest),
+        None => mesh,
+    }
 }
 
 /// A piece of a mesh of tetrahedra, its surface as the mesh; nodes on bent edges move by `straighten` (m) at most.

@@ -72,9 +72,8 @@ pub fn load_text(path: &Path, text: &str) -> Result<LoadedProject, FileError> {
         .check()
         .map_err(|e| FileError::broken(&mesh_path, e))?;
     repairs.notes.extend(taken);
-    let vertices = mesh.positions().len();
-    let masks = masks::read(path, &mut project, groups, vertices)?;
-    let painted = masks::read_painted(path, &project, vertices)?;
+    let masks = masks::read(path, &mut project, groups, &mesh)?;
+    let painted = masks::read_painted(path, &project, &mesh)?;
     if let Some(name) = &mut project.feasible.painted {
         *name = plain(name).to_owned();
     }

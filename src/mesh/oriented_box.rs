@@ -63,11 +63,19 @@ impl OrientedBox {
     /// Its corners (m) in the file's coordinates, where it lies along the axes of the file.
     #[must_use]
     pub fn along_axes(&self) -> Option<(DVec3, DVec3)> {
+        self.along(Stance::default())
+    }
+
+    /// Its corners (m) in the coordinates of a stance, where it lies along the directions of that.
+    #[must_use]
+    pub fn along(&self, stance: Stance) -> Option<(DVec3, DVec3)> {
         /// What rounding leaves between two directions that are the same.
         const SAME: f64 = 1e-9;
-        let lies = |d: &Direction| self.stance.direction(*d).abs().max_element() > 1.0 - SAME;
+        let own = |d: &Direction| stance.coordinates(self.stance.direction(*d));
+        let lies = |d: &Direction| own(d).abs().max_element() > 1.0 - SAME;
         Direction::ALL.iter().all(lies).then(|| {
-            let [a, b] = [self.lower, self.upper].map(|corner| self.stance.place(corner));
+            let corner = |c: DVec3| stance.coordinates(self.stance.place(c));
+            let [a, b] = [self.lower, self.upper].map(corner);
             (a.min(b), a.max(b))
         })
     }

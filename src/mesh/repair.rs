@@ -17,6 +17,8 @@ pub struct Repair {
     pub fill_holes: f64,
     /// The farthest that the node of an edge may be moved where a bent edge turns a tetrahedron inside out (m).
     pub straighten: f64,
+    /// Edges longer than this are halved (m); zero: where triangles are large beside the part.
+    pub halve: f64,
 }
 
 impl Default for Repair {
@@ -25,6 +27,7 @@ impl Default for Repair {
             weld: 0.0,
             fill_holes: 0.0,
             straighten: f64::INFINITY,
+            halve: f64::INFINITY,
         }
     }
 }

@@ -27,6 +27,8 @@ pub struct RepairReport {
     pub filled_holes: usize,
     /// Triangles thinner than a hundredth of their length: kept; graded elements do not have them.
     pub slivers: usize,
+    /// Triangles that long edges were halved into, for what is painted and shown a vertex; none where none was.
+    pub halved_into: usize,
     /// The mesh is open, but closes where vertices within so much (m) of each other are joined.
     pub closes_within: Option<f64>,
     /// So many open edges would be joined where vertices within so much (m) of each other are, and others stay open.
@@ -78,6 +80,12 @@ impl RepairReport {
         ];
         let found = found.into_iter().filter(|&(number, ..)| number > 0);
         parts.extend(found.map(|(number, one, many)| plain::either(number, one, many)));
+        if self.halved_into > 0 {
+            parts.push(format!(
+                "long edges halved, for what is painted and shown ({} triangles; part.halve_mm)",
+                self.halved_into
+            ));
+        }
         if let Some(within) = self.closes_within {
             let mm = plain::digits(within * 1e3);
             parts.push(format!(

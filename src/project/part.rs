@@ -85,6 +85,9 @@ keys! {
         )]
         straighten_mm: f64, "mm", ROOM,
             "a bent edge that turns a tetrahedron inside out is straightened where its node moves no farther than this";
+        #[serde(default, skip_serializing_if = "defaults::is_zero")]
+        halve_mm: f64, "mm", ROOM,
+            "edges longer than this are halved, so that there are vertices to paint on and to show fields at; 0 does so where triangles are large beside the part, 1000000 never";
         #[serde(default)]
         elements: Elements, "", Range::Words(&["graded", "as-given"]),
             "\"graded\": computed on a mesh of its own, finer where the strain changes; \"as-given\": on the file's triangles";
@@ -114,6 +117,11 @@ impl Part {
             weld: self.weld_mm * MM,
             fill_holes: self.fill_holes_mm * MM,
             straighten: self.straighten_mm * MM,
+            halve: match self.elements {
+                Elements::Graded => self.halve_mm * MM,
+                // Those of the file are the elements.
+                Elements::AsGiven => f64::INFINITY,
+            },
         }
     }
 }
@@ -236,5 +244,14 @@ pub(super) mod defaults {
     )]
     pub fn is_usual_straighten(millimetres: &f64) -> bool {
         *millimetres == straighten()
+    }
+
+    /// Whether a value is zero, and need not be written.
+    #[allow(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "serde asks with a reference"
+    )]
+    pub fn is_zero(value: &f64) -> bool {
+        *value == 0.0
     }
 }

@@ -128,7 +128,9 @@ impl Dialog {
             }
             Purpose::SaveAs => "NAME.hapdef.toml",
             Purpose::Picture => "NAME.png",
-            Purpose::Export => "A folder for report.html, sites.csv, design.json, dataset.npz",
+            Purpose::Export => {
+                "A folder: the report, the sites, the data, and what workshop and robot need"
+            }
         }
     }
 

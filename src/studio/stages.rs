@@ -159,7 +159,7 @@ fn part_lines(session: &Session) -> Vec<String> {
     let (lower, upper) = part.bounds();
     let size = (upper - lower) * 1000.0;
     vec![
-        format!("{} triangles", part.triangles().len()),
+        format!("{} triangles", part.as_given().triangles().len()),
         format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z),
     ]
 }

@@ -26,6 +26,7 @@ mod extremes;
 mod fuzz;
 mod given_tetrahedra;
 mod groups;
+mod halved;
 mod inference;
 mod judge;
 mod learning;

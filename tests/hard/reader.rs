@@ -212,6 +212,11 @@ impl Reader {
             weld: if draw.is_multiple_of(3) { 1e-5 } else { 0.0 },
             fill_holes: if draw.is_multiple_of(5) { 5e-2 } else { 0.0 },
             straighten: if draw.is_multiple_of(2) { 1e-2 } else { 0.0 },
+            halve: if draw.is_multiple_of(3) {
+                0.0
+            } else {
+                f64::INFINITY
+            },
         };
         let body = usize::from(draw.is_multiple_of(7));
         match parse_mesh(bytes, self.ending(), Some(folder), 1e-3, body, &repair) {

@@ -2,7 +2,9 @@
 //!
 //! Shape functions live on whole cells, integrals reach only over the material in them (A. Düster, J. Parvizian,
 //! Z. Yang and E. Rank 2008). Empty space keeps a trace of the material's stiffness, so that a cell with a sliver
-//! of material in a corner does not make the whole singular.
+//! of material in a corner does not make the whole singular. The grid stands along the axes of the file, or along those of
+//! the boxes that hold the part where these are turned; points, gradients and displacements are the file's for everybody
+//! else.
 
 use std::collections::HashMap;
 
@@ -18,10 +20,13 @@ use super::{Elements, Shape};
 use crate::budget::{Cancelled, Watch, report};
 use crate::elasticity::Material;
 use crate::mesh::inside::SignedDistance;
+use crate::mesh::stance::Stance;
 
 /// The cells of a part.
 pub struct FiniteCells {
     grid: Grid,
+    /// Along which the grid stands: coordinates in it are those of this.
+    stance: Stance,
     shapes: Lagrange,
     /// Where the cells with material lie, rising, and what they hold.
     places: Vec<Place>,
@@ -46,20 +51,21 @@ const LEAST_SHARE: f64 = 1e-7;
 const NUDGE: f64 = 1e-6;
 
 impl FiniteCells {
-    /// Cuts the cells of a grid. `tolerance` (m) is how far the surface may be off.
+    /// Cuts the cells of a grid that stands so.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
     pub fn new(
         grid: Grid,
+        stance: Stance,
         order: usize,
         surface: &SignedDistance,
         cutting: Cutting,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
         let shapes = Lagrange::new(order);
-        let candidates = near_material(&grid, surface);
-        let cutter = Cutter::new(surface, cutting, order);
+        let candidates = near_material(&grid, stance, surface);
+        let cutter = Cutter::new(surface, stance, cutting, order);
         let mut cells: Vec<(Place, Moments)> = Vec::with_capacity(candidates.len());
         for (done, chunk) in candidates.chunks(CHUNK).enumerate() {
             report(watch, "Cutting cells", done * CHUNK, candidates.len())?;
@@ -80,12 +86,13 @@ impl FiniteCells {
         let (nodes, lattice) = number_nodes(&places, order as u32);
         let positions = lattice
             .iter()
-            .map(|&at| node_position(&grid, &shapes, at))
+            .map(|&at| stance.place(node_position(&grid, &shapes, at)))
             .collect();
         Ok(Self {
             number: (0..).zip(&places).map(|(i, &place)| (place, i)).collect(),
             gradients: gradients(&shapes),
             grid,
+            stance,
             shapes,
             places,
             moments,
@@ -101,7 +108,13 @@ impl FiniteCells {
         self.places.len()
     }
 
-    /// The box of the cell of this number.
+    /// Along which its cells stand.
+    #[must_use]
+    pub fn stance(&self) -> Stance {
+        self.stance
+    }
+
+    /// The box of the cell of this number, in coordinates of the stance.
     #[must_use]
     pub fn cell(&self, number: usize) -> Cell {
         self.grid.cell(self.places[number])
@@ -115,7 +128,8 @@ impl FiniteCells {
             .sum()
     }
 
-    /// The cell with material that a point of the surface belongs to: its own, or the nearest around it.
+    /// The cell with material that a point of the surface belongs to: its own, or the nearest around it. In coordinates of
+    /// the stance.
     fn holding(&self, point: DVec3, outward: DVec3) -> u32 {
         let own = self.grid.place(point);
         let sides = self.grid.cell(own).sides;
@@ -167,7 +181,7 @@ impl Elements for FiniteCells {
     }
 
     fn centre(&self, element: usize) -> DVec3 {
-        self.cell(element).centre()
+        self.stance.place(self.cell(element).centre())
     }
 
     fn stiffness(&self, element: usize, material: &Material) -> Mat<f64> {
@@ -202,10 +216,15 @@ impl Elements for FiniteCells {
         );
         let scale = 2.0 / cell.sides;
         let volume = cell.sides.element_product() / 8.0;
-        isotropic(&gram, material, scale * volume.sqrt())
+        let mut stiffness = isotropic(&gram, material, scale * volume.sqrt());
+        if self.stance != Stance::default() {
+            turn(&mut stiffness, self.stance);
+        }
+        stiffness
     }
 
     fn find(&self, point: DVec3, outward: DVec3, _: &mut u32) -> (u32, DVec3) {
+        let [point, outward] = [point, outward].map(|v| self.stance.coordinates(v));
         let number = self.holding(point, outward);
         (number, self.cell(number as usize).local(point))
     }
@@ -215,14 +234,16 @@ impl Elements for FiniteCells {
     }
 
     fn shape(&self, point: DVec3, outward: DVec3) -> Shape {
+        let [point, outward] = [point, outward].map(|v| self.stance.coordinates(v));
         let number = self.holding(point, outward);
         let cell = self.cell(number as usize);
         let scale = 2.0 / cell.sides;
         let shapes = self.shapes.at(cell.local(point)).into_iter();
+        let gradient = |g: DVec3| self.stance.place(g * scale);
         Shape {
             element: number,
             nodes: self.nodes_of(number as usize).to_vec(),
-            values: shapes.map(|(n, g)| (n, g * scale)).collect(),
+            values: shapes.map(|(n, g)| (n, gradient(g))).collect(),
         }
     }
 
@@ -232,6 +253,24 @@ impl Elements for FiniteCells {
             self.shapes.order() as u32,
         ))
     }
+}
+
+/// A stiffness over displacements along a stance becomes one over those along the file's axes.
+fn turn(stiffness: &mut Mat<f64>, stance: Stance) {
+    let across = |stiffness: &mut Mat<f64>| {
+        for mut column in stiffness.col_iter_mut() {
+            for m in 0..column.nrows() / 3 {
+                let along = DVec3::from_array(std::array::from_fn(|i| column[3 * m + i]));
+                for (i, turned) in stance.place(along).to_array().into_iter().enumerate() {
+                    column[3 * m + i] = turned;
+                }
+            }
+        }
+    };
+    // R K, and with what that is the other way round R (R K)ᵀ = R K Rᵀ.
+    across(stiffness);
+    *stiffness = stiffness.transpose().to_owned();
+    across(stiffness);
 }
 
 fn gradients(shapes: &Lagrange) -> Mat<f64> {
@@ -251,12 +290,12 @@ fn gradients(shapes: &Lagrange) -> Mat<f64> {
 
 /// Cells that may hold material, rising, and whether they are full of it: blocks of cells that the surface does not
 /// reach are taken or left as one.
-fn near_material(grid: &Grid, surface: &SignedDistance) -> Vec<(Place, bool)> {
+fn near_material(grid: &Grid, stance: Stance, surface: &SignedDistance) -> Vec<(Place, bool)> {
     let mut found = Vec::new();
     let mut blocks = vec![([0; 3], grid.counts())];
     while let Some((from, to)) = blocks.pop() {
         let block = grid.span(from, to);
-        let distance = surface.at(block.centre());
+        let distance = surface.at(stance.place(block.centre()));
         let apart = distance.abs() > block.reach();
         let single = (0..3).all(|i| to[i] - from[i] == 1);
         if apart && distance > 0.0 {

@@ -11,6 +11,7 @@ use glam::DVec3;
 
 use super::lagrange::{gauss, legendre};
 use crate::mesh::inside::SignedDistance;
+use crate::mesh::stance::Stance;
 
 /// A box: lower corner and sides (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -210,17 +211,25 @@ fn conical(n: usize) -> Vec<(DVec3, f64)> {
 /// Cuts cells for shape functions of one order.
 pub struct Cutter<'s> {
     surface: &'s SignedDistance,
+    /// Along which cells stand.
+    stance: Stance,
     cutting: Cutting,
     rules: Rules,
     degrees: usize,
 }
 
 impl<'s> Cutter<'s> {
-    /// For elements of this order, cut by this surface.
+    /// For elements of this order that stand so, cut by this surface.
     #[must_use]
-    pub fn new(surface: &'s SignedDistance, cutting: Cutting, order: usize) -> Self {
+    pub fn new(
+        surface: &'s SignedDistance,
+        stance: Stance,
+        cutting: Cutting,
+        order: usize,
+    ) -> Self {
         Self {
             surface,
+            stance,
             cutting,
             rules: Rules::new(order),
             degrees: 2 * order + 1,
@@ -294,7 +303,8 @@ impl Work<'_> {
         if let Some(&known) = self.known.get(&at) {
             return known;
         }
-        let signed = self.cutter.surface.at(self.point(at));
+        let place = self.cutter.stance.place(self.point(at));
+        let signed = self.cutter.surface.at(place);
         self.known.insert(at, signed);
         signed
     }

@@ -187,16 +187,25 @@ impl Grip {
         }
     }
 
-    /// What the springs push back with (N), and twice the energy in them (J).
-    pub(super) fn reaction(&self, displacement: &[f64]) -> (DVec3, f64) {
+    /// What the springs push back with (N) at unknowns that are free, and twice the energy in them (J). What they do to
+    /// a node that is held goes into what holds it.
+    pub(super) fn reaction(
+        &self,
+        displacement: &[f64],
+        is_held: impl Fn(usize) -> bool,
+    ) -> (DVec3, f64) {
         let (mut force, mut energy) = (DVec3::ZERO, 0.0);
         for spring in &self.springs {
             for axis in (0..3).filter(|&i| spring.held.holds(i)) {
-                let shape = &spring.shape;
-                let u: f64 = (shape.nodes.iter().zip(&shape.values))
-                    .map(|(&n, v)| v.0 * displacement[3 * n as usize + axis])
-                    .sum();
-                force[axis] -= spring.stiffness * u;
+                let (mut u, mut free) = (0.0, 0.0);
+                for (&node, value) in spring.shape.nodes.iter().zip(&spring.shape.values) {
+                    let dof = 3 * node as usize + axis;
+                    u += value.0 * displacement[dof];
+                    if !is_held(dof) {
+                        free += value.0;
+                    }
+                }
+                force[axis] -= spring.stiffness * u * free;
                 energy += spring.stiffness * u * u;
             }
         }

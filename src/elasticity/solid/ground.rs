@@ -23,6 +23,7 @@ use crate::budget::{Cancelled, Watch, report};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::grade::even_size;
 use crate::elasticity::load::Touch;
+use crate::elasticity::support::geometry;
 use crate::elasticity::{DofSet, Material, Support};
 use crate::mesh::canonical::Canonical;
 use crate::mesh::reach::{FINGERTIP, Reach};
@@ -99,7 +100,8 @@ impl SolidGround {
         watch: Watch,
     ) -> Result<Self, ElasticError> {
         report(watch, "Measuring walls", 0, 1)?;
-        let (part, supports) = &in_order(part, supports);
+        let (part, supports) = geometry(part, supports);
+        let (part, supports) = &in_order(&part, &supports);
         let immersed = Immersed::new(part, material, supports);
         encloses(part, &immersed)?;
         let held = &immersed.held;

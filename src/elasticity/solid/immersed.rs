@@ -19,6 +19,7 @@ use crate::elasticity::{DofSet, Material, Support};
 use crate::mesh::TriMesh;
 use crate::mesh::cut::ON_PLANE;
 use crate::mesh::inside::SignedDistance;
+use crate::mesh::stance::Stance;
 use crate::mesh::volume::VolumeMesh;
 
 /// A part, its material and its supports.
@@ -100,14 +101,18 @@ impl Immersed {
     /// [`ElasticError::Cancelled`].
     pub fn cells(&self, fineness: &Fineness, watch: Watch) -> Result<FiniteCells, ElasticError> {
         let mut planes: [Vec<f64>; 3] = Default::default();
+        let stance = self.stance();
         for support in &self.supports {
-            if let Some((lower, upper)) = along_planes(support) {
+            if let Some((lower, upper)) = along_planes(support, stance) {
                 for axis in 0..3 {
                     planes[axis].extend([lower[axis], upper[axis]]);
                 }
             }
         }
-        let grid = Grid::new(self.held.mesh.bounds(), fineness.size, &planes);
+        let mesh = &self.held.mesh;
+        let places = mesh.positions().iter().map(|&p| stance.coordinates(p));
+        let Bounds { lower, upper } = Bounds::around(places);
+        let grid = Grid::new((lower, upper), fineness.size, &planes);
         let cutting = Cutting {
             tolerance: fineness.tolerance * fineness.size,
             depth: fineness.depth(),
@@ -115,11 +120,25 @@ impl Immersed {
         let order = fineness.order;
         Ok(FiniteCells::new(
             grid,
+            stance,
             order,
             &self.surface,
             cutting,
             watch,
         )?)
+    }
+
+    /// Along which a grid stands: the axes of the file, or of the first box that holds the part where all are turned.
+    fn stance(&self) -> Stance {
+        let boxes = || {
+            (self.supports.iter()).filter_map(|support| match &support.region {
+                Region::Box(held) => Some(held),
+                Region::Vertices(_) => None,
+            })
+        };
+        let upright = boxes().any(|held| held.along_axes().is_some());
+        let turned = boxes().next().filter(|_| !upright);
+        turned.map_or_else(Stance::default, |held| held.stance)
     }
 
     /// The model on cells of a fineness, pressed and read on `surface`.
@@ -215,12 +234,12 @@ impl Immersed {
         }
     }
 
-    /// Holds the faces of the part that lie in the border of a support's box (m), with all of the part beyond it: no
-    /// element within the box has them.
+    /// Holds the faces of the part that lie in the border of a support's box (m, in the stance of the cells), with all of
+    /// the part beyond it: no element within the box has them.
     fn spring_on_border(
         &self,
         grip: &mut Grip,
-        on: &dyn Elements,
+        on: &FiniteCells,
         number: usize,
         planes: Option<(DVec3, DVec3)>,
         size: f64,
@@ -232,7 +251,8 @@ impl Immersed {
         let (least, most) = mesh.bounds();
         let slack = ON_PLANE * (most - least).length();
         let lies_in = |facet: u32, plane: DVec3| {
-            let off = mesh.corners(facet).map(|p| (p - plane).abs());
+            let corners = mesh.corners(facet).map(|p| on.stance().coordinates(p));
+            let off = corners.map(|p| (p - plane).abs());
             (0..3).any(|axis| off.iter().all(|off| off[axis] <= slack))
         };
         for facet in 0..mesh.triangles().len() as u32 {
@@ -261,9 +281,13 @@ impl Immersed {
         for (number, support) in self.supports.iter().enumerate() {
             let held = displacements(support);
             let is_volume = held == DofSet::DISPLACEMENTS && {
-                let planes = along_planes(support);
+                let planes = along_planes(support, cells.stance());
                 let inside = |p: DVec3| match planes {
-                    Some((lower, upper)) if (Bounds { lower, upper }).contains(p) => held,
+                    Some((lower, upper))
+                        if (Bounds { lower, upper }).contains(cells.stance().coordinates(p)) =>
+                    {
+                        held
+                    }
                     _ => DofSet::default(),
                 };
                 let any = (0..cells.count()).any(|c| inside(cells.centre(c)).0 != 0);
@@ -287,11 +311,11 @@ fn displacements(support: &Support) -> DofSet {
     DofSet(support.held.0 & DofSet::DISPLACEMENTS.0)
 }
 
-/// The box (m) of a support where planes of a grid can lie along its faces. One that is turned holds the surface in it
-/// by springs, as what is painted does: cells that it goes through would hold a staircase.
-fn along_planes(support: &Support) -> Option<(DVec3, DVec3)> {
+/// The box (m) of a support where planes of a grid that stands so can lie along its faces. One that stands otherwise holds
+/// the surface in it by springs, as what is painted does: cells that it goes through would hold a staircase.
+fn along_planes(support: &Support, stance: Stance) -> Option<(DVec3, DVec3)> {
     match &support.region {
-        Region::Box(held) => held.along_axes(),
+        Region::Box(held) => held.along(stance),
         Region::Vertices(_) => None,
     }
 }

@@ -142,6 +142,12 @@ fn corner(value: f64, vertices: usize) -> Result<u32, String> {
     if value.fract() == 0.0 && value >= 0.0 && value < (vertices as f64) {
         return Ok(value as u32);
     }
+    // Beyond these digits a number of three hundred would fill lines.
+    let value = if value.abs() < 1e15 {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    };
     Err(format!(
         "names vertex {value}, and there are {vertices}, from 0"
     ))

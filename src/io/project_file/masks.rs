@@ -9,6 +9,7 @@ use zip::ZipArchive;
 use super::names::{arrays_path, plain};
 use crate::io::npz::read_mask;
 use crate::io::{FileError, source};
+use crate::mesh::TriMesh;
 use crate::plain::quote;
 use crate::project::{Masks, Project};
 
@@ -21,7 +22,7 @@ pub(super) fn read(
     path: &Path,
     project: &mut Project,
     groups: Masks,
-    vertices: usize,
+    mesh: &TriMesh,
 ) -> Result<Masks, FileError> {
     let mut masks = groups;
     if project.mask_names().next().is_none() {
@@ -32,7 +33,7 @@ pub(super) fn read(
     for (key, name) in project.mask_keys() {
         let own = plain(name).to_owned();
         // What is not there, or is for another mesh, gives way to the group of that name.
-        match arrays.mask(key, name, vertices, &found) {
+        match arrays.mask(key, name, mesh, &found) {
             Ok(mask) => drop(masks.insert(own.clone(), Arc::new(mask))),
             Err(_) if masks.contains_key(&own) => {}
             Err(error) => return Err(error),
@@ -49,13 +50,13 @@ pub(super) fn read(
 pub(super) fn read_painted(
     path: &Path,
     project: &Project,
-    vertices: usize,
+    mesh: &TriMesh,
 ) -> Result<Option<Vec<bool>>, FileError> {
     let Some(name) = &project.feasible.painted else {
         return Ok(None);
     };
     let arrays = Arrays::beside(path)?;
-    let mask = arrays.mask("feasible.painted", name, vertices, &[])?;
+    let mask = arrays.mask("feasible.painted", name, mesh, &[])?;
     Ok(Some(mask))
 }
 
@@ -87,7 +88,7 @@ impl Arrays {
         &self,
         key: &str,
         name: &str,
-        vertices: usize,
+        mesh: &TriMesh,
         groups: &[String],
     ) -> Result<Vec<bool>, FileError> {
         let asked = quote(plain(name));
@@ -112,21 +113,21 @@ impl Arrays {
             ));
         }
         let mask = read_mask(&self.path, name)?;
-        if mask.len() != vertices {
-            return Err(FileError::broken(
+        let length = mask.len();
+        mesh.mask_of(mask).ok_or_else(|| {
+            let vertices = mesh.before_halving().positions().len();
+            let remedy = if key.starts_with("support") {
+                ", or give that support a box"
+            } else {
+                ""
+            };
+            FileError::broken(
                 &self.path,
                 format!(
-                    "the mask {asked} of {key} has {} values, but the part has {vertices} vertices, and takes one for each: it is of another mesh, or of the same mesh taken in otherwise (part.body, part.weld_mm). Paint it again{}",
-                    mask.len(),
-                    if key.starts_with("support") {
-                        ", or give that support a box"
-                    } else {
-                        ""
-                    }
+                    "the mask {asked} of {key} has {length} values, but the part has {vertices} vertices, and takes one for each: it is of another mesh, or of the same mesh taken in otherwise (part.body, part.weld_mm, part.halve_mm). Paint it again{remedy}"
                 ),
-            ));
-        }
-        Ok(mask)
+            )
+        })
     }
 }
 
@@ -195,7 +196,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = project(folder.path(), &[("rim", 4)]);
         let masks = load(&path).unwrap().inputs.masks;
-        assert_eq!(*masks["rim"], [true; 4]);
+        // And on all that lies between, where its long edges are halved.
+        assert!(masks["rim"].len() > 4 && masks["rim"].iter().all(|m| *m));
     }
 
     #[test]

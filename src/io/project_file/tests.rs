@@ -208,6 +208,8 @@ fn numbered(folder: &Path, number: u8) -> (Project, Vec<bool>, Masks) {
     };
     let mut project = Project::around("sheet.obj", Some(Unit::Millimetre));
     project.touch.force_n = f64::from(number);
+    // Masks of as many values as the file has vertices.
+    project.part.halve_mm = 1e6;
     project.feasible.keep_out = Some("keep-out".into());
     project.supports.push(SupportKeys {
         kind: SupportKind::Clamped,

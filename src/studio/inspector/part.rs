@@ -69,6 +69,13 @@ fn taking_in(ui: &mut Ui, project: &mut Project, bodies: usize, again: bool) -> 
         Part::straighten_mm(),
         0.1,
     );
+    number(
+        ui,
+        "Halve edges",
+        &mut project.part.halve_mm,
+        Part::halve_mm(),
+        0.1,
+    );
     if !again {
         return false;
     }
