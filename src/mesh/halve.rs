@@ -50,15 +50,16 @@ impl TriMesh {
     /// The same surface with all edges halved that are longer than this (m), until none is.
     #[must_use]
     pub fn halved(self, longest: f64) -> Self {
+        let mut triangles = 0..self.triangles.len() as u32;
+        if triangles.len() >= MOST || !triangles.any(|t| self.longest_side(t) > longest) {
+            return self;
+        }
         let mut halving = Halving::new(&self, longest);
         while halving.triangles.len() < MOST {
             let Some(Long { edge, .. }) = halving.longest.pop() else {
                 break;
             };
             halving.halve(edge);
-        }
-        if halving.parents.is_empty() {
-            return self;
         }
         let mut fine = Self::from_checked(halving.positions, halving.triangles);
         fine.closes_within = self.closes_within;

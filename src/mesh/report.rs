@@ -80,12 +80,6 @@ impl RepairReport {
         ];
         let found = found.into_iter().filter(|&(number, ..)| number > 0);
         parts.extend(found.map(|(number, one, many)| plain::either(number, one, many)));
-        if self.halved_into > 0 {
-            parts.push(format!(
-                "long edges halved, for what is painted and shown ({} triangles; part.halve_mm)",
-                self.halved_into
-            ));
-        }
         if let Some(within) = self.closes_within {
             let mm = plain::digits(within * 1e3);
             parts.push(format!(
@@ -97,6 +91,12 @@ impl RepairReport {
             let mm = plain::digits(within * 1e3);
             parts.push(format!(
                 "{edges} open edges lie along each other and are not joined: the wall is torn there. Vertices within {mm} mm are joined by part.weld_mm = {mm}"
+            ));
+        }
+        if self.halved_into > 0 {
+            parts.push(format!(
+                "long edges halved: {} triangles to paint on and to show fields at (part.halve_mm)",
+                self.halved_into
             ));
         }
         let changed = (!parts.is_empty()).then(|| parts.join(", "));
