@@ -125,7 +125,12 @@ fn certificate_label(ask: &Ask<'_>, ui: &mut Ui) {
     if let Some(words) = words.filter(|_| ask.view.tab.is_of_design() && ask.session.as_designed())
     {
         ui.separator();
-        ui.add(cut(words)).on_hover_text(ASSUMES);
+        // Beside the tabs there is room for the figure.
+        let brief = words
+            .split_once(" possible (")
+            .map_or(&*words, |(brief, _)| brief);
+        ui.add(cut(brief))
+            .on_hover_text(format!("{words}. {ASSUMES}"));
     }
 }
 
@@ -149,9 +154,11 @@ fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
         format!("; as selected judged {:.2} mm", r.error_mm)
     });
     ui.separator();
-    ui.add(cut(
-        RichText::new(text + &beside).color(super::theme::TOUCHED)
-    ));
+    let brief = text
+        .split_once(" mm")
+        .map_or(text.clone(), |(mm, _)| format!("{mm} mm"));
+    ui.add(cut(RichText::new(brief).color(super::theme::TOUCHED)))
+        .on_hover_text(text + &beside);
 }
 
 /// A label that is cut rather than make the panel wider than the window; the pointer on it shows all of it.
