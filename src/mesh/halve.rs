@@ -181,9 +181,16 @@ impl Halving {
         }
     }
 
+    /// Halves an edge, unless a triangle at it is so thin that its halves might have no area.
     fn halve(&mut self, [a, b]: [u32; 2]) {
-        let middle = self.positions.len() as u32;
+        let Some(triangles) = self.around.get(&[a, b]) else {
+            return;
+        };
+        if triangles.iter().any(|&t| self.is_thin(t)) {
+            return;
+        }
         let between = self.positions[a as usize].midpoint(self.positions[b as usize]);
+        let middle = self.positions.len() as u32;
         self.positions.push(between);
         self.parents.push([a, b]);
         let triangles = self.around.remove(&[a, b]).unwrap_or_default();
@@ -193,6 +200,15 @@ impl Halving {
         for end in [a, b] {
             self.look_at(named(end, middle));
         }
+    }
+
+    /// Whether rounding moves the corners of a triangle by a noticeable part of its height.
+    fn is_thin(&self, t: u32) -> bool {
+        /// Of its longest side. Halves of halves may be a hundred times as thin, and places are rounded to 1e-16.
+        const HEIGHT: f64 = 1e-6;
+        let [a, b, c] = self.triangles[t as usize].map(|v| self.positions[v as usize]);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        (b - a).cross(c - a).length() < HEIGHT * longest * longest
     }
 
     /// Divides a triangle from the middle of one of its edges to the corner opposite; it keeps the half at the first
@@ -310,6 +326,28 @@ mod tests {
         };
         let [one, other] = [0, 10].map(|turn| places(&strips(turn).halved(0.004)));
         assert_eq!(one, other);
+    }
+
+    #[test]
+    fn slivers_keep_their_area() {
+        // Beside a square a triangle whose height is a few roundings.
+        let far = 1.0;
+        let points = [
+            DVec3::new(far, 0.0, 0.0),
+            DVec3::new(far + 0.1, 0.0, 0.0),
+            DVec3::new(far + 0.1, 0.1, 0.0),
+            DVec3::new(far, 0.1, 0.0),
+            DVec3::new(far + 0.05, -3e-11, 0.0),
+        ];
+        let triangles = [[0, 1, 2], [0, 2, 3], [0, 4, 1]];
+        let fine = TriMesh::new(&points, &triangles, 0)
+            .unwrap()
+            .0
+            .halved(0.002);
+        assert!(fine.triangles().len() > 1000);
+        for t in 0..fine.triangles().len() as u32 {
+            assert!(fine.facet_normal(t).z > 0.9, "{t}");
+        }
     }
 
     #[test]
