@@ -71,7 +71,9 @@ pub struct TriMesh {
     /// The tetrahedra that it is the surface of, where it came with them.
     volume: Option<Arc<VolumeMesh>>,
     /// What it was before its long edges were halved.
-    given: Option<Arc<halve::Given>>,
+    given: Option<Arc<Self>>,
+    /// For each vertex that was added by that the two that it lies between, which come before it.
+    parents: Vec<[u32; 2]>,
     /// It is open, and closes where vertices of its file within so much (m) of each other are joined.
     closes_within: Option<f64>,
     /// Where its points are found, once somebody has asked; copies share it.
@@ -121,6 +123,7 @@ impl TriMesh {
             vertex_normals,
             volume: None,
             given: None,
+            parents: Vec::new(),
             closes_within: None,
             index: OnceLock::new(),
         }

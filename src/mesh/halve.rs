@@ -14,14 +14,6 @@ use glam::{DVec3, I64Vec3};
 
 use super::TriMesh;
 
-/// A mesh as it was before its long edges were halved.
-#[derive(Debug)]
-pub(super) struct Given {
-    pub mesh: Arc<TriMesh>,
-    /// For each vertex that was added the two that it lies between, which come before it.
-    pub parents: Vec<[u32; 2]>,
-}
-
 /// No more triangles are made than this.
 const MOST: usize = 150_000;
 /// Of the part's diagonal: how long edges may be where nobody says it.
@@ -63,23 +55,21 @@ impl TriMesh {
         }
         let mut fine = Self::from_checked(halving.positions, halving.triangles);
         fine.closes_within = self.closes_within;
-        fine.given = Some(Arc::new(Given {
-            mesh: Arc::new(self),
-            parents: halving.parents,
-        }));
+        fine.given = Some(Arc::new(self));
+        fine.parents = halving.parents;
         fine
     }
 
     /// The mesh before its long edges were halved; itself where none was.
     #[must_use]
     pub fn as_given(self: &Arc<Self>) -> &Arc<Self> {
-        self.given.as_ref().map_or(self, |given| &given.mesh)
+        self.given.as_ref().unwrap_or(self)
     }
 
     /// As [`Self::as_given`], of one that nobody shares yet.
     #[must_use]
     pub fn before_halving(&self) -> &Self {
-        self.given.as_ref().map_or(self, |given| &given.mesh)
+        self.given.as_deref().unwrap_or(self)
     }
 
     /// A mask of this mesh from one of it, or of it before its long edges were halved: what was added belongs to it
@@ -87,10 +77,10 @@ impl TriMesh {
     #[must_use]
     pub fn mask_of(&self, mask: Vec<bool>) -> Option<Vec<bool>> {
         if let Some(given) = &self.given
-            && mask.len() == given.mesh.positions.len()
+            && mask.len() == given.positions.len()
         {
             let mut shares: Vec<f64> = mask.iter().map(|&m| f64::from(u8::from(m))).collect();
-            for &[a, b] in &given.parents {
+            for &[a, b] in &self.parents {
                 shares.push(f64::midpoint(shares[a as usize], shares[b as usize]));
             }
             return Some(shares.into_iter().map(|share| share >= 0.5).collect());
@@ -105,7 +95,7 @@ impl TriMesh {
         let Some(given) = &self.given else {
             return Some(mask.to_vec());
         };
-        let before = mask.get(..given.mesh.positions.len())?.to_vec();
+        let before = mask.get(..given.positions.len())?.to_vec();
         let again = self.mask_of(before.clone());
         (again.as_deref() == Some(mask)).then_some(before)
     }
@@ -300,7 +290,7 @@ mod tests {
     #[test]
     fn masks_of_what_was_given_reach_as_far_as_they_did() {
         let fine = strips(0).halved(0.005);
-        let given = fine.given.as_ref().unwrap().mesh.positions().to_vec();
+        let given = fine.before_halving().positions().to_vec();
         let below = |p: &DVec3| p.z < 0.05;
         let mask = fine.mask_of(given.iter().map(below).collect()).unwrap();
         for (p, &set) in fine.positions().iter().zip(&mask) {
