@@ -372,7 +372,7 @@ fn a_file_of_several_bodies_asks_which_and_repairs_when_told() {
     w.open_file(&path, Some(hapdef::project::Unit::Millimetre));
     let said = &w.session().news.messages[0].text;
     assert!(said.contains("body 0 of 2"), "{said}");
-    let triangles = |w: &Window| w.session().document.part.triangles().len();
+    let triangles = |w: &Window| w.session().document.part.as_given().triangles().len();
     assert_eq!(triangles(&w), 128);
     let part = &mut w.session_mut().document.state.project.part;
     part.body = 1;
