@@ -240,6 +240,7 @@ fn a_solid_and_a_shell_of_the_same_tube_agree() {
 fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
     // A block pressed beside its foot, and a flange pressed above the boss that it is held by: cells stand as the box does.
     type Place = fn(DVec3) -> DVec3;
+    type Part<'a> = &'a dyn Fn(Place) -> Arc<TriMesh>;
     let turn: Place = |p| DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 0.5).normalize(), 0.8) * p;
     let flange = |place: Place| {
         let bricks = Bricks {
@@ -254,7 +255,6 @@ fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
         bricks.surface()
     };
     let beam = |place: Place| block(DVec3::new(0.01, 0.01, 0.05), place);
-    type Part<'a> = &'a dyn Fn(Place) -> Arc<TriMesh>;
     let cases: [(&str, Part, f64, DVec3, DVec3, f64); 2] = [
         (
             "beam",
