@@ -349,9 +349,9 @@ impl Ground {
 
 /// The part, or where too much of it lies in facets that distances cannot be measured on, even ones on its surface.
 fn even_enough(ground: &grade::Ground) -> Arc<TriMesh> {
-    let part = ground.part();
     /// Share of the area that may lie in such facets.
     const SHARE: f64 = 0.02;
+    let part = ground.part();
     let rim = part.boundary_vertices();
     let size = size_mm(part) * 1e-3;
     let unfit: f64 = (0..part.triangles().len() as u32)
