@@ -31,6 +31,8 @@ pub(super) fn size_mm(mesh: &TriMesh) -> f64 {
 pub fn check_shape(part: &TriMesh) -> Result<(), DesignError> {
     /// Elements along all edges of the part, each one counted for itself.
     const MOST_ALONG: f64 = 5e6;
+    // An edge to a vertex far away has been halved into others that lie between.
+    let part = part.before_halving();
     if let Some((place, distance, size)) = far_vertex(part) {
         return Err(DesignError::FarVertex {
             place_mm: place * 1e3,
@@ -417,6 +419,19 @@ mod tests {
         let said = check_memory(40_000, 40_000_000, Signal::Strain).unwrap_err();
         assert!(said.to_string().contains("touch.count"), "{said}");
         assert!(check_room(10, 10, 24).is_ok());
+    }
+
+    #[test]
+    fn a_vertex_far_away_is_named_where_the_edges_to_it_were_halved() {
+        let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+        let (mut positions, mut triangles) = (square.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
+        positions.push(DVec3::new(0.5, 1e4, 0.0));
+        triangles.push([3, 2, 4]);
+        let (part, _) = TriMesh::new(&positions, &triangles, 0).unwrap();
+        let fine = part.with_long_edges_halved(1.0);
+        assert!(fine.positions().len() > 1000);
+        let said = check_shape(&fine).unwrap_err().to_string();
+        assert!(said.contains("one vertex of the part"), "{said}");
     }
 
     #[test]

@@ -247,7 +247,7 @@ fn halved(mesh: TriMesh, repair: &Repair) -> TriMesh {
         Some(repair.halve)
     };
     match longest {
-        Some(longest) => mesh.halved(longest),
+        Some(longest) => mesh.with_long_edges_halved(longest),
         None => mesh,
     }
 }

@@ -41,7 +41,7 @@ pub fn longest_wanted(mesh: &TriMesh) -> Option<f64> {
 impl TriMesh {
     /// The same surface with all edges halved that are longer than this (m), until none is.
     #[must_use]
-    pub fn halved(self, longest: f64) -> Self {
+    pub fn with_long_edges_halved(self, longest: f64) -> Self {
         let mut triangles = 0..self.triangles.len() as u32;
         if triangles.len() >= MOST || !triangles.any(|t| self.longest_side(t) > longest) {
             return self;
@@ -263,7 +263,7 @@ mod tests {
         let given = strips(0);
         let wanted = longest_wanted(&given).unwrap();
         let (area, edges) = (given.area(), given.boundary_edges().count());
-        let fine = Arc::new(given.halved(wanted));
+        let fine = Arc::new(given.with_long_edges_halved(wanted));
         let longest = (0..fine.triangles().len() as u32)
             .map(|t| fine.longest_side(t))
             .fold(0.0, f64::max);
@@ -289,7 +289,7 @@ mod tests {
 
     #[test]
     fn masks_of_what_was_given_reach_as_far_as_they_did() {
-        let fine = strips(0).halved(0.005);
+        let fine = strips(0).with_long_edges_halved(0.005);
         let given = fine.before_halving().positions().to_vec();
         let below = |p: &DVec3| p.z < 0.05;
         let mask = fine.mask_of(given.iter().map(below).collect()).unwrap();
@@ -314,7 +314,7 @@ mod tests {
             places.sort_unstable();
             places
         };
-        let [one, other] = [0, 10].map(|turn| places(&strips(turn).halved(0.004)));
+        let [one, other] = [0, 10].map(|turn| places(&strips(turn).with_long_edges_halved(0.004)));
         assert_eq!(one, other);
     }
 
@@ -333,7 +333,7 @@ mod tests {
         let fine = TriMesh::new(&points, &triangles, 0)
             .unwrap()
             .0
-            .halved(0.002);
+            .with_long_edges_halved(0.002);
         assert!(fine.triangles().len() > 1000);
         for t in 0..fine.triangles().len() as u32 {
             assert!(fine.facet_normal(t).z > 0.9, "{t}");
@@ -342,10 +342,10 @@ mod tests {
 
     #[test]
     fn a_mesh_that_is_fine_enough_is_left() {
-        let fine = strips(0).halved(0.003);
+        let fine = strips(0).with_long_edges_halved(0.003);
         let count = fine.triangles().len();
         assert!(longest_wanted(&fine).is_none());
-        let again = Arc::new(fine.halved(1.0));
+        let again = Arc::new(fine.with_long_edges_halved(1.0));
         assert_eq!(again.triangles().len(), count);
     }
 }
