@@ -47,7 +47,9 @@ pub use gauges::SAME_MM;
 pub use jobs::{Ended, Jobs, Running, Task, duration};
 pub use kept::chooser_title;
 pub use live::training::{train, training_touches};
-pub use live::{Feed, LEAST_KNOWN, Mishap, Recording, STRIPS_S, Strip, WANTED_KNOWN};
+pub use live::{
+    Awaited, Feed, Gathered, LEAST_KNOWN, Mishap, Recording, STRIPS_S, Strip, WANTED_KNOWN,
+};
 pub use news::{Event, Message, News};
 pub use opening::Opened;
 pub use shape::Shape;

@@ -1,11 +1,13 @@
 //! Live touch: a board, or one that is simulated, and what its readings say of a touch.
 
 pub(super) mod feed;
+pub(super) mod gathering;
 mod known;
 pub(super) mod training;
 mod upkeep;
 
 pub use feed::{Feed, Recording, STRIPS_S, Strip};
+pub use gathering::{Awaited, Gathered};
 pub use known::{LEAST as LEAST_KNOWN, WANTED as WANTED_KNOWN};
 
 use std::path::{Path, PathBuf};
@@ -16,7 +18,7 @@ use super::jobs::{Task, stop};
 use super::news::Event;
 use super::slot::{Slot, current};
 use super::state::Session;
-use super::state::live::{Gathering, Target};
+use super::state::live::Target;
 use crate::board::{
     ChannelFault, Drawn, Faults, Illness, Script, SimulatedBoard, Truth, script_seed,
 };
@@ -114,7 +116,6 @@ impl Session {
         self.live.connection = None;
         self.live.hosted = None;
         self.live.target = None;
-        self.live.gathering = Gathering::default();
         self.live.feed = Shared::default();
         self.show_estimator(self.desk.estimator);
     }

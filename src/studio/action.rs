@@ -139,6 +139,7 @@ pub enum BoardAction {
     TakeKnown,
     Calibrate,
     CalibrateFromBoard,
+    StopTakingKnown,
 }
 
 /// What concerns the test-bed.
@@ -319,6 +320,7 @@ impl BoardAction {
             Self::Disconnect => session.disconnect(),
             Self::CloseEstimator => session.close_estimator(),
             Self::TakeKnown => session.take_known(),
+            Self::StopTakingKnown => session.stop_taking_known(),
             Self::Calibrate => session.start_calibration(),
             Self::CalibrateFromBoard => session.calibrate_from_board(),
         }

@@ -12,10 +12,11 @@ use hapdef::project::PartModel;
 use hapdef::studio::{Field, Studio};
 use window::Window;
 
-/// The bundled limb with its wall, a few touches wide.
+/// A short limb with its wall, a few touches wide.
 fn solid_limb(folder: &Path) -> PathBuf {
     let written = Command::new(env!("CARGO_BIN_EXE_hapdef"))
-        .args(["limb", "--solid", "--no-sites", "--thickness", "3", "--out"])
+        .args(["limb", "--solid", "--no-sites", "--thickness", "3"])
+        .args(["--height", "60", "--columns", "4", "--hoops", "3", "--out"])
         .arg(folder)
         .status()
         .unwrap();
@@ -51,7 +52,7 @@ fn a_solid_from_its_faces_to_its_report() {
 
     // Pressed outside, it bends.
     w.press("Touch");
-    let hoop = w.place(33.3, 0.0, 60.0);
+    let hoop = w.place(33.3, 0.0, 30.0);
     w.click(hoop);
     w.wait("the touch", 120, |s| {
         s.session.caches.touching.result().is_some()
@@ -98,13 +99,13 @@ fn measured(w: &mut Window) {
 /// What is outside is painted to be inside, measured anew, and taken back.
 fn corrected(w: &mut Window) {
     let outside = |w: &Window, p: DVec3| side_at(w.harness.state(), p);
-    let place = DVec3::new(33.33, 0.0, 60.0);
+    let place = DVec3::new(33.33, 0.0, 30.0);
     assert!(outside(w, place) < 0.0, "it is outside");
     w.press("Paint");
     w.click_label("Layer");
     w.click_label("Inside face");
     let path: Vec<_> = (0..5)
-        .map(|k| w.place(33.3, f64::from(k) - 2.0, 60.0))
+        .map(|k| w.place(33.3, f64::from(k) - 2.0, 30.0))
         .collect();
     w.drag(&path);
     let known = |s: &Studio| s.session.advice().is_some() && !s.busy();

@@ -104,7 +104,8 @@ impl Window {
                 self.harness.state().session.news.messages
             );
             self.harness.step();
-            std::thread::sleep(Duration::from_millis(5));
+            // What is waited for is computed beside this, and needs the processors more.
+            std::thread::sleep(Duration::from_millis(25));
         }
         self.harness.run_ok();
     }

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
+use super::gathering::Gathering;
 use crate::link::{SessionEvent, State};
 use crate::live::{Estimator, Health, Traffic, Update};
 use crate::wire::Hello;
@@ -64,6 +65,8 @@ pub struct Feed {
     pub ended: Option<Result<(), String>>,
     /// Whose trail is drawn.
     pub estimator: Estimator,
+    /// Known touches that are being read.
+    pub gathering: Gathering,
     open: Option<Strip>,
     looked: Option<Instant>,
     drawn: Option<Instant>,
@@ -183,6 +186,7 @@ impl Feed {
             .retain(|(t, e, _)| now - t < TRAIL_S && *e == estimator);
         if let Some(strain) = &update.strain {
             self.strip(now, strain);
+            self.gathering.hear(update.time_us, strain, self.truth);
         }
         self.update = Some(update.clone());
     }

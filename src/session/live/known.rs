@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::gathering::{Awaited, Gathered};
 use crate::design::Sensing;
-use crate::inference::calibration::SAMPLES;
 use crate::inference::{Calibration, Known, calibrate};
 use crate::job::Reporter;
 use crate::session::jobs::Task;
@@ -16,8 +16,6 @@ use crate::uncertainty::{Pressing, Uncertainty};
 /// How many are proposed, and how many a calibration takes at least.
 pub const WANTED: usize = crate::design::PROPOSED;
 pub const LEAST: usize = 4;
-/// Pictures that are taken of a press: the first may still show the rise.
-const FRAMES: usize = 1 + SAMPLES;
 
 impl Session {
     /// Where the next known touch is proposed (m).
@@ -30,18 +28,24 @@ impl Session {
 
     /// Reads the press that is on as one at the proposed place.
     pub fn take_known(&mut self) {
-        self.live.gathering.rows.clear();
-        self.live.gathering.exact = false;
-        self.live.gathering.at = self.proposed_touch();
+        let Some(at) = self.proposed_touch() else {
+            return;
+        };
+        self.live.exact = false;
+        let force = self.desk.known_force_n;
+        self.live.await_known(Awaited::Press(at, force));
     }
 
     /// Takes the next touches of a simulated board as known ones, and calibrates with them.
     pub fn calibrate_from_board(&mut self) {
         self.live.known.clear();
-        self.live.gathering.from_board = true;
-        self.live.gathering.exact = true;
-        self.live.gathering.rows.clear();
-        self.live.gathering.truth = None;
+        self.live.exact = true;
+        self.live.await_known(Awaited::Board);
+    }
+
+    /// Reads no more known touches.
+    pub fn stop_taking_known(&mut self) {
+        self.live.await_known(Awaited::Nothing);
     }
 
     /// How many known touches there are of these gauges.
@@ -57,77 +61,33 @@ impl Session {
         all.filter_map(move |slot| current(Some(slot), &inputs))
     }
 
-    /// Takes in what is read meanwhile.
+    /// Takes in what was read meanwhile.
     pub(super) fn gather_known(&mut self) {
         let Some(sensing) = self.sensing().map(Arc::clone) else {
             return;
         };
-        let Some((update, truth)) = self.live.look(|f| (f.update.clone(), f.truth)) else {
-            return;
-        };
-        let Some(update) = update.filter(|u| u.time_us != self.live.gathering.last_us) else {
-            return;
-        };
-        self.live.gathering.last_us = update.time_us;
-        let Some(strain) = update.strain else {
-            return;
-        };
-        if let Some(at) = self.live.gathering.at {
-            self.live.gathering.rows.push(strain);
-            if self.live.gathering.rows.len() >= FRAMES {
-                self.live.gathering.at = None;
-                let force = self.desk.known_force_n;
-                self.keep_known(&sensing, at, force);
-            }
-        } else if self.live.gathering.from_board {
-            self.gather_from_board(&sensing, strain, truth);
+        let from_board = self.live.awaited() == Awaited::Board;
+        for gathered in self.live.gathered() {
+            self.keep_known(&sensing, &gathered);
         }
-    }
-
-    /// A touch whose force stands still is read as long as it does; each once.
-    fn gather_from_board(
-        &mut self,
-        sensing: &Sensing,
-        strain: Vec<f64>,
-        truth: Option<(DVec3, f64)>,
-    ) {
-        let gathering = &mut self.live.gathering;
-        let same = truth.is_some() && truth == gathering.truth;
-        if same {
-            if gathering.rows.len() < FRAMES {
-                gathering.rows.push(strain);
-            }
-        } else {
-            gathering.rows.clear();
-            gathering.truth = truth;
-        }
-        // The first picture of a plateau may still show the rise.
-        let Some((place, force)) = truth.filter(|_| gathering.rows.len() >= FRAMES) else {
-            return;
-        };
-        if gathering.read == Some(place) {
-            return;
-        }
-        gathering.read = Some(place);
-        self.keep_known(sensing, place, force);
-        if self.known_touches() >= WANTED {
-            self.live.gathering.from_board = false;
+        if from_board && self.known_touches() >= WANTED {
+            self.stop_taking_known();
             self.start_calibration();
         }
     }
 
-    fn keep_known(&mut self, sensing: &Sensing, place: DVec3, force: f64) {
-        let rows = std::mem::take(&mut self.live.gathering.rows);
-        let mean =
-            |c: usize| rows.iter().skip(1).map(|r| r[c]).sum::<f64>() / (rows.len() - 1) as f64;
+    fn keep_known(&mut self, sensing: &Sensing, gathered: &Gathered) {
         // What was not trusted says nothing of how it is glued.
         let used = self.live.look(|f| f.used.clone()).unwrap_or_default();
         let trusted = |c: usize| used.get(c).copied().unwrap_or(true);
-        let read = |c: usize| if trusted(c) { mean(c) } else { f64::NAN };
-        let reading = (0..sensing.gauges.len()).map(read).collect();
-        let at = sensing.drawn.map.mesh.index().nearest(place).0;
+        let read = |c: usize| gathered.strain.get(c).copied().filter(|_| trusted(c));
+        let reading = (0..sensing.gauges.len()).map(|c| read(c).unwrap_or(f64::NAN));
+        let value = Known {
+            at: sensing.drawn.map.mesh.index().nearest(gathered.at).0,
+            force: gathered.force,
+            reading: reading.collect(),
+        };
         let inputs = self.document.sensing_inputs();
-        let value = Known { at, force, reading };
         self.live.known.push(Slot { inputs, value });
     }
 
@@ -147,7 +107,7 @@ impl Session {
             elements: sensing.off.elements,
             ..self.document.state.project.uncertainty()
         };
-        if self.live.gathering.exact {
+        if self.live.exact {
             off.pressing = Pressing::EXACT;
         }
         let work = move |_: &Reporter| Ok(calibrate(&sensing.drawn, &known, &noise, &off));

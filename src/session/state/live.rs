@@ -12,6 +12,7 @@ use crate::link::{Address, Command, Connection, Hosted, State};
 use crate::live::Update;
 use crate::project::LiveKeys;
 use crate::session::live::feed::{Feed, Shared};
+use crate::session::live::gathering::{Awaited, Gathered, Gathering};
 use crate::session::live::training::Pair;
 use crate::session::slot::Slot;
 use crate::session::state::learned::Learnt;
@@ -26,22 +27,6 @@ pub(in crate::session) enum Target {
 /// Trained estimators, and the gauges that they were trained for.
 pub(in crate::session) type TrainedFor = (Vec<bool>, Pair);
 
-/// A known touch that is being read.
-#[derive(Default)]
-pub struct Gathering {
-    /// From the touches of a simulated board, until there are enough.
-    pub from_board: bool,
-    /// Whether all of them were read off a board that tells where it is pressed, and how hard.
-    pub(in crate::session) exact: bool,
-    /// At a place that was proposed.
-    pub at: Option<DVec3>,
-    pub(in crate::session) rows: Vec<Vec<f64>>,
-    pub(in crate::session) truth: Option<(DVec3, f64)>,
-    /// The last touch that was read: each only once.
-    pub(in crate::session) read: Option<DVec3>,
-    pub(in crate::session) last_us: u64,
-}
-
 /// A connection, and what is known of the gauges that it reads.
 #[derive(Default)]
 pub struct Live {
@@ -54,7 +39,8 @@ pub struct Live {
     pub(in crate::session) target: Option<Target>,
     /// Known presses, with the gauges that read them: of others they say nothing.
     pub(in crate::session) known: Vec<Slot<SensingInputs, Known>>,
-    pub(in crate::session) gathering: Gathering,
+    /// Whether all of them were read off a board that tells where it is pressed, and how hard.
+    pub(in crate::session) exact: bool,
     pub(in crate::session) trained: Option<Slot<SensingInputs, TrainedFor>>,
     /// For which gauges training was begun.
     pub(in crate::session) training_for: Option<Vec<bool>>,
@@ -108,13 +94,25 @@ impl Live {
         self.look(|feed| feed.truth).flatten()
     }
 
-    /// Whether a known touch is being read, and whether off a simulated board.
+    /// Which known touches are being read.
     #[must_use]
-    pub fn is_gathering(&self) -> (bool, bool) {
-        (
-            self.gathering.at.is_some() || self.gathering.from_board,
-            self.gathering.from_board,
-        )
+    pub fn awaited(&self) -> Awaited {
+        self.look(|feed| feed.gathering.awaited())
+            .unwrap_or_default()
+    }
+
+    /// Begins to read known touches, or ends it.
+    pub(in crate::session) fn await_known(&self, what: Awaited) {
+        if let Ok(mut feed) = self.feed.lock() {
+            feed.gathering = Gathering::of(what);
+        }
+    }
+
+    /// The known touches that were read since somebody asked last.
+    pub(in crate::session) fn gathered(&self) -> Vec<Gathered> {
+        let feed = self.feed.lock();
+        feed.map(|mut feed| feed.gathering.take())
+            .unwrap_or_default()
     }
 
     pub(in crate::session) fn send(&self, command: Command) {

@@ -13,7 +13,7 @@ use crate::board::Illness;
 use crate::link::{PortInfo, ports};
 use crate::live::Estimator;
 use crate::project::{CalibrationKeys, LiveKeys};
-use crate::session::{Desk, LEAST_KNOWN, Mishap, WANTED_KNOWN};
+use crate::session::{Awaited, Desk, LEAST_KNOWN, Mishap, WANTED_KNOWN};
 
 /// What is typed at the live stage.
 #[derive(Default)]
@@ -307,9 +307,9 @@ fn known_buttons(ask: &mut Ask<'_>, ui: &mut Ui) {
     let (count, connected) = (ask.session.known_touches(), ask.session.live.is_connected());
     ui.label(format!("{count} known touches of {WANTED_KNOWN}"));
     ui.horizontal(|ui| {
-        let (waiting, _) = ask.session.live.is_gathering();
+        let idle = ask.session.live.awaited() == Awaited::Nothing;
         if ui
-            .add_enabled(connected && !waiting, egui::Button::new("Take this press"))
+            .add_enabled(connected && idle, egui::Button::new("Take this press"))
             .clicked()
         {
             ask.act(BoardAction::TakeKnown);
@@ -327,13 +327,20 @@ fn known_buttons(ask: &mut Ask<'_>, ui: &mut Ui) {
 }
 
 fn calibrate_from_board(ask: &mut Ask<'_>, ui: &mut Ui) {
+    if ask.session.live.awaited() == Awaited::Board {
+        let help = "Those that were taken are kept";
+        if ui
+            .button("Stop taking touches")
+            .on_hover_text(help)
+            .clicked()
+        {
+            ask.act(BoardAction::StopTakingKnown);
+        }
+        return;
+    }
     let help = "The next touches of the simulated board, whose places and forces are known";
-    let (_, waiting) = ask.session.live.is_gathering();
     if ui
-        .add_enabled(
-            !waiting,
-            egui::Button::new("Calibrate from the simulated board"),
-        )
+        .button("Calibrate from the simulated board")
         .on_hover_text(help)
         .clicked()
     {
