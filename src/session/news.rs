@@ -59,6 +59,11 @@ impl News {
         }
     }
 
+    /// What was told is of something that is not open any more; what went wrong stays until it is read.
+    pub(super) fn leave(&mut self) {
+        self.messages.retain(|message| message.error);
+    }
+
     pub(super) fn happened(&mut self, event: Event) {
         self.events.push(event);
     }

@@ -184,6 +184,7 @@ impl Session {
         }
         let was_live = self.live.is_connected();
         self.replace(opened.document, opened.shape);
+        self.news.leave();
         for said in opened.said {
             self.tell(said);
         }

@@ -135,6 +135,7 @@ fn another_project_takes_the_place_of_all_that_was_known() {
     assert!(said(&s, "was changed while the file was read"));
     let before = s.document.state.clone();
     s.simulate();
+    s.news.tell("The report is in a folder");
     // Even of the very same part: what was measured of it belongs to the session that is gone.
     s.open(Opened::new(limb(), None, before));
     assert!(s.results.simulation.is_none() && !s.busy());
@@ -144,6 +145,9 @@ fn another_project_takes_the_place_of_all_that_was_known() {
     }
     assert!(s.results.simulation.is_none());
     assert!(s.advice().is_none());
+    // So does what was told of it, but not what went wrong.
+    assert!(!said(&s, "The report is in"));
+    assert!(said(&s, "was changed while the file was read"));
     let opened = |e: &Event| matches!(e, Event::Opened { .. });
     assert!(s.news.take_events().iter().any(opened));
 }
