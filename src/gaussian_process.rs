@@ -45,6 +45,20 @@ impl GpKernel {
             0.0
         }
     }
+
+    /// k between all of so many places; a distance (m) is the same both ways, and is looked at once.
+    fn between_all(&self, count: usize, distance: impl Fn(usize, usize) -> f64 + Sync) -> Mat<f64> {
+        let mut values = vec![0.0; count * count];
+        values
+            .par_chunks_exact_mut(count.max(1))
+            .enumerate()
+            .for_each(|(i, row)| {
+                for (j, v) in row[..=i].iter_mut().enumerate() {
+                    *v = self.at(distance(i, j));
+                }
+            });
+        Mat::from_fn(count, count, |i, j| values[i.max(j) * count + i.min(j)])
+    }
 }
 
 /// Symmetric distances between all locations (m), by rows; infinite between separate pieces.
@@ -113,16 +127,7 @@ impl Covariance {
     pub fn new(distances: &Distances, kernel: &GpKernel, watch: Watch) -> Result<Self, Cancelled> {
         report(watch, STAGE, 0, 3)?;
         let n = distances.count();
-        let mut values = vec![0.0; n * n];
-        values
-            .par_chunks_exact_mut(n.max(1))
-            .enumerate()
-            .for_each(|(i, row)| {
-                for (j, v) in row[..=i].iter_mut().enumerate() {
-                    *v = kernel.at(distances.at(i, j));
-                }
-            });
-        let k = Mat::from_fn(n, n, |i, j| values[i.max(j) * n + i.min(j)]);
+        let k = kernel.between_all(n, |i, j| distances.at(i, j));
         report(watch, STAGE, 1, 3)?;
         let noise = kernel.noise.max(0.0);
         // A factor is thirty times cheaper than a spectrum, and there is one if nothing is negative.
@@ -221,12 +226,13 @@ impl<'a> Tried<'a> {
     fn with(&self, kernel: &GpKernel) -> GpTrial {
         /// Every how manyth site is left out at once.
         const FOLDS: usize = 5;
+        let used = &self.used;
+        let k = kernel.between_all(used.len(), |i, j| self.distances.at(used[i], used[j]));
         let (mut wrong, mut all) = (0.0, 0.0);
         for fold in 0..FOLDS {
             let (test, train): (Vec<usize>, Vec<usize>) =
-                (0..self.used.len()).partition(|i| i % FOLDS == fold);
-            let (gram, used) = (&self.gram, &self.used);
-            let (w, a) = prediction_error(gram, self.distances, used, kernel, &train, &test);
+                (0..used.len()).partition(|i| i % FOLDS == fold);
+            let (w, a) = prediction_error(&self.gram, &k, kernel.noise, &train, &test);
             wrong += w;
             all += a;
         }
@@ -283,29 +289,22 @@ pub fn best(trials: &[GpTrial]) -> Option<GpKernel> {
         .map(|t| t.kernel)
 }
 
-/// Squared errors of predicting the test sites from the training sites over all touches, and the squares
-/// of the test signals about the training mean. Only products of signals are needed: with weights W
-/// (test × train) the prediction is μ + W (x - μ), μ the mean over the training sites.
+/// Squared errors of predicting the test sites from the training sites over all touches, by a kernel between them
+/// and its noise, and the squares of the test signals about the training mean. Only products of signals are
+/// needed: with weights W (test × train) the prediction is μ + W (x - μ), μ the mean over the training sites.
 fn prediction_error(
     gram: &Mat<f64>,
-    distances: &Distances,
-    used: &[usize],
-    kernel: &GpKernel,
+    k: &Mat<f64>,
+    noise: f64,
     train: &[usize],
     test: &[usize],
 ) -> (f64, f64) {
     let (n, m) = (train.len(), test.len());
-    let k = |a: usize, b: usize| kernel.at(distances.at(used[a], used[b]));
     // Where the kernel is no covariance the noise may be too little: such a kernel has no error.
     let own = Mat::from_fn(n, n, |i, j| {
-        k(train[i], train[j])
-            + if i == j {
-                kernel.noise.max(ROUNDING)
-            } else {
-                0.0
-            }
+        k[(train[i], train[j])] + if i == j { noise.max(ROUNDING) } else { 0.0 }
     });
-    let cross = Mat::from_fn(n, m, |i, j| k(train[i], test[j]));
+    let cross = Mat::from_fn(n, m, |i, j| k[(train[i], test[j])]);
     let Ok(factor) = own.llt(Side::Lower) else {
         return (f64::NAN, 1.0);
     };
