@@ -2,6 +2,7 @@
 
 mod benching;
 mod counted_line;
+mod held;
 mod host;
 #[cfg(feature = "mcap")]
 mod mcap_log;
@@ -21,6 +22,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 pub use benching::{BY_HAND, BenchOrder, press_at_ports, press_simulated};
+pub use held::Held;
 pub use host::{Doorway, Entrance, Hosted, host};
 #[cfg(feature = "mcap")]
 pub use mcap_log::McapLog;
@@ -90,6 +92,17 @@ impl Address {
     /// A message that says what is wrong with the port, the host or the recording.
     pub fn check(&self) -> Result<(), String> {
         self.open().map(drop)
+    }
+
+    /// As [`Self::check`]; a socket stays open, for [`Listener::holding`] to go on with.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub fn hold(&self) -> Result<Option<Held>, String> {
+        match self {
+            Self::Socket(address) => Held::new(socket::connect(address)?).map(Some),
+            Self::Serial { .. } | Self::Recording { .. } => self.check().map(|()| None),
+        }
     }
 
     /// Whether it has an end.

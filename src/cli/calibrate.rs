@@ -21,7 +21,7 @@ use crate::inference::calibration::judged::{Outlook, misfits, outlook};
 use crate::inference::{Calibration, Known, calibrate};
 use crate::io::points::{AskedPoint, read_points};
 use crate::io::project_file::{self, LoadedProject};
-use crate::link::{Address, BAUD, Listener, Pace, SessionEvent};
+use crate::link::{Address, BAUD, Held, Listener, Pace, SessionEvent};
 use crate::live::Pipeline;
 use crate::mesh::SurfacePoint;
 use crate::uncertainty::{Pressing, Uncertainty};
@@ -94,11 +94,11 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let spared = Spared::of(&loaded).and("the recording itself", recording);
     let spared = spared.and("the points", args.points.as_deref());
     spared.check_result("--table", args.table.as_deref())?;
-    address.check().map_err(anyhow::Error::msg)?;
+    let held = address.hold().map_err(anyhow::Error::msg)?;
     let sensing = sensing_for(&common, &loaded)?;
     let points = on_part(points, &sensing, args.force);
     let off = off_with(&loaded, &sensing, args.machine);
-    let read = read(address, &loaded, &sensing, points)?;
+    let read = read((address, held), &loaded, &sensing, points)?;
     let found = fit((&sensing, &loaded), read, &off, args)?;
     if let Some(path) = &args.table {
         summary::write_table(path, &found.rows)?;
@@ -152,7 +152,7 @@ fn on_part(points: Vec<AskedPoint>, sensing: &Sensing, force: f64) -> Vec<AskedP
 
 /// One press after another, as they are made.
 fn read(
-    address: Address,
+    (address, held): (Address, Option<Held>),
     loaded: &LoadedProject,
     sensing: &Sensing,
     points: Vec<AskedPoint>,
@@ -170,7 +170,8 @@ fn read(
     }
     let mut asked = Asked::new(points, prompts);
     let stop = AtomicBool::new(false);
-    let ended = Listener::new(address, pipeline).run(&stop, &inbox, |event| {
+    let listener = Listener::new(address, pipeline).holding(held);
+    let ended = listener.run(&stop, &inbox, |event| {
         if let SessionEvent::Message(text) | SessionEvent::Trouble(text) = &event {
             out::say(&format!("hapdef: {text}"));
         }

@@ -115,7 +115,7 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     let spared = spared(&loaded, &address);
     spared.check("--csv", args.csv.as_deref())?;
     spared.check("--mcap", args.mcap.as_deref())?;
-    address.check().map_err(anyhow::Error::msg)?;
+    let held = address.hold().map_err(anyhow::Error::msg)?;
     let learned = learned(args, &loaded)?;
     let (commands, inbox) = channel();
     let mut output = Output::new(args, commands.clone(), learned)?;
@@ -124,6 +124,7 @@ pub fn run(args: &ListenArgs) -> anyhow::Result<()> {
     let recorder = recorder.map_err(anyhow::Error::msg)?;
     let pipeline = pipeline(args, &loaded, output.learned.as_ref())?;
     let listener = Listener::new(address, pipeline)
+        .holding(held)
         .at_rate(args.rate)
         .recording(recorder);
 

@@ -1,5 +1,7 @@
 //! What bytes come from and go to.
 
+use std::time::Instant;
+
 /// What one look at a port brought.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Got {
@@ -27,6 +29,10 @@ impl Got {
 pub trait Port: Send {
     /// Waits a few milliseconds at most.
     fn read(&mut self, buffer: &mut [u8]) -> Got;
+    /// When what was read last came.
+    fn came(&self) -> Instant {
+        Instant::now()
+    }
     /// Best effort: a port that takes nothing is found out by reading.
     fn write(&mut self, bytes: &[u8]);
 }

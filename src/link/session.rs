@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver as Inbox;
 use std::time::{Duration, Instant};
 
-use super::{Got, Port, old_note};
+use super::{Got, Held, Port, old_note};
 use crate::live::{Doubt, Input};
 use crate::plain;
 use crate::wire::{Hello, Message};
@@ -41,7 +41,10 @@ impl Listener {
         inbox: &Inbox<Command>,
         mut tell: impl FnMut(SessionEvent),
     ) -> Result<(), String> {
-        let mut port = self.address.open()?;
+        let mut port = match self.held.take().and_then(Held::port) {
+            Some(port) => port,
+            None => self.address.open()?,
+        };
         self.remember_device();
         if self.recorder.is_some() {
             self.begin_recording();
@@ -113,7 +116,8 @@ impl Listener {
                 Got::Nothing => {}
                 Got::Bytes(count) => {
                     let arrived = Instant::now();
-                    let now_us = self.begun.elapsed().as_micros() as u64;
+                    let since = port.came().saturating_duration_since(self.begun);
+                    let now_us = since.as_micros() as u64;
                     self.receiver
                         .push(&buffer[..count], now_us, |input| inputs.push(input));
                     for input in inputs.drain(..) {

@@ -6,12 +6,24 @@ use std::time::Duration;
 
 use super::port::{Got, Port};
 
-struct Socket(TcpStream);
+pub(super) struct Socket(TcpStream);
 
-const WAIT: Duration = Duration::from_millis(5);
+/// How long a read waits.
+pub(super) const WAIT: Duration = Duration::from_millis(5);
 const CONNECT: Duration = Duration::from_millis(800);
 
+impl Socket {
+    pub(super) fn new(stream: TcpStream) -> Self {
+        Self(stream)
+    }
+}
+
 pub(super) fn open(address: &str) -> Result<Box<dyn Port>, String> {
+    Ok(Box::new(Socket(connect(address)?)))
+}
+
+/// A connection that a read waits a moment at.
+pub(super) fn connect(address: &str) -> Result<TcpStream, String> {
     let all = address
         .to_socket_addrs()
         .map_err(|e| format!("{address}: no such host ({e}). Write host:port"))?;
@@ -22,7 +34,7 @@ pub(super) fn open(address: &str) -> Result<Box<dyn Port>, String> {
                 let _ = stream.set_nodelay(true);
                 let _ = stream.set_read_timeout(Some(WAIT));
                 let _ = stream.set_write_timeout(Some(Duration::from_millis(100)));
-                return Ok(Box::new(Socket(stream)));
+                return Ok(stream);
             }
             Err(e) => last = e.to_string(),
         }

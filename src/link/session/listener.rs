@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::timing::Timing;
 use crate::link::counted_line::CountedLine;
-use crate::link::{Address, Port, Recorder, Truths};
+use crate::link::{Address, Held, Port, Recorder, Truths};
 use crate::live::{Doubt, Pipeline, Receiver, Rest, Sample, Traffic, Update};
 use crate::wire::{Hello, Message, encode};
 
@@ -65,6 +65,8 @@ pub enum Command {
 /// One who listens, on whatever thread it is run on.
 pub struct Listener {
     pub(super) address: Address,
+    /// The connection to it, where it is open already.
+    pub(super) held: Option<Held>,
     pub(super) pipeline: Pipeline,
     pub(super) receiver: Receiver,
     pub(super) recorder: Option<Recorder>,
@@ -97,6 +99,7 @@ impl Listener {
     pub fn new(address: Address, pipeline: Pipeline) -> Self {
         Self {
             address,
+            held: None,
             pipeline,
             receiver: Receiver::default(),
             recorder: None,
@@ -122,6 +125,14 @@ impl Listener {
     #[must_use]
     pub fn at_rate(mut self, hertz: Option<u16>) -> Self {
         self.rate = hertz;
+        self
+    }
+
+    /// Goes on with a connection that is open already.
+    #[must_use]
+    pub fn holding(mut self, held: Option<Held>) -> Self {
+        self.begun = held.as_ref().map_or(self.begun, |held| held.since);
+        self.held = held;
         self
     }
 
