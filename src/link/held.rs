@@ -53,7 +53,7 @@ impl Held {
         self.stop.store(true, Ordering::Relaxed);
         let (stream, kept) = self.reading.take()?.join().ok()?;
         Some(Box::new(Kept {
-            kept,
+            chunks: kept,
             read: 0,
             came: None,
             rest: Socket::new(stream),
@@ -91,7 +91,7 @@ fn keep(mut stream: TcpStream, stop: &AtomicBool) -> (TcpStream, VecDeque<Chunk>
 }
 
 struct Kept {
-    kept: VecDeque<Chunk>,
+    chunks: VecDeque<Chunk>,
     /// How many bytes of the first were read.
     read: usize,
     /// When those came that were read last; nothing where all were read that were kept.
@@ -101,7 +101,7 @@ struct Kept {
 
 impl Port for Kept {
     fn read(&mut self, buffer: &mut [u8]) -> Got {
-        let Some(first) = self.kept.front() else {
+        let Some(first) = self.chunks.front() else {
             self.came = None;
             return self.rest.read(buffer);
         };
@@ -111,7 +111,7 @@ impl Port for Kept {
         buffer[..count].copy_from_slice(&left[..count]);
         self.read += count;
         if self.read == first.bytes.len() {
-            self.kept.pop_front();
+            self.chunks.pop_front();
             self.read = 0;
         }
         Got::Bytes(count)
