@@ -15,6 +15,7 @@ pub mod immersed;
 pub mod isotropic;
 pub mod lagrange;
 pub mod orders;
+mod piece;
 pub mod pressed;
 pub mod series;
 pub mod simplex;

@@ -2,11 +2,9 @@
 
 mod graded;
 mod own;
-mod piece;
 mod solved;
 
 pub use self::own::Foreseen;
-pub(super) use self::piece::Piece;
 pub use self::solved::SolidGraded;
 
 use std::collections::BTreeMap;

@@ -8,7 +8,7 @@ use super::cells::FiniteCells;
 use super::cut::Cutting;
 use super::grid::Grid;
 use super::grip::Grip;
-use super::ground::Piece;
+use super::piece::Piece;
 use super::tetrahedra::Tetrahedra;
 use super::{Elements, SolidModel};
 use crate::bounds::Bounds;

@@ -3,7 +3,6 @@
 use glam::DVec3;
 
 use super::SolidGround;
-use super::piece::Piece;
 use super::solved::{SAFETY, SolidGraded, Solved};
 use crate::budget::{Elements, Watch};
 use crate::elasticity::error::ElasticError;
@@ -12,6 +11,7 @@ use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::solid::immersed::Fineness;
 use crate::elasticity::solid::orders::{self, FIRST};
+use crate::elasticity::solid::piece::Piece;
 use crate::elasticity::solid::simplex::{HIGHEST, Simplex};
 use crate::elasticity::solid::tetrahedra::Tetrahedra;
 use crate::memory;
