@@ -88,9 +88,9 @@ fn main() -> anyhow::Result<()> {
     eprintln!("in all: {:.1} processor s", cpu_seconds());
 
     let mut text = head(&loaded, &displaced, &judged, quality);
-    beside::write(&mut text, &judged.evaluation, &matched);
+    beside::write(&mut text, &judged, &matched);
     reduction::write(&mut text, &displaced.feasibility, &measured);
-    displaced::write(&mut text, &judged.evaluation);
+    displaced::write(&mut text, &judged);
     let ours = kernels::ours(&displaced);
     let kernels: Vec<&Chosen> = ours.iter().chain(&theirs).collect();
     kernels::write(&mut text, &kernels, &judged);

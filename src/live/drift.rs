@@ -227,13 +227,15 @@ impl Drift {
             *x -= rest;
         }
         let beyond = match &touches.contacts[..] {
-            [touch] if touch.narrow => (self.misfit).beyond(touch.position, touch.force, &mean),
-            _ => Some((mean, misfit::doubt_of(reading))),
+            [touch] if touch.narrow => {
+                (self.misfit).beyond(touch.position, touch.force, &mean, ways)
+            }
+            _ => Some((mean, misfit::doubt_of(reading), ways())),
         };
-        if let Some((off, doubt)) = beyond {
+        if let Some((off, doubt, ways)) = beyond {
             let noise = noise.iter().zip(&doubt);
             let variance: Vec<f64> = noise.map(|(n, d)| n * n / samples + d).collect();
-            self.correct(&off, &variance, used, &ways());
+            self.correct(&off, &variance, used, &ways);
         }
         self.weigh(noise, used);
         true

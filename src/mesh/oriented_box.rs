@@ -80,6 +80,38 @@ impl OrientedBox {
         })
     }
 
+    /// Its faces where they go through the box around a part, in pieces no larger than `side` (m): the middle of each, the
+    /// direction out of the box, and its area (m²).
+    #[must_use]
+    pub fn pieces_across(&self, part: &TriMesh, side: f64) -> Vec<(DVec3, DVec3, f64)> {
+        const MOST: f64 = 512.0;
+        let around = Self::around(part, self.stance);
+        let (lower, upper) = (self.lower.max(around.lower), self.upper.min(around.upper));
+        let pieces = ((upper - lower) / side)
+            .ceil()
+            .clamp(DVec3::ZERO, DVec3::splat(MOST));
+        let step = (upper - lower) / pieces.max(DVec3::ONE);
+        let mut found = Vec::new();
+        for axis in 0..3 {
+            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+            for (level, outward) in [(self.lower[axis], -1.0), (self.upper[axis], 1.0)] {
+                if level <= around.lower[axis] || level >= around.upper[axis] {
+                    continue;
+                }
+                let normal = self.stance.place(DVec3::AXES[axis] * outward);
+                for i in 0..pieces[a] as u32 {
+                    for j in 0..pieces[b] as u32 {
+                        let mut at = DVec3::splat(level);
+                        at[a] = lower[a] + (f64::from(i) + 0.5) * step[a];
+                        at[b] = lower[b] + (f64::from(j) + 0.5) * step[b];
+                        found.push((self.stance.place(at), normal, step[a] * step[b]));
+                    }
+                }
+            }
+        }
+        found
+    }
+
     /// The mirror image of a point (m), through the middle of the box across one of its directions.
     #[must_use]
     pub fn mirrored(&self, p: DVec3, across: Direction) -> DVec3 {

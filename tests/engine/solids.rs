@@ -241,6 +241,7 @@ fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
     // A block pressed beside its foot, and a flange pressed above the boss that it is held by: cells stand as the box does.
     type Place = fn(DVec3) -> DVec3;
     type Part<'a> = &'a dyn Fn(Place) -> Arc<TriMesh>;
+    let upright: Place = |p| p;
     let turn: Place = |p| DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 0.5).normalize(), 0.8) * p;
     let flange = |place: Place| {
         let bricks = Bricks {
@@ -274,15 +275,32 @@ fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
         ),
     ];
     for (name, part, top, at, normal, size) in cases {
-        let [upright, oblique] = [(|p| p) as Place, turn].map(|turn| {
+        let ways = [(upright, false), (turn, false), (turn, true)];
+        let [upright, oblique, across] = ways.map(|(turn, with_another)| {
             let part = part(turn);
-            let foot = Support {
-                region: Region::Box(OrientedBox {
-                    stance: Stance::about(turn(DVec3::Z)),
-                    lower: DVec3::NEG_ONE,
-                    upper: DVec3::new(1.0, 1.0, top),
-                }),
+            let stance = Stance::about(turn(DVec3::Z));
+            let region = |lower, upper| {
+                Region::Box(OrientedBox {
+                    stance,
+                    lower,
+                    upper,
+                })
+            };
+            let held = |region| Support {
+                region,
                 held: DofSet::ALL,
+            };
+            let foot = held(region(DVec3::NEG_ONE, DVec3::new(1.0, 1.0, top)));
+            // Another box lies along the file's axes within what the foot holds: cells stand as that one does.
+            let middle = turn(DVec3::new(at.y, at.y, 0.0));
+            let another = held(Region::Box(OrientedBox::of_file(
+                middle - 1e-3,
+                middle + 1e-3,
+            )));
+            let supports = if with_another {
+                vec![another, foot]
+            } else {
+                vec![foot]
             };
             let touch = Touch {
                 position: turn(at),
@@ -290,16 +308,21 @@ fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
                 force: 1.0,
                 tip_radius: 3e-3,
             };
-            let m = model(&part, RESIN, &[foot], &Fineness::of(size, 0.01));
+            let m = model(&part, RESIN, &supports, &Fineness::of(size, 0.01));
             let load = m.load(&touch);
             let u = m.system().solve_dofs(&load);
             let check = m.check_all(&[touch], &[u]);
             assert!(check.reaction_error < 1e-6, "{name}: {check:?}");
             under(&m, &touch)
         });
-        let more = oblique / upright - 1.0;
-        println!("{name}: {:.2} % more", 100.0 * more);
-        assert!(more.abs() < 2e-3, "{name}: {upright} {oblique}");
+        let [turned, across] = [oblique, across].map(|moved| moved / upright - 1.0);
+        println!(
+            "{name}: {:.2} % more, across the cells {:.2} %",
+            100.0 * turned,
+            100.0 * across
+        );
+        assert!(turned.abs() < 2e-3, "{name}: {upright} {oblique}");
+        assert!(across.abs() < 5e-2, "{name}: {upright} {across}");
     }
 }
 

@@ -149,6 +149,19 @@ impl Grip {
         self.hold_point(elements, point, normal, held, stiffness);
     }
 
+    /// Holds a piece of a face, so large (m²) that a point stands for it. `size` (m) is that of an element.
+    pub fn hold_piece(
+        &mut self,
+        elements: &dyn Elements,
+        (point, normal, area): (DVec3, DVec3, f64),
+        held: DofSet,
+        material: &Material,
+        size: f64,
+    ) {
+        let stiffness = STIFF * material.youngs_modulus / size * area;
+        self.hold_point(elements, point, normal, held, stiffness);
+    }
+
     /// `stiffness` in N/m; `normal` out of the surface there.
     fn hold_point(
         &mut self,

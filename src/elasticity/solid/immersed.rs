@@ -19,6 +19,7 @@ use crate::elasticity::{DofSet, Material, Support};
 use crate::mesh::TriMesh;
 use crate::mesh::cut::ON_PLANE;
 use crate::mesh::inside::SignedDistance;
+use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::stance::Stance;
 use crate::mesh::volume::VolumeMesh;
 
@@ -301,8 +302,21 @@ impl Immersed {
                 continue;
             }
             self.spring(&mut grip, cells, number, held, size);
+            if let (Region::Box(region), DofSet::DISPLACEMENTS) = (&support.region, held) {
+                self.spring_across(&mut grip, cells, region, size);
+            }
         }
         grip
+    }
+
+    /// Holds the part where the faces of a box go through it, however the cells stand: with the surface in the box they
+    /// are the border of all that it holds.
+    fn spring_across(&self, grip: &mut Grip, on: &FiniteCells, held: &OrientedBox, size: f64) {
+        let held_displacements = DofSet::DISPLACEMENTS;
+        let pieces = held.pieces_across(&self.held.mesh, size / PIECES_OF_CELL);
+        for piece in pieces.into_iter().filter(|p| self.surface.inside(p.0)) {
+            grip.hold_piece(on, piece, held_displacements, &self.material, size);
+        }
     }
 }
 
@@ -311,8 +325,11 @@ fn displacements(support: &Support) -> DofSet {
     DofSet(support.held.0 & DofSet::DISPLACEMENTS.0)
 }
 
+/// Where a box stands otherwise than the cells, its faces are held at so many points a side of a cell.
+const PIECES_OF_CELL: f64 = 4.0;
+
 /// The box (m) of a support where planes of a grid that stands so can lie along its faces. One that stands otherwise holds
-/// the surface in it by springs, as what is painted does: cells that it goes through would hold a staircase.
+/// the surface in it, and where its faces go through the part, by springs: cells that it goes through would hold a staircase.
 fn along_planes(support: &Support, stance: Stance) -> Option<(DVec3, DVec3)> {
     match &support.region {
         Region::Box(held) => held.along(stance),

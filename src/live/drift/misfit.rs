@@ -14,30 +14,50 @@ const BLOCKS: f64 = 50.0;
 /// What was left when the touch came to where it is.
 #[derive(Default)]
 pub(super) struct Misfit {
-    found: Option<(DVec3, f64, Vec<f64>)>,
+    found: Option<Found>,
 }
 
+/// A touch as it came to where it is.
+struct Found {
+    place: DVec3,
+    force: f64,
+    left: Vec<f64>,
+    ways: Vec<Vec<f64>>,
+}
+
+/// What has come to what a touch leaves (strain), how far that is in doubt (strain², a channel), and the ways in which the
+/// touch may be another one (strain).
+type Beyond = (Vec<f64>, Vec<f64>, Vec<Vec<f64>>);
+
 impl Misfit {
-    /// What has come to what is left of a touch (m, N, strain) since it came to where it is, and how far that is in doubt
-    /// (strain², a channel); nothing while it comes.
+    /// What has come to what is left of a touch (m, N, strain) since it came to where it is; nothing while it comes.
+    ///
+    /// The ways in which it may be another one are those of when it came: taken anew as its estimate wanders, they would
+    /// together leave no direction free, and the filter would be sure of what nobody has seen (first-estimate Jacobians:
+    /// G. P. Huang, A. I. Mourikis and S. I. Roumeliotis, Int. J. Robotics Research 29, 2010).
     pub fn beyond(
         &mut self,
         place: DVec3,
         force: f64,
         left: &[f64],
-    ) -> Option<(Vec<f64>, Vec<f64>)> {
-        let stays = |(at, of, _): &&(DVec3, f64, Vec<f64>)| {
-            at.distance(place) < STAYS && force < HARDER * of
-        };
-        let Some((_, of, was)) = self.found.as_ref().filter(stays) else {
-            self.found = Some((place, force, left.to_vec()));
+        ways: impl FnOnce() -> Vec<Vec<f64>>,
+    ) -> Option<Beyond> {
+        let stays = |f: &&Found| f.place.distance(place) < STAYS && force < HARDER * f.force;
+        let Some(found) = self.found.as_ref().filter(stays) else {
+            self.found = Some(Found {
+                place,
+                force,
+                left: left.to_vec(),
+                ways: ways(),
+            });
             return None;
         };
-        let share = force / of;
-        let beyond = left.iter().zip(was).map(|(x, w)| x - share * w);
+        let share = force / found.force;
+        let was = || found.left.iter().map(|w| share * w);
         Some((
-            beyond.collect(),
-            was.iter().map(|w| doubt(share * w)).collect(),
+            left.iter().zip(was()).map(|(x, w)| x - w).collect(),
+            was().map(doubt).collect(),
+            found.ways.clone(),
         ))
     }
 
