@@ -98,6 +98,24 @@ impl Distances {
         self.values[i * self.count + j]
     }
 
+    /// Between which lengths (m) of a kernel distances say anything: far below the nearest two locations, and far above
+    /// those farthest apart, all lengths are the same.
+    #[must_use]
+    pub fn meaningful(&self) -> [f64; 2] {
+        const BELOW: f64 = 0.2;
+        const ABOVE: f64 = 20.0;
+        let apart = || {
+            self.values
+                .iter()
+                .copied()
+                .filter(|d| *d > 0.0 && d.is_finite())
+        };
+        [
+            BELOW * apart().fold(f64::INFINITY, f64::min),
+            ABOVE * apart().fold(0.0, f64::max),
+        ]
+    }
+
     /// Locations nearer than `within` (m) to one of lower number.
     #[must_use]
     pub fn coinciding(&self, within: f64) -> usize {
@@ -195,7 +213,7 @@ pub struct GpTrial {
     pub error: f64,
 }
 
-/// Parameters that the search looks at.
+/// Lengths that the search looks at first; while the best is at an end of them it goes on there.
 pub const LENGTHS_M: [f64; 9] = [0.004, 0.007, 0.012, 0.018, 0.025, 0.033, 0.045, 0.065, 0.1];
 /// Powers that the search tries.
 pub const POWERS: [f64; 6] = [0.8, 1.0, 1.3, 1.6, 1.9, 2.0];
@@ -221,6 +239,24 @@ impl<'a> Tried<'a> {
             used,
             gram,
         }
+    }
+
+    /// All powers at these lengths (m).
+    fn all(&self, lengths: &[f64], noise: f64, watch: Watch) -> Result<Vec<GpTrial>, Cancelled> {
+        let of = |&length_m: &f64| {
+            POWERS.map(|power| GpKernel {
+                length_m,
+                power,
+                noise,
+            })
+        };
+        let grid: Vec<GpKernel> = lengths.iter().flat_map(of).collect();
+        grid.par_iter()
+            .map(|kernel| {
+                report(watch, "Fitting the Gaussian process", 0, 1)?;
+                Ok(self.with(kernel))
+            })
+            .collect()
     }
 
     fn with(&self, kernel: &GpKernel) -> GpTrial {
@@ -250,7 +286,8 @@ pub fn trial(x: &SignalMatrix, distances: &Distances, kernel: &GpKernel) -> GpTr
     Tried::new(x, distances).with(kernel)
 }
 
-/// Cross-validated grid search. Returns the map, by rising length and power.
+/// Cross-validated grid search. Returns the map, by rising length and power. Where the best length is the first or the
+/// last of [`LENGTHS_M`], which are those of a limb, it goes on beyond it, as far as distances say anything.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
@@ -260,23 +297,44 @@ pub fn search(
     noise: f64,
     watch: Watch,
 ) -> Result<Vec<GpTrial>, Cancelled> {
+    /// Lengths tried at once, each longer or shorter than the one before by this ratio.
+    const MORE: i32 = 3;
+    const RATIO: f64 = 1.5;
     let tried = Tried::new(x, distances);
-    let grid: Vec<GpKernel> = LENGTHS_M
-        .iter()
-        .flat_map(|&length_m| {
-            POWERS.map(|power| GpKernel {
-                length_m,
-                power,
-                noise,
-            })
-        })
-        .collect();
-    grid.par_iter()
-        .map(|kernel| {
-            report(watch, "Fitting the Gaussian process", 0, 1)?;
-            Ok(tried.with(kernel))
-        })
-        .collect()
+    let mut map = tried.all(&LENGTHS_M, noise, watch)?;
+    let [least, most] = distances.meaningful();
+    while let (Some(best), Some(first), Some(last)) = (best(&map), map.first(), map.last()) {
+        let [first, last] = [first, last].map(|t| t.kernel.length_m);
+        let beyond = |end: f64, sign: i32| (1..=MORE).map(move |k| end * RATIO.powi(sign * k));
+        if best.length_m == first && first > least {
+            let mut shorter: Vec<f64> = beyond(first, -1).collect();
+            shorter.reverse();
+            map.splice(0..0, tried.all(&shorter, noise, watch)?);
+        } else if best.length_m == last && last < most {
+            let longer: Vec<f64> = beyond(last, 1).collect();
+            map.extend(tried.all(&longer, noise, watch)?);
+        } else {
+            break;
+        }
+    }
+    Ok(map)
+}
+
+/// A word where the best length is an end of what was tried: it says no more than that it is shorter, or longer.
+#[must_use]
+pub fn edge_note(map: &[GpTrial]) -> Option<String> {
+    let (best, first, last) = (best(map)?, map.first()?, map.last()?);
+    let how = if best.length_m == first.kernel.length_m {
+        "short: sites say next to nothing of each other"
+    } else if best.length_m == last.kernel.length_m {
+        "long: all sites say nearly the same"
+    } else {
+        return None;
+    };
+    Some(format!(
+        "The kernel's length is at the end of what was tried ({} mm), so {how}. Check the unit of the sites.",
+        crate::plain::digits(best.length_m * 1e3)
+    ))
 }
 
 /// The kernel with the smallest error.
@@ -407,6 +465,16 @@ mod tests {
                 .error
         };
         assert!(error(0.004) > 1.5 * error(found.length_m));
+        // A field that is a hundred times as small is found as well, with the same error.
+        let small = search(&x, &line(n, 4e-5), 1e-6, &unwatched).unwrap();
+        let smaller = best(&small).unwrap();
+        let ratio = found.length_m / smaller.length_m;
+        assert!(
+            (60.0..160.0).contains(&ratio) && smaller.power >= 1.9,
+            "{smaller:?}"
+        );
+        assert!(small.is_sorted_by(|a, b| a.kernel.length_m <= b.kernel.length_m));
+        assert_eq!((edge_note(&map), edge_note(&small)), (None, None));
         // One kernel alone is tried as in the grid.
         let alone = |kernel: &GpKernel| trial(&x, &line(n, 0.004), kernel);
         assert_eq!(alone(&map[3].kernel), map[3]);

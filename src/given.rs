@@ -16,7 +16,7 @@ use crate::elasticity::{Model, Touch};
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain;
 
-pub use sift::{GivenSite, LeftOut, Sifted, Table, check_reach, sift};
+pub use sift::{GivenSite, LeftOut, Sifted, Table, sift};
 
 /// What the model answers.
 pub struct Answer {
@@ -115,6 +115,11 @@ pub fn answer_sifted(
         linearity.as_ref(),
         &inputs.project,
         budget,
+    ));
+    notes.extend(design::large_motion(
+        &inputs.part,
+        &estimate,
+        linearity.as_ref(),
     ));
     let tips = || touches.iter().map(|t| t.tip_radius);
     let smallest = tips().fold(f64::INFINITY, f64::min);

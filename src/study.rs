@@ -155,22 +155,29 @@ pub fn places(svr: &GreedySvr, targets: &[[f64; 3]]) -> usize {
     number_of(&svr.grouping.of(targets))
 }
 
-/// A word on touches that repeat places, where some do.
+/// Words on touches that repeat places, where some do.
 #[must_use]
-pub fn place_note(svr: &GreedySvr, targets: &[[f64; 3]]) -> Option<String> {
-    repeat_note(places(svr, targets), targets.len(), None).or_else(|| clump_note(svr, targets))
+pub fn place_notes(svr: &GreedySvr, targets: &[[f64; 3]]) -> Vec<String> {
+    let repeat = repeat_note(places(svr, targets), targets.len(), None);
+    repeat.into_iter().chain(clump_note(svr, targets)).collect()
 }
 
-/// A word on touches that seem to repeat places less exactly than a machine does, and are divided all the same.
+/// A word on touches that repeat places less exactly than a machine does.
 fn clump_note(svr: &GreedySvr, targets: &[[f64; 3]]) -> Option<String> {
     if svr.grouping != Grouping::Place {
         return None;
     }
+    clump_words(targets).map(|words| format!("{words} (--place-mm sets another distance)."))
+}
+
+/// What touches that lie in clumps are taken for, without the stop at its end.
+#[must_use]
+pub fn clump_words(targets: &[[f64; 3]]) -> Option<String> {
     let clumps = clumps(targets)?;
-    let mm = plain::digits(clumps.apart_mm);
     Some(format!(
-        "The touches lie in {} clumps, far apart for their size. If each is one place that was pressed again and again, say so with --place-mm {mm}: otherwise a model is judged at places that it has learned from, and the errors are too small.",
-        clumps.count
+        "The touches lie in {} clumps, far apart for their size: those within {} mm are taken for one place that was pressed again and again",
+        clumps.count,
+        plain::digits(clumps.apart_mm)
     ))
 }
 

@@ -13,9 +13,10 @@ use clap::Args;
 use super::common::Common;
 use super::listen::sensing_for;
 use super::ranges::between;
+use super::simulate::in_file;
 use super::spared::Spared;
 use super::{listen, out};
-use crate::design::Sensing;
+use crate::design::{Sensing, check_on_part};
 use crate::elasticity::Touch;
 use crate::inference::calibration::judged::{Outlook, misfits, outlook};
 use crate::inference::{Calibration, Known, calibrate};
@@ -94,6 +95,9 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let spared = Spared::of(&loaded).and("the recording itself", recording);
     let spared = spared.and("the points", args.points.as_deref());
     spared.check_result("--table", args.table.as_deref())?;
+    if let Some(path) = &args.points {
+        check_points(path, &points, &loaded)?;
+    }
     let held = address.hold().map_err(anyhow::Error::msg)?;
     let sensing = sensing_for(&common, &loaded)?;
     let points = on_part(points, &sensing, args.force);
@@ -134,6 +138,12 @@ fn off_with(loaded: &LoadedProject, sensing: &Sensing, machine: bool) -> Uncerta
     off
 }
 
+/// Refuses points of a file that are on no surface of the part.
+fn check_points(path: &Path, points: &[AskedPoint], of: &LoadedProject) -> anyhow::Result<()> {
+    let places = points.iter().map(|p| p.position);
+    check_on_part(&of.inputs.part, "point", places).map_err(|error| in_file(error, path, path))
+}
+
 /// The points on the part's surface, with a force each; those that are proposed where none are given.
 fn on_part(points: Vec<AskedPoint>, sensing: &Sensing, force: f64) -> Vec<AskedPoint> {
     let map = &sensing.drawn.map;
@@ -167,6 +177,7 @@ fn read(
     let prompts = !matches!(address, Address::Recording { .. });
     if prompts {
         listen::obey_stdin(commands);
+        out::say("hapdef: waiting for the board; leave the limb alone until its rest is taken");
     }
     let mut asked = Asked::new(points, prompts);
     let stop = AtomicBool::new(false);

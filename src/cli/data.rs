@@ -34,11 +34,19 @@ impl DataArgs {
     /// # Errors
     /// As [`dataset_file::read`].
     pub fn load(&self) -> anyhow::Result<(Data, Vec<String>)> {
-        let GivenData { data, notes } = dataset_file::read(&self.data, self.touches.as_deref())?;
-        for note in &notes {
-            super::out::say(&format!("note: {note}"));
-        }
-        Ok((data, notes))
+        Ok(said(dataset_file::read(
+            &self.data,
+            self.touches.as_deref(),
+        )?))
+    }
+
+    /// Reads it to be answered: the touches may all be at one place.
+    ///
+    /// # Errors
+    /// As [`dataset_file::read_to_answer`].
+    pub fn load_to_answer(&self) -> anyhow::Result<(Data, Vec<String>)> {
+        let touches = self.touches.as_deref();
+        Ok(said(dataset_file::read_to_answer(&self.data, touches)?))
     }
 
     /// What came of the data: an error with their file before it.
@@ -51,6 +59,14 @@ impl DataArgs {
     {
         result.with_context(|| plain::path(&self.data))
     }
+}
+
+/// The data and its notes, which are said.
+fn said(given: GivenData) -> (Data, Vec<String>) {
+    for note in &given.notes {
+        super::out::say(&format!("note: {note}"));
+    }
+    (given.data, given.notes)
 }
 
 /// What is never divided between learning and judging, as `--groups` says.
@@ -211,13 +227,22 @@ impl CriterionArgs {
                 LARGEST_C * spread
             )));
         }
+        let tolerance = mm(self.tolerance, USUAL_TOLERANCE_MM * size);
+        let rounding = hyper.c * targets.len() as f64 * f64::EPSILON;
+        if tolerance < rounding {
+            return Err(misuse(&format!(
+                "--tolerance is {tolerance:e} mm, and sums of {} touches with --c {} mm are rounded to {rounding:.1e} mm: fits would not end. Raise --tolerance, or lower --c",
+                targets.len(),
+                hyper.c
+            )));
+        }
         Ok(GreedySvr {
             hyper,
             folds: self.folds.unwrap_or(USUAL_FOLDS),
             seed: self.seed,
             grouping: self.grouping()?,
             effort: Effort {
-                tolerance: mm(self.tolerance, USUAL_TOLERANCE_MM * size),
+                tolerance,
                 max_steps: self.max_steps.unwrap_or(USUAL_STEPS),
             },
             tolerance: TOLERANCE,

@@ -12,6 +12,7 @@ use super::out;
 use super::ranges::between;
 use super::spared::Spared;
 use crate::budget::unwatched;
+use crate::design::{Nearness, check_chosen};
 use crate::elasticity::Touch;
 use crate::io::handover::{Scene, link};
 use crate::io::project_file::LoadedProject;
@@ -68,6 +69,7 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<()> {
     );
     let loaded = args.common.load()?;
     loaded.inputs.project.check()?;
+    check_chosen(&loaded.inputs)?;
     for (option, path) in [("--gltf", &args.gltf), ("--urdf", &args.urdf)] {
         if let Some(path) = path {
             Spared::of(&loaded).check(option, Some(path))?;
@@ -158,18 +160,19 @@ fn pressed(
 ) -> anyhow::Result<(TriMesh, Vec<DVec3>, Touch)> {
     /// What a place may be off the limb (m).
     const BESIDE: f64 = 5e-3;
+    let off = Nearness::of(&loaded.inputs.part).distance(place);
+    ensure!(
+        off <= BESIDE,
+        "the place of --touch is {} off the limb",
+        plain::mm(off * 1e3)
+    );
     let sensing = sensing_for(&args.common, loaded)
         .context("what a touch does is computed with the gauges of a project")?;
     let model = args
         .common
         .in_pool(|| Ok(sensing.model(&loaded.inputs, &unwatched)?))?;
     let mesh = model.mesh();
-    let (at, off) = mesh.index().nearest(place);
-    ensure!(
-        off <= BESIDE,
-        "the place is {} off the limb",
-        plain::mm(off)
-    );
+    let (at, _) = mesh.index().nearest(place);
     let touch = Touch {
         position: mesh.point(at),
         normal: mesh.normal(at),

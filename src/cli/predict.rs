@@ -37,7 +37,7 @@ pub fn run(args: &PredictArgs) -> anyhow::Result<()> {
         .and("the estimator", Some(&args.model))
         .check_result("--out", args.out.as_deref())?;
     let file = touch_file::read(&args.model)?;
-    let (data, mut notes) = args.data.load()?;
+    let (data, mut notes) = args.data.load_to_answer()?;
     let fits = file.check_channels(data.x.rows());
     args.data.named(fits.map_err(anyhow::Error::msg))?;
     if file.header.origin.fingerprint == touch_file::fingerprint(&data) {

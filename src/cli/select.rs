@@ -148,9 +148,9 @@ pub fn run(args: &SelectArgs) -> anyhow::Result<()> {
     // A choice by expected error divides no touches.
     let divided = settings.kind != SelectorKind::ExpectedError;
     let said: Vec<String> = divided
-        .then(|| study::place_note(&settings.svr, &data.targets))
-        .flatten()
+        .then(|| study::place_notes(&settings.svr, &data.targets))
         .into_iter()
+        .flatten()
         .chain(divided.then(|| args.criterion.paper_note()).flatten())
         .chain(choice.selection.achieved.words().cloned())
         .collect();

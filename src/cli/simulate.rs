@@ -195,9 +195,7 @@ pub(super) fn in_file(error: DesignError, touches: &Path, sites: &Path) -> anyho
         }
         _ => return error.into(),
     };
-    let place = points::line(path, number);
-    let place = place.map_or_else(String::new, |line| format!(", line {line}"));
-    anyhow::Error::new(error).context(format!("{}{place}", path.display()))
+    anyhow::Error::new(error).context(points::place(path, number))
 }
 
 fn say(notes: &[String]) {

@@ -22,7 +22,7 @@ use crate::learning::score::ForceRow;
 use crate::learning::{Asked, ByModel, Family, Lessons, Method, Scores};
 use crate::plain;
 use crate::regression::Grouping;
-use crate::study::Data;
+use crate::study::{self, Data};
 use crate::uncertainty::Pressing;
 
 /// What turns readings into places.
@@ -116,6 +116,13 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
         .check_result("--out", Some(&args.out))?;
     let (data, mut notes) = args.data.load()?;
     let groups = args.groups(&data)?;
+    if args.groups.is_none() {
+        let words = study::clump_words(&data.targets);
+        let note = words.map(|words| format!("{words} (--groups says otherwise)."));
+        note.iter()
+            .for_each(|note| out::say(&format!("note: {note}")));
+        notes.extend(note);
+    }
     if let Some(old) = &args.update {
         let asked = train_update::Asked {
             old,

@@ -102,6 +102,27 @@ pub fn short_of_memory(is_short: bool) -> Option<String> {
     })
 }
 
+/// What has to be known of a solid that touches move by so much of its size that small deformations are none; of a shell
+/// its linearity says so.
+#[must_use]
+pub fn large_motion(
+    part: &TriMesh,
+    estimate: &Discretization,
+    linearity: Option<&Linearity>,
+) -> Option<String> {
+    /// Of the part's size.
+    const LARGE: f64 = 0.1;
+    let moved_mm = 100.0 * estimate.displacement_mm / estimate.displacement_percent;
+    let share = moved_mm / size_mm(part);
+    (linearity.is_none() && share > LARGE).then(|| {
+        format!(
+            "Touches move the part by about {}, {:.0} % of its size: the model is of small deformations, and says nothing there. Check the force, the material, the unit of the mesh and what is held.",
+            plain::mm(moved_mm),
+            100.0 * share
+        )
+    })
+}
+
 /// What has to be known of a tip (its radius, m) that is larger than the part: nobody means that, but it can be computed.
 #[must_use]
 pub fn wide_tip(part: &TriMesh, tip_radius: f64) -> Option<String> {
@@ -278,7 +299,12 @@ impl Ground {
                     aim.vertices = aim.vertices.min(aim.most_vertices);
                     is_short = true;
                 }
-                built => return built.map(|built| Built { is_short, ..built }),
+                built => {
+                    return built.map(|built| Built {
+                        is_short: is_short || built.is_short,
+                        ..built
+                    });
+                }
             }
         }
     }
@@ -320,7 +346,7 @@ impl Ground {
                     model: Box::new(graded.model),
                     estimate: graded.estimate,
                     linearity: None,
-                    is_short: false,
+                    is_short: graded.is_short,
                     balance: graded.balance,
                     models: graded.models,
                     solves: graded.solves,

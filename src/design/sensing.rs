@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::as_built::{as_built, workshop_draw};
 use super::drawn::{drawn_on, map_size, proposed};
 use super::layout::{lay_out_sites, lay_out_touches, test_touches, touches_on};
+use super::nearness::check_on_part;
 use super::{Built, DesignError, Ground, Inputs, Meshed, ground};
 use crate::budget::{Budget, MAP_TRIANGLES, Watch};
 use crate::dataset::{SignalMatrix, Site};
@@ -99,6 +100,7 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
     if project.selection.sites.is_empty() {
         return Err(DesignError::NoGauges);
     }
+    check_chosen(inputs)?;
     let (ground, graded) = laid(inputs, budget, watch)?;
     let gauges = chosen_gauges(project, &*graded.model);
     let sensitivity = Sensitivity::new(&*graded.model, &gauges, watch)?;
@@ -123,6 +125,16 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
         budget: *budget,
         meshed: OnceLock::from(graded.meshed),
     })
+}
+
+/// Refuses chosen gauges ([[selection.site]]) that lie on no surface of the part.
+///
+/// # Errors
+/// [`DesignError::OffThePart`] for the first that does.
+pub fn check_chosen(inputs: &Inputs) -> Result<(), DesignError> {
+    let places = inputs.project.selection.sites.iter();
+    let places = places.map(|site| DVec3::from_array(site.position_mm) * 1e-3);
+    check_on_part(&inputs.part, "gauge of [[selection.site]]", places)
 }
 
 /// The elements that a design of this project and budget has, with the model on them.

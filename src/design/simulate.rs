@@ -5,8 +5,9 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::ground::{Built, Ground, ground, open_solid, short_of_memory, wide_tip};
-use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches, size_mm};
+use super::ground::{Built, Ground, ground, large_motion, open_solid, short_of_memory, wide_tip};
+use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches};
+use super::nearness::{Nearness, check_reach};
 use super::{DesignError, Inputs, Meshed, SLOPE_TOUCHES};
 use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Work};
 use crate::dataset::{self, Dataset, Surveyed};
@@ -168,38 +169,16 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
     Ok(simulated)
 }
 
-/// How far (mm) each required gauge was placed from the part. Of what is far out the box around the part is asked: its
-/// squares are no numbers any more.
-fn required_distances(inputs: &Inputs) -> Vec<f64> {
-    let part = &inputs.part;
-    let (lower, upper) = part.bounds();
-    let distance = |at: &[f64; 3]| {
-        let at = DVec3::from_array(*at) * 1e-3;
-        let of_box = at.distance(at.clamp(lower, upper));
-        if of_box > (upper - lower).length() {
-            return of_box * 1e3;
-        }
-        let nearest = part.index().nearest(at).0;
-        part.point(nearest).distance(at) * 1e3
-    };
-    (inputs.project.selection.required_mm.iter())
-        .map(distance)
-        .collect()
-}
-
 /// Refuses gauges that are required farther from the part than it is large.
 fn check_required(inputs: &Inputs) -> Result<(), DesignError> {
-    let size_mm = size_mm(&inputs.part);
-    let distances = required_distances(inputs).into_iter().enumerate();
-    let mut far = distances.filter(|&(_, distance_mm)| distance_mm > size_mm);
-    far.next().map_or(Ok(()), |(number, distance_mm)| {
-        Err(DesignError::OffThePart {
-            what: "place of selection.required_mm",
-            number,
-            distance_mm,
-            size_mm,
-        })
-    })
+    let what = "place of selection.required_mm";
+    check_reach(&inputs.part, what, required(inputs))
+}
+
+/// Where gauges are required (m).
+fn required(inputs: &Inputs) -> impl Iterator<Item = DVec3> {
+    let places = inputs.project.selection.required_mm.iter();
+    places.map(|place| DVec3::from_array(*place) * 1e-3)
 }
 
 /// What has to be known of required gauges that are nowhere near the part.
@@ -207,7 +186,9 @@ fn required_off(inputs: &Inputs) -> Option<String> {
     /// In spacings of the sites.
     const OFF: f64 = 3.0;
     let most = OFF * inputs.project.sites.spacing_mm;
-    let off: Vec<String> = (required_distances(inputs).into_iter().enumerate())
+    let near = Nearness::of(&inputs.part);
+    let distances = required(inputs).map(|place| near.distance(place) * 1e3);
+    let off: Vec<String> = (distances.enumerate())
         .filter(|&(_, distance)| distance > most)
         .map(|(number, distance)| format!("place {number} by {} mm", digits(distance)))
         .collect();
@@ -304,6 +285,7 @@ fn read(
     let mut cautious = checks.distrust();
     cautious.extend(cautions(&estimate, linearity.as_ref(), project, budget));
     cautious.extend(meshed.cautions(project.tip().1));
+    cautious.extend(large_motion(&inputs.part, &estimate, linearity.as_ref()));
     cautious.extend(wide_tip(&inputs.part, project.tip().1));
     cautious.extend(open_solid(inputs));
     cautious.extend(required_off(inputs));

@@ -2,13 +2,10 @@
 
 use glam::DVec3;
 
-use crate::design::DesignError;
+use crate::design::{DesignError, Nearness, OFF};
 use crate::elasticity::Touch;
-use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
 
-/// What lies farther from the part than this share of its size is on no surface of it.
-const OFF: f64 = 0.05;
 /// A direction that points further out of the surface (degrees) is no direction along it.
 const STEEPEST: f64 = 30.0;
 
@@ -73,20 +70,20 @@ pub struct Sifted {
 /// its surface.
 #[must_use]
 pub fn sift(part: &TriMesh, touches: &[Touch], sites: &[GivenSite]) -> Sifted {
-    let reach = Reach::of(part);
+    let near = Nearness::of(part);
     let touch_distances: Vec<f64> = (touches.iter())
-        .map(|t| reach.distance(t.position))
+        .map(|t| near.distance(t.position))
         .collect();
-    let site_distances: Vec<f64> = (sites.iter()).map(|s| reach.distance(s.position)).collect();
+    let site_distances: Vec<f64> = (sites.iter()).map(|s| near.distance(s.position)).collect();
     let site_angles: Vec<f64> = (sites.iter().zip(&site_distances))
         .map(|(site, &distance)| {
             // Of what lies far away there is no surface beside it.
-            let near = distance <= OFF * reach.size;
-            if near { angle_out(part, site) } else { 0.0 }
+            let beside = distance <= OFF * near.size;
+            if beside { angle_out(part, site) } else { 0.0 }
         })
         .collect();
     let far = |table: Table, row: usize, distance: f64| {
-        (distance > OFF * reach.size).then(|| reach.off(table.row(), row, distance))
+        (distance > OFF * near.size).then(|| near.off(table.row(), row, distance))
     };
     let across = |row: usize| {
         let angle_deg = site_angles[row];
@@ -194,70 +191,6 @@ fn facets_at(part: &TriMesh, at: SurfacePoint) -> Vec<u32> {
         on.iter().all(|v| corners.contains(v))
     };
     around.filter(shares).collect()
-}
-
-/// Whether points can be meant for a part: none lies farther from it than it is large.
-///
-/// # Errors
-/// [`DesignError::OffThePart`] for the first that does; `what` it is.
-pub fn check_reach(
-    part: &TriMesh,
-    what: &'static str,
-    points: impl Iterator<Item = DVec3>,
-) -> Result<(), DesignError> {
-    let reach = Reach::of(part);
-    for (number, point) in points.enumerate() {
-        let distance = reach.distance(point);
-        if distance > reach.size {
-            return Err(reach.off(what, number, distance));
-        }
-    }
-    Ok(())
-}
-
-/// How far from a part points lie.
-struct Reach<'a> {
-    index: &'a SurfaceIndex,
-    lower: DVec3,
-    upper: DVec3,
-    /// m.
-    size: f64,
-}
-
-impl<'a> Reach<'a> {
-    fn of(part: &'a TriMesh) -> Self {
-        let (lower, upper) = part.bounds();
-        Self {
-            index: part.index(),
-            lower,
-            upper,
-            size: (upper - lower).length(),
-        }
-    }
-
-    fn off(&self, what: &'static str, number: usize, distance: f64) -> DesignError {
-        DesignError::OffThePart {
-            what,
-            number,
-            distance_mm: distance * 1000.0,
-            size_mm: self.size * 1000.0,
-        }
-    }
-
-    /// From the part (m); of what is out of reach, from the box around it. The box is asked first: very far
-    /// out squares are no numbers any more, and the nearest place is not found.
-    fn distance(&self, point: DVec3) -> f64 {
-        if !point.is_finite() {
-            return f64::INFINITY;
-        }
-        let beyond = (point - point.clamp(self.lower, self.upper)).abs();
-        let widest = beyond.max_element();
-        if widest > self.size {
-            widest * (beyond / widest).length()
-        } else {
-            self.index.nearest(point).1
-        }
-    }
 }
 
 #[cfg(test)]

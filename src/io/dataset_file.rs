@@ -27,9 +27,30 @@ pub use self::found::GivenData;
 /// # Errors
 /// [`FileError`] naming the file, the place in it and what to do.
 pub fn read(path: &Path, touches: Option<&Path>) -> Result<GivenData, FileError> {
-    let found = if path.is_dir() {
+    let found = found(path, touches)?;
+    let given = found.check_apart();
+    let read = found.checked(path)?;
+    given.map(|()| read)
+}
+
+/// As [`read`], to be answered and not learned from: the touches may all be at one place.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_to_answer(path: &Path, touches: Option<&Path>) -> Result<GivenData, FileError> {
+    found(path, touches)?.checked(path)
+}
+
+fn found(path: &Path, touches: Option<&Path>) -> Result<Found, FileError> {
+    if path.is_dir() {
         exports::read(path, Touches::read(needed(path, touches)?)?)
     } else if ends_with(path, "npz") {
+        if let Some(touches) = touches {
+            return Err(FileError::broken(
+                touches,
+                "not read: an .npz holds where its touches were (p_m), so leave --touches out",
+            ));
+        }
         read_npz(path)
     } else if ends_with(path, "csv") {
         read_csv(path, Touches::read(needed(path, touches)?)?)
@@ -38,8 +59,7 @@ pub fn read(path: &Path, touches: Option<&Path>) -> Result<GivenData, FileError>
             path,
             "a dataset is an .npz, a .csv, or a folder of exported results",
         ))
-    }?;
-    found.checked(path)
+    }
 }
 
 fn needed<'a>(path: &Path, touches: Option<&'a Path>) -> Result<&'a Path, FileError> {
@@ -272,5 +292,23 @@ mod tests {
         assert_eq!(data.costs, [2.0, 3.0]);
         let alone = read(&signals, None).unwrap_err();
         assert!(alone.to_string().contains("--touches"));
+    }
+
+    #[test]
+    fn one_place_can_be_answered_and_not_learned_from() {
+        let folder = tempfile::tempdir().unwrap();
+        let [signals, touches] = ["x.csv", "t.csv"].map(|name| folder.path().join(name));
+        std::fs::write(&signals, "x_mm,y_mm,z_mm,a\n0,0,0,0.5\n9,0,0,1\n").unwrap();
+        std::fs::write(&touches, "x_mm,y_mm,z_mm\n1,2,3\n").unwrap();
+        let said = read(&signals, Some(&touches)).unwrap_err().to_string();
+        assert!(said.contains("one touch only"), "{said}");
+        let answered = read_to_answer(&signals, Some(&touches)).unwrap();
+        assert_eq!(answered.data.targets, [[1.0, 2.0, 3.0]]);
+    }
+
+    #[test]
+    fn touches_beside_those_of_an_archive_are_not_passed_over() {
+        let said = read(Path::new("x.npz"), Some(Path::new("t.csv"))).unwrap_err();
+        assert!(said.to_string().contains("leave --touches out"), "{said}");
     }
 }

@@ -196,6 +196,13 @@ pub fn line(path: &Path, number: usize) -> Option<u64> {
     lines(path).get(number).copied()
 }
 
+/// A table, and the line in it that such a row stands in, for a message.
+#[must_use]
+pub fn place(path: &Path, number: usize) -> String {
+    let line = line(path, number).map_or_else(String::new, |line| format!(", line {line}"));
+    format!("{}{line}", path.display())
+}
+
 /// The lines of all rows of such a table; none of what cannot be read.
 #[must_use]
 pub fn lines(path: &Path) -> Vec<u64> {

@@ -10,12 +10,12 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use glam::{DMat3, DQuat, DVec3};
 use mcap::records::MessageHeader;
-use mcap::{WriteOptions, Writer};
+use mcap::{McapError, WriteOptions, Writer};
 use serde_json::{Value, json};
 
 use crate::inference::Contact;
@@ -26,6 +26,7 @@ const FRAME: &str = "contact";
 
 /// A file that is being written.
 pub struct McapLog {
+    path: PathBuf,
     writer: Writer<BufWriter<File>>,
     channels: [u16; 3],
     sequence: u32,
@@ -62,6 +63,7 @@ impl McapLog {
         }
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
         Ok(Self {
+            path: path.to_owned(),
             writer,
             channels,
             sequence: 0,
@@ -102,7 +104,7 @@ impl McapLog {
             let written = self
                 .writer
                 .write_to_known_channel(&header, bytes.as_bytes());
-            written.map_err(|e| format!("the MCAP file can be written no more: {e}"))?;
+            written.map_err(|e| ended(&self.path, e))?;
         }
         Ok(())
     }
@@ -112,11 +114,21 @@ impl McapLog {
     /// # Errors
     /// Why it can be written no more.
     pub fn finish(&mut self) -> Result<(), String> {
-        let ended = self.writer.finish();
-        ended
-            .map(drop)
-            .map_err(|e| format!("the MCAP file can be written no more: {e}"))
+        let finished = self.writer.finish();
+        finished.map(drop).map_err(|e| ended(&self.path, e))
     }
+}
+
+/// That a file ends here, and why: the library's own words leave out what the system said.
+fn ended(path: &Path, error: McapError) -> String {
+    let why = match error {
+        McapError::Io(error) => error.to_string(),
+        error => error.to_string(),
+    };
+    format!(
+        "{}: it ends here, because it can be written no more: {why}",
+        path.display()
+    )
 }
 
 fn stamp(ns: u64, fraction: &str) -> Value {

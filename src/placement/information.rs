@@ -8,7 +8,7 @@ use super::exchange::Chosen;
 use super::margin::Best;
 use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet, margin};
 use crate::budget::{Achieved, Cancelled, StopReason, Work};
-use crate::gaussian_process::{Covariance, GpKernel, GpTrial};
+use crate::gaussian_process::{self, Covariance, GpKernel, GpTrial};
 use crate::plain;
 
 /// A Gaussian process over locations on the surface; the pool's sites come first, then those where no
@@ -226,6 +226,7 @@ pub(super) fn finish(
         None => StopReason::Converged,
     };
     let mut notes = geometry.covariance.notes();
+    notes.extend(gaussian_process::edge_note(&geometry.map));
     if geometry.coinciding > 0 {
         notes.push(format!(
             "{} at the place of another: of such sites only one is ever chosen.",

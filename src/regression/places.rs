@@ -13,7 +13,8 @@ use serde::Serialize;
 pub enum Grouping {
     /// Each touch by itself.
     Touch,
-    /// The repeats of a place, told by how near they are for the size of what was touched.
+    /// The repeats of a place: told by how near they are for the size of what was touched, and where touches lie in
+    /// [`clumps`], each of them.
     #[default]
     Place,
     /// Touches no farther apart than this (mm).
@@ -35,7 +36,11 @@ impl Grouping {
     pub fn of(self, targets: &[[f64; 3]]) -> Vec<usize> {
         match self {
             Self::Touch => (0..targets.len()).collect(),
-            Self::Place => places(targets, SAME * largest(extents(targets))),
+            Self::Place => {
+                let exactly = SAME * largest(extents(targets));
+                let reach = clumps(targets).map_or(exactly, |clumps| clumps.apart_mm);
+                places(targets, reach)
+            }
             Self::Within(mm) => places(targets, mm),
         }
     }
@@ -81,7 +86,8 @@ pub fn clumps(targets: &[[f64; 3]]) -> Option<Clumps> {
         return None;
     }
     let joins = nearest_joins(&apart);
-    let (first, last) = (count / 4, count - 1 - LEAST);
+    let exact = targets.len() - count;
+    let (first, last) = ((targets.len() / 4).saturating_sub(exact), count - 1 - LEAST);
     let leap = |k: usize| joins[k + 1] / joins[k].max(f64::MIN_POSITIVE);
     let at = (first..last).max_by(|&a, &b| leap(a).total_cmp(&leap(b)))?;
     let within = (joins[at] * joins[at + 1]).sqrt();
@@ -236,9 +242,12 @@ mod tests {
             let wanted: Vec<usize> = (0..75).map(|k| k % 25).collect();
             assert_eq!(groups, wanted);
         }
-        // Depth is a place of its own where the skin is not flat.
+        // On a skin that is not flat depths are at one place where they are near each other for how far places are apart.
         let round = pressed(|x, y| 0.02 * x * y, 1.5);
-        assert_eq!(Grouping::Place.of(&round), Grouping::Touch.of(&round));
+        let wanted: Vec<usize> = (0..75).map(|k| k % 25).collect();
+        assert_eq!(Grouping::Place.of(&round), wanted);
+        let deep = pressed(|x, y| 0.02 * x * y, 4.0);
+        assert_eq!(Grouping::Place.of(&deep), Grouping::Touch.of(&deep));
         // And where they are to be averaged, on a flat skin too.
         let flat = pressed(|_, _| 0.0, 1.5);
         assert_eq!(points(&flat), Grouping::Touch.of(&flat));
@@ -285,6 +294,15 @@ mod tests {
             assert!((3.0 * off..8.0).contains(&found.apart_mm), "{found:?}");
             let grouped = Grouping::Within(found.apart_mm).of(&again(off));
             assert_eq!(grouped.iter().max(), Some(&39));
+        }
+    }
+
+    #[test]
+    fn presses_of_a_place_are_one_group_however_exactly_it_is_found_again() {
+        for off in [0.0, 2e-4, 1e-3, 5e-3, 0.05] {
+            let groups = Grouping::Place.of(&again(off));
+            let wanted: Vec<usize> = (0..400).map(|k| k % 40).collect();
+            assert_eq!(groups, wanted, "{off}");
         }
     }
 

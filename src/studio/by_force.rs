@@ -36,15 +36,12 @@ fn rows(design: &Design) -> impl Iterator<Item = &MatchedRow> {
     (design.evaluation).by_force(design.lead.name(), design.chosen().len())
 }
 
-/// The table, over all touches.
-pub fn force_table(design: &Design, ui: &mut Ui) {
-    ui.label(
-        RichText::new(format!(
-            "{} gauges, all touches (mm)",
-            design.chosen().len()
-        ))
-        .strong(),
-    );
+/// The table, over all touches; of the gauges as they were selected, which is said where they have been moved since.
+pub fn force_table(design: &Design, is_moved: bool, ui: &mut Ui) {
+    let as_selected = if is_moved { " as selected" } else { "" };
+    let count = design.chosen().len();
+    let title = format!("{count} gauges{as_selected}, all touches (mm)");
+    ui.label(RichText::new(title).strong());
     ScrollArea::both().id_salt("by force").show(ui, |ui| {
         Grid::new("by force")
             .num_columns(COLUMNS.len())

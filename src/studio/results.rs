@@ -73,8 +73,8 @@ pub fn header(ask: &mut Ask<'_>, ui: &mut Ui) -> bool {
             ui.colored_label(super::theme::STALE, "of settings that have changed since");
         }
         // What matters most comes first: what follows is cut where there is no room.
-        doubt_label(ask, ui);
         by_hand_label(ask, ui);
+        doubt_label(ask, ui);
         certificate_label(ask, ui);
     });
     ui.separator();
@@ -212,7 +212,8 @@ pub fn error_plots(ask: &Ask<'_>, ui: &mut Ui) {
             region_plots(ask, ui, &regions, height);
         });
         if let Some(design) = design {
-            ui.vertical(|ui| force_table(design, ui));
+            let is_moved = !ask.session.as_designed();
+            ui.vertical(|ui| force_table(design, is_moved, ui));
         }
     });
 }

@@ -55,7 +55,7 @@ pub fn evaluate(data: &Data, question: &Question, watch: Watch) -> Result<Verdic
     test.sort_unstable();
     let mut notes = constant;
     notes.extend(repeat_note(places, data.targets.len(), question.groups));
-    if question.groups.is_none() && places == data.targets.len() {
+    if question.groups.is_none() {
         notes.extend(clump_note(svr, &data.targets));
     }
     notes.extend(judged.unfinished_note());

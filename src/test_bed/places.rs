@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::asked::Asked;
 use crate::bench::{Machine, Mount, Reach, plan};
-use crate::design::{Inputs, Sensing};
+use crate::design::{DesignError, Inputs, Sensing, check_on_part};
 use crate::io::{bench_folder, points};
 use crate::plain;
 
@@ -27,14 +27,26 @@ pub(super) fn places(
         return Ok(bench_folder::read_plan(folder)?);
     }
     if let Some(path) = &asked.points {
-        let points = points::read_points(path)?;
-        return Ok(points.into_iter().map(|p| p.position).collect());
+        let asked = points::read_points(path)?;
+        let places: Vec<DVec3> = asked.into_iter().map(|p| p.position).collect();
+        check_on_part(&inputs.part, "point", places.iter().copied())
+            .map_err(|error| in_file(error, path))?;
+        return Ok(places);
     }
     let seed = inputs.project.budget.seed;
     let touches = sensing.touches(inputs, asked.places, seed, true)?;
     let mut places: Vec<DVec3> = touches.iter().map(|t| t.position).collect();
     places.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
     Ok(places)
+}
+
+/// An error of one of the points, with its file and line before it.
+fn in_file(error: DesignError, path: &Path) -> anyhow::Error {
+    let place = match error {
+        DesignError::OffThePart { number, .. } => points::place(path, number),
+        _ => plain::path(path),
+    };
+    anyhow::Error::new(error).context(place)
 }
 
 /// Those that the machine gets to.

@@ -569,6 +569,13 @@ fn numbers_that_cannot_be_meant_are_refused_as_they_are_read() {
     }
     // Finite, but beyond what can be computed with for touches of this size.
     misused(&["select", "--data", data, "--c", "9e8"], "--c");
+    // And finer than rounding, so that no fit would end.
+    let finest = ["--c", "5e6", "--tolerance", "1e-12"];
+    let finest: Vec<&str> = ["select", "--data", data]
+        .into_iter()
+        .chain(finest)
+        .collect();
+    misused(&finest, "--tolerance");
     refused(&["select", "--data", data, "--keep-out", "99"], "24 sites");
 }
 

@@ -8,8 +8,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use hapdef::budget::{Quality, unwatched};
-use hapdef::design::Inputs;
+use hapdef::design::{Inputs, large_motion};
 use hapdef::elasticity::Touch;
+use hapdef::elasticity::estimate::Discretization;
 use hapdef::given::{self, Answer, GivenSite};
 use hapdef::io::mesh_file::parse_mesh;
 use hapdef::io::npz::Arrays;
@@ -294,4 +295,99 @@ fn a_limb_of_an_absurd_size_is_refused_by_the_size() {
         let (code, said) = hapdef(&["limb", "--out", out, flag, "1e300", "--no-sites"]);
         assert!(code == Some(1) && said.contains(what), "{said}");
     }
+}
+
+/// The bundled limb with coarse elements, in a folder of its own.
+fn limb() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let (code, said) = hapdef(&["limb", "--out", out, "--element", "12"]);
+    assert_eq!(code, Some(0), "{said}");
+    folder
+}
+
+#[test]
+fn what_lies_far_from_the_part_is_refused_by_name_and_distance() {
+    let folder = limb();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (project, glb, points) = (at("limb.hapdef.toml"), at("x.glb"), at("points.csv"));
+    let export = |touch: &str| hapdef(&["export", &project, "--gltf", &glb, "--touch", touch]);
+    for (touch, off) in [
+        ("1e160,0,0", " mm off the limb"),
+        ("5000,0,60", "4968 mm off the limb"),
+        ("80,0,60", " mm off the limb"),
+    ] {
+        let (code, said) = export(touch);
+        let named = said.contains("--touch is ") && said.contains(off);
+        assert!(code == Some(1) && named, "{touch}: {said}");
+    }
+    std::fs::write(&points, "x_mm,y_mm,z_mm\n30,0,60\n3e4,0,60\n").unwrap();
+    let out = at("run");
+    let calibrate = [
+        "calibrate",
+        "--recording",
+        "none.hapdrec",
+        "--project",
+        &project,
+    ];
+    let calibrate: Vec<&str> = calibrate.into_iter().chain(["--points", &points]).collect();
+    let collect = [
+        "collect",
+        &project,
+        "--out",
+        &out,
+        "--simulate",
+        "--plan-only",
+    ];
+    let collect: Vec<&str> = (collect.into_iter())
+        .chain(["--points", &points, "--quality", "draft"])
+        .collect();
+    for arguments in [&calibrate, &collect] {
+        let (code, said) = hapdef(arguments);
+        let named = said.contains("points.csv, line 3") && said.contains("from the part");
+        assert!(code == Some(1) && named, "{arguments:?}: {said}");
+    }
+    assert!(!Path::new(&out).join("plan.csv").exists());
+    let text = std::fs::read_to_string(&project).unwrap();
+    let (before, after) = text.split_once("position_mm = [").unwrap();
+    let far = format!(
+        "{before}position_mm = [3000.0, {}",
+        after.split_once(',').unwrap().1
+    );
+    std::fs::write(&project, far).unwrap();
+    let (code, said) = hapdef(&["export", &project, "--gltf", &glb]);
+    let named = said.contains("gauge of [[selection.site]] 0 lies");
+    assert!(code == Some(1) && named, "{said}");
+}
+
+#[test]
+fn a_weight_of_a_vertex_is_said_and_moves_nothing() {
+    let weighted = OBJ.replace("v 4 0 0\n", "v 4 0 0 2\n");
+    let read =
+        |text: &str| parse_mesh(text.as_bytes(), "obj", None, 1.0, 0, &Repair::default()).unwrap();
+    let (plain, weighted) = (read(OBJ), read(&weighted));
+    assert_eq!(plain.mesh.positions(), weighted.mesh.positions());
+    let said = |notes: &[String]| notes.iter().any(|n| n.contains("1 vertex has a weight"));
+    assert!(said(&weighted.repairs.notes) && !said(&plain.repairs.notes));
+}
+
+#[test]
+fn a_solid_that_gives_way_by_its_own_size_is_no_small_deformation() {
+    let part = Inputs::clone(&strip()).part;
+    let estimate = |displacement_mm: f64| Discretization {
+        displacement_mm,
+        displacement_percent: 2.0,
+        strain_percent: 1.0,
+        loads: 1,
+        places: 1,
+    };
+    let (lower, upper) = part.bounds();
+    let size_mm = 1e3 * (upper - lower).length();
+    // Two per cent of it are off, so that it moves fifty times as far.
+    let said = large_motion(&part, &estimate(0.02 * 0.3 * size_mm), None).unwrap();
+    assert!(said.contains("30 % of its size"), "{said}");
+    assert_eq!(
+        large_motion(&part, &estimate(0.02 * 0.05 * size_mm), None),
+        None
+    );
 }

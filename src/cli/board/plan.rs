@@ -5,9 +5,8 @@ use std::path::Path;
 use super::args::BoardArgs;
 use crate::board::{ChannelFault, Fault, Faults, GivenPress, Press, Script, aside};
 use crate::cli::simulate::in_file;
-use crate::design::{Inputs, Sensing};
+use crate::design::{self, Inputs, Sensing};
 use crate::elasticity::Touch;
-use crate::given;
 use crate::io::points;
 use crate::mesh::TriMesh;
 use crate::wire::MOST_CHANNELS;
@@ -90,7 +89,7 @@ fn faults(args: &BoardArgs, channels: usize) -> anyhow::Result<Faults> {
 /// Presses from a file, all of them near the part.
 fn read_script(path: &Path, part: &TriMesh) -> anyhow::Result<Vec<GivenPress>> {
     let presses = points::read_presses(path)?;
-    given::check_reach(part, "touch", presses.iter().map(|p| p.position))
+    design::check_reach(part, "touch", presses.iter().map(|p| p.position))
         .map_err(|error| in_file(error, path, path))?;
     Ok(presses)
 }

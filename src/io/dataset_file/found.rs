@@ -37,6 +37,12 @@ pub(super) struct Found {
 }
 
 impl Found {
+    /// Touches that something can be learned from.
+    pub(super) fn check_apart(&self) -> Result<(), FileError> {
+        let touches = self.targets.iter().map(|&p| DVec3::from_array(p));
+        Places::new(&self.touches, touches).check_apart()
+    }
+
     pub(super) fn checked(self, path: &Path) -> Result<GivenData, FileError> {
         self.check_signals(path)?;
         for (site, cost) in self.costs.iter().enumerate() {

@@ -144,7 +144,8 @@ impl<'a> Places<'a> {
         })
     }
 
-    fn check_touches(&self) -> Result<(), FileError> {
+    /// Refuses touches that are all at one place: nothing can be learned from them.
+    pub(super) fn check_apart(&self) -> Result<(), FileError> {
         if self.longest_side() > ONE {
             return Ok(());
         }
@@ -164,7 +165,6 @@ impl<'a> Places<'a> {
 pub fn check(touches: &Places, sites: &Places) -> Result<Vec<String>, FileError> {
     touches.within_reach()?;
     sites.within_reach()?;
-    touches.check_touches()?;
     let (pressed, read) = (touches.longest_side(), sites.longest_side());
     let (narrow, wide) = (pressed.min(read), pressed.max(read));
     if sites.points.len() < 2 || wide <= UNLIKE * narrow {

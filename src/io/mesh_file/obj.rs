@@ -46,6 +46,8 @@ struct Reader {
     last: (usize, bool),
     points_and_lines: usize,
     curved: usize,
+    /// Vertices with a weight other than one.
+    weighted: usize,
     /// Lines that mean nothing here: how many, the first of them and its first word.
     unknown: Option<(usize, usize, String)>,
 }
@@ -82,7 +84,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Coordinates, then a weight or a colour.
+    /// Coordinates, then a colour, or the weight that a curve would give it.
     fn vertex<'w>(
         &mut self,
         line: usize,
@@ -91,7 +93,10 @@ impl Reader {
         let values: Vec<f64> = words.map(|w| number(w, line)).collect::<Result<_, _>>()?;
         let place = match values[..] {
             [x, y, z] | [x, y, z, _, _, _] | [x, y, z, _, _, _, _] => DVec3::new(x, y, z),
-            [x, y, z, weight] if weight != 0.0 => DVec3::new(x, y, z) / weight,
+            [x, y, z, weight] => {
+                self.weighted += usize::from(weight != 1.0);
+                DVec3::new(x, y, z)
+            }
             _ => return Err(at(line, "a vertex has three coordinates")),
         };
         self.soup.positions.push(place);
@@ -172,6 +177,12 @@ impl Reader {
             no_surface(self.curved, "curves and curved patches"),
         ];
         self.soup.notes.extend(left_out.into_iter().flatten());
+        if self.weighted > 0 {
+            self.soup.notes.push(format!(
+                "{} a weight, which is for curves alone: the coordinates are taken as they stand",
+                plain::either(self.weighted, "vertex has", "vertices have")
+            ));
+        }
         let (last, is_face) = self.last;
         if is_face && !ended {
             self.soup.notes.push(format!(

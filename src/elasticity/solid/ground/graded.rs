@@ -82,8 +82,10 @@ impl SolidGround {
         let mut grids = Grids::default();
         let mut size = shape.first(tip, away, least);
         let solve = |size: f64| self.solve(size, &touches, &places, watch);
+        let mut is_short = false;
         let estimate = loop {
             if !grids.go_on(size, solve)? {
+                is_short = true;
                 break self.left(&grids, &touches, &places);
             }
             let next = sizing::next(size, least);
@@ -103,7 +105,10 @@ impl SolidGround {
         let Some(last) = grids.last else {
             unreachable!("there is a first grid");
         };
-        Ok(last.graded(&touches, estimate, models))
+        Ok(SolidGraded {
+            is_short,
+            ..last.graded(&touches, estimate, models)
+        })
     }
 
     /// What the last of several grids is off by; unknown where there is one only.

@@ -24,6 +24,8 @@ pub struct SolidGraded {
     pub models: u64,
     /// Loads solved on the way here.
     pub solves: u64,
+    /// Whether memory did not hold the next finer one.
+    pub is_short: bool,
 }
 
 /// The error is an estimate: stop at this share of the tolerance.
@@ -71,6 +73,7 @@ impl Solved {
             estimate,
             models,
             solves: models * touches.len() as u64,
+            is_short: false,
         }
     }
 }
