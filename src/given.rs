@@ -109,6 +109,7 @@ pub fn answer_sifted(
     } = built;
     notes.extend(design::short_of_memory(is_short));
     notes.extend(design::open_solid(&inputs));
+    notes.extend(design::overlapping_tetrahedra(&inputs));
     notes.extend(checks.distrust());
     notes.extend(design::cautions(
         &estimate,

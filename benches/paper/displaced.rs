@@ -119,7 +119,7 @@ impl Displaced {
             drawn: data.sites,
             workshop: data.x.clone(),
             x: data.x,
-            off: finer.off.clone(),
+            off: finer.off,
             grid: finer.grid,
             pressed: None,
         })

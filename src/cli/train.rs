@@ -119,8 +119,9 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     if args.groups.is_none() {
         let words = study::clump_words(&data.targets);
         let note = words.map(|words| format!("{words} (--groups says otherwise)."));
-        note.iter()
-            .for_each(|note| out::say(&format!("note: {note}")));
+        if let Some(note) = &note {
+            out::say(&format!("note: {note}"));
+        }
         notes.extend(note);
     }
     if let Some(old) = &args.update {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::layout::{check_shape, size_mm};
 use super::{DesignError, Inputs, LAYOUT, Meshed};
@@ -16,6 +17,7 @@ use crate::elasticity::solid::ground::SolidGround;
 use crate::elasticity::{Model, Touch};
 use crate::feasible::Surroundings;
 use crate::mesh::walls::Side;
+use crate::mesh::winding::Winding;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain;
 use crate::project::{Elements as ElementKind, PartModel, Project};
@@ -144,6 +146,36 @@ pub fn open_solid(inputs: &Inputs) -> Option<String> {
     (solid && open > 0).then(|| {
         format!(
             "The part is taken as a solid, and {open} edges of its surface are open: what lies behind its holes and seams is a guess. Fill or join them (part.fill_holes_mm, part.weld_mm), or close them in the program that wrote it."
+        )
+    })
+}
+
+/// What has to be known of a solid whose own tetrahedra have outer faces within others.
+#[must_use]
+pub fn overlapping_tetrahedra(inputs: &Inputs) -> Option<String> {
+    /// How far in front of a face it is asked what is there, in roots of its area.
+    const BEFORE: f64 = 1e-3;
+    let solid = inputs.project.part.model == PartModel::Solid;
+    let part = inputs.part.as_given();
+    if !solid || part.volume().is_none() {
+        return None;
+    }
+    let winding = Winding::new(part);
+    let is_within = |&facet: &u32| {
+        let [a, b, c] = part.corners(facet);
+        let before = part.facet_normal(facet) * BEFORE * part.facet_area(facet).sqrt();
+        winding.at((a + b + c) / 3.0 + before) > 0.5
+    };
+    let facets = (0..part.triangles().len() as u32).into_par_iter();
+    let within = facets.filter(is_within).count();
+    (within > 0).then(|| {
+        format!(
+            "{} within other elements: where tetrahedra overlap the part is too stiff, and where bodies lie against each other without being joined nothing passes between them. Mend the mesh in the program that wrote it.",
+            plain::either(
+                within,
+                "outer face of the tetrahedra lies",
+                "outer faces of the tetrahedra lie"
+            )
         )
     })
 }

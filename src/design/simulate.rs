@@ -5,7 +5,10 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::ground::{Built, Ground, ground, large_motion, open_solid, short_of_memory, wide_tip};
+use super::ground::{
+    Built, Ground, ground, large_motion, open_solid, overlapping_tetrahedra, short_of_memory,
+    wide_tip,
+};
 use super::layout::{check_foreseen, check_memory, lay_out_sites, lay_out_touches};
 use super::nearness::{Nearness, check_reach};
 use super::{DesignError, Inputs, Meshed, SLOPE_TOUCHES};
@@ -288,6 +291,7 @@ fn read(
     cautious.extend(large_motion(&inputs.part, &estimate, linearity.as_ref()));
     cautious.extend(wide_tip(&inputs.part, project.tip().1));
     cautious.extend(open_solid(inputs));
+    cautious.extend(overlapping_tetrahedra(inputs));
     cautious.extend(required_off(inputs));
     cautious.extend(on_supports(inputs, &dataset.touches)?);
     let (mesh, held) = meshed.gauge_surface();

@@ -509,3 +509,28 @@ fn ranges_without_end_cost_nothing() {
     let said = loaded.repairs.notes.join("; ");
     assert!(said.contains("not there"), "{said}");
 }
+
+#[test]
+fn tetrahedra_that_overlap_are_said() {
+    let said = |elements: (Vec<DVec3>, Vec<[u32; 4]>)| {
+        let loaded = read("msh", &msh2(any_kind(elements))).unwrap();
+        let (_, _, notes) = answer(loaded, None);
+        (
+            notes.iter().any(|n| n.contains("within other elements")),
+            notes,
+        )
+    };
+    let (nodes, mut tetrahedra) = strip();
+    let (overlaps, notes) = said((nodes.clone(), tetrahedra.clone()));
+    assert!(!overlaps, "{notes:?}");
+    // From two corners of the strip's middle to two others, through the elements between.
+    let at = |i: u32, j: u32, k: u32| i + 41 * (j + 9 * k);
+    let mut through = [at(20, 2, 0), at(24, 2, 0), at(20, 6, 0), at(20, 2, 1)];
+    let [a, b, c, d] = through.map(|n| nodes[n as usize]);
+    if (b - a).cross(c - a).dot(d - a) < 0.0 {
+        through.swap(0, 1);
+    }
+    tetrahedra.push(through);
+    let (overlaps, notes) = said((nodes, tetrahedra));
+    assert!(overlaps, "{notes:?}");
+}
