@@ -115,15 +115,11 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
         )
         .check_result("--out", Some(&args.out))?;
     let (data, mut notes) = args.data.load()?;
-    let groups = args.groups(&data)?;
-    if args.groups.is_none() {
-        let words = study::clump_words(&data.targets);
-        let note = words.map(|words| format!("{words} (--groups says otherwise)."));
-        if let Some(note) = &note {
-            out::say(&format!("note: {note}"));
-        }
-        notes.extend(note);
+    let (groups, note) = args.groups(&data)?;
+    if let Some(note) = &note {
+        out::say(&format!("note: {note}"));
     }
+    notes.extend(note);
     if let Some(old) = &args.update {
         let asked = train_update::Asked {
             old,
@@ -248,13 +244,17 @@ pub(super) fn in_pool<T: Send>(
 }
 
 impl TrainArgs {
-    /// The group of each touch.
-    fn groups(&self, data: &Data) -> anyhow::Result<Vec<usize>> {
+    /// The group of each touch, and a word where touches are taken for repeats of a place that are none to the digit.
+    fn groups(&self, data: &Data) -> anyhow::Result<(Vec<usize>, Option<String>)> {
         let kept = (self.data).kept(self.groups.as_deref(), false, data.targets.len())?;
         Ok(match kept {
-            Kept::Usual => Grouping::Place.of(&data.targets),
-            Kept::Touch => Grouping::Touch.of(&data.targets),
-            Kept::Given(groups) => groups.of_touches,
+            Kept::Usual => {
+                let words = study::clump_words(&data.targets);
+                let note = words.map(|words| format!("{words} (--groups none divides them)."));
+                (Grouping::Place.of(&data.targets), note)
+            }
+            Kept::Touch => (Grouping::Touch.of(&data.targets), None),
+            Kept::Given(groups) => (groups.of_touches, None),
         })
     }
 

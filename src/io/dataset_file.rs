@@ -304,6 +304,7 @@ mod tests {
         assert!(said.contains("one touch only"), "{said}");
         let answered = read_to_answer(&signals, Some(&touches)).unwrap();
         assert_eq!(answered.data.targets, [[1.0, 2.0, 3.0]]);
+        assert!(answered.notes.is_empty(), "{:?}", answered.notes);
     }
 
     #[test]

@@ -21,7 +21,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::inference::Touches;
+use crate::inference::{Kind, Touches};
 
 use self::creep::Creep;
 use self::misfit::Misfit;
@@ -228,7 +228,9 @@ impl Drift {
         }
         let beyond = match &touches.contacts[..] {
             [touch] if touch.narrow => {
-                (self.misfit).beyond(touch.position, touch.force, &mean, ways)
+                let is_area = matches!(touches.kind, Kind::Area(_));
+                let touch = (touch.position, touch.force, is_area);
+                (self.misfit).beyond(touch, &mean, ways)
             }
             _ => Some((mean, misfit::doubt_of(reading), ways())),
         };

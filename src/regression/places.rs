@@ -36,11 +36,10 @@ impl Grouping {
     pub fn of(self, targets: &[[f64; 3]]) -> Vec<usize> {
         match self {
             Self::Touch => (0..targets.len()).collect(),
-            Self::Place => {
-                let exactly = SAME * largest(extents(targets));
-                let reach = clumps(targets).map_or(exactly, |clumps| clumps.apart_mm);
-                places(targets, reach)
-            }
+            Self::Place => clumps(targets).map_or_else(
+                || repeats(targets),
+                |clumps| places(targets, clumps.apart_mm),
+            ),
             Self::Within(mm) => places(targets, mm),
         }
     }
@@ -51,6 +50,13 @@ impl Grouping {
 #[must_use]
 pub fn points(targets: &[[f64; 3]]) -> Vec<usize> {
     grouped(targets, SAME * largest(extents(targets)), None)
+}
+
+/// The place of each touch that is repeated as exactly as a machine does (positions in mm), numbered as they first appear:
+/// as [`Grouping::Place`], but of what is found again less exactly nothing is taken for one. Such touches may be averaged.
+#[must_use]
+pub fn repeats(targets: &[[f64; 3]]) -> Vec<usize> {
+    places(targets, SAME * largest(extents(targets)))
 }
 
 /// Touches that lie in clumps which are far apart for their size, as repeats of a place do that is found again to some
@@ -72,6 +78,8 @@ pub fn clumps(targets: &[[f64; 3]]) -> Option<Clumps> {
     const MOST: usize = 8000;
     /// By how much the distances leap.
     const LEAP: f64 = 4.0;
+    /// Joins that are exact but for so many times what counts as the same place.
+    const NEARLY: f64 = 20.0;
     /// Fewer clumps than this may be anything; and a quarter of the touches at least repeat a place.
     const LEAST: usize = 4;
     let mut apart: Vec<[f64; 3]> = Vec::new();
@@ -86,10 +94,17 @@ pub fn clumps(targets: &[[f64; 3]]) -> Option<Clumps> {
         return None;
     }
     let joins = nearest_joins(&apart);
+    let last = count - 1 - LEAST;
+    // Where most repeats are exact, those that just missed it count with them: near that distance, and not any two
+    // places that happen to be the nearest of all.
     let exact = targets.len() - count;
-    let (first, last) = ((targets.len() / 4).saturating_sub(exact), count - 1 - LEAST);
+    let nearly = NEARLY * SAME * largest(extents(targets));
+    let is_enough =
+        |k: &usize| *k >= count / 4 || (k + exact >= targets.len() / 4 && joins[*k] <= nearly);
     let leap = |k: usize| joins[k + 1] / joins[k].max(f64::MIN_POSITIVE);
-    let at = (first..last).max_by(|&a, &b| leap(a).total_cmp(&leap(b)))?;
+    let at = (0..last)
+        .filter(is_enough)
+        .max_by(|&a, &b| leap(a).total_cmp(&leap(b)))?;
     let within = (joins[at] * joins[at + 1]).sqrt();
     let groups = places(&apart, within);
     let clumps = groups.iter().max().map_or(0, |most| most + 1);
@@ -318,6 +333,20 @@ mod tests {
             .collect();
         assert_eq!(clumps(&scan), None);
         assert_eq!(clumps(&again(0.0)), None);
+        // The two nearest of many places that are each pressed twice may lie close by chance.
+        for seed in 0..40 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let once: Vec<[f64; 3]> = (0..100)
+                .map(|_| {
+                    [
+                        100.0 * rng.random::<f64>(),
+                        100.0 * rng.random::<f64>(),
+                        0.0,
+                    ]
+                })
+                .collect();
+            assert_eq!(clumps(&[&once[..], &once].concat()), None, "{seed}");
+        }
         assert_eq!(clumps(&[[1.0; 3]; 30]), None);
     }
 }

@@ -167,7 +167,8 @@ pub fn check(touches: &Places, sites: &Places) -> Result<Vec<String>, FileError>
     sites.within_reach()?;
     let (pressed, read) = (touches.longest_side(), sites.longest_side());
     let (narrow, wide) = (pressed.min(read), pressed.max(read));
-    if sites.points.len() < 2 || wide <= UNLIKE * narrow {
+    // Touches at one place say nothing of how large the part is.
+    if sites.points.len() < 2 || pressed <= ONE || wide <= UNLIKE * narrow {
         let doubt = || in_doubt(wide, touches, sites);
         return Ok((wide > WIDE).then(doubt).into_iter().collect());
     }

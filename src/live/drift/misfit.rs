@@ -21,6 +21,7 @@ pub(super) struct Misfit {
 struct Found {
     place: DVec3,
     force: f64,
+    is_area: bool,
     left: Vec<f64>,
     ways: Vec<Vec<f64>>,
 }
@@ -30,23 +31,26 @@ struct Found {
 type Beyond = (Vec<f64>, Vec<f64>, Vec<Vec<f64>>);
 
 impl Misfit {
-    /// What has come to what is left of a touch (m, N, strain) since it came to where it is; nothing while it comes.
+    /// What has come to what is left (strain) of a touch (m, N, whether it is an area) since it came to where it is; nothing
+    /// while it comes.
     ///
     /// The ways in which it may be another one are those of when it came: taken anew as its estimate wanders, they would
     /// together leave no direction free, and the filter would be sure of what nobody has seen (first-estimate Jacobians:
     /// G. P. Huang, A. I. Mourikis and S. I. Roumeliotis, Int. J. Robotics Research 29, 2010).
     pub fn beyond(
         &mut self,
-        place: DVec3,
-        force: f64,
+        (place, force, is_area): (DVec3, f64, bool),
         left: &[f64],
         ways: impl FnOnce() -> Vec<Vec<f64>>,
     ) -> Option<Beyond> {
-        let stays = |f: &&Found| f.place.distance(place) < STAYS && force < HARDER * f.force;
+        let stays = |f: &&Found| {
+            f.is_area == is_area && f.place.distance(place) < STAYS && force < HARDER * f.force
+        };
         let Some(found) = self.found.as_ref().filter(stays) else {
             self.found = Some(Found {
                 place,
                 force,
+                is_area,
                 left: left.to_vec(),
                 ways: ways(),
             });

@@ -2,9 +2,8 @@
 
 use glam::DVec3;
 
-use crate::regression::Grouping;
 use crate::regression::folds::number_of;
-use crate::regression::places::points;
+use crate::regression::places::{points, repeats};
 
 /// Touches by place, with one reading for each, per newton where forces are known.
 ///
@@ -22,7 +21,7 @@ pub(super) struct Merged {
 impl Merged {
     /// Merges touches by their places (mm), weighted by their forces (N) where these are known.
     pub fn new(targets: &[[f64; 3]], forces: Option<&[f64]>) -> Self {
-        let along_the_skin = Grouping::Place.of(targets);
+        let along_the_skin = repeats(targets);
         let places = if forces.is_some() {
             along_the_skin.clone()
         } else {
