@@ -16,7 +16,7 @@ use super::ranges::between;
 use super::simulate::in_file;
 use super::spared::Spared;
 use super::{listen, out};
-use crate::design::{Sensing, check_on_part};
+use crate::design::{Sensing, check_reach};
 use crate::elasticity::Touch;
 use crate::inference::calibration::judged::{Outlook, misfits, outlook};
 use crate::inference::{Calibration, Known, calibrate};
@@ -138,10 +138,10 @@ fn off_with(loaded: &LoadedProject, sensing: &Sensing, machine: bool) -> Uncerta
     off
 }
 
-/// Refuses points of a file that are on no surface of the part.
+/// Refuses points of a file that lie farther from the part than it is large: people's points are some millimetres off.
 fn check_points(path: &Path, points: &[AskedPoint], of: &LoadedProject) -> anyhow::Result<()> {
     let places = points.iter().map(|p| p.position);
-    check_on_part(&of.inputs.part, "point", places).map_err(|error| in_file(error, path, path))
+    check_reach(&of.inputs.part, "point", places).map_err(|error| in_file(error, path, path))
 }
 
 /// The points on the part's surface, with a force each; those that are proposed where none are given.

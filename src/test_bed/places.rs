@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::asked::Asked;
 use crate::bench::{Machine, Mount, Reach, plan};
-use crate::design::{DesignError, Inputs, Sensing, check_on_part};
+use crate::design::{DesignError, Inputs, Sensing, check_reach};
 use crate::io::{bench_folder, points};
 use crate::plain;
 
@@ -29,7 +29,7 @@ pub(super) fn places(
     if let Some(path) = &asked.points {
         let asked = points::read_points(path)?;
         let places: Vec<DVec3> = asked.into_iter().map(|p| p.position).collect();
-        check_on_part(&inputs.part, "point", places.iter().copied())
+        check_reach(&inputs.part, "point", places.iter().copied())
             .map_err(|error| in_file(error, path))?;
         return Ok(places);
     }
