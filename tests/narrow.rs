@@ -37,6 +37,11 @@ fn few_touches_get_no_more_elements_than_memory_holds() {
     let ask = |most: usize| given::answer(&inputs, &[touch], &[site], &budget(most), &unwatched);
     let answer = ask(50_000).unwrap_or_else(|e: DesignError| panic!("{e}"));
     assert!(answer.pairs().all(|p| p.displacement.is_finite()));
+    let said = answer.notes.join("\n");
+    assert!(
+        said.contains("Memory did not hold as many elements"),
+        "{said}"
+    );
     // Where not even what any number of touches has fits, that is said.
     memory::allow(100_000);
     assert!(ask(50_000).is_err());

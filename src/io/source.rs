@@ -79,7 +79,11 @@ pub fn ordinary(path: &Path) -> Result<Metadata, FileError> {
 /// container and the limits of this process have so much.
 #[must_use]
 pub fn machine_memory() -> u64 {
-    let text = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
+    memory_of(&|path| std::fs::read_to_string(path).unwrap_or_default())
+}
+
+/// By what the system writes about itself.
+fn memory_of(text: &dyn Fn(&str) -> String) -> u64 {
     let of_machine = text("/proc/meminfo")
         .lines()
         .find_map(|l| {
@@ -110,6 +114,31 @@ pub fn machine_memory() -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_least_of_machine_container_and_process_is_what_there_is() {
+        const GB: u64 = 1 << 30;
+        let said = |machine: u64, process: &str, container: &str| {
+            let limits = format!(
+                "Limit                     Soft Limit           Hard Limit           Units\nMax cpu time              1          2            seconds\nMax data size             unlimited            unlimited            bytes\nMax address space         {process}            unlimited            bytes\n"
+            );
+            let machine = format!("MemTotal:       {} kB\nMemFree: 3 kB\n", machine >> 10);
+            memory_of(&|path| match path {
+                "/proc/meminfo" => machine.clone(),
+                "/proc/self/limits" => limits.clone(),
+                _ => container.to_owned(),
+            })
+        };
+        let most = |bytes: u64| bytes / 10 * 8;
+        assert_eq!(said(64 * GB, "unlimited", "max\n"), memory::USUAL);
+        assert_eq!(said(4 * GB, "unlimited", "max\n"), most(4 * GB));
+        assert_eq!(said(64 * GB, &GB.to_string(), "max\n"), most(GB));
+        assert_eq!(
+            said(64 * GB, "unlimited", &format!("{}\n", 2 * GB)),
+            most(2 * GB)
+        );
+        assert_eq!(memory_of(&|_| String::new()), memory::USUAL);
+    }
 
     #[test]
     fn only_ordinary_files_are_read() {

@@ -95,7 +95,7 @@ impl Doubt {
         let words = match self {
             Self::Refused(why) => return why.in_words(),
             Self::Commas => {
-                "the board prints lines such as “1,5;2,5”, with commas beside another sign between the numbers: whether they are decimal commas cannot be told. Print decimal points, or one sign alone between the numbers"
+                "the board prints lines such as “1,5;2,5” or “1,05,2,50”, whose commas may be decimal ones: what is a number cannot be told. Print decimal points, or whole numbers with one sign alone between them"
             }
             Self::NoNumber(place) => {
                 return Some(format!(

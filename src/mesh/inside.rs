@@ -68,7 +68,38 @@ impl SignedDistance {
     /// Signed distance (m).
     #[must_use]
     pub fn at(&self, point: DVec3) -> f64 {
-        let (at, distance) = self.mesh.index().nearest(point);
+        self.signed(point, self.mesh.index().nearest(point))
+    }
+
+    /// Signed distance (m) at a point of a ball, with what [`Self::nearby`] says of that ball.
+    #[must_use]
+    pub fn among(&self, nearby: Option<&[u32]>, point: DVec3) -> f64 {
+        match nearby {
+            Some(triangles) => self.signed(point, self.mesh.index().nearest_of(triangles, point)),
+            None => self.at(point),
+        }
+    }
+
+    /// The triangles that can be nearest to points of a ball (m), of those that can be for a larger ball around it, where
+    /// they are known; `distance` (m) is that of its centre. Nothing where they are more than are worth looking through.
+    #[must_use]
+    pub fn nearby(
+        &self,
+        of: Option<&[u32]>,
+        (centre, radius): (DVec3, f64),
+        distance: f64,
+    ) -> Option<Vec<u32>> {
+        /// A tree is faster than a list from about here on.
+        const MOST: usize = 48;
+        /// Over all rounding.
+        const SLACK: f64 = 1.0 + 1e-9;
+        // No point of the ball is farther from the surface than this one, and the way from its centre, and back.
+        let reach = (distance.abs() + 2.0 * radius) * SLACK;
+        let within = self.mesh.index().within(of, centre, reach, MOST);
+        within.filter(|triangles| !triangles.is_empty())
+    }
+
+    fn signed(&self, point: DVec3, (at, distance): (SurfacePoint, f64)) -> f64 {
         let away = point - self.mesh.point(at);
         let inside = match self.normal(at) {
             Some(normal) if normal.dot(away).abs() > FLAT * distance => normal.dot(away) < 0.0,

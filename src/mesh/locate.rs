@@ -56,6 +56,61 @@ impl SurfaceIndex {
         (at, projection.point.distance(point) * self.size)
     }
 
+    /// How far the surface is from a point (m), where it is nearer than `most` (m): the nearer that is, the faster.
+    #[must_use]
+    pub fn distance_within(&self, point: DVec3, most: f64) -> Option<f64> {
+        let point = self.scaled(point);
+        let (_, projection) =
+            CompositeShapeRef(&self.tree).project_local_point(point, most / self.size, false)?;
+        Some(projection.point.distance(point) * self.size)
+    }
+
+    /// As [`Self::nearest`], among some triangles only.
+    ///
+    /// # Panics
+    /// When there are none.
+    #[must_use]
+    pub fn nearest_of(&self, triangles: &[u32], point: DVec3) -> (SurfacePoint, f64) {
+        let point = self.scaled(point);
+        let projections = triangles.iter().map(|&triangle| {
+            let (projection, location) =
+                (self.tree.triangle(triangle)).project_local_point_and_get_location(point, false);
+            let squared = projection.point.distance_squared(point);
+            (squared, triangle, location)
+        });
+        let nearest = projections.min_by(|a, b| a.0.total_cmp(&b.0));
+        let (squared, triangle, location) = nearest.expect("there are triangles");
+        let at = SurfacePoint {
+            triangle,
+            barycentric: location.barycentric_coordinates().unwrap_or([1.0 / 3.0; 3]),
+        };
+        (at, squared.sqrt() * self.size)
+    }
+
+    /// The triangles no farther than `radius` (m) from a point, of these or of all; nothing where it would be more than
+    /// `most` of all.
+    #[must_use]
+    pub fn within(
+        &self,
+        of: Option<&[u32]>,
+        point: DVec3,
+        radius: f64,
+        most: usize,
+    ) -> Option<Vec<u32>> {
+        let scaled = self.scaled(point);
+        let squared = (radius / self.size).powi(2);
+        let is_near = |triangle: &u32| {
+            let (projection, _) =
+                (self.tree.triangle(*triangle)).project_local_point_and_get_location(scaled, false);
+            projection.point.distance_squared(scaled) <= squared
+        };
+        if let Some(of) = of {
+            return Some(of.iter().copied().filter(is_near).collect());
+        }
+        let bounds: Vec<u32> = self.bounds_near(point, radius).take(most + 1).collect();
+        (bounds.len() <= most).then(|| bounds.into_iter().filter(is_near).collect())
+    }
+
     /// As [`Self::nearest`], for points that may lie on the triangle of the last one: those need no search.
     #[must_use]
     pub fn nearest_from(&self, guess: u32, point: DVec3) -> SurfacePoint {
@@ -92,15 +147,18 @@ impl SurfaceIndex {
     /// Triangles whose bounds come within `radius` of a point (m), in rising order.
     #[must_use]
     pub fn triangles_near(&self, point: DVec3, radius: f64) -> Vec<u32> {
-        let (point, reach) = (self.scaled(point), DVec3::splat(radius / self.size));
-        let (lower, upper) = (point - reach, point + reach);
-        let near = self.tree.bvh().leaves(|node| {
-            let aabb = node.aabb();
-            aabb.mins.cmple(upper).all() && aabb.maxs.cmpge(lower).all()
-        });
-        let mut triangles: Vec<u32> = near.collect();
+        let mut triangles: Vec<u32> = self.bounds_near(point, radius).collect();
         triangles.sort_unstable();
         triangles
+    }
+
+    fn bounds_near(&self, point: DVec3, radius: f64) -> impl Iterator<Item = u32> {
+        let (point, reach) = (self.scaled(point), DVec3::splat(radius / self.size));
+        let (lower, upper) = (point - reach, point + reach);
+        self.tree.bvh().leaves(move |node| {
+            let aabb = node.aabb();
+            aabb.mins.cmple(upper).all() && aabb.maxs.cmpge(lower).all()
+        })
     }
 }
 
@@ -125,7 +183,19 @@ mod tests {
         assert!(index.ray(DVec3::splat(2.0), DVec3::X).is_none());
         for point in [DVec3::new(0.3, 0.4, 0.0), DVec3::new(3.0, -1.0, 2.0)] {
             assert_eq!(index.nearest_from(0, point), index.nearest(point).0);
+            let (at, distance) = index.nearest(point);
+            assert_eq!(index.nearest_of(&[0], point), (at, distance));
+            assert_eq!(
+                index.distance_within(point, 1.01 * distance + 1e-9),
+                Some(distance)
+            );
+            assert_eq!(index.within(None, point, distance + 1e-9, 1), Some(vec![0]));
+            assert_eq!(index.within(None, point, distance + 1e-9, 0), None);
+            let none = (distance > 0.0).then(Vec::new);
+            let nearer = index.within(Some(&[0]), point, 0.99 * distance, 0);
+            assert_eq!(nearer.filter(|_| distance > 0.0), none);
         }
+        assert_eq!(index.distance_within(DVec3::splat(3.0), 1.0), None);
         assert_eq!(index.triangles_near(DVec3::new(1.2, 0.0, 0.0), 0.3), [0]);
     }
 

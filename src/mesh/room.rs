@@ -83,18 +83,33 @@ impl<'a> Room<'a> {
         }
     }
 
-    /// How far each node is from the surface (m).
+    /// How far each node is from the surface (m), and what is farther than any ball that is tried so far.
     fn distances(&self, watch: Watch) -> Result<Vec<f64>, Cancelled> {
-        const CHUNK: usize = 1 << 14;
-        let count: usize = self.counts.iter().product();
-        let mut distances = Vec::with_capacity(count);
-        while distances.len() < count {
-            report(watch, "Measuring room", distances.len(), count)?;
-            let chunk = distances.len()..count.min(distances.len() + CHUNK);
-            let distance = |node: usize| self.index.nearest(self.node(node)).1;
-            distances.par_extend(chunk.into_par_iter().map(distance));
+        const ROWS: usize = 256;
+        let [along, ..] = self.counts;
+        let rows = self.counts[1] * self.counts[2];
+        let mut distances = Vec::with_capacity(rows * along);
+        for first in (0..rows).step_by(ROWS) {
+            report(watch, "Measuring room", first, rows)?;
+            let some = first..rows.min(first + ROWS);
+            distances.par_extend(some.into_par_iter().flat_map_iter(|row| self.along(row)));
         }
         Ok(distances)
+    }
+
+    /// Along a row of nodes: each is no farther from the surface than the one before it and a cell.
+    fn along(&self, row: usize) -> impl Iterator<Item = f64> {
+        /// Beyond rounding.
+        const WIDER: f64 = 1.0 + 1e-9;
+        let [along, ..] = self.counts;
+        let most = (f64::from(*TRIED.end()) / 2.0 + 1.0) * self.cell;
+        let nodes = row * along..(row + 1) * along;
+        nodes.scan(most, move |before, node| {
+            let within = ((*before + self.cell) * WIDER).min(most);
+            let distance = self.index.distance_within(self.node(node), within);
+            *before = distance.unwrap_or(most);
+            Some(*before)
+        })
     }
 
     /// The least distance on the best way from outside to each node (m).

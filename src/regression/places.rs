@@ -69,19 +69,20 @@ pub struct Clumps {
     pub apart_mm: f64,
 }
 
-/// Whether touches (positions in mm) lie in clumps: joined from the nearest pair on, the distances leap between those
-/// within and those between, and no clump is as large as the leap. Of more touches than can be compared with each other
+/// Whether touches (positions in mm) lie in clumps: joined from the nearest pair on, hardly a distance is between those
+/// within and those between, and no clump is as large as the gap. Of more touches than can be compared with each other
 /// nothing is said.
 #[must_use]
 pub fn clumps(targets: &[[f64; 3]]) -> Option<Clumps> {
     /// Touches that are compared with each other.
     const MOST: usize = 8000;
-    /// By how much the distances leap.
-    const LEAP: f64 = 4.0;
     /// Joins that are exact but for so many times what counts as the same place.
     const NEARLY: f64 = 20.0;
     /// Fewer clumps than this may be anything; and a quarter of the touches at least repeat a place.
     const LEAST: usize = 4;
+    /// Of so many groups one may be more, or less, than there are joins left: a place that another one is near, or a touch
+    /// beside its place.
+    const STRAY: usize = 10;
     let mut apart: Vec<[f64; 3]> = Vec::new();
     let same = points(targets);
     for (k, &point) in same.iter().enumerate() {
@@ -94,25 +95,50 @@ pub fn clumps(targets: &[[f64; 3]]) -> Option<Clumps> {
         return None;
     }
     let joins = nearest_joins(&apart);
-    let last = count - 1 - LEAST;
     // Where most repeats are exact, those that just missed it count with them: near that distance, and not any two
     // places that happen to be the nearest of all.
     let exact = targets.len() - count;
     let nearly = NEARLY * SAME * largest(extents(targets));
-    let is_enough =
-        |k: &usize| *k >= count / 4 || (k + exact >= targets.len() / 4 && joins[*k] <= nearly);
-    let leap = |k: usize| joins[k + 1] / joins[k].max(f64::MIN_POSITIVE);
-    let at = (0..last)
-        .filter(is_enough)
-        .max_by(|&a, &b| leap(a).total_cmp(&leap(b)))?;
-    let within = (joins[at] * joins[at + 1]).sqrt();
+    let is_enough = |below: usize, at: f64| {
+        below >= count / 4 || (below + exact >= targets.len() / 4 && at <= nearly)
+    };
+    let within = gap(&joins, LEAST, is_enough)?;
+    let joined = joins.partition_point(|&join| join < within);
     let groups = places(&apart, within);
     let clumps = groups.iter().max().map_or(0, |most| most + 1);
     // Lines of a scan are joined by short steps too, but are long: their parts are more places than there are joins left.
-    let is_compact = clumps == count - 1 - at;
-    (leap(at) >= LEAP && is_compact).then_some(Clumps {
+    let left = count - joined;
+    let is_compact = clumps.abs_diff(left) <= left / STRAY;
+    is_compact.then_some(Clumps {
         count: clumps,
         apart_mm: within,
+    })
+}
+
+/// The middle of the widest gap in lengths that rise, across which they leap: next to none of them lie in it, at least
+/// `least` lie above, and `is_enough` says so of how many lie below and of the last of them.
+fn gap(joins: &[f64], least: usize, is_enough: impl Fn(usize, f64) -> bool) -> Option<f64> {
+    /// By how much the lengths leap: of few touches the nearest ones do so by chance.
+    const LEAP: [f64; 2] = [4.0, 2.5];
+    const MANY: usize = 100;
+    /// One of so many may lie in the gap. Lengths between touches at random fill it: a quarter of them below it is not
+    /// far enough from the few above.
+    const WITHIN: usize = 50;
+    let few = joins.len() / WITHIN;
+    let least_leap = LEAP[usize::from(joins.len() >= MANY)];
+    let ends: Vec<usize> = (0..joins.len())
+        .filter(|&k| is_enough(k + 1, joins[k]))
+        .collect();
+    // The fewer lie in it the better: one more may only where none is wide enough.
+    (0..=few).find_map(|strays| {
+        let across = |&k: &usize| {
+            let next = k + 1 + strays;
+            (next + least <= joins.len()).then(|| (joins[k], joins[next]))
+        };
+        let leap = |(from, to): (f64, f64)| to / from.max(f64::MIN_POSITIVE);
+        let gaps = ends.iter().filter_map(across);
+        let widest = gaps.max_by(|&a, &b| leap(a).total_cmp(&leap(b)))?;
+        (leap(widest) >= least_leap).then(|| (widest.0 * widest.1).sqrt())
     })
 }
 
@@ -312,6 +338,32 @@ mod tests {
         }
     }
 
+    /// Presses of a probe that finds a place again to 0.2 mm, at 160 places of which some are 2 mm apart: neither the
+    /// farthest repeats nor the nearest places leave a gap that nothing lies in.
+    #[test]
+    fn a_few_places_that_others_are_near_hide_no_clumps() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut places: Vec<[f64; 3]> = Vec::new();
+        while places.len() < 160 {
+            let at = [0, 1, 2].map(|axis| {
+                let extent = if axis == 2 { 3.0 } else { 80.0 };
+                extent * rng.random::<f64>()
+            });
+            let far = |p: &[f64; 3]| (0..3).map(|k| (p[k] - at[k]).powi(2)).sum::<f64>() > 4.0;
+            if places.iter().all(far) {
+                places.push(at);
+            }
+        }
+        let touches: Vec<[f64; 3]> = (0..800)
+            .map(|k| places[k % 160].map(|x| x + 0.2 * normal(&mut rng)))
+            .collect();
+        let found = clumps(&touches).unwrap();
+        assert!((130..=176).contains(&found.count), "{found:?}");
+        let groups = Grouping::Place.of(&touches);
+        let apart = (160..800).filter(|&k| groups[k] != groups[k % 160]).count();
+        assert!(apart < 32, "{apart}");
+    }
+
     #[test]
     fn presses_of_a_place_are_one_group_however_exactly_it_is_found_again() {
         for off in [0.0, 2e-4, 1e-3, 5e-3, 0.05] {
@@ -346,6 +398,17 @@ mod tests {
                 })
                 .collect();
             assert_eq!(clumps(&[&once[..], &once].concat()), None, "{seed}");
+        }
+        // Touches drawn at random, along a line, all over a skin or all through a body.
+        for seed in 0..60 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let extents = [[100.0, 1.0, 0.0], [100.0, 60.0, 0.0], [100.0, 80.0, 60.0]];
+            let count = 40 + 12 * seed as usize;
+            let drawn = |extent: f64, rng: &mut ChaCha8Rng| extent * rng.random::<f64>();
+            let touches: Vec<[f64; 3]> = (0..count)
+                .map(|_| extents[seed as usize % 3].map(|extent| drawn(extent, &mut rng)))
+                .collect();
+            assert_eq!(clumps(&touches), None, "{seed}");
         }
         assert_eq!(clumps(&[[1.0; 3]; 30]), None);
     }

@@ -253,8 +253,10 @@ fn on_mesh(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inference::Known;
     use crate::link::BAUD;
     use crate::session::Wake;
+    use crate::session::slot::Slot;
 
     fn session() -> Session {
         let document = Document::new(opening::bundled().unwrap(), None);
@@ -277,8 +279,20 @@ mod tests {
         s.live.recorded = Some("old-part.hapdrec".into());
         s.complain("stays to be read");
         s.tell("the old part is done");
+        let pressed = Known {
+            at: s.document.inputs().part.vertex_point(0),
+            force: 5.0,
+            reading: vec![1e-4; 10],
+        };
+        s.live.known.push(Slot {
+            inputs: s.document.sensing_inputs(),
+            value: pressed,
+        });
+        assert_eq!(s.known_touches(), 1);
         let opened = another(&s);
         s.open(opened);
+        // The same project opened again is another limb on the desk, and may be glued otherwise.
+        assert_eq!(s.known_touches(), 0);
         assert!(!s.drive.take && s.live.recorded.is_none());
         assert_eq!((s.caches.touching.version, s.results.version), (0, 0));
         // What is of the desk stays.

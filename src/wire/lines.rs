@@ -9,7 +9,8 @@ pub enum Reading {
     /// One number a channel.
     Values(Vec<f64>),
     /// Numbers with commas between some and another sign between others, as in “1,5;2,5”: two decimal commas or
-    /// four numbers, nobody knows.
+    /// four numbers, nobody knows. Or with commas alone, where one of these lines or one before shows that they are
+    /// decimal ones, as “1,05,2,50” does: no count begins with a zero.
     Unclear,
     /// A row of numbers but for this one (from 1), which is none that counts can be: “nan”, “inf”, or beyond all
     /// bounds.
@@ -27,6 +28,8 @@ pub struct LineReader {
     channels: Option<usize>,
     /// Lines in a row with another count.
     others: usize,
+    /// A line has shown that commas are decimal ones.
+    has_decimal_commas: bool,
 }
 
 impl LineReader {
@@ -60,7 +63,8 @@ impl LineReader {
         let Some(values) = numbers(text) else {
             return self.without_number(text);
         };
-        if is_unclear(text) {
+        self.has_decimal_commas |= shows_decimal_commas(text);
+        if is_unclear(text) || (self.has_decimal_commas && fractions(text).is_some()) {
             return Reading::Unclear;
         }
         match self.channels {
@@ -125,6 +129,28 @@ fn is_unclear(text: &str) -> bool {
     bare && other
 }
 
+/// Of whole numbers with nothing but bare commas between them, the whole parts and the fractions that they would be.
+fn fractions(text: &str) -> Option<(Vec<&str>, Vec<&str>)> {
+    let is_digits = |word: &&str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_digit());
+    let words: Vec<&str> = text.trim().split(',').collect();
+    let halves = |odd: usize| words.iter().skip(odd).step_by(2).copied();
+    let wholes: Vec<&str> = halves(0)
+        .map(|w| w.trim_start_matches(['-', '+']))
+        .collect();
+    let fractions: Vec<&str> = halves(1).collect();
+    let fits = wholes.len() == fractions.len() && wholes.iter().chain(&fractions).all(is_digits);
+    fits.then_some((wholes, fractions))
+}
+
+/// Whether a line of whole numbers and commas is one of numbers with decimal commas: every second one may begin with a
+/// zero, as no count does, and those before them do not.
+fn shows_decimal_commas(text: &str) -> bool {
+    let is_padded = |word: &&str| word.len() > 1 && word.starts_with('0');
+    fractions(text).is_some_and(|(wholes, fractions)| {
+        fractions.iter().any(is_padded) && !wholes.iter().any(is_padded)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -184,6 +210,25 @@ mod tests {
             Reading::NoNumber(1),
         ];
         assert_eq!(kinds, expected);
+    }
+
+    #[test]
+    fn commas_that_a_zero_shows_to_be_decimal_are_no_signs_between_numbers() {
+        let values = |v: &[f64]| Reading::Values(v.to_vec());
+        // As a sketch prints numbers of two decimals where commas are decimal: the second line shows it.
+        let said = readings(b"1,25,-0,50\n1,05,2,50\n1,25,2,50\n1,2,3\n1.5,2\n");
+        let expected = [
+            values(&[1.0, 25.0, 0.0, 50.0]),
+            Reading::Unclear,
+            Reading::Unclear,
+        ];
+        assert_eq!(said[..3], expected);
+        // Counts that are padded on both sides are counts, and so are those with signs.
+        let said = readings(b"0512,0034\n0001,0002\n5,-05\n0,0\n10,0\n");
+        assert!(
+            said.iter().all(|r| matches!(r, Reading::Values(_))),
+            "{said:?}"
+        );
     }
 
     #[test]

@@ -39,6 +39,15 @@ fn the_readme_is_short() {
     assert!(page("README.md").lines().count() <= 130);
 }
 
+/// What somebody needs before anything else works, and whoever tries the readers hard.
+#[test]
+fn what_a_bare_machine_needs_and_the_long_run_are_named() {
+    assert!(page("README.md").contains("gcc libc6-dev"));
+    let contributing = page("CONTRIBUTING.md");
+    assert!(contributing.contains("gcc libc6-dev"));
+    assert!(contributing.contains("cargo bench --bench hard -- --inputs"));
+}
+
 #[test]
 fn every_link_leads_somewhere() {
     let broken: Vec<String> = PAGES

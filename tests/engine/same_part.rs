@@ -279,10 +279,18 @@ fn a_solid_answers_the_same_in_any_order() {
         force: 10.0,
         tip_radius: 4e-3,
     };
-    let found = |seed: u64| {
-        let (positions, triangles) = reordered(&whole, seed);
+    let found_at = |seed: u64, off: DVec3| {
+        let (mut positions, triangles) = reordered(&whole, seed);
+        for p in &mut positions {
+            *p += off;
+        }
+        let touch = Touch {
+            position: touch.position + off,
+            ..touch
+        };
         let (part, _) = TriMesh::new(&positions, &triangles, 0).unwrap();
-        let mask = part.positions().iter().map(|p| p.z < 1e-9).collect();
+        let is_foot = |p: &DVec3| p.z - off.z < 1e-9;
+        let mask = part.positions().iter().map(is_foot).collect();
         let foot = Support {
             region: Region::Vertices(Arc::new(mask)),
             held: DofSet::ALL,
@@ -300,11 +308,15 @@ fn a_solid_answers_the_same_in_any_order() {
         let moved = crate::bench::solids::under(&model, &touch);
         (ground.whole.positions().to_vec(), moved)
     };
+    let found = |seed: u64| found_at(seed, DVec3::ZERO);
     let first = found(0);
     assert!(first.1 > 1e-7, "{}", first.1);
     for seed in 1..3 {
         assert_eq!(found(seed), first, "{seed}");
     }
+    // Elsewhere it is computed where it lies: only rounding is another.
+    let shifted = found_at(0, DVec3::new(0.3, -0.7, 1.1)).1;
+    assert!((shifted / first.1 - 1.0).abs() < 1e-6, "{shifted}");
 }
 
 #[test]

@@ -6,11 +6,10 @@
 //! the boxes that hold the part where these are turned; points, gradients and displacements are the file's for everybody
 //! else.
 
-use std::collections::HashMap;
-
 use faer::{Accum, Mat, MatRef, Par};
 use glam::DVec3;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use super::cut::{Cell, Cutter, Cutting, Moments};
 use super::grid::{Grid, Place};
@@ -31,7 +30,7 @@ pub struct FiniteCells {
     /// Where the cells with material lie, rising, and what they hold.
     places: Vec<Place>,
     moments: Vec<Moments>,
-    number: HashMap<Place, u32>,
+    number: FxHashMap<Place, u32>,
     /// Nodes of each cell, as many as it has shape functions.
     nodes: Vec<u32>,
     /// Lattice places of the nodes, and where they lie (m).
@@ -323,7 +322,7 @@ fn near_material(grid: &Grid, stance: Stance, surface: &SignedDistance) -> Vec<(
 
 /// Nodes of every cell, and the lattice places of all nodes.
 fn number_nodes(cells: &[Place], order: u32) -> (Vec<u32>, Vec<[u32; 3]>) {
-    let mut known: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut known: FxHashMap<[u32; 3], u32> = FxHashMap::default();
     let mut lattice = Vec::new();
     let mut nodes = Vec::new();
     for cell in cells {

@@ -5,9 +5,8 @@
 //! out exactly however they cross, round ones to the tolerance. All integrals that a stiffness needs follow from
 //! the moments of the material against products of Legendre polynomials.
 
-use std::collections::HashMap;
-
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 
 use super::lagrange::{gauss, legendre};
 use crate::mesh::inside::SignedDistance;
@@ -242,10 +241,10 @@ impl<'s> Cutter<'s> {
         let mut work = Work {
             cutter: self,
             cell,
-            known: HashMap::new(),
+            known: FxHashMap::default(),
             moments: Moments::none(self.degrees),
         };
-        work.visit([0; 3], 0);
+        work.visit([0; 3], 0, None);
         work.moments
     }
 }
@@ -254,7 +253,7 @@ impl<'s> Cutter<'s> {
 struct Work<'c> {
     cutter: &'c Cutter<'c>,
     cell: &'c Cell,
-    known: HashMap<[u32; 3], f64>,
+    known: FxHashMap<[u32; 3], f64>,
     moments: Moments,
 }
 
@@ -298,31 +297,50 @@ impl Work<'_> {
         self.cell.lower + self.cell.sides * DVec3::from_array(at.map(|i| f64::from(i) / whole))
     }
 
-    /// Signed distance (m).
-    fn distance(&mut self, at: [u32; 3]) -> f64 {
+    /// Signed distance (m), with what is known of the triangles near there.
+    fn distance(&mut self, at: [u32; 3], nearby: Option<&[u32]>) -> f64 {
         if let Some(&known) = self.known.get(&at) {
             return known;
         }
         let place = self.cutter.stance.place(self.point(at));
-        let signed = self.cutter.surface.at(place);
+        let signed = self.cutter.surface.among(nearby, place);
         self.known.insert(at, signed);
         signed
     }
 
-    fn visit(&mut self, lower: [u32; 3], depth: u32) {
+    /// The triangles that can be nearest within a box, where they are fewer than those near it were.
+    fn narrow(
+        &self,
+        middle: [u32; 3],
+        reach: f64,
+        distance: f64,
+        nearby: Option<&[u32]>,
+    ) -> Option<Vec<u32>> {
+        /// So few are not worth a look for fewer.
+        const FEW: usize = 2;
+        if nearby.is_some_and(|triangles| triangles.len() <= FEW) {
+            return None;
+        }
+        let centre = self.cutter.stance.place(self.point(middle));
+        (self.cutter.surface).nearby(nearby, (centre, reach), distance)
+    }
+
+    fn visit(&mut self, lower: [u32; 3], depth: u32, nearby: Option<&[u32]>) {
         let side = self.finest() >> depth;
         let half = side / 2;
         let place = |offset: [u32; 3]| std::array::from_fn(|i| lower[i] + offset[i] * half);
         let reach = self.cell.reach() / f64::from(1 << depth);
-        let centre = self.distance(place([1; 3]));
+        let centre = self.distance(place([1; 3]), nearby);
         if centre.abs() >= reach {
             if centre < 0.0 {
                 self.whole(lower, side);
             }
             return;
         }
-        let corners = CORNERS.map(|c| self.distance(place(c)));
-        let faces = FACES.map(|(middle, _)| self.distance(place(middle)));
+        let narrowed = self.narrow(place([1; 3]), reach, centre, nearby);
+        let nearby = narrowed.as_deref().or(nearby);
+        let corners = CORNERS.map(|c| self.distance(place(c), nearby));
+        let faces = FACES.map(|(middle, _)| self.distance(place(middle), nearby));
         let all = corners.iter().chain(&faces).chain([&centre]);
         // No point of the box is farther than half its longest side from all of these: none lies across.
         let covered = self.cell.sides.max_element() / f64::from(2 << depth);
@@ -345,6 +363,7 @@ impl Work<'_> {
                 self.visit(
                     std::array::from_fn(|i| lower[i] + child[i] / 2 * half),
                     depth + 1,
+                    nearby,
                 );
             }
             return;

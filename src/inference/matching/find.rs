@@ -3,6 +3,7 @@
 use super::modes::{Mode, widest};
 use super::weighed::Observation;
 use super::{Contact, Matching};
+use crate::inference::deviation::About;
 
 impl Matching {
     /// The touch that explains a reading (strain, a channel each) best.
@@ -63,9 +64,22 @@ impl Matching {
         if starts.is_empty() {
             starts.push(0);
         }
+        let begin = |&start: &usize| {
+            let start = self.map.mesh.vertex_point(start);
+            self.begin(measured, start, None, About::default())
+        };
+        let begun: Vec<Mode> = starts.iter().map(begin).collect();
+        let best = begun
+            .iter()
+            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence));
+        let least = best.map_or(f64::NEG_INFINITY, |best| {
+            best.log_evidence - HOPELESS - best.cost.max(0.0)
+        });
+        // Of numbers that are none all count.
+        let may_count = |m: &Mode| m.log_evidence.total_cmp(&least).is_ge();
         let mut modes: Vec<Mode> = Vec::with_capacity(STARTS);
-        for start in starts {
-            let mode = self.follow(measured, self.map.mesh.vertex_point(start), None);
+        for mode in begun.into_iter().filter(may_count) {
+            let mode = self.settle(measured, mode, None);
             // Two starts may end at the same place.
             let same = |m: &Mode| m.position.distance(mode.position) < 0.5 * self.map.spacing();
             if !modes.iter().any(same) {
@@ -80,6 +94,10 @@ impl Matching {
 const STARTS: usize = 4;
 
 const APART: f64 = 3.0;
+
+/// A place that explains a reading so much worse than the best, and by as much as that leaves unexplained, will not be
+/// the best one once both are settled, nor count beside it.
+const HOPELESS: f64 = 40.0;
 
 /// Beyond this deviation, in templates, their posterior takes the place of Gauss–Newton's normal one.
 const BROAD: f64 = 1.0;

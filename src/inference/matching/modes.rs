@@ -126,9 +126,31 @@ impl Matching {
     ) -> Mode {
         let (force, about) = known.unzip();
         let about = about.unwrap_or_default();
+        let mode = self.begin(observed, start, force, about);
+        let settled = known.map(|_| (self.map.mesh.point(start), about));
+        self.settle(observed, mode, settled)
+    }
+
+    /// The most likely place near a start, by what is taken there.
+    pub(super) fn begin(
+        &self,
+        observed: &Observation,
+        start: SurfacePoint,
+        force: Option<f64>,
+        about: About,
+    ) -> Mode {
         let terms = self.terms(observed, start, force, about);
-        let mut mode = self.descend(observed, &terms, start);
-        let mut before = (self.map.mesh.point(start), about);
+        self.descend(observed, &terms, start)
+    }
+
+    /// Goes on from where a place was found by what was taken elsewhere; no further where that was as good as here
+    /// (`before`: where, and how the touch was made).
+    pub(super) fn settle(
+        &self,
+        observed: &Observation,
+        mut mode: Mode,
+        mut before: Option<(DVec3, About)>,
+    ) -> Mode {
         let turns = match &self.errors.deviations {
             None => 0,
             Some(deviations) if deviations.nuisances.is_none() => 1,
@@ -136,12 +158,14 @@ impl Matching {
         };
         for _ in 0..turns {
             // A touch that goes on is where it was.
-            let moved = mode.position.distance(before.0) > SETTLED * self.map.spacing();
-            let turned = mode.about.aside.distance(before.1.aside) > SETTLED;
-            if known.is_some() && !moved && !turned {
-                break;
+            if let Some((place, about)) = &mut before {
+                let moved = mode.position.distance(*place) > SETTLED * self.map.spacing();
+                let turned = mode.about.aside.distance(about.aside) > SETTLED;
+                if !moved && !turned {
+                    break;
+                }
+                (*place, *about) = (mode.position, mode.about);
             }
-            before = (mode.position, mode.about);
             let terms = self.terms(observed, mode.at, Some(mode.force), mode.about);
             mode = self.descend(observed, &terms, mode.at);
         }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::kernels::{score_templates, score_with_gluing};
-use super::modes::Mode;
+use super::modes::{Mode, TURNS};
 use super::weighed::Observation;
 use super::{Contact, Load, Matching};
 use crate::inference::map::LANES;
@@ -111,17 +111,19 @@ impl Matching {
     fn force_at(&self, observed: &Observation, node: usize) -> (f64, f64, f64) {
         let g = self.map.node(node);
         let deviation = self.errors.deviations.as_ref().map(|d| d.all.node(node));
-        let force = deviation.map_or(0.0, |_| self.fitting_force(observed, g, deviation, &[]));
-        let weighed = observed.weighed(deviation, &[], force);
-        let measured = observed.measured(&weighed);
-        let (_, d) = measured.products(g);
-        let (force, cost) = measured.fit(g, self.most_force);
+        let mut force = deviation.map_or(0.0, |_| observed.first_force(g));
+        force = force.clamp(0.0, self.most_force);
+        for _ in 0..deviation.map_or(0, |_| TURNS) {
+            force = observed.sums(g, deviation, force).fit(self.most_force).0;
+        }
+        let sums = observed.sums(g, deviation, force);
+        let (force, cost) = sums.fit(self.most_force);
         // A force is never known worse than that it lies between nothing and the most.
-        let variance = d.max(12.0 * self.most_force.powi(-2)).recip();
+        let variance = sums.d.max(12.0 * self.most_force.powi(-2)).recip();
         (
             force,
             variance,
-            0.5 * observed.squares - cost - weighed.log + 0.5 * variance.ln(),
+            0.5 * observed.squares - cost - sums.log + 0.5 * variance.ln(),
         )
     }
 }

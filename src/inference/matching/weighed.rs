@@ -138,12 +138,7 @@ impl<'a> Measured<'a> {
     /// Best force and half the squares left over at a place with these readings per newton.
     pub fn fit(&self, g: &[f64], most_force: f64) -> (f64, f64) {
         let (s, d) = self.products(g);
-        let force = if d > 0.0 {
-            (s / d).clamp(0.0, most_force)
-        } else {
-            0.0
-        };
-        (force, 0.5 * self.squares - force * (s - 0.5 * force * d))
+        fit([s, d, self.squares], most_force)
     }
 
     /// Weighted product of the reading with those of a newton, and the squares of these.
@@ -262,20 +257,46 @@ impl<'a> Observation<'a> {
         nuisances: &[Nuisance],
         force: f64,
     ) -> Weighed {
-        let mut log = 0.0;
+        let mut product = Product::default();
         let weight = |(c, w): (usize, &f64)| {
             let off = gluing_deviation.map_or(0.0, |deviation| force * deviation[c]);
             let wider = 1.0 + w * off * off;
-            log += 0.5 * wider.ln();
+            product.times(wider);
             w / wider
         };
         let w: Vec<f64> = self.w.iter().enumerate().map(weight).collect();
         let shared = Shared::of(self.drift, nuisances, force, &w);
         Weighed {
-            log: log + shared.log - self.shared.log,
+            log: 0.5 * product.ln() + shared.log - self.shared.log,
             shared,
             w,
         }
+    }
+
+    /// The sums of [`Self::weighed`] without nuisances: thousands of templates are looked at one by one for a single
+    /// reading, and no list is kept for any of them.
+    pub fn sums(&self, g: &[f64], gluing_deviation: Option<&[f64]>, force: f64) -> Sums {
+        let mut sums = Sums::default();
+        let (mut all, mut of_x, mut of_g) = (0.0, 0.0, 0.0);
+        let mut wider = Product::default();
+        for (c, ((x, w), g)) in self.x.iter().zip(&self.w).zip(g).enumerate() {
+            let off = gluing_deviation.map_or(0.0, |deviation| force * deviation[c]);
+            let by = 1.0 + w * off * off;
+            wider.times(by);
+            let w = w / by;
+            sums.squares += w * x * x;
+            sums.s += w * x * g;
+            sums.d += w * g * g;
+            (all, of_x, of_g) = (all + w, of_x + w * x, of_g + w * g);
+        }
+        let inner = 1.0 + self.drift * all;
+        let taken = self.drift / inner;
+        sums.squares -= taken * of_x * of_x;
+        sums.s -= taken * of_x * of_g;
+        sums.d -= taken * of_g * of_g;
+        wider.times(inner);
+        sums.log = 0.5 * wider.ln() - self.shared.log;
+        sums
     }
 
     /// The reading under these weights, as it is compared with templates.
@@ -290,6 +311,67 @@ impl<'a> Observation<'a> {
         let s: f64 = trusted().map(|((x, g), _)| x * g).sum();
         let d: f64 = trusted().map(|((_, g), _)| g * g).sum();
         if d > 0.0 { s / d } else { 0.0 }
+    }
+}
+
+/// Weighted sums of a reading and of what a newton reads at a place.
+#[derive(Clone, Copy, Default)]
+pub(in crate::inference) struct Sums {
+    /// Their product.
+    s: f64,
+    /// Squares of what a newton reads.
+    pub d: f64,
+    /// Squares of the reading.
+    squares: f64,
+    /// Half the logarithm of the covariance's determinant, over that without gluing.
+    pub log: f64,
+}
+
+impl Sums {
+    /// As [`Measured::fit`].
+    pub fn fit(&self, most_force: f64) -> (f64, f64) {
+        fit([self.s, self.d, self.squares], most_force)
+    }
+}
+
+/// Best force and half the squares left over, by the weighted product of reading and template, the squares of the
+/// template, and those of the reading.
+fn fit([s, d, squares]: [f64; 3], most_force: f64) -> (f64, f64) {
+    let force = if d > 0.0 {
+        (s / d).clamp(0.0, most_force)
+    } else {
+        0.0
+    };
+    (force, 0.5 * squares - force * (s - 0.5 * force * d))
+}
+
+/// A product of which only the logarithm counts: that is taken where it grows large, and not for every factor.
+struct Product {
+    product: f64,
+    log: f64,
+}
+
+impl Default for Product {
+    fn default() -> Self {
+        Self {
+            product: 1.0,
+            log: 0.0,
+        }
+    }
+}
+
+impl Product {
+    fn times(&mut self, factor: f64) {
+        const LARGE: f64 = 1e100;
+        self.product *= factor;
+        if self.product > LARGE {
+            self.log += self.product.ln();
+            self.product = 1.0;
+        }
+    }
+
+    fn ln(&self) -> f64 {
+        self.log + self.product.ln()
     }
 }
 
@@ -377,6 +459,12 @@ mod tests {
             assert!((d - g.dot(&(&inverse * &g))).abs() < 1e-12);
             assert!((measured.squares - x.dot(&(&inverse * &x))).abs() < 1e-12);
             assert!((weighed.log - 0.5 * (determinant / without).ln()).abs() < 1e-12);
+            if nuisances.is_empty() {
+                let sums = observed.sums(&G, Some(&gluing_deviation), force);
+                assert!((sums.s - s).abs() < 1e-12 && (sums.d - d).abs() < 1e-12);
+                assert!((sums.squares - measured.squares).abs() < 1e-12);
+                assert!((sums.log - weighed.log).abs() < 1e-12);
+            }
         }
     }
 
