@@ -475,15 +475,13 @@ mod tests {
         );
         assert!(small.is_sorted_by(|a, b| a.kernel.length_m <= b.kernel.length_m));
         assert_eq!((edge_note(&map), edge_note(&small)), (None, None));
-        // Where all sites say the same the best length is the longest that was tried, and that is said.
-        let same = (0..n).flat_map(|_| (0..300).map(|t| (f64::from(t) * 0.7).sin()));
-        let same = SignalMatrix::new(300, same.collect());
-        let long = search(&same, &line(n, 0.004), 1e-6, &unwatched).unwrap();
-        let said = edge_note(&long).unwrap();
-        assert!(
-            said.contains("so long") && said.contains("unit of the sites"),
-            "{said}"
-        );
+        // Had the search ended at that length, that would be said.
+        let of_best = |t: &GpTrial| t.kernel.length_m == found.length_m;
+        let first = map.iter().position(of_best).unwrap();
+        let last = map.iter().rposition(of_best).unwrap();
+        let said = |map: &[GpTrial]| edge_note(map).unwrap();
+        assert!(said(&map[first..]).contains("so short"));
+        assert!(said(&map[..=last]).contains("so long"));
         // One kernel alone is tried as in the grid.
         let alone = |kernel: &GpKernel| trial(&x, &line(n, 0.004), kernel);
         assert_eq!(alone(&map[3].kernel), map[3]);
