@@ -200,6 +200,9 @@ impl SignedDistance {
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
     use super::super::winding::tests::ball;
     use super::*;
 
@@ -224,6 +227,41 @@ mod tests {
             inside += usize::from(expected);
         }
         inside
+    }
+
+    /// However balls are taken within balls, what is near says the same as the whole surface.
+    #[test]
+    fn the_triangles_near_a_ball_say_all_of_it() {
+        let mesh = Arc::new(ball(3));
+        let distance = SignedDistance::new(&mesh);
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let mut within = |radius: f64| {
+            let mut drawn = || (2.0 * rng.random::<f64>() - 1.0) * radius;
+            DVec3::new(drawn(), drawn(), drawn())
+        };
+        let (mut narrowed, mut looked) = (0, 0);
+        for _ in 0..400 {
+            let (mut centre, mut radius) = (within(1.2), 0.3);
+            let mut nearby: Option<Vec<u32>> = None;
+            for _ in 0..4 {
+                let before = nearby.as_ref().map(Vec::len);
+                nearby = distance
+                    .nearby(nearby.as_deref(), (centre, radius), distance.at(centre))
+                    .or(nearby);
+                narrowed += usize::from(nearby.as_ref().map(Vec::len) < before);
+                for _ in 0..8 {
+                    // A box's corner lies on its ball: as far as points are asked for.
+                    let point = centre + within(radius / 3f64.sqrt());
+                    let (found, whole) =
+                        (distance.among(nearby.as_deref(), point), distance.at(point));
+                    assert!((found - whole).abs() < 1e-12, "{found} {whole}");
+                    looked += usize::from(nearby.is_some());
+                }
+                centre += within(radius / 4.0);
+                radius /= 2.0;
+            }
+        }
+        assert!(narrowed > 100 && looked > 5000, "{narrowed} {looked}");
     }
 
     /// A ball with a fin that has two sides and nothing between them, outside and in its middle.
