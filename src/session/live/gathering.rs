@@ -46,13 +46,13 @@ pub struct Gathering {
 }
 
 impl Gathering {
-    /// Begins to read anew.
-    #[must_use]
-    pub fn of(awaited: Awaited) -> Self {
-        Self {
+    /// Begins to read anew, or ends it. What was finished waits until somebody asks for it.
+    pub fn begin(&mut self, awaited: Awaited) {
+        *self = Self {
             awaited,
+            taken: self.take(),
             ..Self::default()
-        }
+        };
     }
 
     #[must_use]
@@ -120,6 +120,12 @@ mod tests {
 
     const HERE: DVec3 = DVec3::new(0.01, 0.02, 0.03);
 
+    fn of(awaited: Awaited) -> Gathering {
+        let mut gathering = Gathering::default();
+        gathering.begin(awaited);
+        gathering
+    }
+
     /// Samples a millisecond apart from `from_ms` on, each the number of its millisecond, while a touch has a force (N).
     fn hear(gathering: &mut Gathering, from_ms: u64, count: u64, force: impl Fn(u64) -> f64) {
         for ms in from_ms..from_ms + count {
@@ -130,7 +136,7 @@ mod tests {
 
     #[test]
     fn a_press_is_read_off_the_samples_however_seldom_somebody_looks() {
-        let mut gathering = Gathering::of(Awaited::Press(HERE, 5.0));
+        let mut gathering = of(Awaited::Press(HERE, 5.0));
         hear(&mut gathering, 100, 1000, |_| 0.0);
         let taken = gathering.take();
         assert_eq!(taken.len(), 1);
@@ -143,7 +149,7 @@ mod tests {
 
     #[test]
     fn a_touch_of_the_board_is_read_once_and_only_while_its_force_stands_still() {
-        let mut gathering = Gathering::of(Awaited::Board);
+        let mut gathering = of(Awaited::Board);
         // It rises for half a second, stands for half a second, and goes down again.
         hear(&mut gathering, 0, 500, |ms| 0.01 * (ms + 1) as f64);
         assert_eq!(gathering.take(), []);
@@ -162,8 +168,20 @@ mod tests {
     }
 
     #[test]
+    fn what_was_finished_outlives_the_end_and_what_was_not_does_not() {
+        let mut gathering = of(Awaited::Press(HERE, 5.0));
+        hear(&mut gathering, 0, 1000, |_| 0.0);
+        gathering.begin(Awaited::Press(HERE, 6.0));
+        hear(&mut gathering, 1000, 50, |_| 0.0);
+        gathering.begin(Awaited::Nothing);
+        hear(&mut gathering, 1050, 1000, |_| 0.0);
+        let forces: Vec<f64> = gathering.take().iter().map(|g| g.force).collect();
+        assert_eq!(forces, [5.0]);
+    }
+
+    #[test]
     fn a_slow_board_is_read_sample_by_sample() {
-        let mut gathering = Gathering::of(Awaited::Press(HERE, 5.0));
+        let mut gathering = of(Awaited::Press(HERE, 5.0));
         for k in 0..READINGS as u64 {
             assert_eq!(gathering.take(), []);
             gathering.hear(100_000 * k, &[1.0, 2.0], None);

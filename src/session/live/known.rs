@@ -39,6 +39,8 @@ impl Session {
     /// Takes the next touches of a simulated board as known ones, and calibrates with them.
     pub fn calibrate_from_board(&mut self) {
         self.live.known.clear();
+        // One that was read meanwhile is not of these.
+        drop(self.live.gathered());
         self.live.exact = true;
         self.live.await_known(Awaited::Board);
     }

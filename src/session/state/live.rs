@@ -12,7 +12,7 @@ use crate::link::{Address, Command, Connection, Hosted, State};
 use crate::live::Update;
 use crate::project::LiveKeys;
 use crate::session::live::feed::{Feed, Shared};
-use crate::session::live::gathering::{Awaited, Gathered, Gathering};
+use crate::session::live::gathering::{Awaited, Gathered};
 use crate::session::live::training::Pair;
 use crate::session::slot::Slot;
 use crate::session::state::learned::Learnt;
@@ -104,7 +104,7 @@ impl Live {
     /// Begins to read known touches, or ends it.
     pub(in crate::session) fn await_known(&self, what: Awaited) {
         if let Ok(mut feed) = self.feed.lock() {
-            feed.gathering = Gathering::of(what);
+            feed.gathering.begin(what);
         }
     }
 
