@@ -109,6 +109,9 @@ fn everywhere(args: &SimulateArgs, loaded: &LoadedProject) -> anyhow::Result<()>
         let first = &touches[..touches.len().min(vtu::TOUCHES)];
         vtu::write(path, model.mesh(), &vtu::fields(&*model, first))?;
     }
+    for doubt in simulated.doubts() {
+        out::say(&format!("NOT TO BE TRUSTED: {}", doubt.words));
+    }
     say(&simulated.achieved.words().cloned().collect::<Vec<_>>());
     let dataset = &simulated.dataset;
     let summary = json!({

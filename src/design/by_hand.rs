@@ -61,7 +61,7 @@ impl Design {
         let selections = Arc::make_mut(&mut design.selections);
         if let Some(led) = selections.iter_mut().find(|s| s.selector == self.lead) {
             led.achieved.cautions.push(
-                "Gauges were moved by hand: the chosen set and its errors are those of the gauges as they are, not of the selector. What it says of ties and gaps is of the set that it chose.".into(),
+                "Gauges were moved by hand: the chosen set and its errors are those of the gauges as they are, not of the selector. What it says of ties, gaps and exchanges is of the set that it chose.".into(),
             );
             // Its figures for that set say nothing of this one.
             led.achieved.error_estimate = None;

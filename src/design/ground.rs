@@ -100,7 +100,7 @@ pub(super) fn solid_ground(inputs: &Inputs, watch: Watch) -> Result<SolidGround,
 #[must_use]
 pub fn short_of_memory(is_short: bool) -> Option<String> {
     is_short.then(|| {
-        "Memory did not hold as many elements as this quality asks for: there are fewer. Allow more with --memory-gb, or choose a lower quality.".into()
+        "Memory did not hold as many elements as this quality asks for: there are fewer. Allow more with --memory-gb.".into()
     })
 }
 

@@ -57,9 +57,8 @@ pub enum ElasticError {
     },
     /// A solid whose surface is not closed.
     #[error(
-        "the mesh encloses nothing (it has {}), so it is no solid: {} in the program that wrote it, fill its holes (part.fill_holes_mm), or take it as a shell (part.model = \"shell\")",
-        plain::count(*rims, "free edge"),
-        closing(*closes_within)
+        "the mesh {}, or take it as a shell (part.model = \"shell\")",
+        no_solid(*rims, *closes_within)
     )]
     Open {
         /// Its free edges.
@@ -114,6 +113,18 @@ impl ElasticError {
 }
 
 /// How an open mesh is closed.
+/// Why it is no solid, and what helps.
+fn no_solid(rims: usize, closes_within: Option<f64>) -> String {
+    if rims == 0 {
+        return "is closed, but behind much of its surface there is nothing: a vertex lies far off, facets look the wrong way round, or bodies lie within each other. Mend it in the program that wrote it".into();
+    }
+    format!(
+        "encloses nothing (it has {}), so it is no solid: {} in the program that wrote it, fill its holes (part.fill_holes_mm)",
+        plain::count(rims, "free edge"),
+        closing(closes_within)
+    )
+}
+
 fn closing(within: Option<f64>) -> String {
     let join = |metres: f64| {
         let mm = plain::digits(metres * 1e3);

@@ -4,6 +4,7 @@ use super::Section;
 use crate::mesh::bends::bends;
 use crate::mesh::surface::Surface;
 use crate::mesh::{Edge, TriMesh};
+use crate::plain;
 
 /// Beyond this the wall is no thin shell: thickness over radius of curvature, and over width.
 const THICK_FOR_RADIUS: f64 = 0.1;
@@ -51,9 +52,9 @@ pub fn cautions(surface: &Surface, section: &Section, tip_radius: f64) -> Vec<St
     }
     if tip_radius < t {
         notes.push(format!(
-            "The tip (radius {:.2} mm) is smaller than the wall is thick ({:.2} mm): the dent right under it is not in a shell model.",
-            mm(tip_radius),
-            mm(t)
+            "The tip (radius {} mm) is smaller than the wall is thick ({} mm): the dent right under it is not in a shell model.",
+            plain::digits(mm(tip_radius)),
+            plain::digits(mm(t))
         ));
     }
     notes

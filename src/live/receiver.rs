@@ -68,6 +68,8 @@ pub enum Doubt {
     Refused(Refusal),
     /// Rows of numbers with commas that may be decimal ones.
     Commas,
+    /// Rows of numbers that are as numbers with decimal commas would be, but may be counts.
+    Fractions,
     /// Rows of numbers in which this one, from 1, is none.
     NoNumber(usize),
     /// Bytes that are neither frames nor rows of numbers.
@@ -85,7 +87,7 @@ impl Doubt {
         match self {
             Self::Refused(why) => why.is_lasting(),
             Self::Commas | Self::NoNumber(_) => true,
-            Self::Neither | Self::NoData | Self::Changed => false,
+            Self::Fractions | Self::Neither | Self::NoData | Self::Changed => false,
         }
     }
 
@@ -96,6 +98,9 @@ impl Doubt {
             Self::Refused(why) => return why.in_words(),
             Self::Commas => {
                 "the board prints lines such as “1,5;2,5” or “1,05,2,50”, whose commas may be decimal ones: what is a number cannot be told. Print decimal points, or whole numbers with one sign alone between them"
+            }
+            Self::Fractions => {
+                "every second number in the board's lines has as many digits, and more than those between: if commas are decimal ones, as in “1,25,1,50”, each number is taken for two. Print decimal points, or whole numbers"
             }
             Self::NoNumber(place) => {
                 return Some(format!(
@@ -269,6 +274,12 @@ impl Receiver {
     #[must_use]
     pub fn speaks_lines(&self) -> bool {
         self.speech == Speech::Lines
+    }
+
+    /// Whether its lines are as numbers with decimal commas would be.
+    #[must_use]
+    pub fn may_have_decimal_commas(&self) -> bool {
+        self.speaks_lines() && self.lines.may_have_decimal_commas()
     }
 
     /// Why nothing that came since the last sample can be used, as far as that is known.

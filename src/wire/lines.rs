@@ -30,6 +30,8 @@ pub struct LineReader {
     others: usize,
     /// A line has shown that commas are decimal ones.
     has_decimal_commas: bool,
+    /// Lines in a row that are as numbers with decimal commas would be.
+    alike: usize,
 }
 
 impl LineReader {
@@ -64,6 +66,11 @@ impl LineReader {
             return self.without_number(text);
         };
         self.has_decimal_commas |= shows_decimal_commas(text);
+        self.alike = if resembles_decimal_commas(text) {
+            self.alike + 1
+        } else {
+            0
+        };
         if is_unclear(text) || (self.has_decimal_commas && fractions(text).is_some()) {
             return Reading::Unclear;
         }
@@ -80,12 +87,21 @@ impl LineReader {
         }
     }
 
-    /// What a line says that is no row of numbers: where rows of as many came before, that one of them is none.
+    /// Whether lines have come as numbers with decimal commas would: it may be chance.
+    #[must_use]
+    pub fn may_have_decimal_commas(&self) -> bool {
+        /// So many in a row.
+        const LINES: usize = 16;
+        self.alike >= LINES
+    }
+
+    /// What a line says that is no row of numbers: where no rows of another length came before, that one of them is none.
     fn without_number(&self, text: &str) -> Reading {
         let words: Vec<&str> = words(text).collect();
         // As sketches print what they cannot count: `Serial.print` has a word of its own beside the two of C.
         let is_number = |word: &&str| word.parse::<f64>().is_ok() || *word == "ovf";
-        let is_row = self.channels == Some(words.len()) && words.iter().all(is_number);
+        let fits = self.channels.is_none_or(|known| known == words.len());
+        let is_row = fits && words.iter().all(is_number);
         match words.iter().position(|word| count(word).is_none()) {
             Some(place) if is_row => Reading::NoNumber(place + 1),
             _ => Reading::Other,
@@ -151,6 +167,18 @@ fn shows_decimal_commas(text: &str) -> bool {
     })
 }
 
+/// Whether every second number has as many digits, and more than those between: of several numbers with decimal commas
+/// that is so, of counts hardly ever.
+fn resembles_decimal_commas(text: &str) -> bool {
+    const LEAST: usize = 2;
+    fractions(text).is_some_and(|(wholes, fractions)| {
+        let digits = fractions[0].len();
+        fractions.len() >= LEAST
+            && fractions.iter().all(|f| f.len() == digits)
+            && wholes.iter().all(|w| w.len() < digits)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -184,7 +212,7 @@ mod tests {
     fn a_number_that_is_none_is_found() {
         let said = readings(b"nan,1\n1,2\novf,1\n1,-inf\n1e16,1\n1,2,nan\n1,no\n");
         let expected = [
-            Reading::Other,
+            Reading::NoNumber(1),
             Reading::Values(vec![1.0, 2.0]),
             Reading::NoNumber(1),
             Reading::NoNumber(2),
@@ -229,6 +257,16 @@ mod tests {
             said.iter().all(|r| matches!(r, Reading::Values(_))),
             "{said:?}"
         );
+        // Where no zero shows it, lines that go on looking like it are told of.
+        let may_be_decimal = |line: &str| {
+            let mut reader = LineReader::default();
+            reader.push(line.repeat(20).as_bytes(), |_| ());
+            reader.may_have_decimal_commas()
+        };
+        assert!(may_be_decimal("1,25,-1,50,1,33,1,41\n"));
+        for line in ["512,498,503,511\n", "1,25\n", "3,14,2,15\n4,10,5,9\n"] {
+            assert!(!may_be_decimal(line), "{line}");
+        }
     }
 
     #[test]

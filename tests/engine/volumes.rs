@@ -379,7 +379,7 @@ fn what_gmsh_files_hold_besides_is_noted() {
     elements.push(elements[3].clone());
     let said = notes("msh", &msh2((nodes, elements)));
     assert!(
-        said.contains("1 tetrahedra are there a second time"),
+        said.contains("1 tetrahedron is there a second time"),
         "{said}"
     );
     let good = msh2(block());

@@ -65,8 +65,9 @@ fn missing_accessor(bytes: &[u8]) -> Option<String> {
         mesh.primitives.iter().enumerate().find_map(|(p, primitive)| {
             let missing = (primitive.attributes.values()).find(|a| a.value() >= count)?;
             Some(format!(
-                "meshes[{m}].primitives[{p}] of the glTF file names accessor {}, and there are {count}, from 0",
-                missing.value()
+                "meshes[{m}].primitives[{p}] of the glTF file names accessor {} (from 0), and the file has {}",
+                missing.value(),
+                plain::count(count, "accessor")
             ))
         })
     })

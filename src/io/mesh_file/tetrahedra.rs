@@ -94,8 +94,8 @@ impl Tetrahedra {
         }
         if let Some(place) = self.repeated {
             soup.notes.push(format!(
-                "{} tetrahedra are there a second time (the first in {place}) and were taken once",
-                self.repeats
+                "{} there a second time (the first in {place}) and taken once",
+                plain::either(self.repeats, "tetrahedron is", "tetrahedra are")
             ));
         }
         let volume = VolumeMesh::of(soup.positions.clone(), &self.all);

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::listener::{Listener, SessionEvent, State};
-use crate::live::Sample;
+use crate::live::{Doubt, Sample};
 
 impl Listener {
     /// Says where a gauge is on a channel that does not come, whether a board has told how many there are or its
@@ -46,6 +46,18 @@ impl Listener {
         }
     }
 
+    /// Says once that the commas of plain lines may be decimal ones.
+    fn doubt_commas(&mut self, tell: &mut impl FnMut(SessionEvent)) {
+        let doubt = Doubt::Fractions;
+        if !self.receiver.may_have_decimal_commas() || self.explained.contains(&doubt) {
+            return;
+        }
+        self.explained.push(doubt);
+        if let Some(words) = doubt.in_words() {
+            tell(SessionEvent::Message(&words));
+        }
+    }
+
     pub(super) fn measure(
         &mut self,
         sample: &Sample,
@@ -61,6 +73,7 @@ impl Listener {
             self.record(|r| r.own("tare"));
         }
         self.compare_channels(sample.counts.len(), tell);
+        self.doubt_commas(tell);
         let update = self.pipeline.push(sample);
         if let Some(news) = self.pipeline.news() {
             tell(SessionEvent::Message(&news.in_words()));
