@@ -27,16 +27,24 @@ pub(super) fn places(
         return Ok(bench_folder::read_plan(folder)?);
     }
     if let Some(path) = &asked.points {
-        let asked = points::read_points(path)?;
-        let places: Vec<DVec3> = asked.into_iter().map(|p| p.position).collect();
-        check_reach(&inputs.part, "point", places.iter().copied())
-            .map_err(|error| in_file(error, path))?;
-        return Ok(places);
+        return points_of(path, inputs);
     }
     let seed = inputs.project.budget.seed;
     let touches = sensing.touches(inputs, asked.places, seed, true)?;
     let mut places: Vec<DVec3> = touches.iter().map(|t| t.position).collect();
     places.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+    Ok(places)
+}
+
+/// Somebody's own points (m).
+///
+/// # Errors
+/// One that lies far from the part, by its file and line.
+pub(super) fn points_of(path: &Path, inputs: &Inputs) -> anyhow::Result<Vec<DVec3>> {
+    let asked = points::read_points(path)?;
+    let places: Vec<DVec3> = asked.into_iter().map(|p| p.position).collect();
+    check_reach(&inputs.part, "point", places.iter().copied())
+        .map_err(|error| in_file(error, path))?;
     Ok(places)
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::ensure;
 
 use super::asked::Asked;
+use super::places::points_of;
 use crate::design::Inputs;
 use crate::io::bench_folder::{self, About, limb_key};
 use crate::io::machine_file::{self, MachineFile};
@@ -34,6 +35,9 @@ impl Run {
         let before = before.filter(|_| pressed);
         if let Some(before) = &before {
             same(before, &about, folder)?;
+        } else if let Some(path) = &asked.points {
+            // What cannot be pressed is said before anything is computed.
+            points_of(path, inputs)?;
         }
         Ok(Self {
             asked,
