@@ -664,6 +664,30 @@ fn the_size_of_the_part_changes_nothing_but_the_size_of_the_errors() {
     assert!(notes(&given).contains("C (200 mm) is small"), "{given}");
 }
 
+/// A real skin that was pressed five times at each of 961 places: a tenth of the error goes where repeats are divided.
+#[test]
+fn a_measured_skin_is_judged_by_its_places() {
+    let skin = "../shared/measured/eflesh_1.npz";
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(skin);
+    if !path.is_file() {
+        println!("skipped: {} is not there", path.display());
+        return;
+    }
+    let judge = |split: &str| {
+        let data = path.to_str().unwrap();
+        let base = ["evaluate", "--data", data, "--sites", "0,3,6,9,12,14"];
+        json(&[&base[..], &["--estimator", "nearest", "--split", split]].concat())
+    };
+    let [together, apart] = ["place", "touch"].map(judge);
+    assert_eq!(
+        (&together["places"], &apart["places"]),
+        (&961.into(), &4805.into())
+    );
+    // 1.69 and 1.46 mm when this was written.
+    let last = |v: &Value| numbers(&v["criterion_mm"])[5];
+    assert!(last(&together) > 1.1 * last(&apart), "{together} {apart}");
+}
+
 #[test]
 fn repeats_of_a_place_are_judged_together() {
     /// Times that each place is pressed.
