@@ -112,7 +112,6 @@ impl ElasticError {
     }
 }
 
-/// How an open mesh is closed.
 /// Why it is no solid, and what helps.
 fn no_solid(rims: usize, closes_within: Option<f64>) -> String {
     if rims == 0 {
@@ -125,6 +124,7 @@ fn no_solid(rims: usize, closes_within: Option<f64>) -> String {
     )
 }
 
+/// How an open mesh is closed, by joining vertices within a distance (m) where that does.
 fn closing(within: Option<f64>) -> String {
     let join = |metres: f64| {
         let mm = plain::digits(metres * 1e3);

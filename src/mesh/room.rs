@@ -83,7 +83,8 @@ impl<'a> Room<'a> {
         }
     }
 
-    /// How far each node is from the surface (m), and what is farther than any ball that is tried so far.
+    /// How far each node is from the surface (m); what is farther than the largest ball that is tried counts as a cell
+    /// farther than that.
     fn distances(&self, watch: Watch) -> Result<Vec<f64>, Cancelled> {
         const ROWS: usize = 256;
         let [along, ..] = self.counts;

@@ -308,7 +308,8 @@ impl Work<'_> {
         signed
     }
 
-    /// The triangles that can be nearest within a box, where they are fewer than those near it were.
+    /// The triangles that can be nearest within a box, by its middle, how far its corners are from that and how far the
+    /// surface is (m), of those that can be near it; nothing where they are few already, or too many for a list.
     fn narrow(
         &self,
         middle: [u32; 3],
