@@ -18,6 +18,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix3, Matrix4, Matrix4x3, Vector3, Vector4};
 
 use super::Errors;
+use super::sums::{Product, Sums, fit};
 use crate::inference::deviation::{About, MOST, Nuisance};
 use crate::inference::map::Slope;
 
@@ -311,67 +312,6 @@ impl<'a> Observation<'a> {
         let s: f64 = trusted().map(|((x, g), _)| x * g).sum();
         let d: f64 = trusted().map(|((_, g), _)| g * g).sum();
         if d > 0.0 { s / d } else { 0.0 }
-    }
-}
-
-/// Weighted sums of a reading and of what a newton reads at a place.
-#[derive(Clone, Copy, Default)]
-pub(in crate::inference) struct Sums {
-    /// Their product.
-    s: f64,
-    /// Squares of what a newton reads.
-    pub d: f64,
-    /// Squares of the reading.
-    squares: f64,
-    /// Half the logarithm of the covariance's determinant, over that without gluing.
-    pub log: f64,
-}
-
-impl Sums {
-    /// As [`Measured::fit`].
-    pub fn fit(&self, most_force: f64) -> (f64, f64) {
-        fit([self.s, self.d, self.squares], most_force)
-    }
-}
-
-/// Best force and half the squares left over, by the weighted product of reading and template, the squares of the
-/// template, and those of the reading.
-fn fit([s, d, squares]: [f64; 3], most_force: f64) -> (f64, f64) {
-    let force = if d > 0.0 {
-        (s / d).clamp(0.0, most_force)
-    } else {
-        0.0
-    };
-    (force, 0.5 * squares - force * (s - 0.5 * force * d))
-}
-
-/// A product of which only the logarithm counts: that is taken where it grows large, and not for every factor.
-struct Product {
-    product: f64,
-    log: f64,
-}
-
-impl Default for Product {
-    fn default() -> Self {
-        Self {
-            product: 1.0,
-            log: 0.0,
-        }
-    }
-}
-
-impl Product {
-    fn times(&mut self, factor: f64) {
-        const LARGE: f64 = 1e100;
-        self.product *= factor;
-        if self.product > LARGE {
-            self.log += self.product.ln();
-            self.product = 1.0;
-        }
-    }
-
-    fn ln(&self) -> f64 {
-        self.log + self.product.ln()
     }
 }
 
