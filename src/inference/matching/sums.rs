@@ -47,7 +47,8 @@ impl Default for Product {
 }
 
 impl Product {
-    pub fn times(&mut self, factor: f64) {
+    /// One more factor.
+    pub(super) fn times(&mut self, factor: f64) {
         const LARGE: f64 = 1e100;
         self.product *= factor;
         if self.product > LARGE {
@@ -56,7 +57,8 @@ impl Product {
         }
     }
 
-    pub fn ln(&self) -> f64 {
+    /// Natural logarithm of the product so far.
+    pub(super) fn ln(&self) -> f64 {
         self.log + self.product.ln()
     }
 }
