@@ -4,8 +4,10 @@
 //! K(L, L) = R Rᵀ: C. Williams and M. Seeger, 2001. The factor is a pivoted Cholesky in double precision,
 //! cut where it reaches rounding, as S. Fine and K. Scheinberg, JMLR 2, 2001.
 
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt_pivoting::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Mat, MatRef, Par};
+use faer::{Mat, MatRef, Par, Spec};
 
 /// Pivots of the landmarks' own kernel below this are rounding.
 const CUT: f64 = 1e-10;
@@ -35,48 +37,27 @@ pub fn features(cross: MatRef<f64>, landmarks: &[usize]) -> Mat<f64> {
 /// Lower factor of a positive semidefinite matrix in the order of its pivots, up to its numerical rank.
 fn pivoted_cholesky(mut a: Mat<f64>) -> (Mat<f64>, Vec<usize>) {
     let n = a.nrows();
-    let mut pivots: Vec<usize> = (0..n).collect();
-    let mut rank = 0;
-    while rank < n {
-        let best = (rank..n).fold(rank, |b, i| if a[(i, i)] > a[(b, b)] { i } else { b });
-        if a[(best, best)] <= CUT {
-            break;
-        }
-        swap(&mut a, rank, best);
-        pivots.swap(rank, best);
-        let pivot = a[(rank, rank)].sqrt();
-        a[(rank, rank)] = pivot;
-        for i in rank + 1..n {
-            a[(i, rank)] /= pivot;
-        }
-        for j in rank + 1..n {
-            let factor = a[(j, rank)];
-            let (done, rest) = a.as_mut().split_at_col_mut(j);
-            let (column, mut target) = (done.col(rank), rest.col_mut(0));
-            for i in j..n {
-                target[i] -= factor * column[i];
-            }
-        }
-        rank += 1;
-    }
+    let (mut pivots, mut places) = (vec![0_usize; n], vec![0_usize; n]);
+    let mut memory = MemBuffer::new(cholesky_in_place_scratch::<usize, f64>(
+        n,
+        Par::Seq,
+        Spec::default(),
+    ));
+    let factored = cholesky_in_place(
+        a.as_mut(),
+        &mut pivots,
+        &mut places,
+        Par::Seq,
+        MemStack::new(&mut memory),
+        Spec::default(),
+    );
+    // What is no kernel has no features: nothing is learned from it.
+    let found = factored.map_or(0, |(info, _)| info.rank);
+    // Pivots fall, and those below the cut are rounding.
+    let rank = (0..found).take_while(|&k| a[(k, k)].powi(2) > CUT).count();
     pivots.truncate(rank);
     let factor = Mat::from_fn(rank, rank, |i, j| if i >= j { a[(i, j)] } else { 0.0 });
     (factor, pivots)
-}
-
-/// Exchanges two rows and columns of the lower triangle.
-fn swap(a: &mut Mat<f64>, i: usize, j: usize) {
-    if i == j {
-        return;
-    }
-    let n = a.nrows();
-    let at = |r: usize, c: usize| if r >= c { (r, c) } else { (c, r) };
-    for k in (0..n).filter(|&k| k != i && k != j) {
-        let (p, q) = (a[at(i, k)], a[at(j, k)]);
-        (a[at(i, k)], a[at(j, k)]) = (q, p);
-    }
-    let (p, q) = (a[(i, i)], a[(j, j)]);
-    (a[(i, i)], a[(j, j)]) = (q, p);
 }
 
 #[cfg(test)]
