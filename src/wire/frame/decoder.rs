@@ -42,12 +42,7 @@ impl Decoder {
     pub fn push(&mut self, bytes: &[u8], mut tell: impl FnMut(Event)) {
         for &byte in bytes {
             if byte != 0 {
-                if !self.overlong && self.frame.len() > LONGEST {
-                    self.make_room();
-                }
-                if !self.overlong {
-                    self.frame.push(byte);
-                }
+                self.keep(byte);
                 continue;
             }
             if self.overlong {
@@ -60,16 +55,31 @@ impl Decoder {
         }
     }
 
+    fn keep(&mut self, byte: u8) {
+        if self.overlong {
+            // A line that was longer than any frame ends here, and a frame may begin.
+            self.overlong = byte != b'\n';
+            return;
+        }
+        if self.frame.len() > LONGEST {
+            self.make_room();
+        }
+        if !self.overlong {
+            self.frame.push(byte);
+        }
+    }
+
     /// The line was cut: what follows has nothing to do with what was before.
     pub fn reset(&mut self) {
         *self = Self::default();
     }
 
-    /// Longer than any frame, unless what was printed before it goes.
+    /// Longer than any frame, unless the lines that were printed before it go.
     fn make_room(&mut self) {
-        let printed = printed(&self.frame);
-        self.frame.drain(..printed);
-        self.overlong = printed == 0;
+        let line = self.frame.iter().position(|&b| b == b'\n');
+        self.frame
+            .drain(..line.map_or(self.frame.len(), |at| at + 1));
+        self.overlong = line.is_none();
     }
 
     fn end_of_frame(&mut self, tell: &mut impl FnMut(Event)) {
@@ -88,16 +98,16 @@ impl Decoder {
         }
     }
 
-    /// What lies between two zeros. A board that has just printed lines sends no zero before its first frame.
+    /// What lies between two zeros. A board that has just printed lines sends no zero before its first frame, which
+    /// then begins behind one of the line feeds.
     fn read_behind_text(&mut self) -> Result<(u16, u32, Message), Refusal> {
-        let printed = printed(&self.frame);
-        if printed == 0 {
+        let starts = starts_behind_lines(&self.frame);
+        if starts.is_empty() {
             return self.read();
         }
         let whole = self.frame.clone();
         let mut found = self.read();
-        // The last line feed may be the first byte of the frame.
-        for start in [printed, printed - 1] {
+        for start in starts {
             if !matches!(found, Err(Refusal::Framing | Refusal::Damaged)) {
                 break;
             }
@@ -155,14 +165,16 @@ impl Decoder {
     }
 }
 
-/// Bytes at the beginning that are lines of text.
-fn printed(bytes: &[u8]) -> usize {
-    let text = bytes
-        .iter()
-        .take_while(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
-        .count();
-    let last = bytes[..text].iter().rposition(|&b| b == b'\n');
-    last.map_or(0, |at| at + 1)
+/// Where a frame may begin behind lines that were printed, whatever bytes these have.
+fn starts_behind_lines(bytes: &[u8]) -> Vec<usize> {
+    // The first byte of a frame in COBS says where its first zero was, and the second is the kind of message.
+    let begins = |at: &usize| {
+        bytes
+            .get(at + 1)
+            .is_some_and(|&kind| payload::is_known(kind))
+    };
+    let feeds = bytes.iter().enumerate().filter(|(_, b)| **b == b'\n');
+    feeds.map(|(at, _)| at + 1).filter(begins).collect()
 }
 
 #[cfg(test)]
@@ -282,7 +294,15 @@ mod tests {
     #[test]
     fn a_frame_behind_printed_lines_is_found() {
         let hello = Message::Hello(board());
-        for text in ["1,2,3\n", "ready\r\n\n", &"2000 2001 2002\r\n".repeat(100)] {
+        let texts = [
+            "1,2,3\n",
+            "ready\r\n\n",
+            "T = 25 °C\r\n",
+            "\u{1b}[0;32mI (29) boot: ESP-IDF\u{1b}[0m\n",
+            &"2000 2001 2002\r\n".repeat(100),
+            &format!("{}\nready\n", "=".repeat(400)),
+        ];
+        for text in texts {
             let mut bytes = text.as_bytes().to_vec();
             encode(&hello, 0, 0, 12, &mut bytes);
             let found = events(&bytes);

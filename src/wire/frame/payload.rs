@@ -33,6 +33,11 @@ pub(super) fn kind(message: &Message) -> u8 {
     }
 }
 
+/// Whether messages of this kind exist.
+pub(super) fn is_known(kind: u8) -> bool {
+    matches!(kind, HELLO..=PONG | NOTE | ASK_HELLO..=PING)
+}
+
 /// Appends what follows the head of a message's frame.
 pub(super) fn append(message: &Message, bits: u8, out: &mut Vec<u8>) {
     match message {
