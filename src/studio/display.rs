@@ -135,6 +135,14 @@ impl Display {
                     "the window cannot be opened: nothing answers at {name}. Start the display or name another, or {HEADLESS}"
                 )
             }
+            (Self::Socket { name, .. } | Self::Remote { name, .. }, _)
+                if is_turned_away(&error.to_string()) =>
+            {
+                format!(
+                    "the window cannot be opened: {name} turns it away ({}). Give it the display's key (XAUTHORITY names the file; `xauth list` shows what it holds), or {HEADLESS}",
+                    cause(&error.to_string())
+                )
+            }
             _ => format!(
                 "the window cannot be opened: {}. It needs a Vulkan driver and the libraries of a display ({NEEDS}). Or {HEADLESS}",
                 cause(&error.to_string())
@@ -197,6 +205,11 @@ fn cause(error: &str) -> &str {
         None => error,
     };
     told.trim().trim_end_matches('.')
+}
+
+/// Whether an X server that is there lets nobody in, in the words of the window's library.
+fn is_turned_away(error: &str) -> bool {
+    error.contains("open connection to X server")
 }
 
 #[cfg(test)]

@@ -65,18 +65,19 @@ pub fn header(ask: &mut Ask<'_>, ui: &mut Ui) -> bool {
     // A resizable panel that is not filled shrinks a little every frame.
     ui.set_min_height(ui.available_height());
     ui.add_space(4.0);
-    ui.horizontal(|ui| {
+    let beside = ui.horizontal(|ui| {
         for tab in Tab::ALL {
             ui.selectable_value(&mut ask.view.tab, tab, tab.name());
         }
-        if ask.session.design_holds() == Some(false) && ask.view.tab.is_of_design() {
-            ui.colored_label(super::theme::STALE, "of settings that have changed since");
+        let is_roomy = ui.available_width() >= ROOM_BESIDE_TABS;
+        if is_roomy {
+            labels(ask, ui);
         }
-        // What matters most comes first: what follows is cut where there is no room.
-        by_hand_label(ask, ui);
-        doubt_label(ask, ui);
-        certificate_label(ask, ui);
+        is_roomy
     });
+    if !beside.inner && (ask.session.results.design.is_some() || is_by_hand(ask)) {
+        ui.horizontal(|ui| labels(ask, ui));
+    }
     ui.separator();
     let any = ask.session.results.design.is_some()
         || ask.view.compared(ask.project()).next().is_some()
@@ -93,6 +94,20 @@ pub fn header(ask: &mut Ask<'_>, ui: &mut Ui) -> bool {
         );
     }
     any
+}
+
+/// Width in which what holds for all that a design found is beside the names of the tabs; below it is under them.
+const ROOM_BESIDE_TABS: f32 = 300.0;
+
+/// What holds for all that a design found.
+fn labels(ask: &Ask<'_>, ui: &mut Ui) {
+    if ask.session.design_holds() == Some(false) && ask.view.tab.is_of_design() {
+        ui.colored_label(super::theme::STALE, "of settings that have changed since");
+    }
+    // What matters most comes first: what follows is cut where there is no room.
+    by_hand_label(ask, ui);
+    doubt_label(ask, ui);
+    certificate_label(ask, ui);
 }
 
 /// Beside every figure of a design that cannot be trusted: that it cannot, and why.
@@ -124,7 +139,7 @@ fn certificate_label(ask: &Ask<'_>, ui: &mut Ui) {
     let words = set.and_then(SensorSet::certified);
     if let Some(words) = words.filter(|_| ask.view.tab.is_of_design() && ask.session.as_designed())
     {
-        ui.separator();
+        divide(ui);
         // Beside the tabs there is room for the figure.
         let brief = words
             .split_once(" possible (")
@@ -134,10 +149,22 @@ fn certificate_label(ask: &Ask<'_>, ui: &mut Ui) {
     }
 }
 
+/// Whether the gauges are where a hand has put them, and it is known what that does.
+fn is_by_hand(ask: &Ask<'_>) -> bool {
+    let sites = &ask.project().selection.sites;
+    ask.session.knows_hand() && !sites.is_empty() && !ask.session.as_designed()
+}
+
+/// A line between two labels of a row.
+fn divide(ui: &mut Ui) {
+    if ui.min_rect().width() > 0.0 {
+        ui.separator();
+    }
+}
+
 /// What gauges that were moved by hand do to the error.
 fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
-    let sites = &ask.project().selection.sites;
-    if !ask.session.knows_hand() || sites.is_empty() || ask.session.as_designed() {
+    if !is_by_hand(ask) {
         return;
     }
     let text = match ask.session.by_hand_error() {
@@ -153,7 +180,7 @@ fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
     let beside = chosen.map_or(String::new(), |r| {
         format!("; as selected judged {:.2} mm", r.error_mm)
     });
-    ui.separator();
+    divide(ui);
     let brief = text
         .split_once(" mm")
         .map_or(text.clone(), |(mm, _)| format!("{mm} mm"));
