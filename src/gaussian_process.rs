@@ -320,21 +320,33 @@ pub fn search(
     Ok(map)
 }
 
-/// A word where the best length is an end of what was tried: it says no more than that it is shorter, or longer.
+/// Words where the best length or power is an end of what was tried, which says no more than that it lies beyond. That
+/// a power is two is none: above it there is no covariance.
 #[must_use]
-pub fn edge_note(map: &[GpTrial]) -> Option<String> {
-    let (best, first, last) = (best(map)?, map.first()?, map.last()?);
-    let how = if best.length_m == first.kernel.length_m {
-        "short: sites say next to nothing of each other"
-    } else if best.length_m == last.kernel.length_m {
-        "long: all sites say nearly the same"
-    } else {
-        return None;
+pub fn edge_notes(map: &[GpTrial]) -> Vec<String> {
+    let (Some(best), Some(first), Some(last)) = (best(map), map.first(), map.last()) else {
+        return Vec::new();
     };
-    Some(format!(
-        "The kernel's length is at the end of what was tried ({} mm), so {how}. Check the unit of the sites.",
-        crate::plain::digits(best.length_m * 1e3)
-    ))
+    let far = if best.length_m == first.kernel.length_m {
+        Some("short: sites say next to nothing of each other")
+    } else if best.length_m == last.kernel.length_m {
+        Some("long: all sites say nearly the same")
+    } else {
+        None
+    };
+    let length = far.map(|far| {
+        format!(
+            "The kernel's length is at the end of what was tried ({} mm), so {far}. Check the unit of the sites.",
+            crate::plain::digits(best.length_m * 1e3)
+        )
+    });
+    let rough = (best.power == POWERS[0]).then(|| {
+        format!(
+            "The kernel's power is the lowest that was tried ({}): even sites that lie close say different things, as where noise is large or sites are given in the wrong order.",
+            POWERS[0]
+        )
+    });
+    length.into_iter().chain(rough).collect()
 }
 
 /// The kernel with the smallest error.
@@ -474,14 +486,16 @@ mod tests {
             "{smaller:?}"
         );
         assert!(small.is_sorted_by(|a, b| a.kernel.length_m <= b.kernel.length_m));
-        assert_eq!((edge_note(&map), edge_note(&small)), (None, None));
+        assert!(edge_notes(&map).is_empty() && edge_notes(&small).is_empty());
         // Had the search ended at that length, that would be said.
         let of_best = |t: &GpTrial| t.kernel.length_m == found.length_m;
         let first = map.iter().position(of_best).unwrap();
         let last = map.iter().rposition(of_best).unwrap();
-        let said = |map: &[GpTrial]| edge_note(map).unwrap();
+        let said = |map: &[GpTrial]| edge_notes(map).join(" ");
         assert!(said(&map[first..]).contains("so short"));
         assert!(said(&map[..=last]).contains("so long"));
+        let rough: Vec<GpTrial> = map.iter().step_by(POWERS.len()).copied().collect();
+        assert!(said(&rough).contains("power is the lowest"));
         // One kernel alone is tried as in the grid.
         let alone = |kernel: &GpKernel| trial(&x, &line(n, 0.004), kernel);
         assert_eq!(alone(&map[3].kernel), map[3]);

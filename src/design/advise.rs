@@ -120,8 +120,14 @@ pub fn advise(inputs: &Inputs, watch: Watch) -> Result<Advice, DesignError> {
     as_solid.project.part.model = PartModel::Solid;
     match solid_ground(&as_solid, watch) {
         Ok(solid) => of_closed(inputs, &solid, watch),
-        Err(DesignError::Elastic(ElasticError::Open { rims, .. })) => {
-            Ok(of_open(inputs, rims, watch))
+        Err(DesignError::Elastic(open @ ElasticError::Open { rims, .. })) => {
+            let mut advice = of_open(inputs, rims, watch);
+            if inputs.project.part.model == PartModel::Solid {
+                let refused =
+                    format!("As a solid, which the project asks for, it is refused: {open}.");
+                advice.words.insert(1, refused);
+            }
+            Ok(advice)
         }
         Err(error) => Err(error),
     }

@@ -38,9 +38,18 @@ impl Shortage {
         if available > 0 {
             words.push_str(". Ask for fewer gauges (selection.sensors)");
         }
-        if let Some(blame) = blame {
+        // What no filter's limit mends: there are not so many sites at all.
+        let beyond = wanted > feasibility.verdicts.len() && available > 0;
+        let remedy = if beyond {
+            Some(format!(
+                "lower sites.spacing_mm ({})",
+                inputs.project.sites.spacing_mm
+            ))
+        } else {
+            blame.as_ref().map(|blame| remedy(inputs, blame))
+        };
+        if let Some(remedy) = remedy {
             let or = if available > 0 { ", or " } else { ". " };
-            let remedy = remedy(inputs, &blame);
             words.push_str(or);
             words.push_str(&if available > 0 {
                 remedy

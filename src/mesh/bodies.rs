@@ -40,6 +40,7 @@ pub(super) fn keep_body(
         body,
         count: by_area.len(),
     })?;
+    report.left_out = share_left_out(&by_area, body);
     let mut used = vec![false; positions.len()];
     let mut chosen: Vec<[u32; 3]> = Vec::new();
     let belongs = |l: u32| l == label || hollows.get(&l) == Some(&label);
@@ -65,6 +66,13 @@ pub(super) fn keep_body(
         triangles: chosen,
         numbers: numbers.map(|(v, used)| used.then_some(v)).collect(),
     })
+}
+
+/// Share of the area of all bodies that is not this one's.
+fn share_left_out(by_area: &[(u32, f64)], body: usize) -> f64 {
+    let all: f64 = by_area.iter().map(|b| b.1).sum();
+    let others = by_area.iter().enumerate().filter(|(k, _)| *k != body);
+    others.map(|(_, b)| b.1).sum::<f64>() / all
 }
 
 /// One of several surfaces.

@@ -19,6 +19,8 @@ pub struct RepairReport {
     pub flipped_triangles: usize,
     /// Separate bodies found, of which one was kept.
     pub bodies: usize,
+    /// Share of their area in the bodies that were left out.
+    pub left_out: f64,
     /// Edges shared by more than two triangles: kept, the shell is joined there.
     pub non_manifold_edges: usize,
     /// Edges with a triangle on one side only: free rims.
@@ -41,10 +43,20 @@ impl RepairReport {
     /// What was done and found, in words; nothing for a clean mesh.
     #[must_use]
     pub fn in_words(&self, body: usize) -> Option<String> {
+        /// A part with screws and inserts beside it leaves out less.
+        const MUCH: f64 = 0.5;
         let mut parts = Vec::new();
         if self.bodies > 1 {
+            let lacks = if self.left_out > MUCH {
+                format!(
+                    ", which leaves out {:.0} % of the surface: the mesh has come apart, or the part has several",
+                    100.0 * self.left_out
+                )
+            } else {
+                String::new()
+            };
             parts.push(format!(
-                "body {body} of {} is used (0 to {}, by falling area; the part's body setting picks another)",
+                "body {body} of {} is used (0 to {}, by falling area; the part's body setting picks another){lacks}",
                 self.bodies,
                 self.bodies - 1
             ));
@@ -129,5 +141,19 @@ mod tests {
         );
         assert!(words(2).starts_with("2 near vertices joined, 2 triangles turned over, 2 edges"));
         assert!(words(2).contains("2 slivers, 2 edges are open"));
+    }
+
+    #[test]
+    fn a_body_that_is_the_least_of_the_file_says_so() {
+        let words = |left_out: f64| {
+            let report = RepairReport {
+                bodies: 192,
+                left_out,
+                ..RepairReport::default()
+            };
+            report.in_words(0).unwrap()
+        };
+        assert!(words(0.991).contains("leaves out 99 % of the surface"));
+        assert!(!words(0.2).contains("leaves out"));
     }
 }

@@ -226,7 +226,7 @@ pub(super) fn finish(
         None => StopReason::Converged,
     };
     let mut notes = geometry.covariance.notes();
-    notes.extend(gaussian_process::edge_note(&geometry.map));
+    notes.extend(gaussian_process::edge_notes(&geometry.map));
     if geometry.coinciding > 0 {
         notes.push(format!(
             "{} at the place of another: of such sites only one is ever chosen.",
