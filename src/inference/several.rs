@@ -28,6 +28,7 @@ const THREE: f64 = 0.01;
 const AREA: f64 = 0.03;
 const ODD_GAUGE: f64 = 0.01;
 const UNCLEAR: f64 = 0.01;
+const PULL: f64 = 0.01;
 /// One touch that is as sure as this need not be held against others.
 const SURE: f64 = 0.995;
 /// Starts that are followed.
@@ -166,20 +167,7 @@ impl Matching {
         let Some(whitened) = coarse.against(&observed, self.most_force) else {
             return Touches::one(*one, sure);
         };
-        let two = self.two(&observed, coarse, &whitened);
-        let three = self.three(&observed, coarse, &whitened, &two);
-        let areas = coarse.areas(&self.map, &whitened, AREAS);
-        let area = Answers::of(
-            &self.map,
-            areas
-                .iter()
-                .filter_map(|a| self.joined(&observed, &[*a], None)),
-        );
-        let several = [
-            (TWO.ln() + two.log_evidence(), two),
-            (THREE.ln() + three.log_evidence(), three),
-            (AREA.ln() + area.log_evidence(), area),
-        ];
+        let several = self.more_than_one(&observed, coarse, &whitened);
         let nothing = UNCLEAR.ln() + of_nothing_known(&observed);
         let rival = several.iter().fold(nothing, |most, s| most.max(s.0));
         let odd = if rival > first {
@@ -203,6 +191,51 @@ impl Matching {
             k => self.touches(&observed, &several[k - 1].1.0, shares[k]),
         };
         Touches { shares, ..answer }
+    }
+
+    /// Two points, three, and an area, each with the logarithm of its prior and its evidence.
+    fn more_than_one(
+        &self,
+        observed: &Observation,
+        coarse: &Coarse,
+        whitened: &Whitened,
+    ) -> [(f64, Answers); 3] {
+        let two = self.two(observed, coarse, whitened);
+        let three = self.three(observed, coarse, whitened, &two);
+        let areas = coarse.areas(&self.map, whitened, AREAS);
+        let areas = areas
+            .iter()
+            .filter_map(|area| self.joined(observed, &[*area], None));
+        let area = Answers::of(&self.map, areas);
+        [
+            (TWO.ln() + two.log_evidence(), two),
+            (THREE.ln() + three.log_evidence(), three),
+            (AREA.ln() + area.log_evidence(), area),
+        ]
+    }
+
+    /// Whether a reading is rather of something that lets go than of touches, be they one, several or an area: `one` is
+    /// what was found where one touch is looked for, `pull` where one is that reads the opposite.
+    pub fn is_rather_a_pull(
+        &mut self,
+        several: &Several,
+        reading: &[f64],
+        [one, pull]: [&Contact; 2],
+    ) -> bool {
+        let used = self.used.clone();
+        let turned: Vec<f64> = reading.iter().map(|x| -x).collect();
+        let turned = Observation::new(&turned, &self.errors, &used);
+        let pulled = PULL.ln() + self.alone(&turned, pull).log_evidence();
+        let observed = Observation::new(reading, &self.errors, &used);
+        if ONE.ln() + self.alone(&observed, one).log_evidence() > pulled {
+            return false;
+        }
+        let coarse = &several.coarse;
+        let Some(whitened) = coarse.against(&observed, self.most_force) else {
+            return true;
+        };
+        let touched = self.more_than_one(&observed, coarse, &whitened);
+        touched.iter().all(|(log, _)| *log < pulled)
     }
 
     /// As [`Self::count`] for touches that go on: from where they were. Nothing where they do not explain the reading any

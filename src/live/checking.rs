@@ -68,8 +68,15 @@ impl Checking {
         self.health.iter().map(|h| h.is_good()).collect()
     }
 
-    /// Counts of a sample at a rate (Hz), with the highest that the board can send where it has said so.
-    pub fn watch(&mut self, counts: &[f64], rest: Option<&Rest>, rate: f64, highest: Option<f64>) {
+    /// Counts of a sample as they came and, where that is known, without what hums, at a rate (Hz), with the highest that
+    /// the board can send where it has said so.
+    pub fn watch(
+        &mut self,
+        (counts, steady): (&[f64], Option<&[f64]>),
+        rest: Option<&Rest>,
+        rate: f64,
+        highest: Option<f64>,
+    ) {
         let noise = rest.map(|r| &r.noise);
         self.until = self.until.saturating_sub(1);
         if self.until == 0 || self.usual.is_none() || noise.is_none() {
@@ -87,7 +94,8 @@ impl Checking {
                 usual_noise: usual,
                 rate,
             };
-            watcher.push(count, &expected);
+            let hum = steady.map(|steady| count - steady[k]);
+            watcher.push(count, hum, &expected);
             self.health[k] = watcher.health(&expected);
         }
     }

@@ -14,10 +14,13 @@ const LOOKS: u32 = 2;
 /// else has come to touch, or has gone.
 const MORE: f64 = 1.5;
 const BEYOND: f64 = 4.0;
+/// Times the weighted squares of what nothing explained, from which on something else has come.
+const GROWN: f64 = 2.0;
 
 /// What is shown, and what may have to be.
 pub(super) struct Counting {
-    several: Several,
+    /// Where several are searched for.
+    pub several: Several,
     /// Touches that are more than one point; absent while there is one.
     shown: Option<Touches>,
     /// Looks in a row that doubted it.
@@ -26,6 +29,15 @@ pub(super) struct Counting {
     sure_of_one: f64,
     /// Weighted squares up to which a sample is of what the last look saw.
     usual: f64,
+    /// Weighted squares of the reading at the last look.
+    felt: f64,
+}
+
+/// Weighted squares of a reading (strain) over the channels that are trusted.
+fn squares(matching: &Matching, strain: &[f64]) -> f64 {
+    let pairs = strain.iter().zip(&matching.errors.noise);
+    let trusted = pairs.zip(&matching.used).filter(|(_, used)| **used);
+    trusted.map(|((x, noise), _)| (x / noise).powi(2)).sum()
 }
 
 impl Counting {
@@ -38,6 +50,7 @@ impl Counting {
             last_look: None,
             sure_of_one: 1.0,
             usual: 0.0,
+            felt: 0.0,
         }
     }
 
@@ -51,6 +64,10 @@ impl Counting {
     pub fn track(&mut self, matching: &Matching, strain: &[f64]) -> Option<(Touches, bool)> {
         let shown = self.shown.as_ref()?;
         if shown.contacts.is_empty() {
+            if squares(matching, strain) > GROWN * self.felt {
+                self.end();
+                return None;
+            }
             return Some((shown.clone(), false));
         }
         let tracked = matching.track_several(strain, shown);
@@ -94,7 +111,7 @@ impl Counting {
 
     /// Looks how many there are, where `one` is what was found where only one is looked for.
     pub fn look(&mut self, matching: &mut Matching, time_us: u64, strain: &[f64], one: &Contact) {
-        self.last_look = Some(time_us);
+        (self.last_look, self.felt) = (Some(time_us), squares(matching, strain));
         let seen = matching.count(&self.several, strain, one);
         let channels = matching.used.iter().filter(|u| **u).count() as f64;
         self.usual = MORE * seen.unexplained + channels + BEYOND * (2.0 * channels).sqrt();

@@ -42,8 +42,10 @@ impl Health {
 /// Watches one channel's counts.
 #[derive(Clone, Debug, Default)]
 pub struct Watcher {
-    last: [f64; 2],
-    seen: u64,
+    seen: bool,
+    last: f64,
+    /// The last two without what hums, as far as that is known of them.
+    steady: [Option<f64>; 2],
     /// Samples in a row with the very same value.
     same: u64,
     /// Samples since one was at an end of the range.
@@ -89,16 +91,16 @@ const SILENT: f64 = 24.0;
 const MOST_OF_A_LOOK: f64 = 4.0;
 
 impl Watcher {
-    /// Looks at one more sample.
-    pub fn push(&mut self, count: f64, expected: &Expected) {
-        let [a, b] = self.last;
-        self.same = if self.seen > 0 && count == b {
+    /// Looks at one more sample, of which so much is hum; nothing where that is not known, and what trembles not either.
+    pub fn push(&mut self, count: f64, hum: Option<f64>, expected: &Expected) {
+        self.same = if self.seen && count == self.last {
             self.same + 1
         } else {
             0
         };
-        if self.seen >= 2 {
-            let second = (count - 2.0 * b + a).abs() / 6.0_f64.sqrt() / MEDIAN_OF_NORMAL;
+        let steady = hum.map(|hum| count - hum);
+        if let ([Some(a), Some(b)], Some(c)) = (self.steady, steady) {
+            let second = (c - 2.0 * b + a).abs() / 6.0_f64.sqrt() / MEDIAN_OF_NORMAL;
             let step = (TREMBLE_S * expected.rate).max(2.0).recip();
             let up = second > self.tremble.exp();
             // Between far less than counts can show and far more than a converter has.
@@ -110,8 +112,8 @@ impl Watcher {
         } else {
             self.off_scale.map(|n| n + 1)
         };
-        self.last = [b, count];
-        self.seen += 1;
+        (self.seen, self.last) = (true, count);
+        self.steady = [self.steady[1], steady];
     }
 
     /// One look at a touch that it felt.
@@ -171,7 +173,7 @@ mod tests {
     fn after(values: impl Iterator<Item = f64>) -> Health {
         let mut watcher = Watcher::default();
         for v in values {
-            watcher.push(v, &EXPECTED);
+            watcher.push(v, Some(0.0), &EXPECTED);
         }
         watcher.health(&EXPECTED)
     }
@@ -210,14 +212,15 @@ mod tests {
                     let into = (f64::from(k) / rate) % 0.5;
                     let pressed = (into / ramp_s).min((0.4 - into) / ramp_s).clamp(0.0, 1.0);
                     let pressed = pressed * pressed * (3.0 - 2.0 * pressed);
-                    watcher.push(2000.0 + noise(k % 997) + 1500.0 * pressed, &expected);
+                    let count = 2000.0 + noise(k % 997) + 1500.0 * pressed;
+                    watcher.push(count, Some(0.0), &expected);
                     assert!(
                         watcher.health(&expected).is_good(),
                         "{rate} Hz {ramp_s} s {k}"
                     );
                 }
                 for k in 0..rate as u32 {
-                    watcher.push(2000.0 + 20.0 * noise(k % 997), &expected);
+                    watcher.push(2000.0 + 20.0 * noise(k % 997), Some(0.0), &expected);
                 }
                 assert_eq!(
                     watcher.health(&expected),
@@ -226,6 +229,26 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// Hum is as steep as noise where samples are few, and is none.
+    #[test]
+    fn what_hums_is_no_noise() {
+        let expected = Expected {
+            rate: 200.0,
+            ..EXPECTED
+        };
+        let hum = |k: u32| 60.0 * (f64::from(k) * 0.25 * std::f64::consts::TAU + 0.3).sin();
+        let told = |known: fn(f64) -> Option<f64>| {
+            let mut watcher = Watcher::default();
+            for k in 0..600 {
+                watcher.push(2000.0 + noise(k % 997) + hum(k), known(hum(k)), &expected);
+            }
+            watcher.health(&expected)
+        };
+        assert_eq!(told(Some), Health::Good);
+        assert_eq!(told(|_| None), Health::Good);
+        assert_eq!(told(|_| Some(0.0)), Health::Noisy);
     }
 
     #[test]

@@ -26,6 +26,10 @@ const CLEAR: f64 = 12.0;
 /// Seconds in which a line follows the signal, and in which the level it stands on does.
 const FOLLOWS_S: f64 = 0.5;
 const LEVEL_S: f64 = 0.1;
+/// What is off by more than so many times what is usual is a touch that comes or goes, and moves a line no further. The
+/// usual is known after so long (s).
+const UNUSUAL: f64 = 4.0;
+const USUAL_S: f64 = 1.0;
 
 /// One frequency.
 #[derive(Clone, Debug)]
@@ -45,6 +49,8 @@ pub(super) type Rows = VecDeque<(f64, Vec<f64>)>;
 pub(super) struct Hum {
     lines: Vec<Line>,
     level: Vec<f64>,
+    /// What readings are off their level by, usually (counts, mean of the absolute values).
+    usual: Vec<f64>,
     now_s: f64,
     rested: Rows,
     /// When it was last looked for.
@@ -56,7 +62,7 @@ impl Hum {
     /// something does.
     pub fn take_off(&mut self, seconds: f64, counts: &mut [f64], at_rest: bool) {
         self.now_s += seconds;
-        if self.level.is_empty() {
+        if self.level.len() != counts.len() {
             self.level = counts.to_vec();
         }
         if seconds <= 0.0 {
@@ -71,21 +77,35 @@ impl Hum {
         } else {
             self.rested.clear();
         }
-        let follows = (seconds / FOLLOWS_S).min(0.1);
         for line in &mut self.lines {
             line.phase = (line.phase + TAU * line.hertz * seconds) % TAU;
             let (sin, cos) = line.phase.sin_cos();
-            for ((count, [a, b]), level) in counts.iter_mut().zip(&mut line.waves).zip(&self.level)
-            {
-                *count -= *a * cos + *b * sin;
-                let off = *count - level;
-                *a += 2.0 * follows * off * cos;
-                *b += 2.0 * follows * off * sin;
+            for (count, [a, b]) in counts.iter_mut().zip(&line.waves) {
+                *count -= a * cos + b * sin;
             }
         }
+        self.follow(seconds, counts);
+    }
+
+    /// What is left of a sample (counts) moves the lines a little, and the level they stand on.
+    fn follow(&mut self, seconds: f64, left: &[f64]) {
+        let usual = |seconds: f64, usual: f64, off: f64| {
+            usual + (seconds / USUAL_S).min(1.0) * (off.abs().min(UNUSUAL * usual + 1.0) - usual)
+        };
+        self.usual.resize(left.len(), 1.0);
+        let follows = (seconds / FOLLOWS_S).min(0.1);
         let share = (seconds / LEVEL_S).min(1.0);
-        for (level, count) in self.level.iter_mut().zip(counts) {
-            *level += share * (*count - *level);
+        for (c, count) in left.iter().enumerate() {
+            let off = count - self.level[c];
+            let most = UNUSUAL * self.usual[c];
+            for line in &mut self.lines {
+                let (sin, cos) = line.phase.sin_cos();
+                let [a, b] = &mut line.waves[c];
+                let by = 2.0 * follows * off.clamp(-most, most);
+                (*a, *b) = (*a + by * cos, *b + by * sin);
+            }
+            self.usual[c] = usual(seconds, self.usual[c], off);
+            self.level[c] += share * off;
         }
     }
 
@@ -311,6 +331,26 @@ mod tests {
             let shown = (hertz - (hertz / rate).round() * rate).abs();
             assert!((hum.lines[0].hertz - shown).abs() < 0.02, "{:?}", hum.lines);
             assert!((hum.rms(0) - 14.14).abs() < 0.5);
+        }
+    }
+
+    /// Also where a board sends four samples a period, and a touch is steep.
+    #[test]
+    fn what_hums_goes_on_behind_a_steep_touch_at_any_rate() {
+        for rate in [200.0, 250.0, 1000.0] {
+            let mut hum = Hum::default();
+            let mut worst = 0.0_f64;
+            for k in 0..(8.0 * rate) as u32 {
+                let (now, mut counts) = read(k, rate, 50.03, 20.0);
+                let pressed = (3.0..4.0).contains(&now);
+                counts[0] += if pressed { 1500.0 } else { 0.0 };
+                let step_s = if k == 0 { 0.0 } else { rate.recip() };
+                hum.take_off(step_s, &mut counts, !(2.9..5.0).contains(&now));
+                if (4.3..5.0).contains(&now) {
+                    worst = worst.max((counts[0] - 2000.0).abs());
+                }
+            }
+            assert!(worst < 6.0, "{rate} Hz: {worst}");
         }
     }
 

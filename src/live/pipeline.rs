@@ -256,16 +256,15 @@ impl Pipeline {
         let Some(mut counts) = counts else {
             return nothing;
         };
-        let known = self.hello.is_some();
-        let highest = known.then(|| f64::from(self.settings.chain.highest_count()));
-        let rest = self.ground.rest.as_ref();
-        self.checking.watch(&counts, rest, self.rate, highest);
         if self.taring.is_some() {
+            self.watch(&counts, None);
             self.go_on_taring(sample.time_us, &counts);
             return nothing;
         }
         let at_rest = self.feeling.at_rest();
+        let came = counts.clone();
         let strains = (self.ground).strain(step_s, &mut counts, &self.settings, at_rest);
+        self.watch(&came, Some(&counts));
         let Some([raw, strain]) = strains else {
             return nothing;
         };
@@ -306,6 +305,14 @@ impl Pipeline {
             blind: Some(blind),
             ..nothing
         }
+    }
+
+    /// Looks at every channel of a sample, as it came and without what hums.
+    fn watch(&mut self, counts: &[f64], steady: Option<&[f64]>) {
+        let known = self.hello.is_some();
+        let highest = known.then(|| f64::from(self.settings.chain.highest_count()));
+        let rest = self.ground.rest.as_ref();
+        (self.checking).watch((counts, steady), rest, self.rate, highest);
     }
 
     fn go_on_taring(&mut self, time_us: u64, counts: &[f64]) {
@@ -430,7 +437,8 @@ impl Pipeline {
         self.searched = 1;
         let found = self.matching.find(strain);
         let at = (time_us, strain);
-        if self.release.is_seen(&mut self.matching, at, &found) {
+        let several = &self.counting.several;
+        if (self.release).is_seen(&mut self.matching, several, at, &found) {
             return None;
         }
         self.search = Some((strain.to_vec(), found));

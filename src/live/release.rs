@@ -1,7 +1,8 @@
 //! A rest that was no rest: taken while something pressed, it shows as soon as that lets go. The readings are those of a
-//! touch then, but for their sign, and nothing pulls at a limb.
+//! touch then, but for their sign, and nothing pulls at a limb. Two touches may read much like a pull at a third place:
+//! they are held against it.
 
-use crate::inference::{Contact, Matching};
+use crate::inference::{Contact, Matching, Several};
 
 /// Of what a pull explains, twice the logarithm of the likelihood: more than that of noise.
 const CLEAR: f64 = 100.0;
@@ -24,10 +25,11 @@ pub struct Release {
 
 impl Release {
     /// Whether a reading (strain, at a time in µs) is rather of something that lets go than of the touch that explains it
-    /// best.
+    /// best, or of several.
     pub fn is_seen(
         &mut self,
         matching: &mut Matching,
+        several: &Several,
         (time_us, strain): (u64, &[f64]),
         touch: &Contact,
     ) -> bool {
@@ -39,7 +41,9 @@ impl Release {
         let turned: Vec<f64> = strain.iter().map(|x| -x).collect();
         let pull = matching.find(&turned);
         let explained = pull.unexplained < EXPLAINED * pull.strength;
-        let seen = pull.strength > CLEAR && explained && touch.strength < pull.strength - WORSE;
+        let better = pull.strength > CLEAR && touch.strength < pull.strength - WORSE;
+        let seen =
+            explained && better && matching.is_rather_a_pull(several, strain, [touch, &pull]);
         if seen {
             let first = if self.looks == 0 {
                 time_us

@@ -13,3 +13,4 @@ mod ends;
 mod firmware;
 mod live;
 mod promise;
+mod rows;

@@ -35,7 +35,7 @@ const RATE: &str = "100";
 const BITS: &str = "16";
 
 /// Runs the program; what it prints.
-fn hapdef(arguments: &[&str]) -> String {
+pub fn hapdef(arguments: &[&str]) -> String {
     let done = Command::new(env!("CARGO_BIN_EXE_hapdef"))
         .args(arguments)
         .output()
@@ -45,12 +45,12 @@ fn hapdef(arguments: &[&str]) -> String {
     String::from_utf8(done.stdout).unwrap()
 }
 
-fn text(path: &Path) -> &str {
+pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
 /// A project file with another value of the first key of that name.
-fn with(project: &str, key: &str, value: &str) -> String {
+pub fn with(project: &str, key: &str, value: &str) -> String {
     let head = format!("{key} = ");
     let at = project.find(&format!("\n{head}"));
     let at = 1 + at.unwrap_or_else(|| panic!("{key} is not in the project"));
