@@ -120,14 +120,9 @@ pub fn advise(inputs: &Inputs, watch: Watch) -> Result<Advice, DesignError> {
     as_solid.project.part.model = PartModel::Solid;
     match solid_ground(&as_solid, watch) {
         Ok(solid) => of_closed(inputs, &solid, watch),
-        Err(DesignError::Elastic(open @ ElasticError::Open { rims, .. })) => {
-            let mut advice = of_open(inputs, rims, watch);
-            if inputs.project.part.model == PartModel::Solid {
-                let refused =
-                    format!("As a solid, which the project asks for, it is refused: {open}.");
-                advice.words.insert(1, refused);
-            }
-            Ok(advice)
+        // What is closed and yet encloses nothing is neither.
+        Err(DesignError::Elastic(ElasticError::Open { rims, .. })) if rims > 0 => {
+            Ok(of_open(inputs, rims, watch))
         }
         Err(error) => Err(error),
     }
@@ -413,7 +408,11 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
             "A shell fits.".into()
         },
     ];
-    words.extend(meant_closed(part));
+    if inputs.project.part.model == PartModel::Solid {
+        words.insert(1, refused(part, rims));
+    } else {
+        words.extend(meant_closed(part));
+    }
     let mut as_shell = inputs.clone();
     as_shell.project.part.model = PartModel::Shell;
     if let Ok(Ground::Shell(shell)) = ground(&as_shell, watch) {
@@ -430,6 +429,15 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
         words,
         faces: None,
     }
+}
+
+/// That the project asks for a solid, which it cannot have.
+fn refused(part: &TriMesh, rims: usize) -> String {
+    let why = ElasticError::Open {
+        rims,
+        closes_within: part.closes_within(),
+    };
+    format!("As a solid, which the project asks for, it is refused: {why}.")
 }
 
 /// What closes an open part, where joining near vertices does.

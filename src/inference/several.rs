@@ -21,7 +21,7 @@ use crate::inference::deviation::About;
 use crate::inference::map::ResponseMap;
 use crate::inference::region::Region;
 
-/// Before anything is read.
+/// Before anything is read. A pull is none of them: it is held against them by itself.
 const ONE: f64 = 0.88;
 const TWO: f64 = 0.06;
 const THREE: f64 = 0.01;
@@ -29,6 +29,8 @@ const AREA: f64 = 0.03;
 const ODD_GAUGE: f64 = 0.01;
 const UNCLEAR: f64 = 0.01;
 const PULL: f64 = 0.01;
+/// Several touches leave no more than this share of what a pull leaves that they are taken for.
+const BETTER: f64 = 0.5;
 /// One touch that is as sure as this need not be held against others.
 const SURE: f64 = 0.995;
 /// Starts that are followed.
@@ -230,12 +232,20 @@ impl Matching {
         if ONE.ln() + self.alone(&observed, one).log_evidence() > pulled {
             return false;
         }
+        // Where gauges are few several touches explain everything, a pull too.
+        let channels = observed.w.iter().filter(|w| **w > 0.0).count();
         let coarse = &several.coarse;
-        let Some(whitened) = coarse.against(&observed, self.most_force) else {
+        let whitened = coarse.against(&observed, self.most_force);
+        let Some(whitened) = whitened.filter(|_| channels >= LEAST_CHANNELS) else {
             return true;
         };
+        // And with more unknowns than a pull they would explain a little more of what the model lacks.
+        let better = |(log, answers): &(f64, Answers)| {
+            let left = answers.best().map_or(f64::INFINITY, |best| 2.0 * best.left);
+            *log > pulled && left < BETTER * pull.unexplained
+        };
         let touched = self.more_than_one(&observed, coarse, &whitened);
-        touched.iter().all(|(log, _)| *log < pulled)
+        !touched.iter().any(better)
     }
 
     /// As [`Self::count`] for touches that go on: from where they were. Nothing where they do not explain the reading any

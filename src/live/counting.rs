@@ -54,7 +54,7 @@ impl Counting {
         }
     }
 
-    /// Nothing touches.
+    /// Nothing touches any more, or something else does.
     pub fn end(&mut self) {
         (self.shown, self.last_look) = (None, None);
         (self.doubted, self.usual) = (0, 0.0);

@@ -2,7 +2,8 @@
 //!
 //! A line of known frequency is a cosine and a sine of each channel. They are fitted by least squares to a second of rest;
 //! how the phase turns between its halves gives the frequency to a few millihertz. From then on they follow the signal
-//! slowly (B. Widrow et al., Proc. IEEE 63, 1692, 1975), also under a touch, whose ends are too short to move them.
+//! slowly (B. Widrow et al., Proc. IEEE 63, 1692, 1975), also under a touch: its ends are off by more than the rest ever
+//! was, and move them no further than that.
 
 use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
@@ -26,10 +27,10 @@ const CLEAR: f64 = 12.0;
 /// Seconds in which a line follows the signal, and in which the level it stands on does.
 const FOLLOWS_S: f64 = 0.5;
 const LEVEL_S: f64 = 0.1;
-/// What is off by more than so many times what is usual is a touch that comes or goes, and moves a line no further. The
-/// usual is known after so long (s).
+/// What is off by more than so many times what is usual at rest is a touch that comes or goes, and moves a line no further.
 const UNUSUAL: f64 = 4.0;
-const USUAL_S: f64 = 1.0;
+/// Mean absolute value of what rounding to counts does.
+const ROUNDING: f64 = 0.25;
 
 /// One frequency.
 #[derive(Clone, Debug)]
@@ -49,7 +50,7 @@ pub(super) type Rows = VecDeque<(f64, Vec<f64>)>;
 pub(super) struct Hum {
     lines: Vec<Line>,
     level: Vec<f64>,
-    /// What readings are off their level by, usually (counts, mean of the absolute values).
+    /// What readings are off by at rest, without the lines (counts, mean of the absolute values).
     usual: Vec<f64>,
     now_s: f64,
     rested: Rows,
@@ -62,7 +63,7 @@ impl Hum {
     /// something does.
     pub fn take_off(&mut self, seconds: f64, counts: &mut [f64], at_rest: bool) {
         self.now_s += seconds;
-        if self.level.len() != counts.len() {
+        if self.level.is_empty() {
             self.level = counts.to_vec();
         }
         if seconds <= 0.0 {
@@ -89,23 +90,23 @@ impl Hum {
 
     /// What is left of a sample (counts) moves the lines a little, and the level they stand on.
     fn follow(&mut self, seconds: f64, left: &[f64]) {
-        let usual = |seconds: f64, usual: f64, off: f64| {
-            usual + (seconds / USUAL_S).min(1.0) * (off.abs().min(UNUSUAL * usual + 1.0) - usual)
-        };
-        self.usual.resize(left.len(), 1.0);
         let follows = (seconds / FOLLOWS_S).min(0.1);
-        let share = (seconds / LEVEL_S).min(1.0);
-        for (c, count) in left.iter().enumerate() {
-            let off = count - self.level[c];
-            let most = UNUSUAL * self.usual[c];
-            for line in &mut self.lines {
-                let (sin, cos) = line.phase.sin_cos();
-                let [a, b] = &mut line.waves[c];
-                let by = 2.0 * follows * off.clamp(-most, most);
+        let off = left
+            .iter()
+            .zip(&self.level)
+            .map(|(count, level)| count - level);
+        let off: Vec<f64> = off.collect();
+        for line in &mut self.lines {
+            let (sin, cos) = line.phase.sin_cos();
+            for (([a, b], off), usual) in line.waves.iter_mut().zip(&off).zip(&self.usual) {
+                let most = UNUSUAL * usual;
+                let by = 2.0 * follows * off.max(-most).min(most);
                 (*a, *b) = (*a + by * cos, *b + by * sin);
             }
-            self.usual[c] = usual(seconds, self.usual[c], off);
-            self.level[c] += share * off;
+        }
+        let share = (seconds / LEVEL_S).min(1.0);
+        for (level, off) in self.level.iter_mut().zip(off) {
+            *level += share * off;
         }
     }
 
@@ -138,8 +139,8 @@ impl Hum {
             return;
         }
         self.looked_s = self.now_s;
-        let (lines, _) = lines(&self.rested);
-        self.lines = lines;
+        let (lines, left) = lines(&self.rested);
+        (self.lines, self.usual) = (lines, scatter(&left));
         // The sample that is just coming is the last of these.
         let step = self
             .rested
@@ -159,7 +160,7 @@ impl Hum {
     pub fn begin(&mut self, rows: &Rows) -> Rows {
         self.forget();
         let (lines, left) = lines(rows);
-        self.lines = lines;
+        (self.lines, self.usual) = (lines, scatter(&left));
         left
     }
 }
@@ -210,6 +211,16 @@ fn level(rows: &Rows) -> Vec<f64> {
     let channels = rows.front().map_or(0, |r| r.1.len());
     let of = |c: usize| mean(&rows.iter().map(|r| r.1[c]).collect::<Vec<_>>());
     (0..channels).map(of).collect()
+}
+
+/// What every channel of some samples is off its mean by (counts, mean of the absolute values).
+fn scatter(rows: &Rows) -> Vec<f64> {
+    let middle = level(rows);
+    let of = |(c, middle): (usize, &f64)| {
+        let off: Vec<f64> = rows.iter().map(|r| (r.1[c] - middle).abs()).collect();
+        mean(&off).max(ROUNDING)
+    };
+    middle.iter().enumerate().map(of).collect()
 }
 
 /// Cosine and sine of every channel at a frequency, in some of the samples, with phases from the last one.
@@ -334,23 +345,28 @@ mod tests {
         }
     }
 
-    /// Also where a board sends four samples a period, and a touch is steep.
+    /// Also where a board sends four samples a period, and somebody drums on the limb.
     #[test]
-    fn what_hums_goes_on_behind_a_steep_touch_at_any_rate() {
+    fn what_hums_goes_on_behind_steep_touches_at_any_rate() {
         for rate in [200.0, 250.0, 1000.0] {
             let mut hum = Hum::default();
             let mut worst = 0.0_f64;
-            for k in 0..(8.0 * rate) as u32 {
+            for k in 0..(13.0 * rate) as u32 {
                 let (now, mut counts) = read(k, rate, 50.03, 20.0);
-                let pressed = (3.0..4.0).contains(&now);
-                counts[0] += if pressed { 1500.0 } else { 0.0 };
+                let drums = (3.0..12.0).contains(&now);
+                let pressed = if drums && now % 0.5 < 0.12 {
+                    1500.0
+                } else {
+                    0.0
+                };
+                counts[0] += pressed;
                 let step_s = if k == 0 { 0.0 } else { rate.recip() };
-                hum.take_off(step_s, &mut counts, !(2.9..5.0).contains(&now));
-                if (4.3..5.0).contains(&now) {
-                    worst = worst.max((counts[0] - 2000.0).abs());
+                hum.take_off(step_s, &mut counts, now < 3.0);
+                if now > 3.0 {
+                    worst = worst.max((counts[0] - 2000.0 - pressed).abs());
                 }
             }
-            assert!(worst < 6.0, "{rate} Hz: {worst}");
+            assert!(worst < 14.0, "{rate} Hz: {worst}");
         }
     }
 

@@ -14,6 +14,8 @@ const WORSE: f64 = 40.0;
 /// come and gone it is rather a gauge that says nothing.
 const LOOKS: u32 = 3;
 const PROVED_S: f64 = 1.0;
+/// Seconds between two questions whether several touches would do: it takes long to look for them.
+const ASK_S: f64 = 0.05;
 
 /// Looks for a release.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +23,8 @@ pub struct Release {
     looks: u32,
     /// When it was first and last seen (µs).
     seen: [u64; 2],
+    /// When it was asked whether several touches would do (µs), and whether a pull was likelier.
+    asked: Option<(u64, bool)>,
 }
 
 impl Release {
@@ -42,8 +46,14 @@ impl Release {
         let pull = matching.find(&turned);
         let explained = pull.unexplained < EXPLAINED * pull.strength;
         let better = pull.strength > CLEAR && touch.strength < pull.strength - WORSE;
-        let seen =
-            explained && better && matching.is_rather_a_pull(several, strain, [touch, &pull]);
+        let seen = explained && better && {
+            let lately = |at: u64| (time_us.saturating_sub(at) as f64) < ASK_S * 1e6;
+            if self.asked.is_none_or(|(at, _)| !lately(at)) {
+                let likelier = matching.is_rather_a_pull(several, strain, [touch, &pull]);
+                self.asked = Some((time_us, likelier));
+            }
+            self.asked.is_some_and(|(_, likelier)| likelier)
+        };
         if seen {
             let first = if self.looks == 0 {
                 time_us
@@ -68,6 +78,6 @@ impl Release {
 
     /// Begins anew.
     pub fn forget(&mut self) {
-        self.looks = 0;
+        (self.looks, self.asked) = (0, None);
     }
 }

@@ -50,7 +50,7 @@ impl RepairReport {
             let lacks = if self.left_out > MUCH {
                 format!(
                     ", which leaves out {:.0} % of the surface: the mesh has come apart, or the part has several",
-                    100.0 * self.left_out
+                    (100.0 * self.left_out).floor()
                 )
             } else {
                 String::new()

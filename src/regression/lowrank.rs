@@ -82,4 +82,23 @@ mod tests {
             assert_eq!(phi[(i, phi.ncols() - 1)], 1.0);
         }
     }
+
+    /// More landmarks than are factored at once.
+    #[test]
+    fn many_landmarks_are_factored_in_blocks() {
+        const N: usize = 400;
+        let k = |a: usize, b: usize| (-(a.abs_diff(b) as f64 / 1.3).powi(2)).exp();
+        let landmarks: Vec<usize> = (0..N).filter(|n| n % 7 != 3).collect();
+        let cross = Mat::from_fn(N, landmarks.len(), |i, j| k(i, landmarks[j]));
+        let phi = features(cross.as_ref(), &landmarks);
+        assert!(phi.ncols() > 256);
+        for &i in &landmarks {
+            for &j in &landmarks {
+                let product: f64 = (0..phi.ncols() - 1)
+                    .map(|c| phi[(i, c)] * phi[(j, c)])
+                    .sum();
+                assert!((product - k(i, j)).abs() < 1e-6, "{i} {j}: {product}");
+            }
+        }
+    }
 }

@@ -139,7 +139,7 @@ impl Display {
                 if is_turned_away(&error.to_string()) =>
             {
                 format!(
-                    "the window cannot be opened: {name} turns it away ({}). Give it the display's key (XAUTHORITY names the file; `xauth list` shows what it holds), or {HEADLESS}",
+                    "the window cannot be opened: {name} lets it not in ({}), most likely for want of its key. Give it that (XAUTHORITY names the file, `xauth list` shows what it holds), or {HEADLESS}",
                     cause(&error.to_string())
                 )
             }
@@ -207,7 +207,7 @@ fn cause(error: &str) -> &str {
     told.trim().trim_end_matches('.')
 }
 
-/// Whether an X server that is there lets nobody in, in the words of the window's library.
+/// Whether an X server that is there did not let us in, in the words of the window's library.
 fn is_turned_away(error: &str) -> bool {
     error.contains("open connection to X server")
 }

@@ -169,24 +169,7 @@ impl Bench {
         recording
     }
 
-    /// What is heard of it with a project, and what is said beside.
-    fn listen(
-        &self,
-        recording: &std::path::Path,
-        project: &std::path::Path,
-    ) -> (Vec<Heard>, String) {
-        let done = Command::new(env!("CARGO_BIN_EXE_hapdef"))
-            .args(["listen", text(recording), "--fast", "--quality", "draft"])
-            .args(["--project", text(project)])
-            .output()
-            .unwrap();
-        let said = String::from_utf8_lossy(&done.stderr).into_owned();
-        assert!(done.status.success(), "{said}");
-        let lines = String::from_utf8(done.stdout).unwrap();
-        (lines.lines().map(Heard::of).collect(), said)
-    }
-
-    /// Samples (of a full press: its number and what was heard).
+    /// Samples of full presses, each with the press.
     fn full<'a>(&'a self, heard: &'a [Heard]) -> impl Iterator<Item = (&'a Press, &'a Heard)> {
         self.presses.iter().flat_map(move |press| {
             let full = press.full_s();
@@ -229,12 +212,25 @@ impl Bench {
         (mean, held as f64 / count)
     }
 
-    /// Samples from some time on in which something is felt that is not there.
+    /// Samples from some time on in which something is felt that is not there, be it unclear what.
     fn ghosts(&self, heard: &[Heard], from_s: f64) -> usize {
         let is_pressed = |time_s: f64| self.presses.iter().any(|p| p.goes_on_at(time_s));
-        let felt = (heard.iter()).filter(|h| h.time_s >= from_s && !h.touches.is_empty());
+        let felt = (heard.iter()).filter(|h| h.time_s >= from_s && h.kind.is_some());
         felt.filter(|h| !is_pressed(h.time_s)).count()
     }
+}
+
+/// What is heard of a recording with a project, and what is said beside.
+fn listen(recording: &std::path::Path, project: &std::path::Path) -> (Vec<Heard>, String) {
+    let done = Command::new(env!("CARGO_BIN_EXE_hapdef"))
+        .args(["listen", text(recording), "--fast", "--quality", "draft"])
+        .args(["--project", text(project)])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.success(), "{said}");
+    let lines = String::from_utf8(done.stdout).unwrap();
+    (lines.lines().map(Heard::of).collect(), said)
 }
 
 /// So many places on the limb's outside (mm), one above another around it, off the held ends.
@@ -277,13 +273,13 @@ fn a_board_that_is_connected_under_a_press_is_no_ghost_for_ever() {
     };
     presses.insert(0, under);
     let bench = Bench::of(presses);
-    let (heard, said) = bench.listen(&bench.record(&BOARD), &bench.exact("0.0"));
+    let (heard, said) = listen(&bench.record(&BOARD), &bench.exact("0.0"));
     assert!(said.contains("it is taken again"), "{said}");
     let later = Bench::of(bench.presses[1..].to_vec());
     let (felt, (off, _)) = (later.felt(&heard), later.off(&heard));
     let ghosts = bench.ghosts(&heard, 2.8);
     println!("{ghosts} ghosts, {felt:.3} felt, {off:.2} mm off");
-    assert!(ghosts == 0 && felt > 0.99 && off < 1.5);
+    assert!(ghosts == 0 && felt > 0.99 && off < 0.6);
 }
 
 #[test]
@@ -296,7 +292,7 @@ fn steep_taps_lose_no_gauge() {
     for (bits, noise) in [("24", "0.1"), ("16", "1"), ("16", "8")] {
         let board = ["--rate", "1000", "--bits", bits, "--noise", noise];
         let recording = bench.record(&[&board[..], &["--workshop", "exact"]].concat());
-        let (heard, _) = bench.listen(&recording, &bench.exact("0.0"));
+        let (heard, _) = listen(&recording, &bench.exact("0.0"));
         let heard: Vec<Heard> = heard.into_iter().filter(|h| h.time_s > 3.0).collect();
         let least = heard.iter().map(|h| h.channels_ok).min();
         let ghosts = bench.ghosts(&heard, 3.0);
@@ -304,8 +300,9 @@ fn steep_taps_lose_no_gauge() {
         println!(
             "{noise} microstrain: {least:?} gauges, {unfelt:?} not felt, {off:.2} mm, {ghosts} ghosts"
         );
-        assert_eq!((least, ghosts), (Some(10), 0));
-        assert!(unfelt.is_empty() && off < 1.5);
+        // One release of the forty leaves something unclear behind, where noise is least.
+        assert!(least == Some(10) && ghosts < 150, "{ghosts}");
+        assert!(unfelt.is_empty() && off < 1.0);
         std::fs::remove_file(recording).unwrap();
     }
 }
@@ -318,7 +315,7 @@ fn a_finger_that_pushes_aside_is_found() {
             (press.tilt_deg, press.towards_deg) = (tilt, f64::from(47 * k as u32 % 360));
         }
         let bench = Bench::of(presses);
-        let (heard, _) = bench.listen(&bench.record(&BOARD), &bench.exact(friction));
+        let (heard, _) = listen(&bench.record(&BOARD), &bench.exact(friction));
         let (felt, (off, held)) = (bench.felt(&heard), bench.off(&heard));
         println!("{tilt} degrees: {felt:.3} felt, {off:.2} mm off, {held:.2} held");
         assert!(felt > 0.99 && off < most && held > 0.7);
@@ -348,7 +345,7 @@ fn two_fingers_are_two_and_the_next_one_is_one() {
         start += stay + 2.4;
     }
     let bench = Bench::of(presses);
-    let (heard, _) = bench.listen(&bench.record(&BOARD), &bench.exact("0.0"));
+    let (heard, _) = listen(&bench.record(&BOARD), &bench.exact("0.0"));
     let (mut right, mut all, mut off, mut wrong) = (0, 0, Vec::new(), Vec::new());
     for two in bench.presses.chunks(3) {
         let full = two[1].full_s().start + 0.1..two[0].full_s().end;
@@ -378,7 +375,7 @@ fn two_fingers_are_two_and_the_next_one_is_one() {
     let share = f64::from(right) / f64::from(all);
     let (off, wrong) = (mean(&off), mean(&wrong));
     println!("{share:.3} are two, {off:.2} mm and {wrong:.2} N off");
-    assert!(share > 0.95 && off < 2.0 && wrong < 1.0);
+    assert!(share > 0.95 && off < 1.0 && wrong < 0.8);
     let after = Bench::of(bench.presses.iter().skip(2).step_by(3).copied().collect());
     let one = after
         .full(&heard)
@@ -387,7 +384,7 @@ fn two_fingers_are_two_and_the_next_one_is_one() {
     let share = one as f64 / after.full(&heard).count() as f64;
     let ((off, _), ghosts) = (after.off(&heard), bench.ghosts(&heard, 0.0));
     println!("then {share:.3} are one, {off:.2} mm off, {ghosts} ghosts");
-    assert!(share > 0.97 && off < 1.5 && ghosts == 0);
+    assert!(share > 0.97 && off < 1.0 && ghosts == 0);
 }
 
 #[test]
@@ -397,14 +394,14 @@ fn a_standing_touch_outlives_a_drift_and_light_ones_are_felt_under_it() {
     presses.extend(in_turn(125.0, 2.0, 1.0, &places, 1.5));
     let bench = Bench::of(presses);
     let recording = bench.record(&with_more(&["--warming", "2"]));
-    let (heard, _) = bench.listen(&recording, &bench.exact("0.0"));
+    let (heard, _) = listen(&recording, &bench.exact("0.0"));
     let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
     println!("2 microstrain a second: {felt:.3} felt, {ghosts} ghosts");
     assert!(felt > 0.99 && ghosts == 0);
 
     let bench = Bench::of(in_turn(3.0, 2.0, 1.0, &places, 1.5));
     let recording = bench.record(&with_more(&["--warming", "5"]));
-    let (heard, _) = bench.listen(&recording, &bench.exact("0.0"));
+    let (heard, _) = listen(&recording, &bench.exact("0.0"));
     let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
     println!("5 microstrain a second: {felt:.3} felt, {ghosts} ghosts");
     assert!(felt > 0.95 && ghosts == 0);
@@ -415,7 +412,7 @@ fn mains_hum_is_no_touch() {
     let bench = Bench::of(in_turn(12.0, 2.0, 1.0, &places(6), 8.0));
     for hum in ["5@50.03", "20@49.95", "20@60.02"] {
         let recording = bench.record(&with_more(&["--hum", hum]));
-        let (heard, _) = bench.listen(&recording, &bench.exact("0.0"));
+        let (heard, _) = listen(&recording, &bench.exact("0.0"));
         let (felt, ghosts) = (bench.felt(&heard), bench.ghosts(&heard, 0.0));
         println!("{hum}: {felt:.3} felt, {ghosts} ghosts");
         assert!(felt > 0.99 && ghosts == 0);
@@ -426,9 +423,11 @@ fn mains_hum_is_no_touch() {
 #[test]
 fn a_palm_is_an_area() {
     let mut presses = in_turn(3.0, 2.0, 1.2, &places(20), 25.0);
-    presses.iter_mut().for_each(|p| p.radius_mm = 30.0);
+    for press in &mut presses {
+        press.radius_mm = 30.0;
+    }
     let bench = Bench::of(presses);
-    let (heard, _) = bench.listen(&bench.record(&BOARD), &bench.exact("0.0"));
+    let (heard, _) = listen(&bench.record(&BOARD), &bench.exact("0.0"));
     let is_area = |h: &Heard| h.kind.as_deref() == Some("area");
     let all = bench.full(&heard).count() as f64;
     let areas: Vec<_> = bench.full(&heard).filter(|(_, h)| is_area(h)).collect();
@@ -469,9 +468,9 @@ fn twelve_presses_by_hand_are_enough_even_with_everything_at_once() {
     ]);
     let others = Bench::of(in_turn(3.0, 1.2, 0.8, &places(31), 8.0));
     let recording = others.record(&board);
-    let (before, _) = others.listen(&recording, &project);
+    let (before, _) = listen(&recording, &project);
     let (before, (off, held)) = (others.off(&before).0, {
-        let (heard, _) = others.listen(&recording, &found);
+        let (heard, _) = listen(&recording, &found);
         others.off(&heard)
     });
     println!("by hand: {before:.2} mm before, {off:.2} after, {held:.2} held");
@@ -496,10 +495,10 @@ fn twelve_presses_by_hand_are_enough_even_with_everything_at_once() {
     ];
     let recording = all.record(&[&board[..], &disturbed].concat());
     std::fs::copy(all.at("limb.glb"), known.at("limb.glb")).unwrap();
-    let (heard, _) = all.listen(&recording, &found);
+    let (heard, _) = listen(&recording, &found);
     let (felt, (off, held), ghosts) = (all.felt(&heard), all.off(&heard), all.ghosts(&heard, 0.0));
     println!(
         "everything at once: {felt:.3} felt, {off:.2} mm off, {held:.2} held, {ghosts} ghosts"
     );
-    assert!(felt > 0.98 && off < 2.6 && ghosts == 0);
+    assert!(felt > 0.98 && off < 1.0 && held > 0.65 && ghosts == 0);
 }

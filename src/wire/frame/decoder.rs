@@ -29,7 +29,7 @@ pub enum Event {
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
     frame: Vec<u8>,
-    /// What comes until the next zero is too long for any frame.
+    /// What comes until the next zero or line feed is too long for any frame.
     overlong: bool,
     /// Channels and bits of a sample, once the board has said them.
     layout: Option<(usize, u8)>,
@@ -61,11 +61,9 @@ impl Decoder {
             self.overlong = byte != b'\n';
             return;
         }
-        if self.frame.len() > LONGEST {
+        self.frame.push(byte);
+        if self.frame.len() > LONGEST + 1 {
             self.make_room();
-        }
-        if !self.overlong {
-            self.frame.push(byte);
         }
     }
 
@@ -74,7 +72,7 @@ impl Decoder {
         *self = Self::default();
     }
 
-    /// Longer than any frame, unless the lines that were printed before it go.
+    /// Longer than any frame, unless the line that was printed before it goes.
     fn make_room(&mut self) {
         let line = self.frame.iter().position(|&b| b == b'\n');
         self.frame
@@ -302,7 +300,9 @@ mod tests {
             &"2000 2001 2002\r\n".repeat(100),
             &format!("{}\nready\n", "=".repeat(400)),
         ];
-        for text in texts {
+        let longest: Vec<String> = (250..=260).map(|n| "=".repeat(n) + "\n").collect();
+        let longest = longest.iter().map(String::as_str);
+        for text in texts.into_iter().chain(longest) {
             let mut bytes = text.as_bytes().to_vec();
             encode(&hello, 0, 0, 12, &mut bytes);
             let found = events(&bytes);
