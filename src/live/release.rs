@@ -48,7 +48,9 @@ impl Release {
         let better = pull.strength > CLEAR && touch.strength < pull.strength - WORSE;
         let seen = explained && better && {
             let lately = |at: u64| (time_us.saturating_sub(at) as f64) < ASK_S * 1e6;
-            if self.asked.is_none_or(|(at, _)| !lately(at)) {
+            // That it is a pull is asked until it is believed, at every sample.
+            let stands = |likelier: bool| !likelier || self.looks >= LOOKS;
+            if (self.asked).is_none_or(|(at, likelier)| !lately(at) || !stands(likelier)) {
                 let likelier = matching.is_rather_a_pull(several, strain, [touch, &pull]);
                 self.asked = Some((time_us, likelier));
             }

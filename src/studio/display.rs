@@ -139,7 +139,7 @@ impl Display {
                 if is_turned_away(&error.to_string()) =>
             {
                 format!(
-                    "the window cannot be opened: {name} lets it not in ({}), most likely for want of its key. Give it that (XAUTHORITY names the file, `xauth list` shows what it holds), or {HEADLESS}",
+                    "the window cannot be opened: {name} does not let it in ({}), most likely for want of its key. Give it that (XAUTHORITY names the file, `xauth list` shows what it holds), or {HEADLESS}",
                     cause(&error.to_string())
                 )
             }
