@@ -19,7 +19,7 @@ use crate::uncertainty::Making;
 use site::{Moments, gauges_on};
 use std::f64::consts::PI;
 
-pub use making::MakingSlopes;
+pub use making::{MakingSlope, MakingSlopes};
 pub use site::Site;
 pub use slopes::GluingSlopes;
 pub use survey::{Move, Surveyed, survey};
@@ -185,6 +185,39 @@ pub struct TouchRegion<'a> {
     pub triangles: Vec<bool>,
     /// Whether a place (m) belongs to it.
     pub contains: &'a dyn Fn(DVec3) -> bool,
+    /// Where in it they come more often.
+    pub often: Option<Often<'a>>,
+}
+
+/// Where touches come more often than elsewhere.
+pub struct Often<'a> {
+    /// For each triangle whether any place in it belongs there.
+    pub triangles: Vec<bool>,
+    /// Whether a place (m) belongs there.
+    pub contains: &'a dyn Fn(DVec3) -> bool,
+    /// How many times as many touches come to a piece of the surface there as to one beside it.
+    pub times: f64,
+}
+
+/// Places by which areas are compared: to two per cent of them.
+const MEASURED: usize = 4000;
+
+/// Two lists as one, so that any stretch of it has its share of both.
+fn in_proportion<T>(a: Vec<T>, b: Vec<T>) -> Vec<T> {
+    let (of_a, of_b) = (a.len(), b.len());
+    let (mut a, mut b) = (
+        a.into_iter().enumerate().peekable(),
+        b.into_iter().enumerate().peekable(),
+    );
+    std::iter::from_fn(|| {
+        let first = match (a.peek(), b.peek()) {
+            // Whose middle comes first: (2 i + 1) / 2 n.
+            (Some((i, _)), Some((j, _))) => (2 * i + 1) * of_b <= (2 * j + 1) * of_a,
+            (first, _) => first.is_some(),
+        };
+        if first { a.next() } else { b.next() }.map(|(_, value)| value)
+    })
+    .collect()
 }
 
 /// `count` touches spread over the surface, at least `margin` (m) from free edges: evenly for a model
@@ -211,10 +244,29 @@ pub fn distribute_touches(
             && region.is_none_or(|region| (region.contains)(mesh.point(at)))
     };
     let among = |t: u32| region.is_none_or(|region| region.triangles[t as usize]);
-    let points = if even {
-        sample::even_among(mesh, &among, count, seed, inside)
-    } else {
-        sample::random_among(mesh, &among, count, seed, inside)
+    let draw =
+        |count: usize, among: &dyn Fn(u32) -> bool, accept: &dyn Fn(SurfacePoint) -> bool| {
+            if even {
+                sample::even_among(mesh, among, count, seed, accept)
+            } else {
+                sample::random_among(mesh, among, count, seed, accept)
+            }
+        };
+    let points = match region.and_then(|region| region.often.as_ref()) {
+        None => draw(count, &among, &inside),
+        Some(often) => {
+            let there = |at: SurfacePoint| (often.contains)(mesh.point(at));
+            let near = |t: u32| among(t) && often.triangles[t as usize];
+            // How much of the surface it is nobody knows but by trying.
+            let tried = sample::random_among(mesh, &among, count.max(MEASURED), seed, inside);
+            let area = tried.iter().filter(|at| there(**at)).count() as f64;
+            let (weight, rest) = (area * often.times, tried.len() as f64 - area);
+            let frequent = (count as f64 * weight / (weight + rest).max(1.0)).round() as usize;
+            in_proportion(
+                draw(frequent, &near, &|at| there(at) && inside(at)),
+                draw(count - frequent, &among, &|at| !there(at) && inside(at)),
+            )
+        }
     };
     let (force, tip_radius) = tip;
     points
@@ -359,6 +411,17 @@ fn read_displacement(signal: Signal, normal: DVec3, rows: &[Vec<f64>], into: &mu
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn any_stretch_of_two_lists_has_its_share_of_both() {
+        let both = in_proportion(vec![1; 30], vec![0; 10]);
+        assert_eq!(both.len(), 40);
+        for stretch in both.chunks_exact(8) {
+            assert_eq!(stretch.iter().sum::<i32>(), 6);
+        }
+        assert_eq!(in_proportion(vec![1, 2], vec![]), [1, 2]);
+        assert_eq!(in_proportion(vec![], vec![1, 2]), [1, 2]);
+    }
 
     #[test]
     fn the_direction_follows_the_largest_strain() {

@@ -82,6 +82,7 @@ fn knowledge<'a>(
     Knowledge {
         noise,
         variance: Some(variance),
+        shared: None,
         among: None,
         forces,
         seed,

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{DesignError, Inputs, LAYOUT, MOST_SITES, SaidBy, TEST_SEED};
 use crate::bounds::Bounds;
 use crate::budget::Budget;
-use crate::dataset::{self, GluingSlopes, Signal, TouchRegion};
+use crate::dataset::{self, GluingSlopes, Often, Signal, TouchRegion};
 use crate::elasticity::load::Touch;
 use crate::memory;
 use crate::mesh::reach::Finger;
@@ -204,9 +204,17 @@ pub(super) fn touches_on(
         // The outside of a solid is of reached facets already.
         keep_reached(mesh, &reached, &mut triangles);
     }
+    let often = Project::mask("touch.often", project.touch.often.as_ref(), &inputs.masks)?;
+    let frequented =
+        |p: DVec3| often.is_some_and(|mask| inputs.part.mostly_in(mask, index.nearest(p).0));
     let region = TouchRegion {
         triangles,
         contains: &contains,
+        often: often.map(|mask| Often {
+            triangles: near_mask(mesh, &inputs.part, mask),
+            contains: &frequented,
+            times: project.touch.often_times,
+        }),
     };
     let tip = project.tip();
     let touches = dataset::distribute_touches(mesh, count, seed, margin, even, tip, Some(&region));

@@ -157,6 +157,7 @@ mod tests {
         Knowledge {
             noise: 1e-3,
             variance: None,
+            shared: None,
             among: None,
             forces,
             seed: 1,

@@ -136,6 +136,7 @@ fn expected_error(rounds: usize) -> ExpectedError<'static> {
         known: Knowledge {
             noise: 1.0,
             variance: None,
+            shared: None,
             among: None,
             forces: None,
             seed: 5,

@@ -57,6 +57,39 @@ fn touches_come_only_where_they_are_painted_and_gauges_only_where_they_are_not_k
 }
 
 #[test]
+fn touches_come_more_often_where_that_is_painted() {
+    let mut inputs = limb();
+    inputs.project.touch.count = 800;
+    let budget = Quality::Draft.budget();
+    let upper = |p: DVec3| p.z > 0.06;
+    inputs.masks.insert("handle".into(), mask(&inputs, upper));
+    let share = |inputs: &Inputs| {
+        let simulated = design::simulate(inputs, &budget, &unwatched).unwrap();
+        let touches = &simulated.dataset.touches;
+        assert_eq!(touches.len(), 800);
+        // The judge's too, and any stretch of them.
+        let judged = design::reference(inputs, &simulated, &[0, 9], &budget, &unwatched).unwrap();
+        let above = |touches: &[hapdef::elasticity::Touch]| {
+            let above = touches.iter().filter(|t| upper(t.position)).count();
+            above as f64 / touches.len() as f64
+        };
+        let half = &touches[..touches.len() / 2];
+        [above(touches), above(half), above(&judged.touches)]
+    };
+    let [even, _, judged_evenly] = share(&inputs);
+    inputs.project.touch.often = Some("handle".into());
+    inputs.project.touch.often_times = 3.0;
+    let wanted = |even: f64| 3.0 * even / (3.0 * even + 1.0 - even);
+    let expected = [wanted(even), wanted(even), wanted(judged_evenly)];
+    for (share, wanted) in share(&inputs).into_iter().zip(expected) {
+        assert!((share - wanted).abs() < 0.04, "{share} {wanted}");
+    }
+    inputs.project.touch.often = Some("nowhere".into());
+    let error = design::simulate(&inputs, &budget, &unwatched).err();
+    assert!(matches!(error, Some(DesignError::Value(bad)) if bad.key == "touch.often"));
+}
+
+#[test]
 fn a_painted_support_holds_like_the_box_it_covers() {
     let budget = Quality::Draft.budget();
     let boxed = limb();

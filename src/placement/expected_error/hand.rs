@@ -163,6 +163,7 @@ pub(super) mod tests {
         let known = Knowledge {
             noise: 1.0,
             variance: None,
+            shared: None,
             among: None,
             forces: Some(Forces {
                 touches: &forces,
