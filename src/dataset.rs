@@ -6,6 +6,9 @@ mod slopes;
 mod survey;
 
 use glam::DVec3;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -199,25 +202,25 @@ pub struct Often<'a> {
     pub times: f64,
 }
 
-/// Places by which areas are compared: to two per cent of them.
+/// Places by which areas are compared: to two or three per cent of what is accepted of them.
 const MEASURED: usize = 4000;
+const ORDER_SEED: u64 = 0x0f7e;
 
-/// Two lists as one, so that any stretch of it has its share of both.
-fn in_proportion<T>(a: Vec<T>, b: Vec<T>) -> Vec<T> {
-    let (of_a, of_b) = (a.len(), b.len());
-    let (mut a, mut b) = (
-        a.into_iter().enumerate().peekable(),
-        b.into_iter().enumerate().peekable(),
-    );
-    std::iter::from_fn(|| {
-        let first = match (a.peek(), b.peek()) {
-            // Whose middle comes first: (2 i + 1) / 2 n.
-            (Some((i, _)), Some((j, _))) => (2 * i + 1) * of_b <= (2 * j + 1) * of_a,
-            (first, _) => first.is_some(),
-        };
-        if first { a.next() } else { b.next() }.map(|(_, value)| value)
-    })
-    .collect()
+/// How much of some triangles (m²) is accepted, by trying.
+fn accepted_area(
+    mesh: &TriMesh,
+    among: &dyn Fn(u32) -> bool,
+    seed: u64,
+    accept: &dyn Fn(SurfacePoint) -> bool,
+) -> f64 {
+    let triangles = 0..mesh.triangles().len() as u32;
+    let area: f64 = triangles
+        .filter(|&t| among(t))
+        .map(|t| mesh.facet_area(t))
+        .sum();
+    let tried = sample::random_among(mesh, among, MEASURED, seed, |_| true);
+    let accepted = tried.iter().filter(|at| accept(**at)).count();
+    area * accepted as f64 / tried.len().max(1) as f64
 }
 
 /// `count` touches spread over the surface, at least `margin` (m) from free edges: evenly for a model
@@ -257,15 +260,21 @@ pub fn distribute_touches(
         Some(often) => {
             let there = |at: SurfacePoint| (often.contains)(mesh.point(at));
             let near = |t: u32| among(t) && often.triangles[t as usize];
-            // How much of the surface it is nobody knows but by trying.
-            let tried = sample::random_among(mesh, &among, count.max(MEASURED), seed, inside);
-            let area = tried.iter().filter(|at| there(**at)).count() as f64;
-            let (weight, rest) = (area * often.times, tried.len() as f64 - area);
-            let frequent = (count as f64 * weight / (weight + rest).max(1.0)).round() as usize;
-            in_proportion(
-                draw(frequent, &near, &|at| there(at) && inside(at)),
-                draw(count - frequent, &among, &|at| !there(at) && inside(at)),
-            )
+            let frequented = |at: SurfacePoint| there(at) && inside(at);
+            let often_area = accepted_area(mesh, &near, seed, &frequented);
+            let all = accepted_area(mesh, &among, seed, &inside);
+            let weight = often_area * often.times;
+            let share = weight / (weight + (all - often_area).max(0.0)).max(f64::MIN_POSITIVE);
+            let frequent = (count as f64 * share).round() as usize;
+            let mut points = draw(frequent, &near, &frequented);
+            points.extend(draw(count - frequent, &among, &|at| {
+                !there(at) && inside(at)
+            }));
+            // As of all touches: in no order.
+            points.shuffle(&mut ChaCha8Rng::seed_from_u64(
+                seed.wrapping_add(ORDER_SEED),
+            ));
+            points
         }
     };
     let (force, tip_radius) = tip;
@@ -411,17 +420,6 @@ fn read_displacement(signal: Signal, normal: DVec3, rows: &[Vec<f64>], into: &mu
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn any_stretch_of_two_lists_has_its_share_of_both() {
-        let both = in_proportion(vec![1; 30], vec![0; 10]);
-        assert_eq!(both.len(), 40);
-        for stretch in both.chunks_exact(8) {
-            assert_eq!(stretch.iter().sum::<i32>(), 6);
-        }
-        assert_eq!(in_proportion(vec![1, 2], vec![]), [1, 2]);
-        assert_eq!(in_proportion(vec![], vec![1, 2]), [1, 2]);
-    }
 
     #[test]
     fn the_direction_follows_the_largest_strain() {

@@ -164,7 +164,7 @@ impl Project {
             grid_length: self.gauge.grid_length_mm * MM,
             grid_width: self.gauge.grid_width_mm * MM,
             flatness: self.gauge.flatness_mm * MM,
-            noise: self.gauge.noise_microstrain * MICRO,
+            noise: self.uncertainty().of_channel(),
             least_signal_to_noise: self.gauge.least_signal_to_noise,
             range: self.gauge.range_microstrain * MICRO,
         }

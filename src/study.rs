@@ -83,6 +83,7 @@ fn knowledge<'a>(
         noise,
         variance: Some(variance),
         shared: None,
+        density: None,
         among: None,
         forces,
         seed,

@@ -122,9 +122,11 @@ fn serve(
     Ok(())
 }
 
-/// What a count stands for, to three digits.
+/// What a count stands for (microstrain), to three digits.
 fn per_count(chain: &Chain) -> f64 {
-    (1e9 / chain.counts_per_strain()).round() / 1e3
+    let microstrain = 1e6 / chain.counts_per_strain();
+    let digits = 10_f64.powi(2 - microstrain.log10().floor() as i32);
+    (microstrain * digits).round() / digits
 }
 
 /// Ends where the truth can be written no more: a table that is cut would be believed.

@@ -25,6 +25,8 @@ pub(super) struct Known<'a> {
     off: Uncertainty,
     /// Force of each touch (N).
     forces: Vec<f64>,
+    /// How many times as many come as elsewhere, where that differs.
+    density: Option<Vec<f64>>,
     range: [f64; 2],
     possible: f64,
     seed: u64,
@@ -40,6 +42,7 @@ impl<'a> Known<'a> {
             forces: (simulated.dataset.touches.iter())
                 .map(|t| t.force)
                 .collect(),
+            density: density(inputs, simulated),
             range: project.touch.forces_n,
             possible: project.live.largest_force_n.max(project.touch.forces_n[1]),
             seed: project.budget.seed.wrapping_add(SELECTION_NOISE_SEED),
@@ -113,6 +116,7 @@ impl<'a> Known<'a> {
             noise: self.off.of_channel(),
             variance: Some(variance),
             shared: Some(shared),
+            density: self.density.as_deref(),
             among: (self.simulated.dataset.slopes.as_ref()).map(GluingSlopes::touches),
             forces: Some(Forces {
                 touches: &self.forces,
@@ -124,6 +128,24 @@ impl<'a> Known<'a> {
     }
 }
 
+/// How many times as many touches come to where each of them is as to places beside what is often touched; nothing where
+/// no place is.
+fn density(inputs: &Inputs, simulated: &Simulated) -> Option<Vec<f64>> {
+    let touch = &inputs.project.touch;
+    let often = inputs.masks.get(touch.often.as_ref()?)?;
+    let index = inputs.part.index();
+    let there = |at: glam::DVec3| inputs.part.mostly_in(often, index.nearest(at).0);
+    let touches = simulated.dataset.touches.iter();
+    let of = touches.map(|t| {
+        if there(t.position) {
+            touch.often_times
+        } else {
+            1.0
+        }
+    });
+    Some(of.collect())
+}
+
 /// Everything that is known to be off with a simulation's signals: of strain what the project says and the elements are
 /// estimated to leave, of displacements nothing but the gluing.
 pub(super) fn off(project: &Project, simulated: &Simulated) -> Uncertainty {
@@ -132,6 +154,7 @@ pub(super) fn off(project: &Project, simulated: &Simulated) -> Uncertainty {
         Signal::Strain => off.with_elements(simulated.discretization.strain_percent),
         Signal::Displacement | Signal::NormalDisplacement => Uncertainty {
             noise: 0.0,
+            resolution: 0.0,
             drift: 0.0,
             making: Making::EXACT,
             allowed: 0.0,

@@ -264,7 +264,6 @@ impl Document {
             gauge: GaugeKeys {
                 tolerance: ToleranceKeys::default(),
                 drift_microstrain: GaugeKeys::default().drift_microstrain,
-                resolution_microstrain: GaugeKeys::default().resolution_microstrain,
                 ..p.gauge.clone()
             },
             feasible: p.feasible.clone(),

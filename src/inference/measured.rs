@@ -158,6 +158,7 @@ mod tests {
             noise: 1e-3,
             variance: None,
             shared: None,
+            density: None,
             among: None,
             forces,
             seed: 1,

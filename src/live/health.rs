@@ -81,9 +81,8 @@ const HOLD_S: f64 = 0.3;
 const TREMBLE_S: f64 = 0.25;
 /// Median of the absolute value of a normal variable over its deviation.
 pub(super) const MEDIAN_OF_NORMAL: f64 = 0.6745;
-/// Noise at rest (counts) from which a channel cannot stay at one value. A quiet one that rests on the edge between two
-/// shows half a count, whatever its noise is, and rightly stands still once it is pushed off the edge.
-const TREMBLES: f64 = 0.6;
+/// Noise at rest (counts) from which a channel cannot stay at one value.
+const TREMBLES: f64 = 0.35;
 /// Times the usual noise.
 const NOISY: f64 = 6.0;
 /// A channel is dead from here on: the sum of what single looks say (E. S. Page, Biometrika 41, 1954), of which none

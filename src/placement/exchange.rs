@@ -13,6 +13,8 @@ const LEAST: f64 = 1e-4;
 
 /// What sets are compared by, and how one grows.
 pub(super) trait Criterion {
+    /// Whether what is told on the way is rounded, so that sets are compared once more at the end.
+    const ROUNDED: bool = false;
     /// The unit that it is reported in.
     const UNIT: &'static str;
 
@@ -275,10 +277,9 @@ fn exchange<C: Criterion>(
             break;
         }
     }
-    if set == chosen {
-        return Ok((set, grown));
+    if set == chosen || !C::ROUNDED {
+        return Ok((set, value));
     }
-    // On the way it may have been told to rounding only.
     let last = criterion.of(&set)?;
     Ok(if gains(grown, last) {
         (set, last)

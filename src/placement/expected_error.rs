@@ -163,6 +163,7 @@ mod tests {
                 noise: 0.0,
                 variance: None,
                 shared: None,
+                density: None,
                 among: None,
                 forces: None,
                 seed: 1,

@@ -21,7 +21,7 @@ keys! {
             "that a gauge may have at one place: 1 along the largest strain, 2 also across it, up to 4";
         noise_microstrain: f64 = 1.0, "µε", from(0.0, 1e12),
             "standard deviation of a reading";
-        // The simulated board and the judge's readings have it on top of the noise.
+        // Of a simulated board it is what its bits and its gain make it.
         #[serde(skip_serializing_if = "is_default")]
         resolution_microstrain: f64 = 0.0, "µε", from(0.0, 1e6),
             "what one count of the converter stands for; 0 where the noise is that of counts already";

@@ -272,7 +272,7 @@ impl<'a> Source<'a> {
     }
 
     fn signal_to_noise(&self) -> Option<Vec<f64>> {
-        let noise = self.project().gauge.noise_microstrain * 1e-6;
+        let noise = self.project().uncertainty().of_channel();
         let simulation = self.session.results.simulation.as_ref();
         let simulation = simulation.filter(|_| noise > 0.0)?;
         let sites = simulation.value.simulated.dataset.sites.iter();

@@ -137,7 +137,7 @@ impl Wiring {
 
     /// What rounding to counts adds to the noise, where that is much; nothing where it is next to none.
     fn rounding_words(&self) -> Option<String> {
-        /// Of a microstrain: beside the noise of most chains.
+        /// Microstrain: half of the noise of most amplifiers.
         const LITTLE: f64 = 0.5;
         let gain = self.chain.gain.min(self.most_gain);
         let chain = Chain { gain, ..self.chain };
@@ -145,7 +145,7 @@ impl Wiring {
         let rounded = rounding(count);
         (rounded > LITTLE).then(|| {
             format!(
-                "With {} bits and a gain of ×{gain:.0} a count is {count:.1} µε, which adds {rounded:.1} µε to the noise of each reading. The promised errors know of it where gauge.resolution_microstrain says so; with more bits there is less of it.",
+                "With {} bits and a gain of ×{gain:.0} a count is {count:.1} µε, which adds {rounded:.1} µε to the noise of each reading. The promised errors know of that where gauge.resolution_microstrain is {count:.1}; with more bits there is less of it.",
                 chain.bits
             )
         })

@@ -56,6 +56,7 @@ impl Patch {
             noise: 1.0,
             variance: None,
             shared: None,
+            density: None,
             among: None,
             forces: self.loose.then_some(Forces {
                 touches: &self.forces,

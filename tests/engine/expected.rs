@@ -137,6 +137,7 @@ fn expected_error(rounds: usize) -> ExpectedError<'static> {
             noise: 1.0,
             variance: None,
             shared: None,
+            density: None,
             among: None,
             forces: None,
             seed: 5,

@@ -73,17 +73,46 @@ fn touches_come_more_often_where_that_is_painted() {
             let above = touches.iter().filter(|t| upper(t.position)).count();
             above as f64 / touches.len() as f64
         };
-        let half = &touches[..touches.len() / 2];
-        [above(touches), above(half), above(&judged.touches)]
+        // Whoever takes some of them strides over them.
+        let of: Vec<_> = touches.iter().copied().step_by(4).collect();
+        let judged_of: Vec<_> = judged.touches.iter().copied().step_by(2).collect();
+        [
+            above(touches),
+            above(&of),
+            above(&judged.touches),
+            above(&judged_of),
+        ]
     };
-    let [even, _, judged_evenly] = share(&inputs);
+    let [even, _, judged_evenly, _] = share(&inputs);
     inputs.project.touch.often = Some("handle".into());
     inputs.project.touch.often_times = 3.0;
     let wanted = |even: f64| 3.0 * even / (3.0 * even + 1.0 - even);
-    let expected = [wanted(even), wanted(even), wanted(judged_evenly)];
+    let expected = [even, even, judged_evenly, judged_evenly].map(wanted);
     for (share, wanted) in share(&inputs).into_iter().zip(expected) {
-        assert!((share - wanted).abs() < 0.04, "{share} {wanted}");
+        assert!((share - wanted).abs() < 0.07, "{share} {wanted}");
     }
+    // Three times as often in a spot of a per cent.
+    let spot = |p: DVec3| p.distance(DVec3::new(0.0318, 0.0, 0.06)) < 8e-3;
+    inputs.masks.insert("spot".into(), mask(&inputs, spot));
+    let within = |inputs: &Inputs| {
+        let simulated = design::simulate(inputs, &budget, &unwatched).unwrap();
+        (simulated.dataset.touches.iter())
+            .filter(|t| spot(t.position))
+            .count()
+    };
+    inputs.project.touch.often = None;
+    let evenly = within(&inputs) as f64;
+    inputs.project.touch.often = Some("spot".into());
+    inputs.project.touch.often_times = 10.0;
+    let often = within(&inputs) as f64;
+    assert!((5.0..15.0).contains(&(often / evenly)), "{evenly} {often}");
+    // Nobody touches what is painted there.
+    inputs
+        .masks
+        .insert("nothing".into(), mask(&inputs, |_| false));
+    inputs.project.touch.often = Some("nothing".into());
+    let error = design::simulate(&inputs, &budget, &unwatched).err();
+    assert!(matches!(error, Some(DesignError::Value(bad)) if bad.key == "touch.often"));
     inputs.project.touch.often = Some("nowhere".into());
     let error = design::simulate(&inputs, &budget, &unwatched).err();
     assert!(matches!(error, Some(DesignError::Value(bad)) if bad.key == "touch.often"));

@@ -18,8 +18,8 @@
 //! Experiments, 2006, ch. 3–6 and 9; Y. Yu, Monotonic convergence of a general algorithm for computing optimal designs,
 //! Annals of Statistics 38, 2010).
 //!
-//! What it holds for: C is what the bank's filter at the true place has, and the smallest covariance that the linear
-//! and normal model of that neighbourhood allows, so that no estimator at all, told in what neighbourhood of the scene a
+//! What it holds for: C is the smallest covariance that the linear
+//! and normal model of that neighbourhood allows, the bank's filter at the true place where that allows for no more than comes, so that no estimator at all, told in what neighbourhood of the scene a
 //! touch is, has a smaller mean error there (its posterior is normal, and T. W. Anderson's lemma, Proc. AMS 6, 1955,
 //! puts the best answer into its middle). Told nothing of that it can only be worse: what far places that may be taken
 //! for each other cost comes on top and is left out here. The bank's estimate of the whole error is of some presses and
@@ -32,7 +32,7 @@ use nalgebra::{Matrix2, SMatrix, SVector};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::bank::{MOST, PLAIN, Unknowns, prior, row};
+use super::bank::{Bank, MOST, PLAIN, Unknowns, prior, row};
 use super::elliptic::mean_length_and_slope;
 use super::scene::Scene;
 use crate::budget::{Cancelled, Watch, report};
@@ -145,16 +145,11 @@ fn bounded<const N: usize>(
     watch: Watch,
 ) -> Result<Option<Certificate>, Cancelled> {
     let relaxed = Relaxed::<N>::new(scene, free, held);
-    let as_chosen = |site: &usize| if own.contains(site) { 1.0 } else { 0.0 };
-    let weights: Vec<f64> = free.iter().map(as_chosen).collect();
-    let Some(local) = relaxed.expected(&weights) else {
-        return Ok(None);
-    };
     let bound = relaxed.bound(own.len(), watch)?;
     let sound = bound.filter(|b| *b > 0.0 && b.is_finite());
     Ok(sound.map(|bound_mm| Certificate {
         bound_mm,
-        local_mm: local.mm,
+        local_mm: Bank::of(scene, &[held, own].concat()).local(),
         refined: false,
     }))
 }
@@ -360,6 +355,7 @@ mod tests {
             noise: 0.05,
             variance: Some(variance),
             shared: None,
+            density: None,
             among: None,
             forces: with_forces.then_some(Forces {
                 touches: &forces,

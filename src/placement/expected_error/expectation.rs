@@ -292,6 +292,7 @@ impl<'a> Expectation<'a> {
 }
 
 impl Criterion for Expectation<'_> {
+    const ROUNDED: bool = true;
     const UNIT: &'static str = "mm";
 
     fn of(&mut self, set: &[usize]) -> Result<f64, PlacementError> {

@@ -164,6 +164,7 @@ pub(super) mod tests {
             noise: 1.0,
             variance: None,
             shared: None,
+            density: None,
             among: None,
             forces: Some(Forces {
                 touches: &forces,

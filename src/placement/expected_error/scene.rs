@@ -81,6 +81,9 @@ pub struct Knowledge<'a> {
     pub variance: Option<Variance<'a>>,
     /// What all sites feel together of a touch, beside its place and force; nothing where absent.
     pub shared: Option<&'a Shared<'a>>,
+    /// How many times as many of the touches come to a piece of the surface as to others, of each touch; as many
+    /// everywhere where absent. Whoever finds touches takes any piece to be as likely as another.
+    pub density: Option<&'a [f64]>,
     /// Touches that places are taken from, rising: those whose variance is known. All where absent.
     pub among: Option<&'a [usize]>,
     /// Absent where the signals are what they are.
@@ -237,9 +240,17 @@ impl<'a> Outlook<'a> {
         let presses: Vec<usize> = presses.into_iter().map(|k| all[k]).collect();
         in_neighbourhoods(&mut places, &merged.positions);
         let around = Around::new(&merged.positions, &merged.groups);
-        let [places, presses] = [places, presses].map(|numbers| Spots {
+        let thinned = |touches: &Vec<(usize, f64)>| {
+            known
+                .density
+                .map_or(1.0, |density| density[touches[0].0].recip())
+        };
+        let by_area: Vec<f64> = merged.touches.iter().map(thinned).collect();
+        let as_they_come = vec![1.0; merged.len()];
+        let of = [(places, by_area), (presses, as_they_come)];
+        let [places, presses] = of.map(|(numbers, masses)| Spots {
             neighbours: (numbers.par_iter().map(|&at| around.of(at).neighbours)).collect(),
-            standing: standing(&merged.positions, &numbers),
+            standing: standing(&merged.positions, &masses, &numbers),
             numbers,
         });
         let unit = unit(x, known.noise).recip();

@@ -132,7 +132,7 @@ pub(super) fn corrections(filters: &Filters, rows: &Rows) -> Vec<f32> {
 wide! {
     fn spread<'a>(filters: &'a Filters, rows: &'a Rows, gains: &'a mut [f32]) {
         let count = rows.half.len();
-        let covariances = filters.covariances.chunks_exact(count);
+        let covariances = filters.covariances.chunks_exact(count.max(1));
         for ((i, j), values) in entries(filters.unknowns).zip(covariances) {
             let ways = [(i, j), (j, i)];
             for (i, j) in ways.into_iter().take(if i == j { 1 } else { 2 }) {
@@ -150,12 +150,12 @@ wide! {
     /// What a reading leaves of the filters' covariances at all places.
     pub(super) fn shrink<'a>(filters: &'a mut Filters, rows: &'a Rows, gains: &'a [f32]) {
         let count = rows.half.len();
-        let covariances = filters.covariances.chunks_exact_mut(count);
+        let covariances = filters.covariances.chunks_exact_mut(count.max(1));
         for ((i, j), values) in entries(filters.unknowns).zip(covariances) {
             let [a, b] = [i, j].map(|i| &gains[i * count..][..count]);
             let terms = a.iter().zip(b).zip(&rows.half);
             for (value, ((a, b), half)) in values.iter_mut().zip(terms) {
-                // Where places are filled up nothing is read.
+                // Nothing where so much was predicted that half over it is no number any more.
                 *value -= a * b / (2.0 * half).max(f32::MIN_POSITIVE);
             }
         }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::budget::unwatched;
 use crate::dataset::SignalMatrix;
-use crate::placement::expected_error::{Detail, Forces, Knowledge, NUISANCES, Shared};
+use crate::placement::expected_error::{Detail, Forces, Knowledge, NUISANCES, Shared, certify};
 
 const SIDE: usize = 9;
 const SITES: usize = 5;
@@ -31,6 +31,7 @@ fn scene(felt: f64, nuisances: [Option<f64>; NUISANCES], drift: f64) -> Scene {
         noise: 1.0,
         variance: None,
         shared: Some(&shared),
+        density: None,
         among: None,
         forces: Some(Forces {
             touches: &forces,
@@ -113,6 +114,83 @@ fn what_all_share_hides_less_than_what_each_has_for_itself() {
         without < drifting && drifting < 0.8 * alone,
         "{without} {drifting} {alone}"
     );
+}
+
+#[test]
+fn no_three_of_five_gauges_are_better_than_the_bound() {
+    for made in [0.0, 0.4, 1.0] {
+        let scene = scene(2.0, [Some(made), Some(made), Some(made)], 3.0);
+        let certificate = certify(&scene, &[0, 1, 2, 3, 4], &[], &[0, 1, 2], &unwatched);
+        let certificate = certificate.unwrap().unwrap();
+        let all = (0..SITES).flat_map(|a| (0..a).flat_map(move |b| (0..b).map(move |c| [a, b, c])));
+        let best = all
+            .map(|set| Bank::of(&scene, &set).local())
+            .fold(f64::INFINITY, f64::min);
+        let own = Bank::of(&scene, &[0, 1, 2]).local();
+        assert!(
+            certificate.bound_mm <= best && best <= own,
+            "{made} {certificate:?} {best}"
+        );
+        assert!((certificate.local_mm - own).abs() < 1e-12);
+        // It is near, where no more is allowed for than comes.
+        assert!(
+            made < 1.0 || certificate.bound_mm > 0.6 * best,
+            "{certificate:?} {best}"
+        );
+    }
+}
+
+#[test]
+fn what_places_think_in_lanes_is_what_one_filter_thinks() {
+    for nuisances in [
+        [None; NUISANCES],
+        [None, Some(0.5), Some(0.5)],
+        [Some(1.0); NUISANCES],
+    ] {
+        for drift in [0.0, 3.0] {
+            let scene = scene(2.0, nuisances, drift);
+            let set = [0, 1, 2, 3, 4];
+            let bank = Bank::of(&scene, &set);
+            let count = bank.positions.len() / 3;
+            let press = scene.levels[0].presses.start;
+            let force = scene.levels[0].force;
+            let mut looked_at = 0;
+            for (k, place) in scene.places.iter().enumerate() {
+                let known = &bank.presses[press];
+                // What stands for the press itself, or is too unlikely, is not looked at.
+                let open = known.blocks.contains(&((k / LANES) as u32));
+                if known.costs[k] > 1e20 || !open {
+                    continue;
+                }
+                looked_at += 1;
+                let mut one = Press::at_rest(&scene, place);
+                for (turn, &site) in set.iter().enumerate() {
+                    let (_, reading) = Own::of(&scene, (site, turn), press, force);
+                    let here = scene.at_places.of(site);
+                    let own = Own::at_place(&scene, &here, k, (force, reading));
+                    (one.covariance, one.estimate, one.cost) = own.corrected(&one);
+                }
+                let off =
+                    |a: f32, b: f64, size: f64| (f64::from(a) - b).abs() < 2e-2 * size.max(1.0);
+                assert!(
+                    off(known.costs[k], one.cost, one.cost.abs()),
+                    "{} {}",
+                    known.costs[k],
+                    one.cost
+                );
+                for i in 0..PLAIN + scene.unknowns.len() {
+                    let thought = known.estimates[i * count + k];
+                    let size = one.estimate.abs().max();
+                    assert!(
+                        off(thought, one.estimate[i], size),
+                        "{i}: {thought} {}",
+                        one.estimate[i]
+                    );
+                }
+            }
+            assert!(looked_at > 5, "{looked_at}");
+        }
+    }
 }
 
 #[test]

@@ -150,16 +150,19 @@ pub(super) fn in_neighbourhoods(places: &mut [usize], positions: &[DVec3]) {
     in_neighbourhoods(high, positions);
 }
 
-/// Some of the places with what each stands for: the places that are nearest to it.
-pub(super) fn standing(positions: &[DVec3], of: &[usize]) -> Vec<Place> {
+/// Some of the places with what each stands for: the places that are nearest to it, each of which has some weight.
+pub(super) fn standing(positions: &[DVec3], weights: &[f64], of: &[usize]) -> Vec<Place> {
     let nearest = |at: &DVec3| {
         let away = |k: &usize| positions[of[*k]].distance_squared(*at);
         (0..of.len()).min_by(|a, b| away(a).total_cmp(&away(b)))
     };
     let owners: Vec<Option<usize>> = positions.par_iter().map(nearest).collect();
     let mut masses = vec![0.0; of.len()];
-    for owner in owners.into_iter().flatten() {
-        masses[owner] += 1.0 / positions.len() as f64;
+    let all: f64 = weights.iter().sum();
+    for (owner, weight) in owners.into_iter().zip(weights) {
+        if let Some(owner) = owner {
+            masses[owner] += weight / all;
+        }
     }
     of.par_iter()
         .zip(masses)
