@@ -409,7 +409,7 @@ impl Lab {
             &self.sensing,
             Workshop::All,
             script,
-            Some(15.0),
+            15.0,
             options,
             faults,
             &unwatched,

@@ -82,8 +82,6 @@ fn knowledge<'a>(
     Knowledge {
         noise,
         variance: Some(variance),
-        shared: None,
-        density: None,
         among: None,
         forces,
         seed,

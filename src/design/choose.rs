@@ -246,10 +246,8 @@ fn select_by_expected_error(
 ) -> Result<Selection, DesignError> {
     let known = Known::new(inputs, simulated);
     let variance = |row: usize, touch: usize| known.variance(reduced.feasible[row], touch);
-    let felt = |row: usize, touch: usize| known.felt(reduced.feasible[row], touch);
-    let shared = known.shared(&felt);
     let selector = ExpectedError {
-        known: known.knowledge(&variance, &shared),
+        known: known.knowledge(&variance),
         detail: detail(budget),
         rounds: expected_error::ROUNDS,
     };

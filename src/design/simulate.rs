@@ -272,8 +272,7 @@ fn read(
     let unknowns = model.system().dimension();
     let gauge = &project.gauge;
     let (signal, directions) = (gauge.signal, gauge.directions);
-    let making = project.uncertainty().making_allowed();
-    let changes = (&evenly(touches.len(), SLOPE_TOUCHES)[..], &making);
+    let changes = (&evenly(touches.len(), SLOPE_TOUCHES)[..], &project.making());
     let mut dataset =
         dataset::simulate(model, touches, &points, signal, directions, changes, watch)?;
     dataset.work += before;

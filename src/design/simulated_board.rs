@@ -52,7 +52,7 @@ pub fn simulated(
     sensing: &Sensing,
     workshop: Workshop,
     script: Script,
-    hardest: Option<f64>,
+    most_force: f64,
     mut options: Options,
     faults: Faults,
     watch: Watch,
@@ -64,9 +64,7 @@ pub fn simulated(
         .into_iter()
         .take(300)
         .collect();
-    if let Some(most_force) = hardest {
-        options.chain.gain = fitting_gain(&reference, &gains, &typical, most_force, &options.chain);
-    }
+    options.chain.gain = fitting_gain(&reference, &gains, &typical, most_force, &options.chain);
     Ok(SimulatedBoard::new(
         reference, gains, script, options, faults,
     ))

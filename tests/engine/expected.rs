@@ -136,8 +136,6 @@ fn expected_error(rounds: usize) -> ExpectedError<'static> {
         known: Knowledge {
             noise: 1.0,
             variance: None,
-            shared: None,
-            density: None,
             among: None,
             forces: None,
             seed: 5,

@@ -215,7 +215,7 @@ impl Bench {
             &lab.sensing,
             workshop,
             script,
-            Some(10.0),
+            10.0,
             options,
             faults,
             &unwatched,
