@@ -409,7 +409,7 @@ impl Lab {
             &self.sensing,
             Workshop::All,
             script,
-            15.0,
+            Some(15.0),
             options,
             faults,
             &unwatched,

@@ -117,6 +117,12 @@ const DISTURBED: u64 = 0xd157;
 const FASTEST: u16 = 10_000;
 
 impl SimulatedBoard {
+    /// What stands between its strains and its counts.
+    #[must_use]
+    pub fn chain(&self) -> &Chain {
+        &self.options.chain
+    }
+
     /// A board whose gauges read `sensitivity`, with these gains.
     #[must_use]
     pub fn new(

@@ -6,6 +6,9 @@ mod slopes;
 mod survey;
 
 use glam::DVec3;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +22,7 @@ use crate::uncertainty::Making;
 use site::{Moments, gauges_on};
 use std::f64::consts::PI;
 
-pub use making::MakingSlopes;
+pub use making::{MakingSlope, MakingSlopes};
 pub use site::Site;
 pub use slopes::GluingSlopes;
 pub use survey::{Move, Surveyed, survey};
@@ -185,6 +188,39 @@ pub struct TouchRegion<'a> {
     pub triangles: Vec<bool>,
     /// Whether a place (m) belongs to it.
     pub contains: &'a dyn Fn(DVec3) -> bool,
+    /// Where in it they come more often.
+    pub often: Option<Often<'a>>,
+}
+
+/// Where touches come more often than elsewhere.
+pub struct Often<'a> {
+    /// For each triangle whether any place in it belongs there.
+    pub triangles: Vec<bool>,
+    /// Whether a place (m) belongs there.
+    pub contains: &'a dyn Fn(DVec3) -> bool,
+    /// How many times as many touches come to a piece of the surface there as to one beside it.
+    pub times: f64,
+}
+
+/// Places by which areas are compared: to two or three per cent of what is accepted of them.
+const MEASURED: usize = 4000;
+const ORDER_SEED: u64 = 0x0f7e;
+
+/// How much of some triangles (m²) is accepted, by trying.
+fn accepted_area(
+    mesh: &TriMesh,
+    among: &dyn Fn(u32) -> bool,
+    seed: u64,
+    accept: &dyn Fn(SurfacePoint) -> bool,
+) -> f64 {
+    let triangles = 0..mesh.triangles().len() as u32;
+    let area: f64 = triangles
+        .filter(|&t| among(t))
+        .map(|t| mesh.facet_area(t))
+        .sum();
+    let tried = sample::random_among(mesh, among, MEASURED, seed, |_| true);
+    let accepted = tried.iter().filter(|at| accept(**at)).count();
+    area * accepted as f64 / tried.len().max(1) as f64
 }
 
 /// `count` touches spread over the surface, at least `margin` (m) from free edges: evenly for a model
@@ -211,10 +247,35 @@ pub fn distribute_touches(
             && region.is_none_or(|region| (region.contains)(mesh.point(at)))
     };
     let among = |t: u32| region.is_none_or(|region| region.triangles[t as usize]);
-    let points = if even {
-        sample::even_among(mesh, &among, count, seed, inside)
-    } else {
-        sample::random_among(mesh, &among, count, seed, inside)
+    let draw =
+        |count: usize, among: &dyn Fn(u32) -> bool, accept: &dyn Fn(SurfacePoint) -> bool| {
+            if even {
+                sample::even_among(mesh, among, count, seed, accept)
+            } else {
+                sample::random_among(mesh, among, count, seed, accept)
+            }
+        };
+    let points = match region.and_then(|region| region.often.as_ref()) {
+        None => draw(count, &among, &inside),
+        Some(often) => {
+            let there = |at: SurfacePoint| (often.contains)(mesh.point(at));
+            let near = |t: u32| among(t) && often.triangles[t as usize];
+            let frequented = |at: SurfacePoint| there(at) && inside(at);
+            let often_area = accepted_area(mesh, &near, seed, &frequented);
+            let all = accepted_area(mesh, &among, seed, &inside);
+            let weight = often_area * often.times;
+            let share = weight / (weight + (all - often_area).max(0.0)).max(f64::MIN_POSITIVE);
+            let frequent = (count as f64 * share).round() as usize;
+            let mut points = draw(frequent, &near, &frequented);
+            points.extend(draw(count - frequent, &among, &|at| {
+                !there(at) && inside(at)
+            }));
+            // As of all touches: in no order.
+            points.shuffle(&mut ChaCha8Rng::seed_from_u64(
+                seed.wrapping_add(ORDER_SEED),
+            ));
+            points
+        }
     };
     let (force, tip_radius) = tip;
     points

@@ -331,7 +331,13 @@ mod tests {
         let sized = |p: &mut Project| p.touch.tip_tolerance_mm = 0.5;
         let dragged = |p: &mut Project| p.touch.friction_percent = 10.0;
         assert_eq!(stale(knows, sized), [true; 3]);
-        assert_eq!(stale(knows, dragged), [true; 3]);
+        // Of a force along the surface it is simulated in any case, because whoever finds touches allows for one.
+        assert_eq!(stale(knows, dragged), [false, true, true]);
+        let straight = |p: &mut Project| p.live.friction_percent = 0.0;
+        assert_eq!(stale(knows, straight), [true; 3]);
+        let counted = |p: &mut Project| p.gauge.resolution_microstrain = 2.0;
+        // Sites that hardly move a count are filtered.
+        assert_eq!(stale(knows, counted), [true; 3]);
         let mut document = document();
         let simulated = |d: &Document| d.simulation_inputs(d.state.project.budget.quality);
         let chosen = |d: &Document| d.selection_inputs(d.state.project.budget.quality);

@@ -164,7 +164,7 @@ impl Project {
             grid_length: self.gauge.grid_length_mm * MM,
             grid_width: self.gauge.grid_width_mm * MM,
             flatness: self.gauge.flatness_mm * MM,
-            noise: self.gauge.noise_microstrain * MICRO,
+            noise: self.uncertainty().of_channel(),
             least_signal_to_noise: self.gauge.least_signal_to_noise,
             range: self.gauge.range_microstrain * MICRO,
         }
@@ -249,11 +249,12 @@ impl Project {
     }
 
     /// Everything that is known to be off. What the elements leave is not: a simulation says that, and
-    /// [`Uncertainty::with_elements`] takes it in. Nor is the converter's resolution, which the board knows.
+    /// [`Uncertainty::with_elements`] takes it in.
     #[must_use]
     pub fn uncertainty(&self) -> Uncertainty {
         Uncertainty {
             noise: self.gauge.noise_microstrain * MICRO,
+            resolution: self.gauge.resolution_microstrain * MICRO,
             gluing: self.gluing(),
             stiffness: self.live.stiffness_percent / 100.0,
             making: self.making(),

@@ -82,6 +82,8 @@ fn knowledge<'a>(
     Knowledge {
         noise,
         variance: Some(variance),
+        shared: None,
+        density: None,
         among: None,
         forces,
         seed,

@@ -14,9 +14,8 @@
 //! | stiffness | a common factor of all readings, the same as another force: no place is worse for it, every force is |
 //! | pressing | nothing that is read later; known presses are off by it while gauges are calibrated |
 //!
-//! Tip and friction are of a touch, and all gauges feel the same of them: matching and calibration take that in full, and
-//! tell them apart from the place. In the choice each channel is off by them for itself, with the variance that they have
-//! there.
+//! Tip, friction and drift are felt by all gauges together: choice, matching and calibration know that, and tell them apart
+//! from the place.
 
 use std::f64::consts::PI;
 
@@ -119,7 +118,13 @@ impl Making {
     /// in both, in the square of the reading's unit.
     #[must_use]
     pub fn variance(&self, tip: f64, shear: f64) -> f64 {
-        (self.tip * tip).powi(2) + (self.friction * shear).powi(2) / 2.0
+        (self.tip * tip).powi(2) + (self.along_either() * shear).powi(2)
+    }
+
+    /// Of the force along the surface in either of two directions at right angles, over the force that presses.
+    #[must_use]
+    pub fn along_either(&self) -> f64 {
+        self.friction / 2.0_f64.sqrt()
     }
 }
 
@@ -254,13 +259,6 @@ impl Uncertainty {
         self.noise.hypot(rounding(self.resolution))
     }
 
-    /// The same, with what drifts. All channels do that together, so that it hides less than this says: for whoever
-    /// cannot tell a common error from others.
-    #[must_use]
-    pub fn of_channel_and_drift(&self) -> f64 {
-        self.of_channel().hypot(self.drift)
-    }
-
     /// Whether gauges are built, pressed and read alike, whatever noise and elements are: what was measured on them and
     /// judged for one holds for the other.
     #[must_use]
@@ -323,11 +321,9 @@ mod tests {
         let both = Uncertainty {
             noise: 3e-6,
             resolution: 12.0_f64.sqrt() * 4e-6,
-            drift: 12e-6,
             ..Uncertainty::default()
         };
         assert!((both.of_channel() - 5e-6).abs() < 1e-15);
-        assert!((both.of_channel_and_drift() - 13e-6).abs() < 1e-15);
     }
 
     #[test]

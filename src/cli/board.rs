@@ -61,8 +61,10 @@ pub fn run(args: &BoardArgs) -> anyhow::Result<()> {
         Outlet::Door(entrance) => serve(args, board, entrance, tell, &failures)?,
         Outlet::Recording { recorder, seconds } => {
             let path = recorder.path.clone();
+            let chain = *board.chain();
             let samples = record(board, recorder, seconds, tell).map_err(anyhow::Error::msg)?;
-            let said = json!({ "recording": path, "seconds": seconds, "samples": samples });
+            let said = json!({ "recording": path, "seconds": seconds, "samples": samples,
+                "gain": chain.gain, "microstrain_per_count": per_count(&chain) });
             out::line(&said.to_string())?;
         }
     }
@@ -109,13 +111,22 @@ fn serve(
     tell: impl FnMut(Truth) + Send + 'static,
     failures: &Receiver<std::io::Error>,
 ) -> anyhow::Result<()> {
+    let chain = *board.chain();
     let hosted = host(board, entrance, tell).map_err(anyhow::Error::msg)?;
-    out::line(&json!({ "port": hosted.port }).to_string())?;
+    let said = json!({ "port": hosted.port, "gain": chain.gain, "microstrain_per_count": per_count(&chain) });
+    out::line(&said.to_string())?;
     while args.seconds.is_none_or(|s| hosted.seconds() < s) {
         check_truth(args, failures)?;
         std::thread::sleep(Duration::from_millis(20));
     }
     Ok(())
+}
+
+/// What a count stands for (microstrain), to three digits.
+fn per_count(chain: &Chain) -> f64 {
+    let microstrain = 1e6 / chain.counts_per_strain();
+    let digits = 10_f64.powi(2 - microstrain.log10().floor() as i32);
+    (microstrain * digits).round() / digits
 }
 
 /// Ends where the truth can be written no more: a table that is cut would be believed.
@@ -185,7 +196,7 @@ fn build(
             script_seed(seed),
         ),
     };
-    let most = strongest(&script).unwrap_or(args.force[1]);
+    let hardest = strongest(&script).unwrap_or(args.force[1]);
     let options = Options {
         rate_hz: args.rate,
         noise: args.noise.unwrap_or(inputs.project.gauge.noise_microstrain) * 1e-6,
@@ -193,6 +204,7 @@ fn build(
         disturbances: args.disturbed.disturbances(),
         chain: Chain {
             bits: args.bits,
+            gain: args.gain.unwrap_or(Chain::default().gain),
             ..Chain::default()
         },
         ..options(inputs, plan.channels)
@@ -202,7 +214,7 @@ fn build(
         &sensing,
         args.workshop,
         script,
-        most,
+        args.gain.is_none().then_some(hardest),
         options,
         plan.faults,
         watch,

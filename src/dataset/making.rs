@@ -22,9 +22,17 @@ pub struct MakingSlopes {
     touches: Vec<usize>,
     /// Sites × touches: strain a metre of the tip's radius.
     tip: Vec<f32>,
-    /// Sites × touches: strain where as much force acts along the surface as presses, as the root of the sum of the
-    /// squares over two directions.
-    shear: Vec<f32>,
+    /// Sites × touches, for each of two directions along the surface: strain where as much force acts that way as presses.
+    shear: [Vec<f32>; 2],
+}
+
+/// What a site's reading of a touch changes by.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MakingSlope {
+    /// Strain a metre of the tip's radius.
+    pub tip: f64,
+    /// Strain where as much force acts along the surface as presses, in each of two directions at right angles.
+    pub shear: [f64; 2],
 }
 
 impl MakingSlopes {
@@ -57,57 +65,69 @@ impl MakingSlopes {
         };
         let mut solves = 0;
         // One after the other: the answers to both together might not fit where those to one do.
+        let shape = (sites.len(), pressed.len());
         if let Some(sized) = solve(making.tip > 0.0, of_two_sizes)? {
             solves += sized.solves;
             let radius = |t: usize| pressed[t].tip_radius;
             let slope = |t: usize, [larger, smaller]: [f64; WAYS]| {
                 (larger - smaller) / (2.0 * STEP * radius(t))
             };
-            found.tip = each(&sized, sites.len(), pressed.len(), slope);
+            found.tip = each(&sized, shape, slope);
         }
         if let Some(dragged) = solve(making.friction > 0.0, along_the_surface)? {
             solves += dragged.solves;
-            let size = |_: usize, [along, across]: [f64; WAYS]| along.hypot(across);
-            found.shear = each(&dragged, sites.len(), pressed.len(), size);
+            found.shear = [0, 1].map(|way| each(&dragged, shape, |_, ways| ways[way]));
         }
         Ok((found, solves))
     }
 
-    /// Variance that touches made like that put on a site's reading of the touch of a column.
+    /// The touches of the dataset that they are known for, column by column.
     #[must_use]
-    pub fn variance(&self, site: usize, column: usize, making: &Making) -> f64 {
+    pub fn touches(&self) -> &[usize] {
+        &self.touches
+    }
+
+    /// What a site's reading of the touch of a column changes by.
+    #[must_use]
+    pub fn of_touch(&self, site: usize, column: usize) -> MakingSlope {
         let at = site * self.touches.len() + column;
-        let of = |values: &[f32]| values.get(at).map_or(0.0, |v| f64::from(*v));
-        making.variance(of(&self.tip), of(&self.shear))
+        let of = |values: &Vec<f32>| values.get(at).map_or(0.0, |v| f64::from(*v));
+        MakingSlope {
+            tip: of(&self.tip),
+            shear: self.shear.each_ref().map(of),
+        }
     }
 
     /// Those of one site alone.
     #[must_use]
     pub(super) fn only(&self, site: usize) -> Self {
         let count = self.touches.len();
-        let own = |values: &[f32]| match values {
+        let own = |values: &Vec<f32>| match &values[..] {
             [] => Vec::new(),
             all => all[site * count..][..count].to_vec(),
         };
         Self {
             touches: self.touches.clone(),
             tip: own(&self.tip),
-            shear: own(&self.shear),
+            shear: self.shear.each_ref().map(own),
         }
     }
 
     /// Forgets all sites but the first.
     pub(super) fn truncate(&mut self, sites: usize) {
         let count = sites * self.touches.len();
-        self.tip.truncate(count);
-        self.shear.truncate(count);
+        let [along, across] = &mut self.shear;
+        for values in [&mut self.tip, along, across] {
+            values.truncate(count);
+        }
     }
 
     /// One site more, of which they are known under every touch.
     pub(super) fn push(&mut self, site: &Self) {
-        for &touch in &self.touches {
-            self.tip.extend(site.tip.get(touch));
-            self.shear.extend(site.shear.get(touch));
+        let [along, across] = &mut self.shear;
+        let rows = [&site.tip, &site.shear[0], &site.shear[1]];
+        for (values, row) in [&mut self.tip, along, across].into_iter().zip(rows) {
+            values.extend(self.touches.iter().filter_map(|&touch| row.get(touch)));
         }
     }
 }
@@ -134,8 +154,7 @@ fn along_the_surface(touch: &Touch) -> [Push; WAYS] {
 /// What every site makes of what it reads of each touch made in two ways: sites × touches.
 fn each(
     responses: &Responses,
-    sites: usize,
-    touches: usize,
+    (sites, touches): (usize, usize),
     of: impl Fn(usize, [f64; WAYS]) -> f64,
 ) -> Vec<f32> {
     let mut row = vec![0.0; WAYS * touches];

@@ -246,8 +246,10 @@ fn select_by_expected_error(
 ) -> Result<Selection, DesignError> {
     let known = Known::new(inputs, simulated);
     let variance = |row: usize, touch: usize| known.variance(reduced.feasible[row], touch);
+    let felt = |row: usize, touch: usize| known.felt(reduced.feasible[row], touch);
+    let shared = known.shared(&felt);
     let selector = ExpectedError {
-        known: known.knowledge(&variance),
+        known: known.knowledge(&variance, &shared),
         detail: detail(budget),
         rounds: expected_error::ROUNDS,
     };

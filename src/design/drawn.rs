@@ -19,7 +19,7 @@ const PROPOSED_SEED: u64 = 0xca11;
 
 /// Known touches as they are proposed, on the surface that touches land on.
 pub(super) fn proposed(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<Touch>, DesignError> {
-    touches_on(mesh, inputs, PROPOSED, PROPOSED_SEED, true)
+    touches_on(mesh, inputs, PROPOSED, PROPOSED_SEED, (true, false))
 }
 
 /// Length and width (m) of the grid of a gauge that reads at a point.

@@ -61,13 +61,19 @@ impl Finest {
             .map(|&at| layout.point(at))
             .collect();
         let surface = ground.touch_layout();
-        let sample = touches_on(&surface, inputs, GRADED_FOR, project.budget.seed, true)?;
+        let sample = touches_on(
+            &surface,
+            inputs,
+            GRADED_FOR,
+            project.budget.seed,
+            (true, false),
+        )?;
         let coarse = ground.build(&sample, &places, &FINEST, watch)?.meshed;
         let (meshed, model) = coarse.reference_model(watch)?;
         let surface = meshed.touched_surface();
         let seed = project.budget.seed.wrapping_add(JUDGE_SEED);
         Ok(Self {
-            touches: touches_on(&surface, inputs, JUDGED, seed, false)?,
+            touches: touches_on(&surface, inputs, JUDGED, seed, (false, true))?,
             meshed,
             model,
         })

@@ -11,7 +11,8 @@ use crate::budget::{Cancelled, Watch, report};
 use crate::memory;
 use crate::mesh::scatter::Scatter;
 use crate::placement::expected_error::{
-    Detail, Hand, Mistaken, Pair, Scene, blind, least_helpful, most_helpful, taken_for, worst_pairs,
+    Detail, Hand, Mistaken, NUISANCES, Pair, Scene, blind, least_helpful, most_helpful, taken_for,
+    worst_pairs,
 };
 
 /// A scene of all sites of a simulation, and how it lies on the part. Sets are numbers of sites of the dataset.
@@ -162,11 +163,12 @@ impl InHand {
 fn scene(inputs: &Inputs, simulated: &Simulated, watch: Watch) -> Result<Scene, Cancelled> {
     let known = Known::new(inputs, simulated);
     let variance = |site: usize, touch: usize| known.variance(site, touch);
+    let felt = |site: usize, touch: usize| known.felt(site, touch);
     let dataset = &simulated.dataset;
     Scene::new(
         &dataset.x,
         &dataset.targets_mm(),
-        &known.knowledge(&variance),
+        &known.knowledge(&variance, &known.shared(&felt)),
         detail(dataset.sites.len()),
         watch,
     )
@@ -176,8 +178,8 @@ fn scene(inputs: &Inputs, simulated: &Simulated, watch: Watch) -> Result<Scene, 
 fn detail(sites: usize) -> Detail {
     /// Of what may be taken.
     const SHARE: f64 = 0.05;
-    /// Of one site at one place: four numbers in single precision.
-    const BYTES: f64 = 16.0;
+    /// Of one site at one place: four numbers in single precision, and one for each nuisance.
+    const BYTES: f64 = 4.0 * (4 + NUISANCES) as f64;
     let needed = BYTES * (sites * (FINE.places + FINE.presses)) as f64;
     let share = (SHARE * memory::allowed() / needed.max(1.0)).min(1.0);
     let part = |of: usize| ((share * of as f64) as usize).max(1);
@@ -204,7 +206,7 @@ mod tests {
         assert_eq!(detail(3000), FINE);
         let many = detail(50_000);
         assert!(many.places < FINE.places && many.presses < FINE.presses);
-        let bytes = 16.0 * 50_000.0 * (many.places + many.presses) as f64;
+        let bytes = 28.0 * 50_000.0 * (many.places + many.presses) as f64;
         assert!(bytes <= 0.05 * memory::USUAL as f64);
         assert_eq!(detail(0), FINE);
     }

@@ -251,7 +251,7 @@ pub(super) fn judge(
             workshop: &reference.workshop,
             test_targets: &test_targets,
             regions: &reference.regions,
-            noise: inputs.project.gauge.noise_microstrain * 1e-6,
+            noise: inputs.project.uncertainty().of_channel(),
             streams,
             seed: inputs.project.budget.seed.wrapping_add(NOISE_SEED),
         },
@@ -272,7 +272,7 @@ pub fn estimate(inputs: &Inputs, dataset: &Dataset, sites: &[usize], gamma: f64)
     let targets: Vec<[f64; 3]> = touches.iter().map(|&t| all[t]).collect();
     let x = dataset.x.select_rows(sites).select_columns(&touches);
     let noise = if dataset.signal == Signal::Strain {
-        inputs.project.gauge.noise_microstrain * 1e-6
+        inputs.project.uncertainty().of_channel()
     } else {
         0.0
     };

@@ -1,13 +1,15 @@
 //! What is known of the signals of a simulation beside their values: noise, gluing, how touches are made, and what its
 //! elements leave: all that [`Uncertainty`] describes.
 //!
-//! A drift that is common to all channels counts as noise of each, of the same variance: that they share it, so that
-//! differences between channels are free of it, would take an unknown more in every filter.
+//! What all gauges feel together of a touch is told as such: a tip of another size and a force along the surface, as far as
+//! whoever finds touches allows for them, and a drift.
 
 use super::{Inputs, SELECTION_NOISE_SEED, Simulated};
 use crate::budget::{Budget, Cancelled, Watch};
-use crate::dataset::{GluingSlopes, MakingSlopes, Signal};
-use crate::placement::expected_error::{Detail, Forces, Knowledge, Scene, Variance, expected};
+use crate::dataset::{GluingSlopes, MakingSlope, MakingSlopes, Signal};
+use crate::placement::expected_error::{
+    Detail, Forces, Knowledge, NUISANCES, Scene, Shared, Variance, expected,
+};
 use crate::project::Project;
 use crate::uncertainty::{Making, Uncertainty};
 
@@ -23,6 +25,8 @@ pub(super) struct Known<'a> {
     off: Uncertainty,
     /// Force of each touch (N).
     forces: Vec<f64>,
+    /// How many times as many come as elsewhere, where that differs.
+    density: Option<Vec<f64>>,
     range: [f64; 2],
     possible: f64,
     seed: u64,
@@ -38,45 +42,81 @@ impl<'a> Known<'a> {
             forces: (simulated.dataset.touches.iter())
                 .map(|t| t.force)
                 .collect(),
+            density: density(inputs, simulated),
             range: project.touch.forces_n,
             possible: project.live.largest_force_n.max(project.touch.forces_n[1]),
             seed: project.budget.seed.wrapping_add(SELECTION_NOISE_SEED),
         }
     }
 
-    /// What gluing, the way touches are made and elements put on the signal of a site (as numbered in the dataset) under a touch.
+    /// What gluing and elements put on the signal of a site (as numbered in the dataset) under a touch.
     pub fn variance(&self, site: usize, touch: usize) -> f64 {
         let reading = self.simulated.dataset.x.row(site)[touch];
-        let dataset = &self.simulated.dataset;
-        let changes = dataset.slopes.as_ref().zip(dataset.making.as_ref());
-        self.variance_of(reading, changes, site, touch)
+        let slopes = self.simulated.dataset.slopes.as_ref();
+        self.variance_of(reading, slopes, site, touch)
     }
 
     /// What they put on a gauge's reading of a touch where it is known what that changes by: of a site among some.
     pub fn variance_of(
         &self,
         reading: f64,
-        changes: Option<(&GluingSlopes, &MakingSlopes)>,
+        changes: Option<&GluingSlopes>,
         site: usize,
         touch: usize,
     ) -> f64 {
         let elements = (self.off.elements * reading).powi(2);
-        let Some((glued, made)) = changes else {
-            return elements;
-        };
-        let Ok(column) = glued.touches().binary_search(&touch) else {
-            return elements;
-        };
-        let glued = glued.variance(site, column, reading, &self.off.gluing);
-        glued + made.variance(site, column, &self.off.making) + elements
+        let column = |slopes: &GluingSlopes| slopes.touches().binary_search(&touch).ok();
+        let glued = changes.and_then(|slopes| {
+            let gluing = &self.off.gluing;
+            Some(slopes.variance(site, column(slopes)?, reading, gluing))
+        });
+        elements + glued.unwrap_or(0.0)
     }
 
-    /// For a pool with this variance of its rows.
-    pub fn knowledge<'b>(&'b self, variance: Variance<'b>) -> Knowledge<'b> {
+    /// What the way a touch is made puts on the signals of all sites together: of one of them (as numbered in the dataset).
+    pub fn felt(&self, site: usize, touch: usize) -> [f64; NUISANCES] {
+        let dataset = &self.simulated.dataset;
+        let made = dataset.making.as_ref();
+        made.map_or([0.0; NUISANCES], |made| self.felt_of(made, site, touch))
+    }
+
+    /// The same of a site among some: by a tip as much larger, and forces along the surface as large, as is allowed for.
+    pub fn felt_of(&self, made: &MakingSlopes, site: usize, touch: usize) -> [f64; NUISANCES] {
+        let Ok(column) = made.touches().binary_search(&touch) else {
+            return [0.0; NUISANCES];
+        };
+        let allowed = self.off.making_allowed();
+        let MakingSlope { tip, shear } = made.of_touch(site, column);
+        let [along, across] = shear.map(|by| allowed.along_either() * by);
+        [allowed.tip * tip, along, across]
+    }
+
+    /// What there is to find of a touch beside place and force, where `felt` says what sites feel of it.
+    pub fn shared<'b>(
+        &self,
+        felt: &'b (dyn Fn(usize, usize) -> [f64; NUISANCES] + Sync),
+    ) -> Shared<'b> {
+        let (made, allowed) = (self.off.making, self.off.making_allowed());
+        let share = |made: f64, allowed: f64| (allowed > 0.0).then(|| made / allowed);
+        let aside = share(made.friction, allowed.friction);
+        Shared {
+            felt,
+            nuisances: [share(made.tip, allowed.tip), aside, aside],
+            drift: self.off.drift,
+        }
+    }
+
+    /// For a pool whose rows have this variance, and feel so much together.
+    pub fn knowledge<'b>(
+        &'b self,
+        variance: Variance<'b>,
+        shared: &'b Shared<'b>,
+    ) -> Knowledge<'b> {
         Knowledge {
-            // All channels drift together, which a filter of three unknowns cannot hold: as if each did for itself.
-            noise: self.off.of_channel_and_drift(),
+            noise: self.off.of_channel(),
             variance: Some(variance),
+            shared: Some(shared),
+            density: self.density.as_deref(),
             among: (self.simulated.dataset.slopes.as_ref()).map(GluingSlopes::touches),
             forces: Some(Forces {
                 touches: &self.forces,
@@ -88,6 +128,24 @@ impl<'a> Known<'a> {
     }
 }
 
+/// How many times as many touches come to where each of them is as to places beside what is often touched; nothing where
+/// no place is.
+fn density(inputs: &Inputs, simulated: &Simulated) -> Option<Vec<f64>> {
+    let touch = &inputs.project.touch;
+    let often = inputs.masks.get(touch.often.as_ref()?)?;
+    let index = inputs.part.index();
+    let there = |at: glam::DVec3| inputs.part.mostly_in(often, index.nearest(at).0);
+    let touches = simulated.dataset.touches.iter();
+    let of = touches.map(|t| {
+        if there(t.position) {
+            touch.often_times
+        } else {
+            1.0
+        }
+    });
+    Some(of.collect())
+}
+
 /// Everything that is known to be off with a simulation's signals: of strain what the project says and the elements are
 /// estimated to leave, of displacements nothing but the gluing.
 pub(super) fn off(project: &Project, simulated: &Simulated) -> Uncertainty {
@@ -96,6 +154,7 @@ pub(super) fn off(project: &Project, simulated: &Simulated) -> Uncertainty {
         Signal::Strain => off.with_elements(simulated.discretization.strain_percent),
         Signal::Displacement | Signal::NormalDisplacement => Uncertainty {
             noise: 0.0,
+            resolution: 0.0,
             drift: 0.0,
             making: Making::EXACT,
             allowed: 0.0,
@@ -129,10 +188,11 @@ pub fn expected_errors(
     sites.sort_unstable();
     sites.dedup();
     let variance = |row: usize, touch: usize| known.variance(sites[row], touch);
+    let felt = |row: usize, touch: usize| known.felt(sites[row], touch);
     let scene = Scene::new(
         &simulated.dataset.x.select_rows(&sites),
         &simulated.dataset.targets_mm(),
-        &known.knowledge(&variance),
+        &known.knowledge(&variance, &known.shared(&felt)),
         FINE,
         watch,
     )?;

@@ -7,13 +7,13 @@ use rayon::prelude::*;
 use super::{DesignError, Inputs, LAYOUT, MOST_SITES, SaidBy, TEST_SEED};
 use crate::bounds::Bounds;
 use crate::budget::Budget;
-use crate::dataset::{self, GluingSlopes, Signal, TouchRegion};
+use crate::dataset::{self, GluingSlopes, Often, Signal, TouchRegion};
 use crate::elasticity::load::Touch;
 use crate::memory;
 use crate::mesh::reach::Finger;
 use crate::mesh::unroll::Unrolling;
 use crate::mesh::{Edge, SurfacePoint, TriMesh, sample};
-use crate::project::{Lattice, PartModel, Project};
+use crate::project::{BadValue, Lattice, PartModel, Project};
 
 /// Most touches that the slopes of gluing are found for, evenly chosen: a variance needs no more.
 pub const SLOPE_TOUCHES: usize = 1300;
@@ -161,7 +161,8 @@ pub(super) fn lay_out_touches(
     /// Radius (m) of a tip that is a point: no element is as small.
     const POINT: f64 = 1e-6;
     let count = inputs.project.touch.count.min(budget.touches);
-    let mut touches = touches_on(mesh, inputs, count, inputs.project.budget.seed, true)?;
+    let seed = inputs.project.budget.seed;
+    let mut touches = touches_on(mesh, inputs, count, seed, (true, true))?;
     if budget.point_tip {
         for touch in &mut touches {
             touch.tip_radius = touch.tip_radius.min(POINT);
@@ -178,15 +179,19 @@ pub(super) fn test_touches(
     count: usize,
 ) -> Result<Vec<Touch>, DesignError> {
     let seed = inputs.project.budget.seed.wrapping_add(TEST_SEED);
-    touches_on(surface, inputs, count, seed, false)
+    touches_on(surface, inputs, count, seed, (false, true))
 }
 
+/// Touches on a surface: evenly spread or drawn at random, and more of them where they come often if they are `weighed`.
+///
+/// # Errors
+/// [`DesignError`] for masks that are not there, or where no touch comes.
 pub(super) fn touches_on(
     mesh: &TriMesh,
     inputs: &Inputs,
     count: usize,
     seed: u64,
-    even: bool,
+    (even, weighed): (bool, bool),
 ) -> Result<Vec<Touch>, DesignError> {
     let project = &inputs.project;
     let margin = project.touch.edge_margin_mm * 1e-3;
@@ -204,14 +209,30 @@ pub(super) fn touches_on(
         // The outside of a solid is of reached facets already.
         keep_reached(mesh, &reached, &mut triangles);
     }
+    let often = Project::mask("touch.often", project.touch.often.as_ref(), &inputs.masks)?;
+    let often = often.filter(|_| weighed);
+    let frequented =
+        |p: DVec3| often.is_some_and(|mask| inputs.part.mostly_in(mask, index.nearest(p).0));
     let region = TouchRegion {
         triangles,
         contains: &contains,
+        often: often.map(|mask| Often {
+            triangles: near_mask(mesh, &inputs.part, mask),
+            contains: &frequented,
+            times: project.touch.often_times,
+        }),
     };
     let tip = project.tip();
     let touches = dataset::distribute_touches(mesh, count, seed, margin, even, tip, Some(&region));
     if touches.is_empty() {
         return Err(no_touches(mesh, inputs));
+    }
+    if often.is_some() && !touches.iter().any(|t| frequented(t.position)) {
+        return Err(DesignError::Value(BadValue {
+            key: "touch.often".into(),
+            rule: "a region that touches come to, and not too small for one of them. Paint it where they land, or take it out".into(),
+            value: project.touch.often.clone().unwrap_or_default(),
+        }));
     }
     Ok(touches)
 }

@@ -272,7 +272,7 @@ pub fn geometry(
 pub(super) fn noisy_signals<'a>(inputs: &Inputs, reduced: &'a Reduced) -> Cow<'a, SignalMatrix> {
     let project = &inputs.project;
     let noise = if project.selection.with_noise && project.gauge.signal == Signal::Strain {
-        project.gauge.noise_microstrain * 1e-6
+        project.uncertainty().of_channel()
     } else {
         0.0
     };

@@ -79,7 +79,7 @@ pub(super) fn noisy_means<'a>(
     draw: u64,
     streams: &[u64],
 ) -> std::borrow::Cow<'a, SignalMatrix> {
-    let noise = inputs.project.gauge.noise_microstrain * 1e-6 / samples.sqrt();
+    let noise = inputs.project.uncertainty().of_channel() / samples.sqrt();
     let seed = inputs.project.budget.seed.wrapping_add(NOISE_SEED);
     evaluation::add_noise_by(x, noise, seed.wrapping_add(draw), &|row| streams[row])
 }

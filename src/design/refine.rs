@@ -28,7 +28,7 @@ use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Move, Signal, Site, Surveyed, survey};
 use crate::elasticity::Touch;
 use crate::elasticity::respond::Pressed;
-use crate::placement::expected_error::Moving;
+use crate::placement::expected_error::{Moving, NUISANCES};
 use crate::placement::{Constraints, Selection, SensorSet};
 use crate::uncertainty::Making;
 
@@ -152,8 +152,9 @@ fn search(
     let known = Known::new(inputs, simulated);
     // Of gauges that move it is told seat by seat.
     let unasked = |_: usize, _: usize| 0.0;
-    let own = known.knowledge(&unasked);
-    let mut confirmed = known.knowledge(&unasked);
+    let shared = known.shared(&|_, _| [0.0; NUISANCES]);
+    let own = known.knowledge(&unasked, &shared);
+    let mut confirmed = known.knowledge(&unasked, &shared);
     confirmed.seed = own.seed.wrapping_add(CONFIRM_SEED);
     let constraints = Constraints {
         failure: keys.failure,
@@ -175,7 +176,7 @@ fn search(
     let model = simulated.meshed.model(watch)?;
     let pressed = Pressed::new(&*model, &simulated.dataset.touches);
     let sites: Vec<Site> = set.iter().map(|&s| simulated.dataset.sites[s]).collect();
-    let making = inputs.project.making();
+    let making = inputs.project.uncertainty().making_allowed();
     let made = (&simulated.dataset.touches[..], &making);
     let (surveyed, solves) = survey(&pressed, &sites, made, watch)?;
     let mut work = model.system().work();
@@ -367,10 +368,9 @@ impl Search<'_> {
 
 /// Puts a gauge into a seat that reads `x`, and is off as `like` is.
 fn seat_in(moving: &mut Moving, known: &Known, seat: usize, x: &[f64], like: &Surveyed) {
-    let changes = Some((&like.slopes, &like.making));
-    moving.seat(seat, x, &|touch| {
-        known.variance_of(x[touch], changes, 0, touch)
-    });
+    let variance = |touch: usize| known.variance_of(x[touch], Some(&like.slopes), 0, touch);
+    let felt = |touch: usize| known.felt_of(&like.making, 0, touch);
+    moving.seat(seat, x, &variance, &felt);
 }
 
 /// All moves of a length (m) and an angle (radians): on a circle, unturned and turned, and turned alone.

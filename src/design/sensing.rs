@@ -261,7 +261,7 @@ impl Sensing {
         seed: u64,
         even: bool,
     ) -> Result<Vec<Touch>, DesignError> {
-        touches_on(&self.drawn.map.mesh, inputs, count, seed, even)
+        touches_on(&self.drawn.map.mesh, inputs, count, seed, (even, true))
     }
 }
 

@@ -272,7 +272,8 @@ fn read(
     let unknowns = model.system().dimension();
     let gauge = &project.gauge;
     let (signal, directions) = (gauge.signal, gauge.directions);
-    let changes = (&evenly(touches.len(), SLOPE_TOUCHES)[..], &project.making());
+    let making = project.uncertainty().making_allowed();
+    let changes = (&evenly(touches.len(), SLOPE_TOUCHES)[..], &making);
     let mut dataset =
         dataset::simulate(model, touches, &points, signal, directions, changes, watch)?;
     dataset.work += before;

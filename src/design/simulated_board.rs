@@ -52,7 +52,7 @@ pub fn simulated(
     sensing: &Sensing,
     workshop: Workshop,
     script: Script,
-    most_force: f64,
+    hardest: Option<f64>,
     mut options: Options,
     faults: Faults,
     watch: Watch,
@@ -64,7 +64,9 @@ pub fn simulated(
         .into_iter()
         .take(300)
         .collect();
-    options.chain.gain = fitting_gain(&reference, &gains, &typical, most_force, &options.chain);
+    if let Some(most_force) = hardest {
+        options.chain.gain = fitting_gain(&reference, &gains, &typical, most_force, &options.chain);
+    }
     Ok(SimulatedBoard::new(
         reference, gains, script, options, faults,
     ))

@@ -40,6 +40,7 @@ pub struct ElementInputs {
     /// off they are made only whether they are at all: what signals change by is simulated then.
     touch: TouchKeys,
     region: Option<Mask>,
+    often: Option<Mask>,
     sites: SiteKeys,
     quality: Quality,
     seed: u64,
@@ -53,8 +54,10 @@ pub struct ElementInputs {
 struct Off {
     tolerance: ToleranceKeys,
     drift_microstrain: f64,
+    resolution_microstrain: f64,
     tip_tolerance_mm: f64,
     friction_percent: f64,
+    allowed_percent: f64,
 }
 
 impl Off {
@@ -62,8 +65,10 @@ impl Off {
         Self {
             tolerance: project.gauge.tolerance,
             drift_microstrain: project.gauge.drift_microstrain,
+            resolution_microstrain: project.gauge.resolution_microstrain,
             tip_tolerance_mm: project.touch.tip_tolerance_mm,
             friction_percent: project.touch.friction_percent,
+            allowed_percent: project.live.friction_percent,
         }
     }
 }
@@ -114,7 +119,6 @@ pub struct DesignInputs {
     evaluation: EvaluationKeys,
     off: Off,
     calibration: CalibrationKeys,
-    allowed_percent: f64,
     /// One estimator knows how hard anybody presses.
     judging: Judging,
 }
@@ -122,7 +126,7 @@ pub struct DesignInputs {
 /// What is painted on all layers, and what is held.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaintInputs {
-    layers: [Mask; 6],
+    layers: [Mask; Layer::ALL.len()],
     held: Held,
 }
 
@@ -153,6 +157,7 @@ pub struct ExpectedInputs {
     gauge: GaugeKeys,
     touch: TouchKeys,
     largest_force_n: f64,
+    allowed_percent: f64,
     /// Gauges off the lattice are of one design alone.
     off_lattice: Vec<Site>,
 }
@@ -164,8 +169,8 @@ pub struct SensingInputs {
     sites: Vec<ChosenSite>,
     grid_mm: [f64; 2],
     off: Off,
-    /// What touches and known presses are allowed to have along the surface (%).
-    aside_percent: [f64; 2],
+    /// What known presses are allowed to have along the surface (%).
+    pressed_aside_percent: f64,
 }
 
 /// What a jig for the chosen gauges depends on.
@@ -226,10 +231,11 @@ impl Document {
             touch: TouchKeys {
                 forces_n: usual.forces_n,
                 tip_tolerance_mm: f64::from(p.touch.tip_tolerance_mm > 0.0),
-                friction_percent: f64::from(p.touch.friction_percent > 0.0),
+                friction_percent: f64::from(p.uncertainty().making_allowed().friction > 0.0),
                 ..p.touch.clone()
             },
             region: p.touch.region.as_ref().map(|name| self.mask(name)),
+            often: p.touch.often.as_ref().map(|name| self.mask(name)),
             sites: p.sites.clone(),
             quality,
             seed: p.budget.seed,
@@ -310,7 +316,6 @@ impl Document {
             evaluation: p.evaluation.clone(),
             off: Off::of(p),
             calibration: p.calibration,
-            allowed_percent: p.live.friction_percent,
             judging: p.judging(),
         }
     }
@@ -358,6 +363,7 @@ impl Document {
             gauge: p.gauge.clone(),
             touch: p.touch.clone(),
             largest_force_n: p.live.largest_force_n,
+            allowed_percent: p.live.friction_percent,
             off_lattice: off_lattice.to_vec(),
         }
     }
@@ -371,7 +377,7 @@ impl Document {
             sites: p.selection.sites.clone(),
             grid_mm: [p.gauge.grid_length_mm, p.gauge.grid_width_mm],
             off: Off::of(p),
-            aside_percent: [p.live.friction_percent, p.calibration.friction_percent],
+            pressed_aside_percent: p.calibration.friction_percent,
         }
     }
 }

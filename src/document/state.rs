@@ -31,14 +31,17 @@ pub enum Layer {
     /// itself is wrong.
     Inside,
     Outside,
+    /// Where touches come more often than elsewhere.
+    Often,
 }
 
 impl Layer {
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Feasible,
         Self::KeepOut,
         Self::Support,
         Self::Touch,
+        Self::Often,
         Self::Inside,
         Self::Outside,
     ];
@@ -50,6 +53,7 @@ impl Layer {
             Self::KeepOut => "Keep out",
             Self::Support => "Support",
             Self::Touch => "Touch region",
+            Self::Often => "Often touched",
             Self::Inside => "Inside face",
             Self::Outside => "Outside face",
         }
@@ -76,6 +80,7 @@ fn key(project: &Project, layer: Layer) -> Option<&Option<String>> {
     match layer {
         Layer::KeepOut => Some(&project.feasible.keep_out),
         Layer::Touch => Some(&project.touch.region),
+        Layer::Often => Some(&project.touch.often),
         Layer::Inside => Some(&project.part.inside),
         Layer::Outside => Some(&project.part.outside),
         Layer::Feasible | Layer::Support => None,
@@ -87,6 +92,7 @@ fn key_mut(project: &mut Project, layer: Layer) -> Option<(&mut Option<String>, 
     match layer {
         Layer::KeepOut => Some((&mut project.feasible.keep_out, "keep-out")),
         Layer::Touch => Some((&mut project.touch.region, "touch-region")),
+        Layer::Often => Some((&mut project.touch.often, "often-touched")),
         Layer::Inside => Some((&mut project.part.inside, "inside-face")),
         Layer::Outside => Some((&mut project.part.outside, "outside-face")),
         Layer::Feasible | Layer::Support => None,
@@ -212,7 +218,10 @@ impl State {
 
     /// A region without a vertex would forbid every touch, or mean nothing.
     pub(super) fn drop_empty_layers(&mut self) {
-        for layer in [Layer::KeepOut, Layer::Touch, Layer::Inside, Layer::Outside] {
+        for layer in Layer::ALL {
+            if matches!(layer, Layer::Feasible | Layer::Support) {
+                continue;
+            }
             if self.layer(layer).is_some_and(|mask| !mask.contains(&true)) {
                 self.clear(layer);
             }

@@ -123,7 +123,7 @@ impl Nuisances {
             let normal = axes[0].mesh.normal(at);
             let along = normal.any_orthonormal_vector();
             let [x, y, z] = axes.each_ref().map(|m| m.at(at));
-            let by = self.making.friction / 2.0_f64.sqrt();
+            let by = self.making.along_either();
             [along, normal.cross(along)].map(|way| Nuisance {
                 force: way * by,
                 tip: 0.0,

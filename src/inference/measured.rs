@@ -157,6 +157,8 @@ mod tests {
         Knowledge {
             noise: 1e-3,
             variance: None,
+            shared: None,
+            density: None,
             among: None,
             forces,
             seed: 1,

@@ -65,7 +65,7 @@ pub fn range(dataset: &Dataset, site: usize) -> (f64, f64) {
 /// Rms strain over noise; absent when the project has no noise.
 #[must_use]
 pub fn signal_to_noise(inputs: &Inputs, rms_strain: f64) -> Option<f64> {
-    let noise = inputs.project.gauge.noise_microstrain * 1e-6;
+    let noise = inputs.project.uncertainty().of_channel();
     (noise > 0.0).then(|| rms_strain / noise)
 }
 

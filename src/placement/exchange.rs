@@ -13,6 +13,8 @@ const LEAST: f64 = 1e-4;
 
 /// What sets are compared by, and how one grows.
 pub(super) trait Criterion {
+    /// Whether what is told on the way is rounded, so that sets are compared once more at the end.
+    const ROUNDED: bool = false;
     /// The unit that it is reported in.
     const UNIT: &'static str;
 
@@ -46,6 +48,27 @@ pub(super) trait Criterion {
         let screened = self.screened(others, number)?;
         let best = screened.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
         Ok(best.map(|(place, _)| place))
+    }
+
+    /// A place that is better for the gauge of a number than the one that it has in a set of some criterion, and the
+    /// criterion there; nothing where none is. `others` is the field without it.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    fn better_for(
+        &mut self,
+        others: &Field,
+        (set, number): (&[usize], usize),
+        value: f64,
+    ) -> Result<Option<(usize, f64)>, PlacementError> {
+        let best = self.best_for(others, number)?;
+        let Some(place) = best.filter(|place| *place != set[number]) else {
+            return Ok(None);
+        };
+        let mut tried = set.to_vec();
+        tried[number] = place;
+        let with = self.of(&tried)?;
+        Ok(gains(value, with).then_some((place, with)))
     }
 
     /// Adds gauge after gauge to a field, each the best in its turn, and tells of each set.
@@ -225,7 +248,7 @@ impl<'f> Run<'f> {
 }
 
 /// Whether a criterion is better than before by more than rounding.
-fn gains(before: f64, after: f64) -> bool {
+pub(super) fn gains(before: f64, after: f64) -> bool {
     before - after > LEAST * before.abs()
 }
 
@@ -235,10 +258,10 @@ fn exchange<C: Criterion>(
     criterion: &mut C,
     empty: &Field,
     chosen: &[usize],
-    value: f64,
+    grown: f64,
     rounds: usize,
 ) -> Result<(Vec<usize>, f64), PlacementError> {
-    let (mut set, mut value) = (chosen.to_vec(), value);
+    let (mut set, mut value) = (chosen.to_vec(), grown);
     let kept = empty.required();
     let free = set.len().saturating_sub(kept);
     // A gauge need not be looked at again while nothing else has changed.
@@ -247,20 +270,22 @@ fn exchange<C: Criterion>(
         let number = kept + turn % free;
         let others = empty.without(&set, number);
         unchanged += 1;
-        let best = criterion.best_for(&others, number)?;
-        if let Some(place) = best.filter(|place| *place != set[number]) {
-            let mut tried = set.clone();
-            tried[number] = place;
-            let with = criterion.of(&tried)?;
-            if gains(value, with) {
-                (set, value, unchanged) = (tried, with, 1);
-            }
+        if let Some((place, with)) = criterion.better_for(&others, (&set, number), value)? {
+            (set[number], value, unchanged) = (place, with, 1);
         }
         if unchanged >= free {
             break;
         }
     }
-    Ok((set, value))
+    if set == chosen || !C::ROUNDED {
+        return Ok((set, value));
+    }
+    let last = criterion.of(&set)?;
+    Ok(if gains(grown, last) {
+        (set, last)
+    } else {
+        (chosen.to_vec(), grown)
+    })
 }
 
 /// At most so many other first gauges than a run had: the best ones whose signals differ from that one's and each

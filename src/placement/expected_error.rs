@@ -21,12 +21,13 @@ pub use self::hand::{BLIND, Hand, blind, least_helpful, most_helpful};
 pub use self::mistaken::{Mistaken, Pair, posterior, taken_for, worst_pairs};
 pub use self::moving::Moving;
 pub use self::scene::{
-    Detail, Forces, Knowledge, Reading, Scatter, Scene, Template, Variance, templates,
+    Detail, Forces, Knowledge, NUISANCES, Reading, Scatter, Scene, Shared, Template, Variance,
+    templates,
 };
 pub use super::exchange::ROUNDS;
 
 use self::bank::Bank;
-use self::expectation::{Expectation, scan};
+use self::expectation::{Expectation, Scenes, scan};
 use super::constraints::{Field, shortage, unreached};
 use super::exchange::{self, Chosen};
 use super::margin;
@@ -54,7 +55,8 @@ impl Selector for ExpectedError<'_> {
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
         let empty = Field::new(pool, request.constraints)?;
-        let mut expectation = Expectation::new(&self.known, self.detail, pool, request)?;
+        let scenes = Scenes::new(&self.known, self.detail, pool, request.watch)?;
+        let mut expectation = Expectation::new(&scenes, pool, request, self.known.seed);
         let mut chosen = exchange::search(&mut expectation, pool, request, &empty, self.rounds)?;
         certify_last(&expectation, request, &empty, &mut chosen)?;
         let losses = expectation.losses_note(&chosen.places)?;
@@ -160,6 +162,8 @@ mod tests {
             known: Knowledge {
                 noise: 0.0,
                 variance: None,
+                shared: None,
+                density: None,
                 among: None,
                 forces: None,
                 seed: 1,

@@ -21,6 +21,10 @@ keys! {
             "that a gauge may have at one place: 1 along the largest strain, 2 also across it, up to 4";
         noise_microstrain: f64 = 1.0, "µε", from(0.0, 1e12),
             "standard deviation of a reading";
+        // Of a simulated board it is what its bits and its gain make it.
+        #[serde(skip_serializing_if = "is_default")]
+        resolution_microstrain: f64 = 0.0, "µε", from(0.0, 1e6),
+            "what one count of the converter stands for; 0 where the noise is that of counts already";
         // A tare and a rest that follows take away what is slower than a touch, and what wanders faster is in the noise
         // as it is measured: beside them nothing is left, unless touches last for minutes or warm the part.
         #[serde(skip_serializing_if = "is_default")]

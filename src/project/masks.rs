@@ -26,6 +26,7 @@ impl Project {
             ("part.inside", self.part.inside.as_mut()),
             ("part.outside", self.part.outside.as_mut()),
             ("touch.region", self.touch.region.as_mut()),
+            ("touch.often", self.touch.often.as_mut()),
             ("feasible.keep_out", self.feasible.keep_out.as_mut()),
         ];
         supports

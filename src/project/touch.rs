@@ -37,6 +37,12 @@ keys! {
         #[serde(skip_serializing_if = "Option::is_none")]
         region: Option<String> = None, "", MASK,
             "touches come only here: a mask in the NPZ file beside this one, or a group of the mesh file";
+        #[serde(skip_serializing_if = "Option::is_none")]
+        often: Option<String> = None, "", MASK,
+            "touches come more often here: a mask in the NPZ file beside this one, or a group of the mesh file";
+        #[serde(skip_serializing_if = "is_usually_often")]
+        often_times: f64 = OFTEN_TIMES, "", from(1.0, 1e3),
+            "how many times as many touches come to a piece of the surface in touch.often as to one beside it";
     }
 }
 
@@ -45,6 +51,17 @@ const FORCES_N: [f64; 2] = [2.0, 30.0];
 
 /// Of whom touches the part, where nothing else is said: a fingertip.
 const REACH_MM: f64 = FINGERTIP * 1e3;
+
+/// How much more touches come to where they come often, where nothing else is said.
+const OFTEN_TIMES: f64 = 4.0;
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes by reference"
+)]
+fn is_usually_often(times: &f64) -> bool {
+    *times == OFTEN_TIMES
+}
 
 #[allow(
     clippy::trivially_copy_pass_by_ref,

@@ -316,7 +316,7 @@ fn board(inputs: &Inputs, sensing: &Sensing, r: &Reporter) -> Result<SimulatedBo
         sensing,
         Workshop::All,
         script,
-        FORCES_N[1],
+        Some(FORCES_N[1]),
         options(inputs, sensing.gauges.len()),
         Faults::default(),
         &|p| r.report(p),

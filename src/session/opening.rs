@@ -221,6 +221,7 @@ fn on_mesh(
     let gone = |name: &mut Option<String>| name.take_if(|name| !masks.contains_key(name)).is_some();
     let regions = gone(&mut project.feasible.keep_out)
         | gone(&mut project.touch.region)
+        | gone(&mut project.touch.often)
         | gone(&mut project.part.inside)
         | gone(&mut project.part.outside);
     let inputs = Inputs {

@@ -127,6 +127,7 @@ impl Command {
             Self::Paint(Layer::KeepOut) => "Paint where no gauge may go",
             Self::Paint(Layer::Support) => "Paint what is held",
             Self::Paint(Layer::Touch) => "Paint where touches come",
+            Self::Paint(Layer::Often) => "Paint where touches come often",
             Self::Paint(Layer::Inside) => "Paint the inside face",
             Self::Paint(Layer::Outside) => "Paint the outside face",
             Self::Stage(Stage::Part) => "Go to part",

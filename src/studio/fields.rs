@@ -272,7 +272,7 @@ impl<'a> Source<'a> {
     }
 
     fn signal_to_noise(&self) -> Option<Vec<f64>> {
-        let noise = self.project().gauge.noise_microstrain * 1e-6;
+        let noise = self.project().uncertainty().of_channel();
         let simulation = self.session.results.simulation.as_ref();
         let simulation = simulation.filter(|_| noise > 0.0)?;
         let sites = simulation.value.simulated.dataset.sites.iter();
@@ -315,6 +315,7 @@ impl<'a> Source<'a> {
         let mask = |layer| self.session.document.layer(layer).map(|m| m.as_slice());
         let painted = mask(Layer::Feasible);
         let (touch, out) = (mask(Layer::Touch), mask(Layer::KeepOut));
+        let often = mask(Layer::Often);
         let supports = self.project().supports(&self.session.document.state.masks);
         let held = supports
             .map(|s| held_freedoms(&self.session.document.part, &s))
@@ -327,7 +328,12 @@ impl<'a> Source<'a> {
                 None => set(painted, v),
             };
             let held = held.get(v).is_some_and(|h| h.0 != 0);
-            shown.region = [feasible, set(touch, v), u8::from(held) * 255, set(out, v)];
+            // Where they come often in full; where they come at all half as strong beside that.
+            let touched = match often {
+                Some(_) => set(often, v).max(set(touch, v) / 2),
+                None => set(touch, v),
+            };
+            shown.region = [feasible, touched, u8::from(held) * 255, set(out, v)];
         }
     }
 

@@ -133,7 +133,8 @@ pub fn paint_region_key(look: Look<'_>, painter: &Painter, rect: Rect) {
             Color32::from_rgb(219, 189, 87),
         ),
         (
-            look.session.document.layer(Layer::Touch).is_some(),
+            look.session.document.layer(Layer::Touch).is_some()
+                || look.session.document.layer(Layer::Often).is_some(),
             "Touches come",
             Color32::from_rgb(128, 153, 230),
         ),

@@ -168,7 +168,11 @@ fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
         return;
     }
     let text = match ask.session.by_hand_error() {
-        (_, Some(mm)) => format!("by hand: {mm:.2} mm on unseen touches"),
+        (Some(expected), Some(judged)) => format!(
+            "by hand: {expected:.2} mm {}; {judged:.2} mm judged on unseen touches",
+            expected_of(ask)
+        ),
+        (None, Some(judged)) => format!("by hand: {judged:.2} mm judged on unseen touches"),
         (Some(mm), None) => format!("by hand: {mm:.2} mm {}, judging …", expected_of(ask)),
         (None, None) => "by hand: …".into(),
     };
@@ -181,6 +185,7 @@ fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
         format!("; as selected judged {:.2} mm", r.error_mm)
     });
     divide(ui);
+    // The first figure is the same while the hand moves and after.
     let brief = text
         .split_once(" mm")
         .map_or(text.clone(), |(mm, _)| format!("{mm} mm"));

@@ -134,7 +134,7 @@ fn paint_controls(ask: &mut Ask<'_>, ui: &mut Ui) {
             }
         })
         .response
-        .on_hover_text("What is painted: where gauges may go, where they must not, what is held, where touches come")
+        .on_hover_text("What is painted: where gauges may go, where they must not, what is held, where touches come, and where they come often")
         .accessible_name("Layer");
     if ask.view.tool.is_brush() {
         let mut mm = ask.view.brush * 1000.0;

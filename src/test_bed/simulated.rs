@@ -74,7 +74,7 @@ fn built(
         sensing,
         flaws.workshop,
         Script::Held(None, 0),
-        ready.asked.most_force_n,
+        Some(ready.asked.most_force_n),
         options,
         Faults::default(),
         watch,

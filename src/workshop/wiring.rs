@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::inner::Glued;
 use crate::inference::Chain;
+use crate::uncertainty::rounding;
 
 /// Of a gauge as it is bought, and of the resistors beside it (Ω).
 pub const RESISTANCE: f64 = 350.0;
@@ -130,7 +131,24 @@ impl Wiring {
                 self.hardest_n, self.most_gain
             )
         });
+        words.extend(self.rounding_words());
         words
+    }
+
+    /// What rounding to counts adds to the noise, where that is much; nothing where it is next to none.
+    fn rounding_words(&self) -> Option<String> {
+        /// Microstrain: half of the noise of most amplifiers.
+        const LITTLE: f64 = 0.5;
+        let gain = self.chain.gain.min(self.most_gain);
+        let chain = Chain { gain, ..self.chain };
+        let count = 1e6 / chain.counts_per_strain();
+        let rounded = rounding(count);
+        (rounded > LITTLE).then(|| {
+            format!(
+                "With {} bits and a gain of ×{gain:.0} a count is {count:.1} µε, which adds {rounded:.1} µε to the noise of each reading. The promised errors know of that where gauge.resolution_microstrain is {count:.1}; with more bits there is less of it.",
+                chain.bits
+            )
+        })
     }
 }
 
@@ -271,6 +289,21 @@ mod tests {
         let volts = 5.0 * 2.0 / 4.0 * 1200e-6 * made.most_gain;
         assert!((volts - 0.8 * 1.65).abs() < 1e-9, "{volts}");
         assert!(made.words()[2].contains("no more than ×440") || made.most_gain > 330.0);
+        // A count at the gain that 30 N leave is a microstrain or less.
+        assert_eq!(made.words().len(), 3);
+        let coarse = wiring(
+            &[gauge(1, [0.0, 4000e-6])],
+            &[0],
+            &[0.03],
+            Chain::default(),
+            [10.0, 30.0],
+        );
+        // 0.977 µε at ×330, and ×44 is left.
+        let said = coarse.words()[3].clone();
+        assert!(
+            said.contains("a gain of ×44 a count is 7.3 µε, which adds 2.1 µε"),
+            "{said}"
+        );
         let bought = bill(&made);
         assert_eq!((bought[0][1].as_str(), bought[1][1].as_str()), ("2", "6"));
     }

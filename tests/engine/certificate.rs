@@ -55,6 +55,8 @@ impl Patch {
         Knowledge {
             noise: 1.0,
             variance: None,
+            shared: None,
+            density: None,
             among: None,
             forces: self.loose.then_some(Forces {
                 touches: &self.forces,

@@ -136,6 +136,8 @@ fn expected_error(rounds: usize) -> ExpectedError<'static> {
         known: Knowledge {
             noise: 1.0,
             variance: None,
+            shared: None,
+            density: None,
             among: None,
             forces: None,
             seed: 5,

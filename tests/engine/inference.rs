@@ -215,7 +215,7 @@ impl Bench {
             &lab.sensing,
             workshop,
             script,
-            10.0,
+            Some(10.0),
             options,
             faults,
             &unwatched,

@@ -41,6 +41,7 @@ fn dragged() -> Inputs {
 fn untold() -> Inputs {
     let mut inputs = dragged();
     inputs.project.touch.friction_percent = 0.0;
+    inputs.project.live.friction_percent = 0.0;
     inputs
 }
 
@@ -100,17 +101,14 @@ fn variances_are_those_of_touches_that_are_made_so() {
         ..Making::EXACT
     };
     for (column, square) in squares.into_iter().enumerate() {
-        let variance = made.variance(17, column, &making);
+        let slope = made.of_touch(17, column);
+        let variance = making.variance(slope.tip, slope.shear[0].hypot(slope.shear[1]));
         assert!(
             (variance - square).abs() < 1e-3 * square + 1e-18,
             "{variance:e} {square:e}"
         );
         // Nobody asked for other tips.
-        let sized = Making {
-            tip: 1e-3,
-            ..Making::EXACT
-        };
-        assert_eq!(made.variance(17, column, &sized), 0.0);
+        assert_eq!(slope.tip, 0.0);
     }
 }
 
@@ -126,6 +124,32 @@ fn gauges_are_chosen_for_touches_that_drag() {
     println!("dragged {of_dragged:?}, straight {of_straight:?} mm");
     assert!(of_dragged[0] < of_dragged[1], "{of_dragged:?}");
     assert!(of_straight[1] < of_dragged[1], "{of_straight:?}");
+}
+
+#[test]
+fn what_is_off_is_expected_to_cost_what_it_costs() {
+    let set = chosen(&untold());
+    let with = |change: &dyn Fn(&mut hapdef::project::Project)| {
+        let mut inputs = untold();
+        change(&mut inputs.project);
+        let errors =
+            design::expected_errors(&inputs, simulated(), std::slice::from_ref(&set), &unwatched);
+        errors.unwrap()[0]
+    };
+    let plain = with(&|_| ());
+    let noisy = with(&|p| p.gauge.noise_microstrain = 20.0);
+    let drifting = with(&|p| p.gauge.drift_microstrain = 20.0);
+    let counted = with(&|p| p.gauge.resolution_microstrain = 20.0);
+    // A finger that may push aside, although none does.
+    let allowed = with(&|p| p.live.friction_percent = 33.0);
+    let dragged = with(&|p| p.touch.friction_percent = 33.0);
+    println!(
+        "{plain} noise {noisy} drift {drifting} counts {counted} allowed {allowed} dragged {dragged}"
+    );
+    // A drift that all channels share is told from touches.
+    assert!(plain < drifting && drifting < 0.8 * noisy);
+    assert!(plain < counted && counted < noisy);
+    assert!(plain < allowed && allowed < dragged);
 }
 
 #[test]

@@ -57,6 +57,68 @@ fn touches_come_only_where_they_are_painted_and_gauges_only_where_they_are_not_k
 }
 
 #[test]
+fn touches_come_more_often_where_that_is_painted() {
+    let mut inputs = limb();
+    inputs.project.touch.count = 800;
+    let budget = Quality::Draft.budget();
+    let upper = |p: DVec3| p.z > 0.06;
+    inputs.masks.insert("handle".into(), mask(&inputs, upper));
+    let share = |inputs: &Inputs| {
+        let simulated = design::simulate(inputs, &budget, &unwatched).unwrap();
+        let touches = &simulated.dataset.touches;
+        assert_eq!(touches.len(), 800);
+        // The judge's too, and any stretch of them.
+        let judged = design::reference(inputs, &simulated, &[0, 9], &budget, &unwatched).unwrap();
+        let above = |touches: &[hapdef::elasticity::Touch]| {
+            let above = touches.iter().filter(|t| upper(t.position)).count();
+            above as f64 / touches.len() as f64
+        };
+        // Whoever takes some of them strides over them.
+        let of: Vec<_> = touches.iter().copied().step_by(4).collect();
+        let judged_of: Vec<_> = judged.touches.iter().copied().step_by(2).collect();
+        [
+            above(touches),
+            above(&of),
+            above(&judged.touches),
+            above(&judged_of),
+        ]
+    };
+    let [even, _, judged_evenly, _] = share(&inputs);
+    inputs.project.touch.often = Some("handle".into());
+    inputs.project.touch.often_times = 3.0;
+    let wanted = |even: f64| 3.0 * even / (3.0 * even + 1.0 - even);
+    let expected = [even, even, judged_evenly, judged_evenly].map(wanted);
+    for (share, wanted) in share(&inputs).into_iter().zip(expected) {
+        assert!((share - wanted).abs() < 0.07, "{share} {wanted}");
+    }
+    // Three times as often in a spot of a per cent.
+    let spot = |p: DVec3| p.distance(DVec3::new(0.0318, 0.0, 0.06)) < 8e-3;
+    inputs.masks.insert("spot".into(), mask(&inputs, spot));
+    let within = |inputs: &Inputs| {
+        let simulated = design::simulate(inputs, &budget, &unwatched).unwrap();
+        (simulated.dataset.touches.iter())
+            .filter(|t| spot(t.position))
+            .count()
+    };
+    inputs.project.touch.often = None;
+    let evenly = within(&inputs) as f64;
+    inputs.project.touch.often = Some("spot".into());
+    inputs.project.touch.often_times = 10.0;
+    let often = within(&inputs) as f64;
+    assert!((5.0..15.0).contains(&(often / evenly)), "{evenly} {often}");
+    // Nobody touches what is painted there.
+    inputs
+        .masks
+        .insert("nothing".into(), mask(&inputs, |_| false));
+    inputs.project.touch.often = Some("nothing".into());
+    let error = design::simulate(&inputs, &budget, &unwatched).err();
+    assert!(matches!(error, Some(DesignError::Value(bad)) if bad.key == "touch.often"));
+    inputs.project.touch.often = Some("nowhere".into());
+    let error = design::simulate(&inputs, &budget, &unwatched).err();
+    assert!(matches!(error, Some(DesignError::Value(bad)) if bad.key == "touch.often"));
+}
+
+#[test]
 fn a_painted_support_holds_like_the_box_it_covers() {
     let budget = Quality::Draft.budget();
     let boxed = limb();

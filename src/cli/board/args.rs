@@ -33,6 +33,9 @@ pub struct BoardArgs {
     /// Bits of the converter.
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u8).range(1..=24))]
     pub bits: u8,
+    /// Of the amplifier; as large as the hardest press allows when left out.
+    #[arg(long, value_parser = between(1.0, 1e5))]
+    pub gain: Option<f64>,
     /// Standard deviation of a reading (microstrain); the project's when left out.
     #[arg(long, value_parser = between(0.0, MOST_MICROSTRAIN))]
     pub noise: Option<f64>,

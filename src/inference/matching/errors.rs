@@ -58,7 +58,7 @@ impl Errors {
     pub(super) fn usual_drag(&self) -> f64 {
         let nuisances = self.deviations.as_ref().and_then(|d| d.nuisances.as_ref());
         let dragging = nuisances.filter(|n| n.axes.is_some());
-        dragging.map_or(0.0, |n| n.making.friction / 2.0_f64.sqrt())
+        dragging.map_or(0.0, |n| n.making.along_either())
     }
 
     /// One over the variance of every channel for this reading; zero for a channel that is left out.

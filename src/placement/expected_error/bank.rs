@@ -6,43 +6,50 @@
 //! estimation using Gaussian sum approximations, IEEE Trans. Automatic Control 17, 1972). Each place has its own
 //! variance of the readings, and that variance its determinant. Where a press really is, the filter's covariance is
 //! the Bayesian Cramér–Rao bound; what the other places get of the probability is the ambiguity.
+//!
+//! What all gauges feel together of a touch (its tip, a push along the surface, a drift) are more unknowns of each filter.
+//! An estimator may allow for more of it than really comes. Its covariance C then is not how far off it is: with a prior
+//! of unit variance for an unknown that really has t², that is less by (1 − t²) c cᵀ, c being C's column of the unknown.
 
 mod filters;
 
 use glam::DVec3;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
 
-pub(super) use self::filters::Rows;
-use self::filters::{
-    Filters, LANES, correct, corrections, predict, sharpness, shrink, sum_masses_with,
-};
+use self::filters::{Filters, correct, corrections, predict, sharpness, shrink, sum_masses_with};
+pub(super) use self::filters::{MOST, PLAIN, Rows};
 use super::elliptic::mean_length;
-use super::scene::{Place, Report, Scene};
+use super::scene::{LANES, Neighbourhood, Place, Report, Scene};
+
+/// Of all unknowns that there may be; zero of those that are not asked for.
+pub(super) type Unknowns = SVector<f64, MOST>;
+type Covariance = SMatrix<f64, MOST, MOST>;
 
 /// Added to the cost of a place that a press already stands for.
 const NEVER: f32 = 1e30;
-/// Places nearer to a press than so many of their reaches are the press's own: around those beyond, the normal
-/// distribution does not come as far as the press, which they would explain as well as its own place does.
-pub(super) const OWN: f64 = 2.5;
 
 /// One press.
+#[derive(Clone)]
 struct Press {
-    /// Where each place thinks the touch is from its middle (mm, mm) and how hard it was (N), and its cost.
-    estimates: [Vec<f32>; 3],
+    /// Where each place thinks the touch is from its middle (mm, mm), how hard it was (N) and what else there is to
+    /// find: one after the other, of all places; and its cost.
+    estimates: Vec<f32>,
     costs: Vec<f32>,
     /// Blocks of places that may still be meant.
     blocks: Vec<u32>,
     /// The filter at the true place.
-    covariance: Matrix3<f64>,
-    estimate: Vector3<f64>,
+    covariance: Covariance,
+    estimate: Unknowns,
     cost: f64,
 }
 
 /// All presses of a scene, read by the gauges of a set.
+#[derive(Clone)]
 pub(super) struct Bank<'a> {
     scene: &'a Scene,
     /// Of the places.
-    positions: [Vec<f32>; 3],
+    positions: Vec<f32>,
     filters: Vec<Filters>,
     presses: Vec<Press>,
     mass: f64,
@@ -61,46 +68,32 @@ impl<'a> Bank<'a> {
             values.resize(count, rest);
             values
         };
-        let filters = || Filters {
-            covariances: [
-                padded(&|p| p.reach.powi(2), 1.0),
-                vec![0.0; count],
-                vec![0.0; count],
-                padded(&|p| p.reach.powi(2), 1.0),
-                vec![0.0; count],
-                vec![(deviation * deviation) as f32; count],
-            ],
-        };
+        let unknowns = PLAIN + scene.unknowns.len();
+        let reaches = padded(&|p| p.reach, 1.0);
+        let filters = || Filters::new(scene, &reaches, (deviation * deviation) as f32);
         // The same for all presses: there are hundreds of them, and a hand waits for this.
         let unlikely = padded(&|p| -p.mass.max(1e-12).ln(), NEVER);
-        let presses = scene.presses.iter().map(|press| {
-            let own = |p: &Place| p.position.distance(press.position) <= OWN * p.reach;
-            let mut own_mass: f64 = scene.places.iter().filter(|p| own(p)).map(|p| p.mass).sum();
-            if own_mass <= 0.0 {
-                own_mass = press.mass;
-            }
+        let presses = scene.around.iter().map(|around| {
             let mut costs = unlikely.clone();
-            for (cost, place) in costs.iter_mut().zip(&scene.places) {
-                if own(place) {
-                    *cost = NEVER;
-                }
+            for &own in &around.own {
+                costs[own as usize] = NEVER;
             }
-            let known = prior(scene, press);
+            let known = prior(scene, around);
+            let mut estimates = vec![0.0; unknowns * count];
+            estimates[2 * count..3 * count].fill(mean as f32);
             Press {
-                estimates: [vec![0.0; count], vec![0.0; count], vec![mean as f32; count]],
+                estimates,
                 costs,
                 blocks: (0..(count / LANES) as u32).collect(),
-                covariance: Matrix3::from_diagonal(&known.component_mul(&known)),
-                estimate: Vector3::new(0.0, 0.0, mean),
-                cost: -own_mass.ln(),
+                covariance: Covariance::from_diagonal(&known.component_mul(&known)),
+                estimate: thought(mean),
+                cost: -around.own_mass.ln(),
             }
         });
         Self {
-            positions: [
-                padded(&|p| p.position.x, 0.0),
-                padded(&|p| p.position.y, 0.0),
-                padded(&|p| p.position.z, 0.0),
-            ],
+            positions: (0..3)
+                .flat_map(|k| padded(&|p| p.position[k], 0.0))
+                .collect(),
             filters: scene.levels.iter().map(|_| filters()).collect(),
             presses: presses.collect(),
             mass: scene.presses.iter().map(|p| p.mass).sum(),
@@ -125,15 +118,9 @@ impl<'a> Bank<'a> {
         bank
     }
 
-    /// Share of the places, over all presses, that may still be meant.
-    pub fn open_share(&self) -> f64 {
-        let open: usize = self.presses.iter().map(|p| p.blocks.len()).sum();
-        (open * LANES) as f64 / (self.presses.len() * self.positions[0].len()).max(1) as f64
-    }
-
     /// Working memory of [`Self::with`].
     pub fn rows(&self) -> Rows {
-        Rows::with(self.positions[0].len())
+        Rows::with(PLAIN + self.scene.unknowns.len(), self.positions.len() / 3)
     }
 
     /// The expected error (mm) of the set.
@@ -146,7 +133,8 @@ impl<'a> Bank<'a> {
     /// The part of [`Self::error`] (mm) that is left where one place is meant.
     pub fn local(&self) -> f64 {
         let places = self.presses.iter().zip(&self.scene.presses);
-        let weighed = places.map(|(press, place)| place.mass * local(&press.covariance));
+        let off = |press: &Press| local(&self.off_by(|i, j| press.covariance[(i, j)]));
+        let weighed = places.map(|(press, place)| place.mass * off(press));
         weighed.sum::<f64>() / self.mass
     }
 
@@ -155,16 +143,13 @@ impl<'a> Bank<'a> {
         let mut errors = Vec::with_capacity(self.presses.len());
         for (filters, level) in self.filters.iter().zip(&self.scene.levels) {
             let nothing = Rows {
-                sharpness: filters.covariances[5]
-                    .iter()
-                    .map(|&v| sharpness(v))
-                    .collect(),
+                sharpness: filters.of_force().iter().map(|&v| sharpness(v)).collect(),
                 ..self.rows()
             };
             errors.extend(level.presses.clone().map(|k| {
                 let press = &self.presses[k];
                 let total = masses_with(press, &nothing, &self.positions, 0.0, press.cost as f32);
-                self.error_of(k, &press.covariance, total)
+                self.error_of(k, &self.off_by(|i, j| press.covariance[(i, j)]), total)
             }));
         }
         errors
@@ -181,11 +166,7 @@ impl<'a> Bank<'a> {
                 rows,
             );
             for k in level.presses.clone() {
-                let press = &self.presses[k];
-                let (own, reading) = self.own(k, site, level.force);
-                let (covariance, _, cost) = own.corrected(press);
-                let total = masses_with(press, rows, &self.positions, reading as f32, cost as f32);
-                sum += self.scene.presses[k].mass * self.error_of(k, &covariance, total);
+                sum += self.scene.presses[k].mass * self.error_with(site, k, level.force, rows);
             }
         }
         sum / self.mass
@@ -194,50 +175,63 @@ impl<'a> Bank<'a> {
     /// Adds a gauge.
     pub fn add(&mut self, site: usize) {
         let mut rows = self.rows();
-        for level in 0..self.filters.len() {
-            let force = self.scene.levels[level].force;
-            let report = self.scene.at_places.of(site);
-            predict(&self.filters[level], &report, force as f32, &mut rows);
-            let gains = corrections(&self.filters[level], &rows);
-            for k in self.scene.levels[level].presses.clone() {
-                let (own, reading) = self.own(k, site, force);
-                let press = &mut self.presses[k];
+        let (scene, turn) = (self.scene, self.gauges);
+        for (filters, level) in self.filters.iter_mut().zip(&scene.levels) {
+            let report = scene.at_places.of(site);
+            predict(filters, &report, level.force as f32, &mut rows);
+            let gains = corrections(filters, &rows);
+            let first = level.presses.start;
+            let presses = self.presses[level.presses.clone()].par_iter_mut();
+            presses.enumerate().for_each(|(k, press)| {
+                let (own, reading) = Own::of(scene, (site, turn), first + k, level.force);
                 let (covariance, estimate, cost) = own.corrected(press);
                 (press.covariance, press.estimate, press.cost) = (covariance, estimate, cost);
-                let [along, across, force] = press.estimates.each_mut();
-                let before = [along, across, force, &mut press.costs];
-                correct(before, &rows, &gains, &press.blocks, reading as f32);
+                press.correct(&rows, &gains, reading as f32);
                 press.close();
-            }
-            shrink(&mut self.filters[level], &rows, &gains);
+            });
+            shrink(filters, &rows, &gains);
         }
         self.gauges += 1;
     }
 
-    /// A site's reading of a press, as the filter at the true place takes it.
-    fn own(&self, press: usize, site: usize, force: f64) -> (Own, f64) {
-        let report = self.scene.at_presses.of(site);
-        let (row, variance) = row(&report, press, force);
-        let deviation = variance.sqrt();
-        let value = f64::from(report.value[press]);
-        // Of the gauge's turn and not of its site: else the sites with the luckiest noise would be chosen.
-        let draw = self.scene.draw(self.gauges, press);
-        let reading = force * value + deviation * f64::from(draw);
-        let own = Own {
-            row,
-            reading: reading / deviation,
-            log: 0.5 * variance.ln(),
+    /// Expected error (mm) of a press of some force (N) with a gauge at a site more, of which the rows are.
+    fn error_with(&self, site: usize, press: usize, force: f64, rows: &Rows) -> f64 {
+        let (own, reading) = Own::of(self.scene, (site, self.gauges), press, force);
+        let known = &self.presses[press];
+        let weighed = own.weighed(known);
+        let total = masses_with(
+            known,
+            rows,
+            &self.positions,
+            reading as f32,
+            weighed.cost as f32,
+        );
+        let entry = |i: usize, j: usize| {
+            known.covariance[(i, j)] - weighed.spread[i] * weighed.spread[j] / weighed.predicted
         };
-        (own, reading)
+        self.error_of(press, &self.off_by(entry), total)
     }
 
-    /// From the covariance at the true place, and the probability (over the one there) and its first moments of all
+    /// Of where an estimate is that has this covariance for whoever makes it: along, along-across, across (mm²).
+    fn off_by(&self, covariance: impl Fn(usize, usize) -> f64) -> [f64; 3] {
+        let mut off = [covariance(0, 0), covariance(0, 1), covariance(1, 1)];
+        for (k, unknown) in self.scene.unknowns.iter().enumerate() {
+            let [along, across] = [0, 1].map(|i| covariance(i, PLAIN + k));
+            let less = 1.0 - unknown.made().powi(2);
+            off[0] -= less * along * along;
+            off[1] -= less * along * across;
+            off[2] -= less * across * across;
+        }
+        off
+    }
+
+    /// From how far off the filter at the true place is, and the probability (over the one there) and its first moments of all
     /// others.
-    fn error_of(&self, press: usize, covariance: &Matrix3<f64>, [mass, x, y, z]: [f64; 4]) -> f64 {
+    fn error_of(&self, press: usize, off: &[f64; 3], [mass, x, y, z]: [f64; 4]) -> f64 {
         let there = self.scene.presses[press].position;
         let own = (1.0 + mass).recip();
         let elsewhere = (DVec3::new(x, y, z) - there * mass) * own;
-        elsewhere.length().hypot(own * local(covariance))
+        (elsewhere.length_squared() + (own * local(off)).powi(2)).sqrt()
     }
 
     /// Which turn the next gauge has: a set hears the same noise whichever of its gauges is added last.
@@ -251,13 +245,9 @@ impl<'a> Bank<'a> {
         for (filters, level) in self.filters.iter().zip(&self.scene.levels) {
             let report = self.scene.at_places.of(site);
             predict(filters, &report, level.force as f32, rows);
-            errors.extend(level.presses.clone().map(|k| {
-                let press = &self.presses[k];
-                let (own, reading) = self.own(k, site, level.force);
-                let (covariance, _, cost) = own.corrected(press);
-                let total = masses_with(press, rows, &self.positions, reading as f32, cost as f32);
-                self.error_of(k, &covariance, total)
-            }));
+            let rows = &*rows;
+            let error = |k| self.error_with(site, k, level.force, rows);
+            errors.extend(level.presses.clone().map(error));
         }
         errors
     }
@@ -268,13 +258,13 @@ impl<'a> Bank<'a> {
         let mut filters: Vec<Press> = scene
             .places
             .iter()
-            .map(|place| Press::at_rest(place, scene.hardest))
+            .map(|place| Press::at_rest(scene, place))
             .collect();
         for &site in set {
             let (there, here) = (scene.at_presses.of(site), scene.at_places.of(site));
             let reading = force * f64::from(there.value[press]);
             for (k, filter) in filters.iter_mut().enumerate() {
-                let own = Own::at_place(&here, k, force, reading);
+                let own = Own::at_place(scene, &here, k, (force, reading));
                 (filter.covariance, filter.estimate, filter.cost) = own.corrected(filter);
             }
         }
@@ -282,28 +272,60 @@ impl<'a> Bank<'a> {
     }
 }
 
-/// How far off (mm) an estimate of this covariance is.
-fn local(covariance: &Matrix3<f64>) -> f64 {
-    mean_length(covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)])
+/// How far off (mm) an estimate of this covariance is: along, along-across, across.
+fn local(&[along, both, across]: &[f64; 3]) -> f64 {
+    mean_length(along, both, across)
 }
 
-/// Deviations of what is known of a press before anything is read: along, across (mm) and force (N).
-pub(super) fn prior(scene: &Scene, press: &Place) -> Vector3<f64> {
-    // As a disc of that radius.
-    let reach = nearest(&scene.places, press.position).reach * OWN / 2.0;
-    Vector3::new(reach, reach, scene.hardest.unwrap_or(0.0))
+/// Deviations of what is known of a press before anything is read: along, across (mm), force (N), and the rest.
+pub(super) fn prior(scene: &Scene, around: &Neighbourhood) -> Unknowns {
+    within(scene, around.reach)
 }
 
-/// What a site's reading of a press of some force says of along, across and force, over the reading's deviation, and
-/// the square of that.
-pub(super) fn row(report: &Report, press: usize, force: f64) -> (Vector3<f64>, f64) {
+/// The same of a touch within some reach (mm).
+fn within(scene: &Scene, reach: f64) -> Unknowns {
+    let mut known = Unknowns::zeros();
+    known.fixed_rows_mut::<2>(0).fill(reach);
+    known[2] = scene.hardest.unwrap_or(0.0);
+    known.rows_mut(PLAIN, scene.unknowns.len()).fill(1.0);
+    known
+}
+
+/// What is thought of a touch of which nothing was read: as hard as that, in the middle of its place.
+fn thought(force: f64) -> Unknowns {
+    let mut thought = Unknowns::zeros();
+    thought[2] = force;
+    thought
+}
+
+/// What a site's reading of a press of some force says of each unknown, over the reading's deviation, and the square of
+/// that.
+pub(super) fn row(scene: &Scene, report: &Report, press: usize, force: f64) -> (Unknowns, f64) {
     let variance = 1.0 + force * force * f64::from(report.variance[press]);
-    let slope = |k: usize| force * f64::from(report.slopes[k][press]);
-    let row = Vector3::new(slope(0), slope(1), f64::from(report.value[press]));
-    (row / variance.sqrt(), variance)
+    let mut row = Unknowns::zeros();
+    row[0] = force * f64::from(report.slopes[0][press]);
+    row[1] = force * f64::from(report.slopes[1][press]);
+    row[2] = f64::from(report.value[press]);
+    let mut nuisances = report.nuisances();
+    for (entry, unknown) in row.iter_mut().skip(PLAIN).zip(&scene.unknowns) {
+        let mut of_touch = || nuisances.next().map_or(0.0, |n| f64::from(n[press]));
+        *entry = unknown.drift().unwrap_or_else(|| force * of_touch());
+    }
+    (row * variance.sqrt().recip(), variance)
 }
 
 impl Press {
+    /// Takes a reading into account at all places that may still be meant.
+    fn correct(&mut self, rows: &Rows, gains: &[f32], reading: f32) {
+        let Self {
+            estimates,
+            costs,
+            blocks,
+            ..
+        } = self;
+        correct(estimates, costs, rows, gains, blocks, reading);
+    }
+
     /// Leaves out blocks of places that are so unlikely that no more gauges will bring them back.
     fn close(&mut self) {
         /// In logarithms of the probability over that of the true place.
@@ -317,15 +339,14 @@ impl Press {
     }
 
     /// A touch around a place of which nothing was read yet; it compares itself with no other place.
-    fn at_rest(place: &Place, hardest: Option<f64>) -> Self {
-        let (mean, deviation) = hardest.map_or((1.0, 0.0), |hardest| (0.0, hardest));
-        let along = place.reach * place.reach;
+    fn at_rest(scene: &Scene, place: &Place) -> Self {
+        let known = within(scene, place.reach);
         Self {
-            estimates: [Vec::new(), Vec::new(), Vec::new()],
+            estimates: Vec::new(),
             costs: Vec::new(),
             blocks: Vec::new(),
-            covariance: Matrix3::from_diagonal(&Vector3::new(along, along, deviation * deviation)),
-            estimate: Vector3::new(0.0, 0.0, mean),
+            covariance: Covariance::from_diagonal(&known.component_mul(&known)),
+            estimate: thought(if scene.hardest.is_some() { 0.0 } else { 1.0 }),
             cost: -place.mass.max(1e-12).ln(),
         }
     }
@@ -344,18 +365,65 @@ impl Press {
 
 /// What is measured at the true place.
 struct Own {
-    row: Vector3<f64>,
+    row: Unknowns,
     reading: f64,
-    log: f64,
+    variance: f64,
+}
+
+/// A reading beside what was thought of a press.
+struct Weighed {
+    /// Covariance of the reading with each unknown.
+    spread: Unknowns,
+    /// Variance of the reading.
+    predicted: f64,
+    /// How far the reading is from what was predicted.
+    off: f64,
+    /// What the press costs with it.
+    cost: f64,
 }
 
 impl Own {
-    fn corrected(&self, press: &Press) -> (Matrix3<f64>, Vector3<f64>, f64) {
+    /// A site's reading of a press, as the filter at the true place takes it.
+    /// The reading is that of the gauge of a turn.
+    fn of(scene: &Scene, (site, turn): (usize, usize), press: usize, force: f64) -> (Self, f64) {
+        let report = scene.at_presses.of(site);
+        let (row, variance) = row(scene, &report, press, force);
+        let deviation = variance.sqrt();
+        // Of the gauge's turn and not of its site: else the sites with the luckiest noise would be chosen.
+        let draw = scene.draw(turn, press);
+        let made = |k: usize| row[PLAIN + k] * f64::from(scene.made(k, press));
+        let made: f64 = (0..scene.unknowns.len()).map(made).sum();
+        let value = f64::from(report.value[press]);
+        let reading = force * value + deviation * (made + f64::from(draw));
+        let own = Self {
+            row,
+            reading: reading / deviation,
+            variance,
+        };
+        (own, reading)
+    }
+
+    fn weighed(&self, press: &Press) -> Weighed {
         let spread = press.covariance * self.row;
         // Never less than the noise: rounding would take more.
         let predicted = (1.0 + self.row.dot(&spread)).max(1.0);
         let off = self.reading - self.row.dot(&press.estimate);
-        let cost = press.cost + off * off / (2.0 * predicted) + 0.5 * predicted.ln() + self.log;
+        let log = 0.5 * (predicted * self.variance).ln();
+        Weighed {
+            cost: press.cost + off * off / (2.0 * predicted) + log,
+            spread,
+            predicted,
+            off,
+        }
+    }
+
+    fn corrected(&self, press: &Press) -> (Covariance, Unknowns, f64) {
+        let Weighed {
+            spread,
+            predicted,
+            off,
+            cost,
+        } = self.weighed(press);
         (
             press.covariance - spread * spread.transpose() / predicted,
             press.estimate + spread * (off / predicted),
@@ -364,50 +432,26 @@ impl Own {
     }
 
     /// What a site would measure of a touch of some force (N) around a place, for a reading (in units of the noise).
-    fn at_place(here: &Report, place: usize, force: f64, reading: f64) -> Self {
-        let variance = 1.0 + force * force * f64::from(here.variance[place]);
-        let deviation = variance.sqrt();
-        let slope = |axis: usize| force * f64::from(here.slopes[axis][place]);
-        let value = f64::from(here.value[place]);
+    fn at_place(scene: &Scene, here: &Report, place: usize, (force, reading): (f64, f64)) -> Self {
+        let (row, variance) = row(scene, here, place, force);
         Self {
-            row: Vector3::new(slope(0), slope(1), value) / deviation,
-            reading: reading / deviation,
-            log: 0.5 * variance.ln(),
+            row,
+            reading: reading / variance.sqrt(),
+            variance,
         }
     }
 }
 
-fn nearest(places: &[Place], position: DVec3) -> Place {
-    let away = |p: &&Place| p.position.distance_squared(position);
-    let nearest = places.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
-    nearest.copied().unwrap_or(Place {
-        position,
-        reach: 1.0,
-        mass: 1.0,
-    })
+/// Probability over that of the true place, and its first moments, of all places.
+fn masses_with(press: &Press, rows: &Rows, positions: &[f32], reading: f32, own: f32) -> [f64; 4] {
+    let Press {
+        estimates,
+        costs,
+        blocks,
+        ..
+    } = press;
+    sum_masses_with(estimates, costs, rows, positions, blocks, reading, own)
 }
 
-/// Probability over that of the true place, and its first moments, of all places.
-fn masses_with(
-    press: &Press,
-    rows: &Rows,
-    positions: &[Vec<f32>; 3],
-    reading: f32,
-    own: f32,
-) -> [f64; 4] {
-    let [along, across, force] = &press.estimates;
-    sum_masses_with(
-        [along, across, force, &press.costs],
-        [
-            &rows.slopes[0],
-            &rows.slopes[1],
-            &rows.slopes[2],
-            &rows.scale,
-        ],
-        [&rows.half, &rows.log, &rows.gain, &rows.sharpness],
-        [&positions[0], &positions[1], &positions[2]],
-        &press.blocks,
-        reading,
-        own,
-    )
-}
+#[cfg(test)]
+mod tests;

@@ -2,6 +2,8 @@
 //!
 //! Around press p, what gauges i with weights w know of where (along, across) and how hard it was is
 //! M(w) = P⁻¹ + Σᵢ wᵢ rᵢ rᵢᵀ: the prior's information and that of each reading, rᵢ being its slopes over its deviation.
+//! What else all gauges feel of a touch is known with them, as far as it is really off: an estimator that allows for more
+//! of it can only be worse.
 //! The part of the expected error that is left where one place is meant is L(w) = E|N(0, C)|, with the place block C of
 //! M⁻¹ (`elliptic`). L is convex in w: 1/(zᵀCz) is the smallest yᵀMy over all y whose place part has product 1 with z,
 //! a minimum of functions linear in w, hence concave; √(zᵀCz) = (1/(zᵀCz))^(−1/2) is a convex and falling function of
@@ -16,8 +18,8 @@
 //! Experiments, 2006, ch. 3–6 and 9; Y. Yu, Monotonic convergence of a general algorithm for computing optimal designs,
 //! Annals of Statistics 38, 2010).
 //!
-//! What it holds for: C is what the bank's filter at the true place has, and the smallest covariance that the linear
-//! and normal model of that neighbourhood allows, so that no estimator at all, told in what neighbourhood of the scene a
+//! What it holds for: C is the smallest covariance that the linear
+//! and normal model of that neighbourhood allows, the bank's filter at the true place where that allows for no more than comes, so that no estimator at all, told in what neighbourhood of the scene a
 //! touch is, has a smaller mean error there (its posterior is normal, and T. W. Anderson's lemma, Proc. AMS 6, 1955,
 //! puts the best answer into its middle). Told nothing of that it can only be worse: what far places that may be taken
 //! for each other cost comes on top and is left out here. The bank's estimate of the whole error is of some presses and
@@ -26,11 +28,11 @@
 //! of variances as they are known. Spacings, costs and budgets are left out, and failures too: with any of them no
 //! set can be better. It holds for the sites that there are, not for gauges that are moved off them.
 
-use nalgebra::{Matrix2, Matrix3, Vector3};
+use nalgebra::{Matrix2, SMatrix, SVector};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::bank::{prior, row};
+use super::bank::{Bank, MOST, PLAIN, Unknowns, prior, row};
 use super::elliptic::mean_length_and_slope;
 use super::scene::Scene;
 use crate::budget::{Cancelled, Watch, report};
@@ -38,7 +40,7 @@ use crate::budget::{Cancelled, Watch, report};
 /// The bound is sought until it is known to this share.
 const TOLERANCE: f64 = 5e-3;
 /// At most so many rounds; what was reached by then is a bound all the same.
-const MOST: usize = 200;
+const ROUNDS: usize = 200;
 /// Weights below this share of an even one are not felt, and none falls below a smaller share, from where it can rise.
 const FELT: f64 = 1e-3;
 const LEAST: f64 = 1e-6;
@@ -125,59 +127,78 @@ pub fn certify(
     if scene.presses.is_empty() || own.iter().any(|site| !free.contains(site)) {
         return Ok(None);
     }
-    let relaxed = Relaxed::new(scene, &free, &held);
-    let as_chosen = |site: &usize| if own.contains(site) { 1.0 } else { 0.0 };
-    let weights: Vec<f64> = free.iter().map(as_chosen).collect();
-    let Some(local) = relaxed.expected(&weights) else {
-        return Ok(None);
+    // Nothing is worth computing of what is never off.
+    let plain = scene.unknowns.iter().all(|u| u.made() == 0.0);
+    let bound = if plain {
+        bounded::<PLAIN>
+    } else {
+        bounded::<MOST>
     };
+    bound(scene, &free, (&held, &own), watch)
+}
+
+/// The certificate of the sites `own`, beside those that are `held` in any case, with so many unknowns of a press.
+fn bounded<const N: usize>(
+    scene: &Scene,
+    free: &[usize],
+    (held, own): (&[usize], &[usize]),
+    watch: Watch,
+) -> Result<Option<Certificate>, Cancelled> {
+    let relaxed = Relaxed::<N>::new(scene, free, held);
     let bound = relaxed.bound(own.len(), watch)?;
     let sound = bound.filter(|b| *b > 0.0 && b.is_finite());
     Ok(sound.map(|bound_mm| Certificate {
         bound_mm,
-        local_mm: local.mm,
+        local_mm: Bank::of(scene, &[held, own].concat()).local(),
         refined: false,
     }))
 }
 
 /// Gauges at all sites, each counted with a weight.
-struct Relaxed {
+struct Relaxed<const N: usize> {
     sites: usize,
     presses: usize,
-    /// Sites × presses: what a reading says of along, across and force, over its deviation, in units of `priors`.
-    rows: Vec<[f32; 3]>,
+    /// Sites × presses: what a reading says of along, across, force and the rest, over its deviation, in units of
+    /// `priors`.
+    rows: Vec<[f32; N]>,
     /// Information about each press in the same units: before anything is read, and of gauges that must be there.
-    base: Vec<Matrix3<f64>>,
-    /// Deviations of what is known of each press before anything is read (mm, mm, N).
-    priors: Vec<Vector3<f64>>,
+    base: Vec<SMatrix<f64, N, N>>,
+    /// Deviations of what is known of each press before anything is read (mm, mm, N, and what is really off).
+    priors: Vec<SVector<f64, N>>,
     /// How likely each press is.
     masses: Vec<f64>,
 }
 
 /// What weights come to.
-struct Expected {
+struct Expected<const N: usize> {
     /// The error (mm).
     mm: f64,
     /// For each press the matrix H with which a row r, as its weight grows, takes rᵀHr from the error.
-    slopes: Vec<Matrix3<f64>>,
+    slopes: Vec<SMatrix<f64, N, N>>,
 }
 
-impl Relaxed {
+impl<const N: usize> Relaxed<N> {
     /// With the sites that are `free`, and those that are `held` in any case.
     fn new(scene: &Scene, free: &[usize], held: &[usize]) -> Self {
-        let priors: Vec<Vector3<f64>> = scene.presses.iter().map(|p| prior(scene, p)).collect();
+        let first = |all: Unknowns| SVector::<f64, N>::from_fn(|k, _| all[k]);
+        let mut made = Unknowns::repeat(1.0);
+        for (entry, unknown) in made.iter_mut().skip(PLAIN).zip(&scene.unknowns) {
+            *entry = unknown.made();
+        }
+        let really = |around| first(prior(scene, around).component_mul(&made));
+        let priors: Vec<SVector<f64, N>> = scene.around.iter().map(really).collect();
         let forces: Vec<f64> = (scene.levels.iter())
             .flat_map(|level| level.presses.clone().map(move |_| level.force))
             .collect();
-        let rows = |&site: &usize| -> Vec<[f32; 3]> {
+        let rows = |&site: &usize| -> Vec<[f32; N]> {
             let report = scene.at_presses.of(site);
             let of = |p: usize| {
-                let (row, _) = row(&report, p, forces[p]);
-                <[f64; 3]>::from(row.component_mul(&priors[p])).map(|r| r as f32)
+                let (row, _) = row(scene, &report, p, forces[p]);
+                <[f64; N]>::from(first(row).component_mul(&priors[p])).map(|r| r as f32)
             };
             (0..priors.len()).map(of).collect()
         };
-        let mut base = vec![Matrix3::identity(); priors.len()];
+        let mut base = vec![SMatrix::identity(); priors.len()];
         for site in held {
             add(&mut base, &rows(site), 1.0);
         }
@@ -197,8 +218,8 @@ impl Relaxed {
         let even = count as f64 / self.sites.max(1) as f64;
         let mut weights = vec![even; self.sites];
         let mut best = f64::NEG_INFINITY;
-        for round in 0..MOST {
-            report(watch, BOUNDING, round, MOST)?;
+        for round in 0..ROUNDS {
+            report(watch, BOUNDING, round, ROUNDS)?;
             let felt = |w: &f64| if *w < FELT * even { 0.0 } else { *w };
             let felt: Vec<f64> = weights.iter().map(felt).collect();
             let Some(expected) = self.expected(&felt) else {
@@ -218,7 +239,7 @@ impl Relaxed {
     }
 
     /// What weights come to; nothing where numbers fail.
-    fn expected(&self, weights: &[f64]) -> Option<Expected> {
+    fn expected(&self, weights: &[f64]) -> Option<Expected<N>> {
         let informed = self.informed(weights);
         let mut expected = Expected {
             mm: 0.0,
@@ -240,7 +261,7 @@ impl Relaxed {
     }
 
     /// Information about each press.
-    fn informed(&self, weights: &[f64]) -> Vec<Matrix3<f64>> {
+    fn informed(&self, weights: &[f64]) -> Vec<SMatrix<f64, N, N>> {
         let mut informed = self.base.clone();
         let tiles = informed.par_chunks_mut(TILE).enumerate();
         tiles.for_each(|(tile, informed)| {
@@ -253,8 +274,8 @@ impl Relaxed {
     }
 
     /// By how much the error falls (mm) as the weight of each site grows, over what it grows by.
-    fn worths(&self, expected: &Expected) -> Vec<f64> {
-        let worth = |rows: &[[f32; 3]]| -> f64 {
+    fn worths(&self, expected: &Expected<N>) -> Vec<f64> {
+        let worth = |rows: &[[f32; N]]| -> f64 {
             let pairs = rows.iter().zip(&expected.slopes);
             pairs
                 .map(|(row, slope)| {
@@ -267,12 +288,12 @@ impl Relaxed {
     }
 }
 
-fn wide(row: &[f32; 3]) -> Vector3<f64> {
-    Vector3::from(row.map(f64::from))
+fn wide<const N: usize>(row: &[f32; N]) -> SVector<f64, N> {
+    SVector::from(row.map(f64::from))
 }
 
 /// Adds what a gauge of some weight says of presses.
-fn add(informed: &mut [Matrix3<f64>], rows: &[[f32; 3]], weight: f64) {
+fn add<const N: usize>(informed: &mut [SMatrix<f64, N, N>], rows: &[[f32; N]], weight: f64) {
     for (known, row) in informed.iter_mut().zip(rows) {
         let r = wide(row);
         *known += r * (r * weight).transpose();
@@ -333,6 +354,8 @@ mod tests {
         let known = Knowledge {
             noise: 0.05,
             variance: Some(variance),
+            shared: None,
+            density: None,
             among: None,
             forces: with_forces.then_some(Forces {
                 touches: &forces,
@@ -355,7 +378,7 @@ mod tests {
             let scene = scene(8, with_forces);
             for set in [vec![], vec![3], vec![1, 4], vec![0, 2, 5, 7]] {
                 let (held, free) = set.split_at(set.len() / 2);
-                let relaxed = Relaxed::new(&scene, free, held);
+                let relaxed = Relaxed::<PLAIN>::new(&scene, free, held);
                 let mm = relaxed.expected(&vec![1.0; free.len()]).unwrap().mm;
                 let bank = local(&scene, &set);
                 assert!((mm - bank).abs() < 1e-4 * bank, "{set:?}: {mm} {bank}");
@@ -367,7 +390,7 @@ mod tests {
     fn worths_are_what_the_error_falls_by() {
         const STEP: f64 = 1e-5;
         for with_forces in [false, true] {
-            let relaxed = Relaxed::new(&scene(7, with_forces), &[0, 1, 3, 4, 6], &[2]);
+            let relaxed = Relaxed::<PLAIN>::new(&scene(7, with_forces), &[0, 1, 3, 4, 6], &[2]);
             let weights = [0.2, 0.7, 0.05, 0.4, 0.65];
             let worths = relaxed.worths(&relaxed.expected(&weights).unwrap());
             for (k, worth) in worths.iter().enumerate() {
@@ -384,7 +407,7 @@ mod tests {
 
     #[test]
     fn the_error_is_convex_in_the_weights() {
-        let relaxed = Relaxed::new(&scene(5, true), &[0, 1, 2, 3, 4], &[]);
+        let relaxed = Relaxed::<PLAIN>::new(&scene(5, true), &[0, 1, 2, 3, 4], &[]);
         let at = |w: &[f64]| relaxed.expected(w).unwrap().mm;
         let (a, b) = ([1.0, 0.0, 0.3, 0.6, 0.0], [0.0, 1.0, 0.1, 0.0, 0.9]);
         let middle: Vec<f64> = (a.iter().zip(&b))

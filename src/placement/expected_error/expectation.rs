@@ -8,26 +8,47 @@ use super::scene::{Detail, Knowledge, Scene};
 use crate::budget::{Cancelled, Watch, report};
 use crate::draw::subsets;
 use crate::placement::constraints::{Constraints, Field, LostBy, reached};
-use crate::placement::exchange::Criterion;
+use crate::placement::exchange::{Criterion, gains};
 use crate::placement::margin::Best;
 use crate::placement::{PlacementError, Pool, Request, SensorSet};
 
 const SELECTING: &str = "Selecting by expected error";
-/// Sites that are looked at in fine detail, and with gauges lost.
-const PROMISING: usize = 48;
+/// Sites that are looked at in fine detail.
+const PROMISING: usize = 64;
+/// And of these with gauges lost.
+const WITH_LOSSES: usize = 48;
 
 /// The criterion.
 pub(super) struct Expectation<'a> {
-    scenes: Scenes,
+    scenes: &'a Scenes,
+    /// The first gauges of a set in which one gauge after the other is exchanged.
+    begun: Option<(Vec<usize>, Banks<'a>)>,
     pool: &'a Pool<'a>,
     request: &'a Request<'a>,
     losses: Option<Losses>,
 }
 
 /// The same touches in coarse and in fine detail.
-struct Scenes {
+pub(super) struct Scenes {
     coarse: Scene,
     fine: Scene,
+}
+
+impl Scenes {
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn new(
+        known: &Knowledge,
+        detail: Detail,
+        pool: &Pool,
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
+        let scene = |detail: Detail| Scene::new(pool.x, pool.targets, known, detail, watch);
+        Ok(Self {
+            coarse: scene(detail.coarse())?,
+            fine: scene(detail)?,
+        })
+    }
 }
 
 /// Sets of gauges that may be lost.
@@ -104,24 +125,20 @@ impl Expected {
 }
 
 impl<'a> Expectation<'a> {
-    /// # Errors
-    /// [`Cancelled`] when the watch asks for it.
+    /// Of touches in both details; `seed` is of the losses.
     pub fn new(
-        known: &Knowledge,
-        detail: Detail,
+        scenes: &'a Scenes,
         pool: &'a Pool<'a>,
         request: &'a Request<'a>,
-    ) -> Result<Self, Cancelled> {
-        let scene = |detail: Detail| Scene::new(pool.x, pool.targets, known, detail, request.watch);
-        Ok(Self {
-            scenes: Scenes {
-                coarse: scene(detail.coarse())?,
-                fine: scene(detail)?,
-            },
+        seed: u64,
+    ) -> Self {
+        Self {
+            scenes,
+            begun: None,
             pool,
             request,
-            losses: Losses::of(request.constraints, known.seed),
-        })
+            losses: Losses::of(request.constraints, seed),
+        }
     }
 
     /// The touches in the detail that counts.
@@ -149,35 +166,45 @@ impl<'a> Expectation<'a> {
         }
     }
 
-    fn banks(&self, others: &[usize], number: usize) -> Banks<'_> {
-        let bank = |scene| {
-            let mut bank = Bank::seated(scene, seats(others, number));
-            bank.take_turn(number);
-            bank
-        };
-        Banks {
-            coarse: bank(&self.scenes.coarse),
-            fine: bank(&self.scenes.fine),
+    /// With the others of a set around the gauge of a number. Gauges are exchanged in their order: those before it stay
+    /// as they are for the next one.
+    fn around(&mut self, others: &[usize], number: usize) -> Banks<'a> {
+        let begun = self.begun.take();
+        let fits =
+            |(sites, _): &(Vec<usize>, Banks)| sites.len() <= number && others.starts_with(sites);
+        let empty = || (Vec::new(), Banks::new(self.scenes));
+        let (mut sites, mut banks) = begun.filter(fits).unwrap_or_else(empty);
+        for (turn, &site) in others[..number].iter().enumerate().skip(sites.len()) {
+            banks.add(turn, site);
+            sites.push(site);
         }
+        let mut around = banks.clone();
+        self.begun = Some((sites, banks));
+        for (turn, site) in seats(others, number).skip(number) {
+            around.add(turn, site);
+        }
+        around.take_turn(number);
+        around
     }
 
-    /// The criterion (mm) with the gauge of a number at some places more: at all of them, or while much is uncertain
-    /// or gauges may be lost, at those that are promising without that. `worth` says how much a gain counts.
+    /// The criterion (mm) with the gauge of a number at some places more: at those that are promising in coarse detail,
+    /// and where gauges may be lost, without that; at one to be `kept` in any case. `worth` says how much a gain counts.
+    ///
+    /// What is saved by that is worth more in presses: sets are chosen by rare touches that are taken for far ones, and
+    /// few presses are soon fitted.
     fn scan(
         &self,
         banks: &Banks,
         (others, number): (&[usize], usize),
-        open: &[usize],
+        (open, kept): (&[usize], Option<usize>),
         worth: &dyn Fn(usize, f64) -> f64,
     ) -> Result<Vec<(usize, f64)>, Cancelled> {
-        /// Share of the places from which many are uncertain.
-        const MUCH: f64 = 0.05;
         let look = |bank: &Bank, places: &[usize]| self.look(bank, places, others.len());
-        let errors = if open.len() <= PROMISING || banks.fine.open_share() < MUCH {
+        let errors = if open.len() <= PROMISING {
             look(&banks.fine, open)?
         } else {
             let screened = look(&banks.coarse, open)?;
-            let promising = foremost(screened, banks.coarse.error(), worth);
+            let promising = foremost(screened, banks.coarse.error(), (worth, kept), PROMISING);
             let mut places: Vec<usize> = promising.into_iter().map(|p| p.0).collect();
             places.sort_unstable();
             look(&banks.fine, &places)?
@@ -186,7 +213,7 @@ impl<'a> Expectation<'a> {
             None => Ok(errors),
             Some(losses) => {
                 // Of those that losses make equal, the best without.
-                let promising = foremost(errors, banks.fine.error(), worth);
+                let promising = foremost(errors, banks.fine.error(), (worth, kept), WITH_LOSSES);
                 self.with_losses(losses, (others, number), &promising)
             }
         }
@@ -265,6 +292,7 @@ impl<'a> Expectation<'a> {
 }
 
 impl Criterion for Expectation<'_> {
+    const ROUNDED: bool = true;
     const UNIT: &'static str = "mm";
 
     fn of(&mut self, set: &[usize]) -> Result<f64, PlacementError> {
@@ -280,13 +308,23 @@ impl Criterion for Expectation<'_> {
         Ok(self.look(&bank, &others.open(), others.chosen.len())?)
     }
 
-    fn best_for(&mut self, others: &Field, number: usize) -> Result<Option<usize>, PlacementError> {
-        let banks = self.banks(&others.chosen, number);
+    /// Compared with what is there in the same look: to rounding, the way a set was added up counts.
+    fn better_for(
+        &mut self,
+        others: &Field,
+        (set, number): (&[usize], usize),
+        _: f64,
+    ) -> Result<Option<(usize, f64)>, PlacementError> {
+        let here = set[number];
+        let banks = self.around(&others.chosen, number);
         // None of the open ones is dearer than what it replaces.
         let gain = |_: usize, gain: f64| gain;
-        let errors = self.scan(&banks, (&others.chosen, number), &others.open(), &gain)?;
+        let open = (&others.open()[..], Some(here));
+        let errors = self.scan(&banks, (&others.chosen, number), open, &gain)?;
+        let now = errors.iter().find(|(place, _)| *place == here);
+        let value = now.map_or(f64::INFINITY, |(_, error)| *error);
         let best = errors.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        Ok(best.map(|(place, _)| place))
+        Ok(best.filter(|(_, error)| gains(value, *error)))
     }
 
     fn grow<'f>(
@@ -294,19 +332,19 @@ impl Criterion for Expectation<'_> {
         mut field: Field<'f>,
         found: &dyn Fn(&SensorSet),
     ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
-        let mut banks = self.banks(&[], 0);
+        let mut banks = Banks::new(self.scenes);
         let mut sets: Vec<SensorSet> = Vec::new();
         let mut before = self.error(&[])?;
         while !field.full() && !reached(&sets, self.request.constraints) {
             let others = (&field.chosen[..], field.chosen.len());
             let worth = |place: usize, gain: f64| field.worth(place, gain);
-            let errors = self.scan(&banks, others, &field.open(), &worth)?;
+            let errors = self.scan(&banks, others, (&field.open(), None), &worth)?;
             let mut best = Best::default();
             for (place, error) in errors {
                 best.offer(place, field.worth(place, before - error));
             }
             let Some(place) = best.place() else { break };
-            banks.add(place);
+            banks.add(field.chosen.len(), place);
             field.add(place);
             before = match self.losses {
                 Some(_) => self.error(&field.chosen)?,
@@ -347,25 +385,47 @@ fn left<'a>(
     Bank::seated(scene, seats.filter(|(turn, _)| !lost.contains(turn)))
 }
 
-/// The places that promise most for the error (mm) there would be with each, the best first.
+/// At most so many of the places, those that promise most for the error (mm) there would be with each, the best first.
 fn foremost(
     mut errors: Vec<(usize, f64)>,
     before: f64,
-    worth: &dyn Fn(usize, f64) -> f64,
+    (worth, kept): (&dyn Fn(usize, f64) -> f64, Option<usize>),
+    most: usize,
 ) -> Vec<(usize, f64)> {
-    let worth = |&(place, error): &(usize, f64)| worth(place, before - error);
-    errors.sort_by(|a, b| worth(b).total_cmp(&worth(a)).then(a.0.cmp(&b.0)));
-    errors.truncate(PROMISING);
+    let rank = |&(place, error): &(usize, f64)| (Some(place) != kept, worth(place, before - error));
+    errors.sort_by(|a, b| {
+        let ((a_free, a_worth), (b_free, b_worth)) = (rank(a), rank(b));
+        let by_worth = b_worth.total_cmp(&a_worth).then(a.0.cmp(&b.0));
+        a_free.cmp(&b_free).then(by_worth)
+    });
+    errors.truncate(most);
     errors
 }
 
+/// A set in both details.
+#[derive(Clone)]
 struct Banks<'a> {
     coarse: Bank<'a>,
     fine: Bank<'a>,
 }
 
-impl Banks<'_> {
-    fn add(&mut self, site: usize) {
+impl<'a> Banks<'a> {
+    /// No gauge yet.
+    fn new(scenes: &'a Scenes) -> Self {
+        Self {
+            coarse: Bank::new(&scenes.coarse),
+            fine: Bank::new(&scenes.fine),
+        }
+    }
+
+    fn take_turn(&mut self, turn: usize) {
+        self.coarse.take_turn(turn);
+        self.fine.take_turn(turn);
+    }
+
+    /// The gauge of a turn.
+    fn add(&mut self, turn: usize, site: usize) {
+        self.take_turn(turn);
         self.coarse.add(site);
         self.fine.add(site);
     }

@@ -163,6 +163,8 @@ pub(super) mod tests {
         let known = Knowledge {
             noise: 1.0,
             variance: None,
+            shared: None,
+            density: None,
             among: None,
             forces: Some(Forces {
                 touches: &forces,

@@ -4,8 +4,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::bank::{Bank, OWN};
-use super::scene::Scene;
+use super::bank::Bank;
+use super::scene::{OWN, Scene};
 use crate::budget::{Cancelled, Watch, report};
 
 /// Where a press could be taken to be, beside where it is.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::bank::Bank;
 use super::expectation::{Expected, Losses};
 use super::hand::Hand;
-use super::scene::{Outlook, Scene, Variance};
+use super::scene::{Beside, NUISANCES, Outlook, Scene, Shared, Variance};
 use super::{Detail, Knowledge};
 use crate::budget::{Cancelled, Watch};
 use crate::dataset::SignalMatrix;
@@ -43,7 +43,7 @@ impl<'a> Moving<'a> {
         let nobody = SignalMatrix::new(x.columns(), vec![0.0; seats * x.columns()]);
         let seated = |detail: Detail| -> Result<Seated<'a>, Cancelled> {
             let outlook = Outlook::new(x, targets, known, detail, watch)?;
-            let scene = outlook.scene(&nobody, None, watch)?;
+            let scene = outlook.scene(&nobody, Beside::default(), watch)?;
             Ok(Seated { outlook, scene })
         };
         let losses = Losses::of(constraints, known.seed);
@@ -57,12 +57,29 @@ impl<'a> Moving<'a> {
         })
     }
 
-    /// Puts a gauge into a seat: what it reads under every touch, and the variance that is on it, by the touch.
-    pub fn seat(&mut self, seat: usize, x: &[f64], variance: &(dyn Fn(usize) -> f64 + Sync)) {
+    /// Puts a gauge into a seat: what it reads under every touch, the variance that is on it, and what it feels with all
+    /// others ([`Shared::felt`]), by the touch.
+    pub fn seat(
+        &mut self,
+        seat: usize,
+        x: &[f64],
+        variance: &(dyn Fn(usize) -> f64 + Sync),
+        felt: &(dyn Fn(usize) -> [f64; NUISANCES] + Sync),
+    ) {
         let row = SignalMatrix::new(x.len(), x.to_vec());
         let variance: Variance = &|_, touch| variance(touch);
+        // What there is to find is the outlook's.
+        let shared = Shared {
+            felt: &|_, touch| felt(touch),
+            nuisances: [None; NUISANCES],
+            drift: 0.0,
+        };
+        let beside = Beside {
+            variance: Some(variance),
+            shared: Some(&shared),
+        };
         for seated in std::iter::once(&mut self.fine).chain(&mut self.coarse) {
-            (seated.outlook).retake(&mut seated.scene, seat, &row, variance);
+            (seated.outlook).retake(&mut seated.scene, seat, &row, beside);
         }
     }
 

@@ -5,18 +5,21 @@ mod around;
 mod merged;
 mod places;
 mod scatter;
+mod shared;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 pub use self::scatter::Scatter;
+pub use self::shared::{NUISANCES, Shared};
 
 use self::around::{Around, Neighbour};
 use self::merged::Merged;
-pub(super) use self::places::{Level, Place};
+pub(super) use self::places::{Level, Neighbourhood, OWN, Place};
 use self::places::{
     REACH, draws, farthest_first, in_neighbourhoods, in_turns, levels, spacing, standing,
 };
+use self::shared::Unknown;
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
 use crate::regression::folds::evenly;
@@ -34,9 +37,11 @@ impl Detail {
     /// As much as tells promising sites from others.
     #[must_use]
     pub fn coarse(self) -> Self {
+        /// With fewer presses the best sites are lost among others.
+        const FEW: usize = 32;
         Self {
             places: self.places.div_ceil(4),
-            presses: self.presses.div_ceil(3),
+            presses: self.presses.div_ceil(6).max(FEW.min(self.presses)),
         }
     }
 }
@@ -46,7 +51,7 @@ impl Default for Detail {
     fn default() -> Self {
         Self {
             places: 1024,
-            presses: 255,
+            presses: 510,
         }
     }
 }
@@ -74,6 +79,11 @@ pub struct Knowledge<'a> {
     /// [`Scatter`]'s. A simulation is exact, and knows what gluing and elements do to it; guessing at its scatter
     /// from its neighbours would count how it bends twice.
     pub variance: Option<Variance<'a>>,
+    /// What all sites feel together of a touch, beside its place and force; nothing where absent.
+    pub shared: Option<&'a Shared<'a>>,
+    /// How many times as many of the touches come to a piece of the surface as to others, of each touch; as many
+    /// everywhere where absent. Whoever finds touches takes any piece to be as likely as another.
+    pub density: Option<&'a [f64]>,
     /// Touches that places are taken from, rising: those whose variance is known. All where absent.
     pub among: Option<&'a [usize]>,
     /// Absent where the signals are what they are.
@@ -83,37 +93,55 @@ pub struct Knowledge<'a> {
 }
 
 /// What every site reports, per newton and in units of the noise, at some places: how much, how that changes over
-/// the surface (a millimetre along two directions), and the variance of what else is off.
+/// the surface (a millimetre along two directions), the variance of what else is off, and what a deviation of each
+/// nuisance of the touch adds. Filled up with silence to whole blocks of places.
 #[derive(Default)]
 pub(super) struct Reports {
+    /// Places, filled up.
     count: usize,
-    /// Site by site: values, slopes along, slopes across, variances.
+    rows: usize,
+    /// Site by site: values, slopes along, slopes across, variances, nuisances.
     values: Vec<f32>,
 }
+
+/// Places that are computed side by side.
+pub(super) const LANES: usize = 16;
+/// Rows that every site has.
+const ROWS: usize = 4;
 
 /// Rows of [`Reports`] of one site.
 pub(super) struct Report<'a> {
     pub value: &'a [f32],
     pub slopes: [&'a [f32]; 2],
     pub variance: &'a [f32],
+    /// One row after the other.
+    nuisances: &'a [f32],
+}
+
+impl<'a> Report<'a> {
+    /// What a deviation of each nuisance adds.
+    pub fn nuisances(&self) -> impl Iterator<Item = &'a [f32]> + use<'a> {
+        self.nuisances.chunks_exact(self.value.len().max(1))
+    }
 }
 
 impl Reports {
-    const ROWS: usize = 4;
-
-    fn of_mut(&mut self, site: usize) -> &mut [f32] {
-        let length = Self::ROWS * self.count;
+    /// The rows of one site, one after the other.
+    pub(super) fn of_mut(&mut self, site: usize) -> &mut [f32] {
+        let length = self.rows * self.count;
         &mut self.values[site * length..][..length]
     }
 
     /// What one site reports.
     pub fn of(&self, site: usize) -> Report<'_> {
-        let all = &self.values[site * Self::ROWS * self.count..][..Self::ROWS * self.count];
+        let length = self.rows * self.count;
+        let all = &self.values[site * length..][..length];
         let row = |k: usize| &all[k * self.count..][..self.count];
         Report {
             value: row(0),
             slopes: [row(1), row(2)],
             variance: row(3),
+            nuisances: &all[ROWS * self.count..],
         }
     }
 }
@@ -123,11 +151,17 @@ pub struct Scene {
     pub(super) places: Vec<Place>,
     pub(super) at_places: Reports,
     pub(super) presses: Vec<Place>,
+    /// Of each press.
+    pub(super) around: Vec<Neighbourhood>,
     pub(super) at_presses: Reports,
     pub(super) levels: Vec<Level>,
     /// The hardest force that is thought possible (N); nothing to find where it is absent.
     pub(super) hardest: Option<f64>,
+    /// What else there is to find of a touch, of unit deviation.
+    pub(super) unknowns: Vec<Unknown>,
     draws: Vec<f32>,
+    /// What it is: unknowns × presses.
+    made: Vec<f32>,
     sites: usize,
 }
 
@@ -146,12 +180,17 @@ impl Scene {
         detail: Detail,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
-        Outlook::new(x, targets, known, detail, watch)?.scene(x, known.variance, watch)
+        Outlook::new(x, targets, known, detail, watch)?.scene(x, known.beside(), watch)
     }
 
     /// Noise of unit deviation in what the gauge of a turn reads of a press.
     pub(super) fn draw(&self, turn: usize, press: usize) -> f32 {
         self.draws[turn % TURNS * self.presses.len() + press]
+    }
+
+    /// An unknown of a press, as far off as it really is, over what is allowed for.
+    pub(super) fn made(&self, unknown: usize, press: usize) -> f32 {
+        self.made[unknown * self.presses.len() + press]
     }
 
     /// How many sites there are.
@@ -169,6 +208,7 @@ pub(super) struct Outlook<'a> {
     /// One over the unit of readings.
     unit: f64,
     forces: Option<Forces<'a>>,
+    unknowns: Vec<Unknown>,
     seed: u64,
 }
 
@@ -200,39 +240,55 @@ impl<'a> Outlook<'a> {
         let presses: Vec<usize> = presses.into_iter().map(|k| all[k]).collect();
         in_neighbourhoods(&mut places, &merged.positions);
         let around = Around::new(&merged.positions, &merged.groups);
-        let [places, presses] = [places, presses].map(|numbers| Spots {
+        let thinned = |touches: &Vec<(usize, f64)>| {
+            known
+                .density
+                .map_or(1.0, |density| density[touches[0].0].recip())
+        };
+        let by_area: Vec<f64> = merged.touches.iter().map(thinned).collect();
+        let as_they_come = vec![1.0; merged.len()];
+        let of = [(places, by_area), (presses, as_they_come)];
+        let [places, presses] = of.map(|(numbers, masses)| Spots {
             neighbours: (numbers.par_iter().map(|&at| around.of(at).neighbours)).collect(),
-            standing: standing(&merged.positions, &numbers),
+            standing: standing(&merged.positions, &masses, &numbers),
             numbers,
         });
+        let unit = unit(x, known.noise).recip();
         Ok(Self {
             places,
             presses,
-            unit: unit(x, known.noise).recip(),
+            unknowns: known.shared.map_or_else(Vec::new, |s| s.unknowns(unit)),
+            unit,
             forces: known.forces,
             seed: known.seed,
             merged,
         })
     }
 
-    /// With what some sites report: `x` of each under every touch, and the variance that is on it.
+    /// With what some sites report: `x` of each under every touch, and what is off with it.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
     pub fn scene(
         &self,
         x: &SignalMatrix,
-        variance: Option<Variance>,
+        beside: Beside,
         watch: Watch,
     ) -> Result<Scene, Cancelled> {
-        let reader = self.reader(x, variance);
+        let reader = self.reader(x, beside);
         let at_places = reader.reports(&self.places);
         report(watch, "Looking at touches", 1, 2)?;
         let at_presses = reader.reports(&self.presses);
         let presses = self.presses.numbers.len();
+        let (standing, places) = (&self.presses.standing, &self.places.standing);
         Ok(Scene {
+            around: (standing.iter())
+                .map(|p| Neighbourhood::of(p, places))
+                .collect(),
             levels: levels(presses, self.forces.map(|f| f.coming)),
             draws: draws(TURNS, presses, self.seed),
+            made: shared::made(&self.unknowns, presses, self.seed),
+            unknowns: self.unknowns.clone(),
             sites: x.rows(),
             places: self.places.standing.clone(),
             presses: self.presses.standing.clone(),
@@ -242,10 +298,10 @@ impl<'a> Outlook<'a> {
         })
     }
 
-    /// Puts another gauge in the stead of a site of a scene: what it reads under every touch, as one row, and the
-    /// variance that is on it.
-    pub fn retake(&self, scene: &mut Scene, site: usize, x: &SignalMatrix, variance: Variance) {
-        let reader = self.reader(x, Some(variance));
+    /// Puts another gauge in the stead of a site of a scene: what it reads under every touch, as one row, and what is
+    /// off with it.
+    pub fn retake(&self, scene: &mut Scene, site: usize, x: &SignalMatrix, beside: Beside) {
+        let reader = self.reader(x, beside);
         let of = [
             (&mut scene.at_places, &self.places),
             (&mut scene.at_presses, &self.presses),
@@ -255,13 +311,32 @@ impl<'a> Outlook<'a> {
         }
     }
 
-    fn reader<'b>(&'b self, x: &'b SignalMatrix, variance: Option<Variance<'b>>) -> Reader<'b> {
+    fn reader<'b>(&'b self, x: &'b SignalMatrix, beside: Beside<'b>) -> Reader<'b> {
         Reader {
             x,
             merged: &self.merged,
-            variance,
+            beside,
+            nuisances: (self.unknowns.iter())
+                .filter_map(|unknown| unknown.of_touch())
+                .collect(),
             forces: self.forces,
             unit: self.unit,
+        }
+    }
+}
+
+/// What is known of readings beside their values.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Beside<'a> {
+    pub variance: Option<Variance<'a>>,
+    pub shared: Option<&'a Shared<'a>>,
+}
+
+impl<'a> Knowledge<'a> {
+    fn beside(&self) -> Beside<'a> {
+        Beside {
+            variance: self.variance,
+            shared: self.shared,
         }
     }
 }
@@ -276,7 +351,9 @@ fn unit(x: &SignalMatrix, noise: f64) -> f64 {
 struct Reader<'a> {
     x: &'a SignalMatrix,
     merged: &'a Merged,
-    variance: Option<Variance<'a>>,
+    beside: Beside<'a>,
+    /// Which nuisances of a touch are of use.
+    nuisances: Vec<usize>,
     forces: Option<Forces<'a>>,
     /// One over the unit of readings.
     unit: f64,
@@ -285,7 +362,8 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn reports(&self, at: &Spots) -> Reports {
         Reports {
-            count: at.numbers.len(),
+            count: at.numbers.len().next_multiple_of(LANES),
+            rows: ROWS + self.nuisances.len(),
             values: (0..self.x.rows())
                 .into_par_iter()
                 .flat_map_iter(|site| self.rows(site, at))
@@ -295,11 +373,12 @@ impl Reader<'_> {
 
     /// Those of one site.
     fn rows(&self, site: usize, at: &Spots) -> Vec<f32> {
-        let count = at.numbers.len();
-        let mut rows = vec![0.0; Reports::ROWS * count];
+        let count = at.numbers.len().next_multiple_of(LANES);
+        let mut rows = vec![0.0; (ROWS + self.nuisances.len()) * count];
         for (k, (&place, neighbours)) in at.numbers.iter().zip(&at.neighbours).enumerate() {
             let of = self.report(site, place, neighbours);
-            for (row, value) in of.into_iter().enumerate() {
+            let felt = self.felt(site, place);
+            for (row, value) in of.into_iter().chain(felt).enumerate() {
                 rows[row * count + k] = value as f32;
             }
         }
@@ -326,7 +405,7 @@ impl Reader<'_> {
 
     /// Per newton squared.
     fn variance(&self, site: usize, place: usize) -> f64 {
-        let Some(variance) = self.variance else {
+        let Some(variance) = self.beside.variance else {
             return 0.0;
         };
         let touches = || self.merged.touches[place].iter().map(|&(t, _)| t);
@@ -335,6 +414,20 @@ impl Reader<'_> {
             variance(site, t) / (force * force)
         };
         touches().map(of).sum::<f64>() / touches().count() as f64 * self.unit * self.unit
+    }
+
+    /// What a deviation of each nuisance adds, per newton.
+    fn felt(&self, site: usize, place: usize) -> impl Iterator<Item = f64> {
+        let mut sum = [0.0; NUISANCES];
+        if let Some(shared) = self.beside.shared.filter(|_| !self.nuisances.is_empty()) {
+            for &(touch, weight) in &self.merged.touches[place] {
+                let felt = (shared.felt)(site, touch);
+                for (sum, felt) in sum.iter_mut().zip(felt) {
+                    *sum += weight * felt * self.unit;
+                }
+            }
+        }
+        self.nuisances.iter().map(move |&k| sum[k])
     }
 }
 
@@ -377,7 +470,8 @@ pub fn templates(
     let reader = Reader {
         x,
         merged: &merged,
-        variance: known.variance,
+        beside: known.beside(),
+        nuisances: Vec::new(),
         forces: known.forces,
         unit: unit.recip(),
     };

@@ -189,6 +189,7 @@ fn what_is_off_is_what_the_keys_say() {
     let mut project = project();
     let usual = project.uncertainty();
     assert_eq!((usual.drift, usual.making), (0.0, Making::EXACT));
+    assert_eq!(usual.resolution, 0.0);
     assert_eq!(usual.pressing, Pressing::default());
     project.gauge.noise_microstrain = 2.0;
     project.gauge.drift_microstrain = 3.0;

@@ -1,22 +1,34 @@
 //! The Kalman filters at all places at once, in blocks of places side by side.
 
-use crate::lanes::{exponential, logarithm, wide};
-use crate::placement::expected_error::scene::Report;
+use std::array::from_fn;
 
-/// Places whose probability is summed side by side.
-pub(super) const LANES: usize = 16;
+use crate::lanes::{exponential, logarithm, wide};
+use crate::placement::expected_error::scene::{LANES, NUISANCES, Report, Scene};
+
+/// Unknowns that every touch has: along, across and force.
+pub(in crate::placement::expected_error) const PLAIN: usize = 3;
+/// No filter has more of them: those, nuisances of the touch, and a drift.
+pub(in crate::placement::expected_error) const MOST: usize = PLAIN + NUISANCES + 1;
+/// Which of them is the force.
+const FORCE: usize = 2;
 
 /// The filters at all places, for one force.
+#[derive(Clone)]
 pub(super) struct Filters {
-    /// Upper triangles of the covariances: along, along-across, along-force, across, across-force, force.
-    pub(super) covariances: [Vec<f32>; 6],
+    /// Unknowns of each.
+    pub(super) unknowns: usize,
+    /// Upper triangles of the covariances, entry by entry at all places: of along, across, force, and what else there is
+    /// to find.
+    pub(super) covariances: Vec<f32>,
+    /// What a drift reads of one deviation; nothing where none is to be found.
+    pub(super) drift: Option<f32>,
 }
 
 /// What a site's reading does to the filters at all places, for one force.
 #[derive(Default)]
 pub(in crate::placement::expected_error) struct Rows {
-    /// Of the reading over its deviation: by place and force.
-    pub(super) slopes: [Vec<f32>; 3],
+    /// Of the reading over its deviation: by each unknown at all places.
+    pub(super) slopes: Vec<f32>,
     /// One over the deviation.
     pub(super) scale: Vec<f32>,
     /// Half over the variance of what is predicted, and the logarithm that belongs to it.
@@ -28,10 +40,11 @@ pub(in crate::placement::expected_error) struct Rows {
 }
 
 impl Rows {
-    pub(super) fn with(count: usize) -> Self {
+    /// Of so many unknowns at so many places.
+    pub(super) fn with(unknowns: usize, count: usize) -> Self {
         let zeros = || vec![0.0; count];
         Self {
-            slopes: [zeros(), zeros(), zeros()],
+            slopes: vec![0.0; unknowns * count],
             scale: zeros(),
             half: zeros(),
             log: zeros(),
@@ -41,31 +54,56 @@ impl Rows {
     }
 }
 
+impl Filters {
+    /// Before anything is read, at the places of a scene: within their reach (filled up with 1), with a force of some
+    /// variance, and all else of unit variance.
+    pub(super) fn new(scene: &Scene, reaches: &[f32], force: f32) -> Self {
+        let unknowns = PLAIN + scene.unknowns.len();
+        let squares: Vec<f32> = reaches.iter().map(|r| r * r).collect();
+        let entry = |(i, j): (usize, usize)| match i {
+            _ if i != j => vec![0.0; squares.len()],
+            FORCE => vec![force; squares.len()],
+            _ if i < FORCE => squares.clone(),
+            _ => vec![1.0; squares.len()],
+        };
+        Self {
+            unknowns,
+            covariances: entries(unknowns).flat_map(entry).collect(),
+            drift: scene
+                .unknowns
+                .iter()
+                .find_map(|u| u.drift())
+                .map(|d| d as f32),
+        }
+    }
+
+    /// Variances of the force.
+    pub(super) fn of_force(&self) -> &[f32] {
+        let count = self.covariances.len() / entries(self.unknowns).count();
+        &self.covariances[place_of(self.unknowns, FORCE, FORCE) * count..][..count]
+    }
+}
+
+/// Entries of an upper triangle, as they are kept.
+fn entries(unknowns: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..unknowns).flat_map(move |i| (i..unknowns).map(move |j| (i, j)))
+}
+
+/// Where the entry (i, j ≥ i) is kept.
+const fn place_of(unknowns: usize, i: usize, j: usize) -> usize {
+    i * unknowns + j - i * (i + 1) / 2
+}
+
 /// Fills in what a reading does to the filters at all places.
 pub(super) fn predict(filters: &Filters, report: &Report, force: f32, rows: &mut Rows) {
-    let count = report.value.len();
-    let [xx, xy, xf, yy, yf, ff] = filters.covariances.each_ref().map(|c| &c[..count]);
-    let [r0, r1, r2] = rows.slopes.each_mut().map(|r| &mut r[..count]);
-    fill(
-        [xx, xy, xf, yy, yf, ff],
-        [
-            report.value,
-            report.slopes[0],
-            report.slopes[1],
-            report.variance,
-        ],
-        [
-            r0,
-            r1,
-            r2,
-            &mut rows.scale[..count],
-            &mut rows.half[..count],
-            &mut rows.log[..count],
-            &mut rows.gain[..count],
-            &mut rows.sharpness[..count],
-        ],
-        force,
-    );
+    let into = [
+        &mut rows.scale[..],
+        &mut rows.half,
+        &mut rows.log,
+        &mut rows.gain,
+        &mut rows.sharpness,
+    ];
+    fill(filters, report, &mut rows.slopes, into, force);
 }
 
 /// One over the deviation; nothing where there is none to know.
@@ -82,113 +120,170 @@ pub(super) fn sharpness(variance: f32) -> f32 {
     }
 }
 
-/// By how much the filters at all places correct along, across and force.
-pub(super) fn corrections(filters: &Filters, rows: &Rows) -> [Vec<f32>; 3] {
-    let [xx, xy, xf, yy, yf, _] = &filters.covariances;
-    let count = xx.len();
-    let (mut along, mut across) = (vec![0.0; count], vec![0.0; count]);
-    for k in 0..count {
-        let r = [0, 1, 2].map(|i: usize| rows.slopes[i][k]);
-        let share = 2.0 * rows.half[k];
-        along[k] = (xx[k] * r[0] + xy[k] * r[1] + xf[k] * r[2]) * share;
-        across[k] = (xy[k] * r[0] + yy[k] * r[1] + yf[k] * r[2]) * share;
-    }
-    [along, across, rows.gain.clone()]
+/// By how much the filters at all places correct each unknown.
+pub(super) fn corrections(filters: &Filters, rows: &Rows) -> Vec<f32> {
+    let count = rows.half.len();
+    let mut gains = vec![0.0; filters.unknowns * count];
+    spread(filters, rows, &mut gains);
+    gains[FORCE * count..][..count].copy_from_slice(&rows.gain);
+    gains
 }
 
-pub(super) fn shrink(filters: &mut Filters, rows: &Rows, gains: &[Vec<f32>; 3]) {
-    const ENTRIES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-    for (values, (i, j)) in filters.covariances.iter_mut().zip(ENTRIES) {
-        for (k, value) in values.iter_mut().enumerate() {
-            if rows.half[k] > 0.0 {
-                *value -= gains[i][k] * gains[j][k] / (2.0 * rows.half[k]);
+wide! {
+    fn spread<'a>(filters: &'a Filters, rows: &'a Rows, gains: &'a mut [f32]) {
+        let count = rows.half.len();
+        let covariances = filters.covariances.chunks_exact(count.max(1));
+        for ((i, j), values) in entries(filters.unknowns).zip(covariances) {
+            let ways = [(i, j), (j, i)];
+            for (i, j) in ways.into_iter().take(if i == j { 1 } else { 2 }) {
+                let slopes = &rows.slopes[j * count..][..count];
+                let terms = values.iter().zip(slopes).zip(&rows.half);
+                for (gain, ((value, slope), half)) in gains[i * count..][..count].iter_mut().zip(terms) {
+                    *gain += value * slope * 2.0 * half;
+                }
             }
         }
     }
 }
 
-/// Takes a reading into account at the places that may still be meant.
-pub(super) fn correct(
-    before: [&mut Vec<f32>; 4],
-    rows: &Rows,
-    gains: &[Vec<f32>; 3],
-    blocks: &[u32],
-    reading: f32,
-) {
-    let [r0, r1, r2] = rows.slopes.each_ref().map(|r| &r[..]);
-    correct_blocks(
-        before.map(Vec::as_mut_slice),
-        [r0, r1, r2, &rows.scale, &rows.half, &rows.log],
-        gains.each_ref().map(|g| &g[..]),
-        blocks,
-        reading,
-    );
+wide! {
+    /// What a reading leaves of the filters' covariances at all places.
+    pub(super) fn shrink<'a>(filters: &'a mut Filters, rows: &'a Rows, gains: &'a [f32]) {
+        let count = rows.half.len();
+        let covariances = filters.covariances.chunks_exact_mut(count.max(1));
+        for ((i, j), values) in entries(filters.unknowns).zip(covariances) {
+            let [a, b] = [i, j].map(|i| &gains[i * count..][..count]);
+            let terms = a.iter().zip(b).zip(&rows.half);
+            for (value, ((a, b), half)) in values.iter_mut().zip(terms) {
+                // Nothing where so much was predicted that half over it is no number any more.
+                *value -= a * b / (2.0 * half).max(f32::MIN_POSITIVE);
+            }
+        }
+    }
 }
 
 fn folded(lanes: [[f32; LANES]; 4]) -> [f64; 4] {
     lanes.map(|lane| lane.iter().map(|v| f64::from(*v)).sum())
 }
 
+/// Calls a function for as many unknowns as there are, so that its loops over them are unrolled.
+macro_rules! for_unknowns {
+    ($count:expr, $name:ident($($arg:expr),*)) => {
+        match $count {
+            PLAIN => $name::<PLAIN>($($arg),*),
+            4 => $name::<4>($($arg),*),
+            5 => $name::<5>($($arg),*),
+            6 => $name::<6>($($arg),*),
+            _ => $name::<MOST>($($arg),*),
+        }
+    };
+}
+
 wide! {
+    /// The probability (over that of the true place) and its first moments, summed over some blocks of places: what is
+    /// thought of each unknown there and what the place costs, before a reading.
     pub(super) fn sum_masses_with<'a>(
-        before: [&'a [f32]; 4],
-        row: [&'a [f32]; 4],
-        after: [&'a [f32]; 4],
-        positions: [&'a [f32]; 3],
+        estimates: &'a [f32],
+        cost: &'a [f32],
+        rows: &'a Rows,
+        positions: &'a [f32],
         blocks: &'a [u32],
         reading: f32,
         own: f32,
     ) -> [f64; 4] {
-        let mut sums = [[0.0_f32; LANES]; 4];
-        let [along, across, force, cost] = before.map(|v| v.as_chunks::<LANES>().0);
-        let [r0, r1, r2, scale] = row.map(|v| v.as_chunks::<LANES>().0);
-        let [half, log, gain, sharpness] = after.map(|v| v.as_chunks::<LANES>().0);
-        let [x, y, z] = positions.map(|v| v.as_chunks::<LANES>().0);
-        for &block in blocks {
-            let b = block as usize;
-            let [along, across, force, cost] = [along[b], across[b], force[b], cost[b]];
-            let [r0, r1, r2, scale] = [r0[b], r1[b], r2[b], scale[b]];
-            let [half, log, gain, sharpness] = [half[b], log[b], gain[b], sharpness[b]];
-            let [x, y, z] = [x[b], y[b], z[b]];
-            for l in 0..LANES {
-                let off = reading * scale[l] - (r0[l] * along[l] + r1[l] * across[l] + r2[l] * force[l]);
-                let pulls = ((force[l] + gain[l] * off) * sharpness[l]).min(0.0);
-                let costs = cost[l] + off * off * half[l] + log[l] + 0.5 * pulls * pulls;
-                let w = exponential((own - costs).min(60.0));
-                sums[0][l] += w;
-                sums[1][l] += w * x[l];
-                sums[2][l] += w * y[l];
-                sums[3][l] += w * z[l];
-            }
-        }
-        folded(sums)
+        for_unknowns!(estimates.len() / cost.len().max(1), sum_of(estimates, cost, rows, positions, blocks, reading, own))
     }
 }
 
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
+#[inline(always)]
+fn sum_of<const N: usize>(
+    estimates: &[f32],
+    cost: &[f32],
+    rows: &Rows,
+    positions: &[f32],
+    blocks: &[u32],
+    reading: f32,
+    own: f32,
+) -> [f64; 4] {
+    let mut sums = [[0.0_f32; LANES]; 4];
+    let [scale, half, log, gain, sharpness, cost] = [
+        &rows.scale[..],
+        &rows.half,
+        &rows.log,
+        &rows.gain,
+        &rows.sharpness,
+        cost,
+    ]
+    .map(|v| v.as_chunks::<LANES>().0);
+    let [estimates, slopes, positions] =
+        [estimates, &rows.slopes, positions].map(|v| v.as_chunks::<LANES>().0);
+    // Blocks of one row.
+    let row = cost.len();
+    for &block in blocks {
+        let b = block as usize;
+        let estimates: [&[f32; LANES]; N] = from_fn(|i| &estimates[i * row + b]);
+        let slopes: [&[f32; LANES]; N] = from_fn(|i| &slopes[i * row + b]);
+        let [scale, half, log, gain] = [&scale[b], &half[b], &log[b], &gain[b]];
+        let [sharpness, cost] = [&sharpness[b], &cost[b]];
+        let [x, y, z]: [&[f32; LANES]; 3] = from_fn(|k| &positions[k * row + b]);
+        for l in 0..LANES {
+            let mut predicted = 0.0;
+            for i in 0..N {
+                predicted += slopes[i][l] * estimates[i][l];
+            }
+            let off = reading * scale[l] - predicted;
+            let pulls = ((estimates[FORCE][l] + gain[l] * off) * sharpness[l]).min(0.0);
+            let costs = cost[l] + off * off * half[l] + log[l] + 0.5 * pulls * pulls;
+            let w = exponential((own - costs).min(60.0));
+            sums[0][l] += w;
+            sums[1][l] += w * x[l];
+            sums[2][l] += w * y[l];
+            sums[3][l] += w * z[l];
+        }
+    }
+    folded(sums)
+}
+
 wide! {
-    fn correct_blocks<'a>(
-        before: [&'a mut [f32]; 4],
-        row: [&'a [f32]; 6],
-        gains: [&'a [f32]; 3],
+    /// Takes a reading into account at the places of some blocks.
+    pub(super) fn correct<'a>(
+        estimates: &'a mut [f32],
+        cost: &'a mut [f32],
+        rows: &'a Rows,
+        gains: &'a [f32],
         blocks: &'a [u32],
         reading: f32,
     ) {
-        let [along, across, force, cost] = before.map(|v| v.as_chunks_mut::<LANES>().0);
-        let [r0, r1, r2, scale, half, log] = row.map(|v| v.as_chunks::<LANES>().0);
-        let [g0, g1, g2] = gains.map(|v| v.as_chunks::<LANES>().0);
+        let cost = cost.as_chunks_mut::<LANES>().0;
+        let estimates = estimates.as_chunks_mut::<LANES>().0;
+        let [scale, half, log] = [&rows.scale, &rows.half, &rows.log].map(|v| v.as_chunks::<LANES>().0);
+        let [slopes, gains] = [&rows.slopes, gains].map(|v| v.as_chunks::<LANES>().0);
+        let row = cost.len();
         for &block in blocks {
             let b = block as usize;
-            let (along, across) = (&mut along[b], &mut across[b]);
-            let (force, cost) = (&mut force[b], &mut cost[b]);
-            let [r0, r1, r2, scale] = [r0[b], r1[b], r2[b], scale[b]];
-            let [half, log, g0, g1, g2] = [half[b], log[b], g0[b], g1[b], g2[b]];
+            let mut off = [0.0_f32; LANES];
             for l in 0..LANES {
-                let predicted = r0[l] * along[l] + r1[l] * across[l] + r2[l] * force[l];
-                let off = reading * scale[l] - predicted;
-                cost[l] += off * off * half[l] + log[l];
-                along[l] += g0[l] * off;
-                across[l] += g1[l] * off;
-                force[l] += g2[l] * off;
+                off[l] = reading * scale[b][l];
+            }
+            for at in (b..estimates.len()).step_by(row) {
+                let (estimate, slope) = (&estimates[at], &slopes[at]);
+                for l in 0..LANES {
+                    off[l] -= slope[l] * estimate[l];
+                }
+            }
+            let (cost, half, log) = (&mut cost[b], &half[b], &log[b]);
+            for l in 0..LANES {
+                cost[l] += off[l] * off[l] * half[l] + log[l];
+            }
+            for at in (b..estimates.len()).step_by(row) {
+                let (estimate, gain) = (&mut estimates[at], &gains[at]);
+                for l in 0..LANES {
+                    estimate[l] += gain[l] * off[l];
+                }
             }
         }
     }
@@ -196,33 +291,95 @@ wide! {
 
 wide! {
     fn fill<'a>(
-        covariances: [&'a [f32]; 6],
-        report: [&'a [f32]; 4],
-        into: [&'a mut [f32]; 8],
+        filters: &'a Filters,
+        report: &'a Report<'a>,
+        slopes: &'a mut [f32],
+        into: [&'a mut [f32]; 5],
         force: f32,
     ) {
-        let count = report[0].len();
-        let [xx, xy, xf, yy, yf, ff] = covariances.map(|c| &c[..count]);
-        let [value, along, across, variance] = report.map(|r| &r[..count]);
-        let [r0, r1, r2, scales, halves, logs, gains, sharp] = into.map(|i| &mut i[..count]);
-        for k in 0..count {
-            let variance = 1.0 + force * force * variance[k];
-            let scale = variance.sqrt().recip();
-            let r = [force * along[k] * scale, force * across[k] * scale, value[k] * scale];
-            let spread = [
-                xx[k] * r[0] + xy[k] * r[1] + xf[k] * r[2],
-                xy[k] * r[0] + yy[k] * r[1] + yf[k] * r[2],
-                xf[k] * r[0] + yf[k] * r[1] + ff[k] * r[2],
-            ];
-            // Never less than the noise: where signals are far above it, rounding would take more.
-            let predicted = (1.0 + r[0] * spread[0] + r[1] * spread[1] + r[2] * spread[2]).max(1.0);
-            let share = predicted.recip();
-            [r0[k], r1[k], r2[k]] = r;
-            scales[k] = scale;
-            halves[k] = 0.5 * share;
-            logs[k] = 0.5 * logarithm(predicted * variance);
-            gains[k] = spread[2] * share;
-            sharp[k] = sharpness(ff[k] - spread[2] * spread[2] * share);
+        for_unknowns!(filters.unknowns, fill_of(filters, report, slopes, into, force));
+    }
+}
+
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
+#[inline(always)]
+fn fill_of<const N: usize>(
+    filters: &Filters,
+    report: &Report,
+    slopes: &mut [f32],
+    into: [&mut [f32]; 5],
+    force: f32,
+) {
+    let covariances = filters.covariances.as_chunks::<LANES>().0;
+    let plain = [report.slopes[0], report.slopes[1], report.value];
+    let mut by: [&[[f32; LANES]]; N] = [&[]; N];
+    for (by, row) in by
+        .iter_mut()
+        .zip(plain.into_iter().chain(report.nuisances()))
+    {
+        *by = row.as_chunks::<LANES>().0;
+    }
+    let drift = filters.drift.unwrap_or(0.0);
+    let variances = report.variance.as_chunks::<LANES>().0;
+    let [scales, halves, logs, gains, sharps] = into.map(|v| v.as_chunks_mut::<LANES>().0);
+    let slopes = slopes.as_chunks_mut::<LANES>().0;
+    // Blocks of one row.
+    let row = variances.len();
+    for (b, variance) in variances.iter().enumerate() {
+        let mut scale = [0.0_f32; LANES];
+        for l in 0..LANES {
+            scale[l] = (1.0 + force * force * variance[l]).sqrt().recip();
         }
+        let mut rows = [[drift; LANES]; N];
+        for i in 0..N {
+            // Readings grow with the force; along and across change them the more, and the force itself by its unit.
+            let by_force = if i == FORCE { 1.0 } else { force };
+            if let Some(row) = by[i].get(b) {
+                for l in 0..LANES {
+                    rows[i][l] = by_force * row[l];
+                }
+            }
+            for l in 0..LANES {
+                rows[i][l] *= scale[l];
+            }
+            slopes[i * row + b] = rows[i];
+        }
+        let mut spread = [[0.0_f32; LANES]; N];
+        for i in 0..N {
+            for j in i..N {
+                let covariance = &covariances[place_of(N, i, j) * row + b];
+                for l in 0..LANES {
+                    spread[i][l] += covariance[l] * rows[j][l];
+                }
+                if i != j {
+                    for l in 0..LANES {
+                        spread[j][l] += covariance[l] * rows[i][l];
+                    }
+                }
+            }
+        }
+        let mut predicted = [1.0_f32; LANES];
+        for i in 0..N {
+            for l in 0..LANES {
+                predicted[l] += rows[i][l] * spread[i][l];
+            }
+        }
+        let force_variance = &covariances[place_of(N, FORCE, FORCE) * row + b];
+        let corrected = &spread[FORCE];
+        // Not written where they go at once: what may lie behind one reference is not known to lie behind no other.
+        let [mut half, mut log, mut gain, mut sharp] = [[0.0_f32; LANES]; 4];
+        for l in 0..LANES {
+            // Never less than the noise: where signals are far above it, rounding would take more.
+            let predicted = predicted[l].max(1.0);
+            let share = predicted.recip();
+            half[l] = 0.5 * share;
+            log[l] = 0.5 * logarithm(predicted / (scale[l] * scale[l]));
+            gain[l] = corrected[l] * share;
+            sharp[l] = sharpness(force_variance[l] - corrected[l] * corrected[l] * share);
+        }
+        (scales[b], halves[b], logs[b], gains[b], sharps[b]) = (scale, half, log, gain, sharp);
     }
 }

@@ -26,6 +26,37 @@ pub(in crate::placement::expected_error) struct Place {
     pub mass: f64,
 }
 
+/// Places nearer to a press than so many of their reaches are the press's own: around those beyond, the normal
+/// distribution does not come as far as the press, which they would explain as well as its own place does.
+pub(in crate::placement::expected_error) const OWN: f64 = 2.5;
+
+/// What stands around a press.
+#[derive(Clone, Debug)]
+pub(in crate::placement::expected_error) struct Neighbourhood {
+    /// The places that are its own.
+    pub own: Vec<u32>,
+    /// How likely it is that a touch comes to one of them.
+    pub own_mass: f64,
+    /// Standard deviation along the surface (mm) of where the press is, before anything is read.
+    pub reach: f64,
+}
+
+impl Neighbourhood {
+    pub(super) fn of(press: &Place, places: &[Place]) -> Self {
+        let away = |p: &Place| p.position.distance_squared(press.position);
+        let is_own = |p: &Place| away(p) <= (OWN * p.reach).powi(2);
+        let own = || (places.iter().enumerate()).filter(|(_, p)| is_own(p));
+        let mass: f64 = own().map(|(_, p)| p.mass).sum();
+        let nearest = places.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+        Self {
+            own: own().map(|(k, _)| k as u32).collect(),
+            own_mass: if mass > 0.0 { mass } else { press.mass },
+            // As a disc of that radius.
+            reach: nearest.map_or(1.0, |p| p.reach) * OWN / 2.0,
+        }
+    }
+}
+
 /// Presses of one force.
 pub(in crate::placement::expected_error) struct Level {
     /// N; 1 where forces do not matter.
@@ -119,16 +150,19 @@ pub(super) fn in_neighbourhoods(places: &mut [usize], positions: &[DVec3]) {
     in_neighbourhoods(high, positions);
 }
 
-/// Some of the places with what each stands for: the places that are nearest to it.
-pub(super) fn standing(positions: &[DVec3], of: &[usize]) -> Vec<Place> {
+/// Some of the places with what each stands for: the places that are nearest to it, each of which has some weight.
+pub(super) fn standing(positions: &[DVec3], weights: &[f64], of: &[usize]) -> Vec<Place> {
     let nearest = |at: &DVec3| {
         let away = |k: &usize| positions[of[*k]].distance_squared(*at);
         (0..of.len()).min_by(|a, b| away(a).total_cmp(&away(b)))
     };
     let owners: Vec<Option<usize>> = positions.par_iter().map(nearest).collect();
     let mut masses = vec![0.0; of.len()];
-    for owner in owners.into_iter().flatten() {
-        masses[owner] += 1.0 / positions.len() as f64;
+    let all: f64 = weights.iter().sum();
+    for (owner, weight) in owners.into_iter().zip(weights) {
+        if let Some(owner) = owner {
+            masses[owner] += weight / all;
+        }
     }
     of.par_iter()
         .zip(masses)
