@@ -7,6 +7,14 @@ use super::{Simulated, WORKSHOP_SEED};
 use crate::dataset::Site;
 use crate::uncertainty::Gluing;
 
+/// How many workshops glue the gauges that are judged: one alone is a tenth better or worse than they are in the mean.
+pub(super) const WORKSHOPS: u64 = 3;
+
+/// The seed of one of the workshops that a design is judged by.
+pub(super) fn of_workshop(seed: u64, workshop: u64) -> u64 {
+    seed.wrapping_add(workshop << 32)
+}
+
 /// Sites of a dataset as a workshop glues their gauges.
 pub(super) fn sites_as_built(
     simulated: &Simulated,

@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use super::judge::{ByMatching, judge, measured_by};
 use super::layout::{lay_out_sites, touches_on};
-use super::reference::grid;
 use super::{Design, DesignError, Inputs, Meshed, Reference, Simulated, ground};
 use crate::budget::{Budget, Elements, Watch};
 use crate::elasticity::{Model, Touch};
@@ -157,8 +156,8 @@ impl Finest {
         sites: &[usize],
         watch: Watch,
     ) -> Result<Reference, DesignError> {
-        let (touches, grid) = (self.touches.clone(), grid(&inputs.project));
-        let reference = measured_by(&*self.model, inputs, simulated, sites, touches, grid, watch)?;
+        let touches = self.touches.clone();
+        let reference = measured_by(&*self.model, inputs, simulated, sites, touches, None, watch)?;
         Ok(Reference {
             element_mm: self.element_mm(),
             ..reference

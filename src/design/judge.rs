@@ -2,9 +2,11 @@
 
 mod matched;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use super::as_built::{gains, sites_as_built};
+use super::as_built::{WORKSHOPS, gains, of_workshop, sites_as_built};
 use super::as_made::as_made;
 use super::drawn::{gauge_at, proposed};
 use super::known;
@@ -21,6 +23,7 @@ use crate::evaluation::{self, Candidate, EstimatorKind, Evaluation, Judging, Tri
 use crate::mesh::TriMesh;
 use crate::placement::Selection;
 use crate::regression::folds::evenly;
+use crate::uncertainty::Gluing;
 
 pub(super) use self::matched::ByMatching;
 pub use crate::placement::expected_error::BLIND;
@@ -40,51 +43,24 @@ pub fn reference(
     let (meshed, model) = simulated.meshed.reference_model(watch)?;
     let mesh = meshed.touched_surface();
     let touches = test_touches(&mesh, inputs, budget.test_touches)?;
-    let grid = grid(&inputs.project);
-    let mut reference = measured_by(&*model, inputs, simulated, sites, touches, grid, watch)?;
-    if inputs.project.judging().estimator() == EstimatorKind::Matching {
-        reference.press(&*model, &mesh, inputs, simulated, watch)?;
-    }
+    let presses = match inputs.project.judging().estimator() {
+        EstimatorKind::Matching => Some(presses_on(&mesh, inputs)?),
+        EstimatorKind::Svr => None,
+    };
+    let mut reference = measured_by(&*model, inputs, simulated, sites, touches, presses, watch)?;
     let work = model.system().work();
     reference.work += work;
     reference.element_mm = meshed.element_mm();
     Ok(reference)
 }
 
-impl Reference {
-    /// Presses on a surface of the model as somebody does who calibrates, and reads the gauges as they are built.
-    fn press(
-        &mut self,
-        model: &dyn Model,
-        surface: &TriMesh,
-        inputs: &Inputs,
-        simulated: &Simulated,
-        watch: Watch,
-    ) -> Result<(), DesignError> {
-        let seed = inputs.project.budget.seed;
-        let asked = proposed(surface, inputs)?;
-        let hand = &self.off.pressing;
-        let presses: Vec<Press> = (0..presses::ROUNDS)
-            .flat_map(|round| {
-                let seed = seed.wrapping_add(PRESS_SEED).wrapping_add(round);
-                presses::by_hand(surface, asked.clone(), hand, seed)
-            })
-            .collect();
-        let made: Vec<Touch> = presses.iter().map(|p| p.made).collect();
-        let made = as_made(
-            &made,
-            &self.off.making_of_presses(),
-            seed.wrapping_add(MADE_SEED + 1),
-        );
-        let built = sites_as_built(simulated, &self.sites, &self.off.gluing, seed);
-        let (x, solves) = read(model, inputs, &made, &built, self.grid, watch)?;
-        self.work.solves += solves as u64;
-        self.pressed = Some(Pressed {
-            presses,
-            x: x.scaled_rows(gains(&self.sites, &self.off.gluing, seed)),
-        });
-        Ok(())
-    }
+/// Presses on a surface as somebody makes them who calibrates: a round for each workshop, one after the other.
+fn presses_on(surface: &TriMesh, inputs: &Inputs) -> Result<Vec<Press>, DesignError> {
+    let asked = proposed(surface, inputs)?;
+    let hand = inputs.project.uncertainty().pressing;
+    let seed = inputs.project.budget.seed.wrapping_add(PRESS_SEED);
+    let round = |k| presses::by_hand(surface, asked.clone(), &hand, seed.wrapping_add(k));
+    Ok((0..WORKSHOPS).flat_map(round).collect())
 }
 
 /// What gauges read under pushes (sites × pushes), over grids of this length and width (m) or at a point, and how many
@@ -112,7 +88,7 @@ fn read(
     ))
 }
 
-/// Sites as a model reads them under touches, over grids of this length and width (m) or at a point. The size of its
+/// Sites as a model reads them under touches and known presses: as drawn, and as workshops glue them. The size of its
 /// elements is for the caller to say.
 pub(super) fn measured_by(
     model: &dyn Model,
@@ -120,26 +96,39 @@ pub(super) fn measured_by(
     simulated: &Simulated,
     sites: &[usize],
     touches: Vec<Touch>,
-    grid: Option<[f64; 2]>,
+    presses: Option<Vec<Press>>,
     watch: Watch,
 ) -> Result<Reference, DesignError> {
-    let project = &inputs.project;
+    let (project, grid) = (&inputs.project, grid(&inputs.project));
     let mut rows = sites.to_vec();
     rows.sort_unstable();
     rows.dedup();
-    // Both kinds of gauges in one measurement: the loads are solved for once.
     let all = &simulated.dataset.sites;
     let drawn: Vec<Site> = rows.iter().map(|&s| all[s]).collect();
     let (off, seed) = (known::off(project, simulated), project.budget.seed);
-    let built = sites_as_built(simulated, &rows, &off.gluing, seed);
-    let gauges: Vec<Site> = drawn.iter().copied().chain(built).collect();
-    let pushes = as_made(&touches, &off.making, seed.wrapping_add(MADE_SEED));
+    let built = |w| sites_as_built(simulated, &rows, &off.gluing, of_workshop(seed, w));
+    // All kinds of gauges in one measurement: the loads are solved for once.
+    let gauges: Vec<Site> = (drawn.iter().copied())
+        .chain((0..WORKSHOPS).flat_map(built))
+        .collect();
+    let mut pushes = as_made(&touches, &off.making, seed.wrapping_add(MADE_SEED));
+    if let Some(presses) = &presses {
+        let made: Vec<Touch> = presses.iter().map(|p| p.made).collect();
+        let making = off.making_of_presses();
+        pushes.extend(as_made(&made, &making, seed.wrapping_add(MADE_SEED + 1)));
+    }
     let (signals, solves) = read(model, inputs, &pushes, &gauges, grid, watch)?;
-    let half =
-        |k: usize| signals.select_rows(&(k * rows.len()..(k + 1) * rows.len()).collect::<Vec<_>>());
-    let (x, workshop) = (half(0), half(1));
-    let workshop = workshop.scaled_rows(gains(&rows, &off.gluing, seed));
+    let columns = |of: Range<usize>| of.collect::<Vec<_>>();
+    let x = signals.select_rows(&columns(0..rows.len()));
+    let x = x.select_columns(&columns(0..touches.len()));
+    let of_workshops = OfWorkshops::new(&signals, &rows, &off.gluing, seed);
+    let each = presses.as_ref().map_or(0, |p| p.len() / WORKSHOPS as usize);
     Ok(Reference {
+        workshop: of_workshops.read(0..touches.len(), |k| k % WORKSHOPS as usize),
+        pressed: presses.map(|presses| Pressed {
+            x: of_workshops.read(touches.len()..pushes.len(), |k| k / each.max(1)),
+            presses,
+        }),
         regions: regions(project, &touches),
         element_mm: f64::NAN,
         touches,
@@ -150,11 +139,43 @@ pub(super) fn measured_by(
         sites: rows,
         drawn,
         x,
-        workshop,
         off,
         grid,
-        pressed: None,
     })
+}
+
+/// What gauges read as each of the workshops glues them.
+struct OfWorkshops<'a> {
+    /// As drawn, then workshop after workshop (sites × pushes).
+    signals: &'a SignalMatrix,
+    /// The gains that the gauges end up with, workshop by workshop.
+    gains: Vec<Vec<f64>>,
+}
+
+impl<'a> OfWorkshops<'a> {
+    fn new(signals: &'a SignalMatrix, sites: &[usize], gluing: &Gluing, seed: u64) -> Self {
+        let gains = |w| gains(sites, gluing, of_workshop(seed, w)).collect();
+        Self {
+            signals,
+            gains: (0..WORKSHOPS).map(gains).collect(),
+        }
+    }
+
+    /// What is read of some of the pushes (sites × pushes), each by the gauges of the workshop whose turn it is.
+    fn read(&self, pushes: Range<usize>, turn: impl Fn(usize) -> usize) -> SignalMatrix {
+        let sites = self.gains[0].len();
+        let rows = (0..sites).flat_map(|site| {
+            pushes.clone().enumerate().map({
+                let turn = &turn;
+                move |(k, push)| {
+                    let workshop = turn(k);
+                    let row = self.signals.row((1 + workshop) * sites + site);
+                    row[push] * self.gains[workshop][site]
+                }
+            })
+        });
+        SignalMatrix::new(pushes.len(), rows.collect())
+    }
 }
 
 /// Judges selections on the reference model by the project's estimator; by regression with all candidates as the baseline, where
@@ -299,4 +320,30 @@ pub fn sites_to_judge(
         .flat_map(|s| &s.sites);
     sites.extend(chosen);
     sites
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_push_is_read_by_the_gauges_whose_turn_it_is() {
+        const PUSHES: usize = 6;
+        let (sites, gluing) = ([4, 9], Gluing::default());
+        let rows = (1 + WORKSHOPS as usize) * sites.len();
+        let values = (0..rows * PUSHES).map(|k| k as f64).collect();
+        let signals = SignalMatrix::new(PUSHES, values);
+        let read = OfWorkshops::new(&signals, &sites, &gluing, 5).read(2..PUSHES, |k| k % 3);
+        for (k, push) in (2..PUSHES).enumerate() {
+            let workshop = k % 3;
+            let seed = of_workshop(5, workshop as u64);
+            for (row, gain) in gains(&sites, &gluing, seed).enumerate() {
+                let there = signals.row((1 + workshop) * sites.len() + row)[push];
+                assert_eq!(read.row(row)[k], gain * there);
+            }
+        }
+        // They are not all glued alike.
+        let gained = |workshop| gains(&[0, 1, 2, 3], &gluing, of_workshop(5, workshop));
+        assert!(!gained(0).eq(gained(1)) || !gained(1).eq(gained(2)));
+    }
 }

@@ -7,6 +7,7 @@ use std::ops::Range;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::as_built::WORKSHOPS;
 use crate::dataset::SignalMatrix;
 use crate::elasticity::Touch;
 use crate::mesh::TriMesh;
@@ -21,15 +22,12 @@ pub struct Press {
     pub made: Touch,
 }
 
-/// How often somebody calibrates: what once would do depends on how that hand was off.
-pub(super) const ROUNDS: u64 = 3;
-
 /// Presses, and what gauges read of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pressed {
-    /// Round by round, as many in each.
+    /// Workshop by workshop, as many on the gauges of each: what one would do depends on how that hand was off.
     pub presses: Vec<Press>,
-    /// Sites, as a workshop would build them, × presses; without noise.
+    /// Sites, as the workshop built them that is pressed, × presses; without noise.
     pub x: SignalMatrix,
 }
 
@@ -62,10 +60,10 @@ pub(super) fn by_hand(mesh: &TriMesh, asked: Vec<Touch>, hand: &Pressing, seed: 
 }
 
 impl Pressed {
-    /// The numbers of the presses of each round.
-    pub fn rounds(&self) -> impl Iterator<Item = Range<usize>> {
-        let each = self.presses.len() / ROUNDS as usize;
-        (0..ROUNDS as usize).map(move |k| k * each..(k + 1) * each)
+    /// The numbers of the presses on the gauges of each workshop.
+    pub fn of_each(&self) -> impl Iterator<Item = Range<usize>> {
+        let each = self.presses.len() / WORKSHOPS as usize;
+        (0..WORKSHOPS as usize).map(move |k| k * each..(k + 1) * each)
     }
 }
 

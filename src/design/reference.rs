@@ -26,14 +26,14 @@ pub struct Reference {
     pub drawn: Vec<Site>,
     /// Signals of these sites (sites × touches).
     pub x: SignalMatrix,
-    /// The same sites as a workshop would build them.
+    /// The same sites as workshops would build them, which take turns from touch to touch.
     pub workshop: SignalMatrix,
     /// How far off they are built, and all else that was known to be off when they were measured.
     pub off: Uncertainty,
     /// Length and width of the grids (m) that gauges read over; absent where they read at a point, as regressions
     /// learn from.
     pub grid: Option<[f64; 2]>,
-    /// Known presses on the gauges as built, where an estimator learns from them.
+    /// Known presses on the gauges of each workshop, where an estimator learns from them.
     pub pressed: Option<Pressed>,
 }
 

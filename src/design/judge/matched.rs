@@ -270,7 +270,7 @@ impl<'a> Set<'a> {
         }
     }
 
-    /// The estimator after the known presses of each round, where there are any.
+    /// The estimator after the known presses on the gauges of each workshop, where there are any.
     fn calibrated(&self, everywhere: &Everywhere) -> Vec<Matching> {
         let trial = self.trial;
         let Some(pressed) = &trial.reference.pressed else {
@@ -289,8 +289,8 @@ impl<'a> Set<'a> {
                 reading: reading(&x, k),
             }
         };
-        (pressed.rounds())
-            .map(|round| self.calibrated_by(&drawn, &round.map(known).collect::<Vec<_>>()))
+        (pressed.of_each())
+            .map(|presses| self.calibrated_by(&drawn, &presses.map(known).collect::<Vec<_>>()))
             .collect()
     }
 
@@ -366,8 +366,9 @@ fn errors_mm(matching: &Matching, x: &SignalMatrix, touches: &[Touch]) -> Vec<f6
     touches.map_init(|| matching.clone(), error).collect()
 }
 
-/// As [`errors_mm`] by several estimators that take turns from touch to touch: the mean over the touches is that over
-/// the estimators too, and each touch is looked for once, so that errors spread as those of one estimator do.
+/// As [`errors_mm`] by the estimators of several workshops' gauges, which take turns from touch to touch as the gauges do:
+/// the mean over the touches is that over the workshops too, and each touch is looked for once, so that errors spread as
+/// those of one estimator do.
 fn taking_turns(estimators: &[Matching], x: &SignalMatrix, touches: &[Touch]) -> Vec<f64> {
     let mut errors = vec![0.0; touches.len()];
     for (turn, matching) in estimators.iter().enumerate() {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::words::judged_on;
 use crate::design::curves::title_of;
-use crate::design::{BLIND, Design};
+use crate::design::{BLIND, Design, Pressed};
 use crate::evaluation::MatchedRow;
 use crate::io::svg::escape;
 
@@ -44,19 +44,16 @@ fn figures(r: &MatchedRow) -> String {
 /// How sets were judged, and every figure.
 pub(super) fn errors(page: &mut String, design: &Design) {
     let reference = &design.reference;
-    let pressed = (reference.pressed.as_ref()).map_or_else(String::new, |p| {
-        let rounds: Vec<usize> = p.rounds().map(|round| round.len()).collect();
-        let known = rounds.first().copied().unwrap_or_default();
-        match rounds.len() {
-            1 => format!("{known} known presses"),
-            many => {
-                format!("{known} known presses ({many} rounds of them take turns over the touches)")
-            }
-        }
-    });
+    let workshops = reference.pressed.iter().flat_map(Pressed::of_each);
+    let presses: Vec<usize> = workshops.map(|of_one| of_one.len()).collect();
+    let known = presses.first().copied().unwrap_or_default();
+    let turns = match presses.len() {
+        0 | 1 => String::new(),
+        many => format!("; gauges of {many} workshops take turns over the touches"),
+    };
     let _ = write!(
         page,
-        "<p>Each reading is matched with the model ({:.2} mm elements), which needs no training; judged on {} touches that no selection has seen, {}. “As built”: every gauge {}, of which the model knows no more than that. “Calibrated”: the same gauges after {pressed}, each made by hand {}. “Blind”: touches that move no gauge by more than {BLIND} times its noise.</p>",
+        "<p>Each reading is matched with the model ({:.2} mm elements), which needs no training; judged on {} touches that no selection has seen, {}. “As built”: every gauge {}, of which the model knows no more than that{turns}. “Calibrated”: the same gauges after {known} known presses, each made by hand {}. “Blind”: touches that move no gauge by more than {BLIND} times its noise.</p>",
         design.simulated.element_mm,
         reference.touches.len(),
         judged_on(design),
