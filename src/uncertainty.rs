@@ -7,7 +7,7 @@
 //! |---|---|
 //! | noise, resolution | a variance of each reading, the same for every touch |
 //! | gluing | by the reading's slopes over the gauge's place and direction, and by its gain: grows with the force |
-//! | elements | a share of the readings |
+//! | elements | as if each gauge was glued off its place and its gain was off: grows with the force |
 //! | tip | by the reading's slope over the tip's radius: grows with the force |
 //! | friction | by what a force along the surface reads there: grows with the force |
 //! | drift | common to all channels: a matrix of rank one beside the diagonal |
@@ -156,6 +156,9 @@ impl Pressing {
 /// What the elements are taken to leave, as a share of a reading, where nobody has estimated it.
 pub const UNESTIMATED: f64 = 0.03;
 
+/// How far a gauge is taken to be moved until it reads something else (m), where nobody knows.
+const LENGTH_SCALE: f64 = 8e-3;
+
 /// Everything that is known to be off (standard deviations).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Uncertainty {
@@ -166,8 +169,12 @@ pub struct Uncertainty {
     pub resolution: f64,
     /// How gauges are glued.
     pub gluing: Gluing,
-    /// What the elements leave, as a share of a reading, each gauge for itself.
+    /// What the elements leave, as a share of a load's largest strain: matching takes as much of readings for wrong, half
+    /// of the square from a channel's own and half from the mean of all.
     pub elements: f64,
+    /// What they leave of single gauges: as if they were glued off by so much. A choice goes by it, because it must know
+    /// which gauges are more off than others. Matching weighs by it no better (RESULTS.md, “What elements leave”).
+    pub as_glued: Gluing,
     /// Of the factor by which the part is stiffer or softer than its model.
     pub stiffness: f64,
     /// How touches come to be made.
@@ -189,6 +196,7 @@ impl Default for Uncertainty {
             resolution: 0.0,
             gluing: Gluing::default(),
             elements: UNESTIMATED,
+            as_glued: as_glued(UNESTIMATED, LENGTH_SCALE),
             stiffness: 0.0,
             making: Making::EXACT,
             allowed: 0.0,
@@ -205,6 +213,7 @@ impl Uncertainty {
         resolution: 0.0,
         gluing: Gluing::EXACT,
         elements: 0.0,
+        as_glued: Gluing::EXACT,
         stiffness: 0.0,
         making: Making::EXACT,
         allowed: 0.0,
@@ -216,12 +225,33 @@ impl Uncertainty {
     #[must_use]
     pub fn with_elements(self, percent: f64) -> Self {
         Self {
-            elements: if percent.is_nan() {
-                UNESTIMATED
-            } else {
-                (percent / 100.0).clamp(0.0, 1.0)
-            },
+            elements: share(percent),
             ..self
+        }
+    }
+
+    /// With what they are estimated to leave of single gauges, in percent of what these read, if they read something else
+    /// when they are moved by `length_scale` (m); not numbers where that is not known.
+    #[must_use]
+    pub fn with_elements_of_gauges(self, percent: f64, length_scale: f64) -> Self {
+        let known = length_scale.is_finite();
+        Self {
+            as_glued: as_glued(
+                share(percent),
+                if known { length_scale } else { LENGTH_SCALE },
+            ),
+            ..self
+        }
+    }
+
+    /// How far off gauges are by gluing and by elements.
+    #[must_use]
+    pub fn of_gauges(&self) -> Gluing {
+        let (glued, elements) = (&self.gluing, &self.as_glued);
+        Gluing {
+            place: glued.place.hypot(elements.place),
+            angle: glued.angle.hypot(elements.angle),
+            gain: glued.gain.hypot(elements.gain),
         }
     }
 
@@ -265,6 +295,25 @@ impl Uncertainty {
     pub fn builds_as(&self, other: &Self) -> bool {
         let built = |off: &Self| (off.gluing, off.making, off.allowed, off.drift, off.pressing);
         built(self) == built(other)
+    }
+}
+
+/// Of an estimate in percent, or where there is none.
+fn share(percent: f64) -> f64 {
+    if percent.is_nan() {
+        UNESTIMATED
+    } else {
+        (percent / 100.0).clamp(0.0, 1.0)
+    }
+}
+
+/// A share of the readings that elements leave: half of its square as a gain that is off and half as a place. That is how
+/// readings of finer elements differ (RESULTS.md, “What elements leave”).
+fn as_glued(share: f64, length_scale: f64) -> Gluing {
+    Gluing {
+        place: share * length_scale,
+        angle: 0.0,
+        gain: share / 2.0_f64.sqrt(),
     }
 }
 
@@ -333,6 +382,31 @@ mod tests {
         assert_eq!(off.with_elements(0.0).elements, 0.0);
         assert_eq!(off.with_elements(1e9).elements, 1.0);
         assert_eq!(off.with_elements(f64::INFINITY).elements, 1.0);
+        let with = |percent: f64| off.with_elements_of_gauges(percent, 5e-3).as_glued;
+        assert_eq!(with(f64::NAN), as_glued(UNESTIMATED, 5e-3));
+        assert_eq!(with(0.0), Gluing::EXACT);
+        assert_eq!(with(f64::INFINITY), as_glued(1.0, 5e-3));
+        assert_eq!(off.with_elements_of_gauges(f64::NAN, f64::NAN), off);
+        assert_eq!(off.with_elements_of_gauges(f64::NAN, f64::INFINITY), off);
+    }
+
+    #[test]
+    fn elements_leave_their_share_of_readings_that_change_over_their_length() {
+        let (share, length) = (0.04, 5e-3);
+        let exact = Uncertainty::NONE.with_elements_of_gauges(100.0 * share, length);
+        // A reading of one and slopes that bring it to nothing over the length, whichever way they lie.
+        let (sin, cos) = 0.7_f64.sin_cos();
+        let (along, across) = (cos / length, sin / length);
+        let variance = exact.of_gauges().variance(1.0, along, across, 9.0);
+        assert!((variance.sqrt() - share).abs() < 1e-12);
+        // Beside gluing, squares add.
+        let both = Uncertainty {
+            gluing: Gluing::default(),
+            ..exact
+        };
+        let sum = variance + Gluing::default().variance(1.0, along, across, 9.0);
+        let together = both.of_gauges().variance(1.0, along, across, 9.0);
+        assert!((together / sum - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -143,6 +143,23 @@ impl GluingSlopes {
         [&self.along, &self.across, &self.turned].map(|values| &values[site * count..][..count])
     }
 
+    /// How far gauges are moved until they read something else (m): the rms of what all of them read over that of what it
+    /// changes by; not a number where that is nothing. `row` is what a site reads of all touches.
+    #[must_use]
+    pub fn length_scale<'a>(&self, row: &(dyn Fn(usize) -> &'a [f64] + Sync)) -> f64 {
+        let squares = |site: usize| {
+            let readings = row(site);
+            let [along, across, _] = self.row(site);
+            let moved = along.iter().chain(across).map(|v| f64::from(*v).powi(2));
+            let read = self.touches.iter().map(|&touch| readings[touch].powi(2));
+            [read.sum::<f64>(), moved.sum::<f64>()]
+        };
+        let sites = self.along.len() / self.touches.len().max(1);
+        let all: Vec<[f64; 2]> = (0..sites).into_par_iter().map(squares).collect();
+        let [read, moved] = [0, 1].map(|k| all.iter().map(|squares| squares[k]).sum::<f64>());
+        (read / moved).sqrt()
+    }
+
     /// Variance that gluing puts on a site's reading of the touch of a column; `reading` is what it reads as drawn.
     #[must_use]
     pub fn variance(&self, site: usize, column: usize, reading: f64, gluing: &Gluing) -> f64 {
@@ -221,6 +238,16 @@ mod tests {
         let expected = 9.0 + 900.0 + 9e4 + 4.0;
         assert!((slopes.variance(1, 1, 4.0, &gluing) - expected).abs() < 1e-6);
         assert_eq!(slopes.select_rows(&[1]).row(0), slopes.row(1));
+        // Both touches of both sites: 4 + 9 + 16 + 25 read, over 14 and a hundred times as much across.
+        let mut x = [1e3; 2 * 9];
+        for (at, read) in [(3, 2.0), (8, -3.0), (9 + 3, 4.0), (9 + 8, 5.0)] {
+            x[at] = read;
+        }
+        let scale = slopes.length_scale(&|site| &x[9 * site..][..9]);
+        assert!(
+            (scale - (54.0_f64 / 1414.0).sqrt()).abs() < 1e-12,
+            "{scale}"
+        );
         assert_eq!(slopes.select_rows(&[1, 0]).touches(), [3, 8]);
     }
 }

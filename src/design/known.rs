@@ -11,7 +11,7 @@ use crate::placement::expected_error::{
     Detail, Forces, Knowledge, NUISANCES, Scene, Shared, Variance, expected,
 };
 use crate::project::Project;
-use crate::uncertainty::{Making, Uncertainty};
+use crate::uncertainty::{Gluing, Making, Uncertainty};
 
 /// A few sites are looked at in more detail than a choice among thousands can.
 pub(super) const FINE: Detail = Detail {
@@ -64,13 +64,12 @@ impl<'a> Known<'a> {
         site: usize,
         touch: usize,
     ) -> f64 {
-        let elements = (self.off.elements * reading).powi(2);
-        let column = |slopes: &GluingSlopes| slopes.touches().binary_search(&touch).ok();
-        let glued = changes.and_then(|slopes| {
-            let gluing = &self.off.gluing;
-            Some(slopes.variance(site, column(slopes)?, reading, gluing))
+        let off = &self.off.of_gauges();
+        let known = changes.and_then(|slopes| {
+            let column = slopes.touches().binary_search(&touch).ok()?;
+            Some(slopes.variance(site, column, reading, off))
         });
-        elements + glued.unwrap_or(0.0)
+        known.unwrap_or_else(|| off.variance(reading, 0.0, 0.0, 0.0))
     }
 
     /// What the way a touch is made puts on the signals of all sites together: of one of them (as numbered in the dataset).
@@ -151,7 +150,11 @@ fn density(inputs: &Inputs, simulated: &Simulated) -> Option<Vec<f64>> {
 pub(super) fn off(project: &Project, simulated: &Simulated) -> Uncertainty {
     let off = project.uncertainty();
     match simulated.dataset.signal {
-        Signal::Strain => off.with_elements(simulated.discretization.strain_percent),
+        Signal::Strain => {
+            let left = &simulated.discretization;
+            off.with_elements(left.strain_percent)
+                .with_elements_of_gauges(left.reading_percent, simulated.length_scale)
+        }
         Signal::Displacement | Signal::NormalDisplacement => Uncertainty {
             noise: 0.0,
             resolution: 0.0,
@@ -159,6 +162,7 @@ pub(super) fn off(project: &Project, simulated: &Simulated) -> Uncertainty {
             making: Making::EXACT,
             allowed: 0.0,
             elements: 0.0,
+            as_glued: Gluing::EXACT,
             ..off
         },
     }

@@ -38,6 +38,8 @@ pub struct Simulated {
     pub carried: Vec<SurfacePoint>,
     /// How far the model is from converged.
     pub discretization: Discretization,
+    /// How far gauges are moved until they read something else (m): see [`dataset::GluingSlopes::length_scale`].
+    pub length_scale: f64,
     /// Where the sites lie on the mesh.
     pub points: Vec<SurfacePoint>,
     /// What lies before and behind the sites of a solid.
@@ -322,6 +324,9 @@ fn read(
         held,
         carried,
         discretization: estimate,
+        length_scale: (dataset.slopes.as_ref()).map_or(f64::NAN, |slopes| {
+            slopes.length_scale(&|site| dataset.x.row(site))
+        }),
         points,
         surroundings,
         lattice: dataset.sites.len(),

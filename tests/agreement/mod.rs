@@ -123,14 +123,18 @@ impl Trial {
         }
     }
 
-    /// Of one set: gauges glued anew for every touch, noise, and a share of the readings that the elements leave.
+    /// Of one set: gauges glued anew for every touch, what the elements leave, which is as if they were glued off, and noise.
     fn matched(&self, sensing: &Sensing, force: f64, touched: Touched) -> f64 {
         let project = &self.inputs.project;
-        let (gluing, noise) = (project.gluing(), project.gauge.noise_microstrain * 1e-6);
-        let share = self.simulated.discretization.strain_percent / 100.0;
+        let noise = project.gauge.noise_microstrain * 1e-6;
+        let left = &self.simulated.discretization;
+        let length_scale = self.simulated.length_scale;
+        let off =
+            (project.uncertainty()).with_elements_of_gauges(left.reading_percent, length_scale);
+        let gluing = off.of_gauges();
         let drawn = &sensing.drawn;
         let errors = Errors {
-            relative: share,
+            relative: left.strain_percent / 100.0,
             deviations: Some(sensing.deviations.clone()),
             ..Errors::of_noise(noise, sensing.gauges.len())
         };
@@ -148,8 +152,7 @@ impl Trial {
                     let moved = place * normal(&mut rng) * changes[0][c]
                         + place * normal(&mut rng) * changes[1][c]
                         + gluing.angle.to_degrees() * normal(&mut rng) * changes[2][c];
-                    let clean = force * (gain * map[c] + moved);
-                    clean * (1.0 + share * normal(&mut rng)) + noise * normal(&mut rng)
+                    force * (gain * map[c] + moved) + noise * normal(&mut rng)
                 })
                 .collect();
             let found = matching.find(&reading);

@@ -425,6 +425,7 @@ fn a_solid_that_gives_way_by_its_own_size_is_no_small_deformation() {
         displacement_mm,
         displacement_percent: 2.0,
         strain_percent: 1.0,
+        reading_percent: 1.0,
         loads: 1,
         places: 1,
     };

@@ -273,6 +273,7 @@ fn what_bounds_the_elements_is_what_is_to_be_changed() {
         displacement_mm: 0.1,
         displacement_percent: 9.0,
         strain_percent: 20.0,
+        reading_percent: 20.0,
         loads: 20,
         places: 100,
     };
