@@ -53,7 +53,7 @@ impl Ellipse {
     fn of(a: f64, b: f64, c: f64) -> Self {
         Self {
             middle: f64::midpoint(a, c),
-            half: ((a - c) / 2.0).hypot(b),
+            half: (((a - c) / 2.0).powi(2) + b * b).sqrt(),
         }
     }
 
@@ -79,6 +79,8 @@ fn second_kind(m: f64) -> f64 {
 fn first_kind(m: f64) -> (f64, f64) {
     /// More than enough for doubles: the difference squares at every step.
     const STEPS: usize = 6;
+    /// What is left after a difference like this is rounding.
+    const SMALL: f64 = 1e-9;
     let (mut a, mut g) = (1.0, (1.0 - m).sqrt());
     let (mut tail, mut power) = (0.0, 1.0);
     for _ in 0..STEPS {
@@ -86,6 +88,9 @@ fn first_kind(m: f64) -> (f64, f64) {
         (a, g) = (f64::midpoint(a, g), (a * g).sqrt());
         tail += power * c * c;
         power *= 2.0;
+        if c < SMALL {
+            break;
+        }
     }
     (FRAC_PI_2 / a, tail)
 }

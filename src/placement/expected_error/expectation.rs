@@ -23,6 +23,9 @@ pub(super) struct Expectation<'a> {
     scenes: &'a Scenes,
     /// The first gauges of a set in which one gauge after the other is exchanged.
     begun: Option<(Vec<usize>, Banks<'a>)>,
+    /// For each gauge of a set that was exchanged, the places that were promising for it when it was looked at first: the
+    /// others have hardly changed since then.
+    promising: Vec<Option<Vec<usize>>>,
     pool: &'a Pool<'a>,
     request: &'a Request<'a>,
     losses: Option<Losses>,
@@ -135,6 +138,7 @@ impl<'a> Expectation<'a> {
         Self {
             scenes,
             begun: None,
+            promising: Vec::new(),
             pool,
             request,
             losses: Losses::of(request.constraints, seed),
@@ -187,28 +191,60 @@ impl<'a> Expectation<'a> {
         around
     }
 
-    /// The criterion (mm) with the gauge of a number at some places more: at those that are promising in coarse detail,
-    /// and where gauges may be lost, without that; at one to be `kept` in any case. `worth` says how much a gain counts.
+    /// Those of the open places that are promising in coarse detail, in their order; one is `kept` in any case. `worth` says
+    /// how much a gain counts.
     ///
     /// What is saved by that is worth more in presses: sets are chosen by rare touches that are taken for far ones, and
     /// few presses are soon fitted.
+    fn promising(
+        &self,
+        banks: &Banks,
+        chosen: usize,
+        (open, kept): (&[usize], Option<usize>),
+        worth: &dyn Fn(usize, f64) -> f64,
+    ) -> Result<Vec<usize>, Cancelled> {
+        if open.len() <= PROMISING {
+            return Ok(open.to_vec());
+        }
+        let screened = self.look(&banks.coarse, open, chosen)?;
+        let promising = foremost(screened, banks.coarse.error(), (worth, kept), PROMISING);
+        let mut places: Vec<usize> = promising.into_iter().map(|p| p.0).collect();
+        places.sort_unstable();
+        Ok(places)
+    }
+
+    /// The promising places for the gauge of a number that is to be exchanged.
+    fn promising_for(
+        &mut self,
+        banks: &Banks,
+        (others, number): (&Field, usize),
+        here: usize,
+    ) -> Result<Vec<usize>, Cancelled> {
+        let open = others.open();
+        if self.promising.len() <= number {
+            self.promising.resize(number + 1, None);
+        }
+        if let Some(known) = &self.promising[number] {
+            let still = |place: &usize| *place == here || open.binary_search(place).is_ok();
+            return Ok(known.iter().copied().filter(still).collect());
+        }
+        // None of the open ones is dearer than what it replaces.
+        let gain = |_: usize, gain: f64| gain;
+        let places = self.promising(banks, others.chosen.len(), (&open, Some(here)), &gain)?;
+        self.promising[number] = Some(places.clone());
+        Ok(places)
+    }
+
+    /// The criterion (mm) with the gauge of a number at some places more; where gauges may be lost, at those of them that
+    /// are promising without that.
     fn scan(
         &self,
         banks: &Banks,
         (others, number): (&[usize], usize),
-        (open, kept): (&[usize], Option<usize>),
+        (places, kept): (&[usize], Option<usize>),
         worth: &dyn Fn(usize, f64) -> f64,
     ) -> Result<Vec<(usize, f64)>, Cancelled> {
-        let look = |bank: &Bank, places: &[usize]| self.look(bank, places, others.len());
-        let errors = if open.len() <= PROMISING {
-            look(&banks.fine, open)?
-        } else {
-            let screened = look(&banks.coarse, open)?;
-            let promising = foremost(screened, banks.coarse.error(), (worth, kept), PROMISING);
-            let mut places: Vec<usize> = promising.into_iter().map(|p| p.0).collect();
-            places.sort_unstable();
-            look(&banks.fine, &places)?
-        };
+        let errors = self.look(&banks.fine, places, others.len())?;
         match &self.losses {
             None => Ok(errors),
             Some(losses) => {
@@ -317,10 +353,10 @@ impl Criterion for Expectation<'_> {
     ) -> Result<Option<(usize, f64)>, PlacementError> {
         let here = set[number];
         let banks = self.around(&others.chosen, number);
-        // None of the open ones is dearer than what it replaces.
+        let places = self.promising_for(&banks, (others, number), here)?;
         let gain = |_: usize, gain: f64| gain;
-        let open = (&others.open()[..], Some(here));
-        let errors = self.scan(&banks, (&others.chosen, number), open, &gain)?;
+        let places = (&places[..], Some(here));
+        let errors = self.scan(&banks, (&others.chosen, number), places, &gain)?;
         let now = errors.iter().find(|(place, _)| *place == here);
         let value = now.map_or(f64::INFINITY, |(_, error)| *error);
         let best = errors.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
@@ -335,10 +371,12 @@ impl Criterion for Expectation<'_> {
         let mut banks = Banks::new(self.scenes);
         let mut sets: Vec<SensorSet> = Vec::new();
         let mut before = self.error(&[])?;
+        self.promising.clear();
         while !field.full() && !reached(&sets, self.request.constraints) {
             let others = (&field.chosen[..], field.chosen.len());
             let worth = |place: usize, gain: f64| field.worth(place, gain);
-            let errors = self.scan(&banks, others, (&field.open(), None), &worth)?;
+            let places = self.promising(&banks, others.1, (&field.open(), None), &worth)?;
+            let errors = self.scan(&banks, others, (&places, None), &worth)?;
             let mut best = Best::default();
             for (place, error) in errors {
                 best.offer(place, field.worth(place, before - error));
