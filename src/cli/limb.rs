@@ -73,14 +73,21 @@ pub fn run(args: &LimbArgs) -> anyhow::Result<()> {
     }
 }
 
+/// Seed of the draws that the example's gauges are chosen by. Sets of other draws are expected to be as little off, but a
+/// choice asks for nothing else: how well they tell two fingers apart and feel light touches under a drift differs from
+/// set to set, and the example is one that does both well (RESULTS.md, “Ten gauges are not ten gauges”).
+const EXAMPLE_SEED: u64 = 2;
+
 /// Ten sites by a Draft design, as the project chooses them.
 fn choose_sites(
     project: &Project,
     mesh: crate::mesh::TriMesh,
 ) -> anyhow::Result<Vec<crate::project::ChosenSite>> {
     use crate::budget::{Quality, unwatched};
+    let mut project = project.clone();
+    project.budget.seed = EXAMPLE_SEED;
     let inputs = Inputs {
-        project: project.clone(),
+        project,
         part: Arc::new(mesh),
         painted: None,
         masks: Masks::new(),
@@ -93,7 +100,7 @@ fn choose_sites(
         &inputs,
         &simulated,
         &reduced,
-        project.selection.selector,
+        inputs.project.selection.selector,
         &budget,
         &unwatched,
     )?;

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, LazyLock};
 
+use crate::gauges;
 use hapdef::board::{ChannelFault, Faults, Illness, Press, RAMP_S, Script, SimulatedBoard, Truth};
 use hapdef::budget::{Quality, unwatched};
 use hapdef::design::simulated_board as board;
@@ -27,7 +28,8 @@ pub struct Lab {
 
 pub fn lab() -> &'static Lab {
     static LAB: LazyLock<Lab> = LazyLock::new(|| {
-        let inputs = hapdef::cli::bundled().unwrap().inputs;
+        let mut inputs = hapdef::cli::bundled().unwrap().inputs;
+        inputs.project.selection.sites = gauges::sites();
         let sensing = design::sensing(&inputs, &Quality::Draft.budget(), &unwatched).unwrap();
         Lab { inputs, sensing }
     });

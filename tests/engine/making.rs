@@ -3,6 +3,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use crate::gauges;
 use glam::DVec3;
 use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::dataset::{self, Signal};
@@ -234,7 +235,8 @@ fn found_of(sensing: &Sensing, touches: &[Touch], aside: f64, off: &Uncertainty)
 
 #[test]
 fn a_finger_that_pushes_aside_is_found_with_its_direction() {
-    let inputs = coarse::limb();
+    let mut inputs = coarse::limb();
+    inputs.project.selection.sites = gauges::sites();
     let sensing = design::sensing(&inputs, &budget(), &unwatched).unwrap();
     let touches = sensing.touches(&inputs, 300, 5, false).unwrap();
     let off = Uncertainty {

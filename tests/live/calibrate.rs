@@ -146,7 +146,7 @@ fn presses_by_hand_show_how_gauges_are_glued() {
     let before = error(&others, None, &at("before.csv"));
     let after = error(&others, Some(&at("found.hapdef.toml")), &at("after.csv"));
     println!("{before:.2} mm before, {after:.2} mm after");
-    assert!(after < 0.8 && after < 0.8 * before);
+    assert!(after < 1.0 && after < 0.6 * before);
 
     // Nothing goes over a project that is none, and too few presses are none.
     script(&at("few.csv"), &known[..3], 10.0);
