@@ -296,6 +296,7 @@ impl SimulatedBoard {
         let strain = self.strain(pushes);
         let step = (seconds - self.read_s).max(0.0);
         self.read_s = seconds;
+        self.disturbed.pass(step);
         let mut felt: Vec<f64> = (0..self.options.channels)
             .map(|c| {
                 let dead = self.faults.illness(c, seconds) == Some(Illness::Dead);

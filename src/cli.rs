@@ -41,7 +41,12 @@ pub use crate::io::opening::{bundled, open};
 ///
 /// Without a command it opens the studio on the bundled limb, or on a project or mesh.
 #[derive(Parser, Debug)]
-#[command(name = "hapdef", version, args_conflicts_with_subcommands = true)]
+#[command(
+    name = "hapdef",
+    version,
+    args_conflicts_with_subcommands = true,
+    mut_subcommands(signed)
+)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -96,6 +101,18 @@ pub enum Command {
     Study(study::StudyArgs),
     /// What a project file may hold: every key with its unit, range, default and meaning.
     Keys(keys::KeysArgs),
+}
+
+/// Takes numbers below zero for values: what is out of range is told with the range, not as an option that there is not.
+fn signed(command: clap::Command) -> clap::Command {
+    let own = command.mut_args(|arg| {
+        if arg.is_positional() || !arg.get_action().takes_values() {
+            arg
+        } else {
+            arg.allow_negative_numbers(true)
+        }
+    });
+    own.mut_subcommands(signed)
 }
 
 /// Gigabytes that can be meant.

@@ -4,7 +4,6 @@
 
 mod advise;
 mod as_built;
-mod as_made;
 mod by_hand;
 mod choose;
 pub mod curves;

@@ -325,6 +325,9 @@ mod tests {
         let drifting = |p: &mut Project| p.gauge.drift_microstrain = 2.0;
         let by_machine = |p: &mut Project| p.calibration.place_mm = 0.0;
         assert_eq!(stale(knows, drifting), [false, true, true]);
+        let poor = |p: &mut Project| p.live.model_error = 0.1;
+        assert_eq!(stale(knows, poor), [false, true, true]);
+        assert_eq!(stale(other, poor), [false, false, true]);
         // What only the judge's estimator knows.
         assert_eq!(stale(knows, by_machine), [false, false, true]);
         // What readings change by is simulated as soon as touches are made otherwise, by however much.

@@ -52,6 +52,7 @@
 // Every public item of the core says what it is: the compiler holds that. What lies around it is for the program alone.
 #![warn(missing_docs)]
 
+mod as_made;
 pub mod bench;
 pub mod board;
 mod bounds;

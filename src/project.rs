@@ -256,6 +256,7 @@ impl Project {
             noise: self.gauge.noise_microstrain * MICRO,
             resolution: self.gauge.resolution_microstrain * MICRO,
             gluing: self.gluing(),
+            model: self.live.model_error_of_any(),
             stiffness: self.live.stiffness_percent / 100.0,
             making: self.making(),
             allowed: self.live.friction_percent / 100.0,

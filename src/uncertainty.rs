@@ -172,6 +172,8 @@ pub struct Uncertainty {
     /// What the elements leave, as a share of a load's largest strain: matching takes as much of readings for wrong, half
     /// of the square from a channel's own and half from the mean of all.
     pub elements: f64,
+    /// What the model is known to be off by whatever its elements are, as a share of a reading: both of the above are no less.
+    pub model: f64,
     /// What they leave of single gauges: as if they were glued off by so much. A choice goes by it, because it must know
     /// which gauges are more off than others. Matching weighs by it no better (RESULTS.md, “What elements leave”).
     pub as_glued: Gluing,
@@ -196,6 +198,7 @@ impl Default for Uncertainty {
             resolution: 0.0,
             gluing: Gluing::default(),
             elements: UNESTIMATED,
+            model: 0.0,
             as_glued: as_glued(UNESTIMATED, LENGTH_SCALE),
             stiffness: 0.0,
             making: Making::EXACT,
@@ -213,6 +216,7 @@ impl Uncertainty {
         resolution: 0.0,
         gluing: Gluing::EXACT,
         elements: 0.0,
+        model: 0.0,
         as_glued: Gluing::EXACT,
         stiffness: 0.0,
         making: Making::EXACT,
@@ -221,11 +225,12 @@ impl Uncertainty {
         pressing: Pressing::EXACT,
     };
 
-    /// With what the elements are estimated to leave, in percent of the strain; not a number where that is not known.
+    /// With what the elements are estimated to leave, in percent of the strain; not a number where that is not known. No less
+    /// than the model is known to be off by.
     #[must_use]
     pub fn with_elements(self, percent: f64) -> Self {
         Self {
-            elements: share(percent),
+            elements: share(percent).max(self.model),
             ..self
         }
     }
@@ -237,7 +242,7 @@ impl Uncertainty {
         let known = length_scale.is_finite();
         Self {
             as_glued: as_glued(
-                share(percent),
+                share(percent).max(self.model),
                 if known { length_scale } else { LENGTH_SCALE },
             ),
             ..self

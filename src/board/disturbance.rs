@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use rand::RngExt;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::draw::normal;
@@ -14,6 +14,9 @@ pub struct Disturbances {
     pub hum: Option<(f64, f64)>,
     /// What all channels drift by together, as a part that is warmed (strain in a second).
     pub warming: f64,
+    /// What all channels are off by together as it comes and goes (strain, standard deviation), and the time (s) in which
+    /// it does.
+    pub wander: Option<(f64, f64)>,
     /// What each channel drifts by alone: standard deviation of its speed (strain in a second).
     pub warming_apart: f64,
     /// Share of a strain that follows later, and the time (s) in which it does: the plastic under a gauge creeps.
@@ -31,6 +34,9 @@ pub(super) struct Disturbed {
     speeds: Vec<f64>,
     /// What has crept so far (strain).
     crept: Vec<f64>,
+    /// How far all have wandered (strain), and what draws the next step.
+    wandered: f64,
+    steps: ChaCha8Rng,
 }
 
 impl Disturbed {
@@ -42,14 +48,25 @@ impl Disturbed {
                 .map(|_| what.warming + what.warming_apart * normal(rng))
                 .collect(),
             crept: vec![0.0; channels],
+            wandered: 0.0,
+            steps: ChaCha8Rng::from_rng(rng),
             what,
+        }
+    }
+
+    /// So long (s) goes by: what all channels wander by follows an Ornstein–Uhlenbeck process, which begins at rest.
+    pub fn pass(&mut self, step: f64) {
+        if let Some((deviation, time)) = self.what.wander {
+            let kept = (-step / time).exp();
+            let drawn = deviation * (1.0 - kept * kept).sqrt() * normal(&mut self.steps);
+            self.wandered = kept * self.wandered + drawn;
         }
     }
 
     /// What channel `c` feels (strain) at a time (s), so long (s) after its last reading, where the part strains it by
     /// `felt`.
     pub fn felt(&mut self, c: usize, felt: f64, seconds: f64, step: f64) -> f64 {
-        let mut strain = felt + self.speeds[c] * seconds;
+        let mut strain = felt + self.wandered + self.speeds[c] * seconds;
         if let Some((amplitude, hertz)) = self.what.hum {
             strain += amplitude * (TAU * hertz * seconds + self.phases[c]).sin();
         }
@@ -77,7 +94,6 @@ impl Disturbed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::SeedableRng;
 
     fn disturbed(what: Disturbances) -> Disturbed {
         Disturbed::new(what, 3, &mut ChaCha8Rng::seed_from_u64(1))
@@ -127,6 +143,29 @@ mod tests {
             let most = read[..20].iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             assert!((4.9e-6..5.1e-6).contains(&most), "{most}");
         }
+    }
+
+    #[test]
+    fn all_channels_wander_together_as_far_as_is_said_and_back() {
+        let (deviation, time) = (4e-6, 10.0);
+        let mut wandering = disturbed(Disturbances {
+            wander: Some((deviation, time)),
+            ..Disturbances::default()
+        });
+        let read: Vec<f64> = (0..40_000)
+            .map(|_| {
+                wandering.pass(1.0);
+                let [first, last] = [0, 2].map(|c| wandering.felt(c, 0.0, 0.0, 1.0));
+                assert_eq!(first, last);
+                first
+            })
+            .collect();
+        let apart = |lag: usize| {
+            let pairs = read.iter().zip(&read[lag..]);
+            pairs.map(|(a, b)| a * b).sum::<f64>() / (read.len() - lag) as f64
+        };
+        assert!((apart(0).sqrt() / deviation - 1.0).abs() < 0.1);
+        assert!((apart(10) / apart(0) - (-1.0_f64).exp()).abs() < 0.1);
     }
 
     #[test]

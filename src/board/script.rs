@@ -6,7 +6,9 @@ use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::as_made::made;
 use crate::elasticity::{Push, Touch};
+use crate::uncertainty::Making;
 
 /// One press: the force rises, stays and falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +67,8 @@ pub struct Random {
     places: Vec<Touch>,
     drawn: Drawn,
     rng: ChaCha8Rng,
+    /// Of how presses are made: where and how hard they press is the same whatever that is.
+    of_making: ChaCha8Rng,
     number: usize,
     press: Press,
 }
@@ -78,22 +82,27 @@ pub struct Drawn {
     pub ramps: [f64; 2],
     /// How far they may push aside (degrees), in any direction.
     pub tilt_deg: f64,
+    /// How far off they are made beside that.
+    pub making: Making,
 }
 
 impl Drawn {
-    /// Straight presses with forces between two (N).
+    /// Presses with forces between two (N), made as far off as is usual.
     #[must_use]
-    pub fn straight(forces: [f64; 2]) -> Self {
+    pub fn usual(forces: [f64; 2], making: Making) -> Self {
         Self {
             forces,
             ramps: [RAMP_S; 2],
             tilt_deg: 0.0,
+            making,
         }
     }
 }
 
 /// Of rising and of falling (s), where nothing else is said.
 pub const RAMP_S: f64 = 0.08;
+/// Beside the seed of the script.
+const OF_MAKING: u64 = 0x3a8e;
 /// Seconds before anything is touched, so that there is time for a tare.
 const FIRST_S: f64 = 3.0;
 
@@ -115,6 +124,7 @@ impl Script {
             places,
             drawn,
             rng: ChaCha8Rng::seed_from_u64(seed),
+            of_making: ChaCha8Rng::seed_from_u64(seed ^ OF_MAKING),
             number: 0,
         };
         random.draw(FIRST_S);
@@ -187,6 +197,7 @@ impl Random {
             let towards = 360.0 * self.rng.random::<f64>();
             self.press.aside = aside(place.normal, DVec3::Z, tilt, towards);
         }
+        self.press = self.press.made(&self.drawn.making, &mut self.of_making);
     }
 }
 
@@ -205,6 +216,17 @@ pub fn aside(normal: DVec3, up: DVec3, tilt_deg: f64, towards_deg: f64) -> DVec3
 }
 
 impl Press {
+    /// The same as it comes to be made.
+    fn made(self, making: &Making, rng: &mut ChaCha8Rng) -> Self {
+        let push = made(&self.touch, making, rng);
+        let drag = push.force - Push::from(&self.touch).force;
+        Self {
+            touch: push.touch,
+            aside: self.aside + drag / self.touch.force,
+            ..self
+        }
+    }
+
     /// Its push at a time; nothing before and after it.
     fn at(&self, seconds: f64) -> Option<Push> {
         let force = self.touch.force * self.share(seconds);
@@ -292,6 +314,7 @@ mod tests {
             forces: [2.0, 3.0],
             ramps: [0.002, 0.08],
             tilt_deg: 20.0,
+            making: Making::EXACT,
         };
         let mut script = Script::random(vec![touch(1.0)], drawn, 7);
         let (mut most, mut seen) = (0.0_f64, 0);
@@ -306,5 +329,38 @@ mod tests {
             seen > 10_000 && (15.0..20.0).contains(&most),
             "{seen} {most}"
         );
+    }
+
+    #[test]
+    fn presses_are_made_as_far_off_as_is_usual_and_no_others_are_drawn_for_it() {
+        let drawn = |making: Making| {
+            let script = Script::random(vec![touch(1.0)], Drawn::usual([2.0, 8.0], making), 7);
+            let Script::Random(mut random) = script else {
+                panic!()
+            };
+            let presses = (0..4000).map(|k| {
+                random.draw(f64::from(k));
+                random.press
+            });
+            presses.collect::<Vec<Press>>()
+        };
+        let exact = drawn(Making::EXACT);
+        let off = drawn(Making {
+            tip: 0.5e-3,
+            friction: 0.2,
+        });
+        let mean = |of: fn(&Press) -> f64| off.iter().map(of).sum::<f64>() / off.len() as f64;
+        let friction = mean(|p| p.aside.length_squared()).sqrt();
+        let tip = mean(|p| (p.touch.tip_radius - 5e-3).powi(2)).sqrt();
+        assert!((friction - 0.2).abs() < 0.01, "{friction}");
+        assert!((tip - 0.5e-3).abs() < 0.02e-3, "{tip}");
+        for (exact, off) in exact.iter().zip(&off) {
+            assert_eq!(exact.aside, DVec3::ZERO);
+            assert_eq!(exact.touch.force, off.touch.force);
+            assert_eq!(
+                (exact.start_s, exact.duration_s),
+                (off.start_s, off.duration_s)
+            );
+        }
     }
 }

@@ -41,7 +41,11 @@ pub fn run(args: &BoardArgs) -> anyhow::Result<()> {
     let plan = Plan::new(args, &loaded.inputs)?;
     let (failed, failures) = channel();
     let mut truth = match &args.truth {
-        Some(path) => Some(TruthFile::create(path, plan.says_more(args), failed)?),
+        Some(path) => Some(TruthFile::create(
+            path,
+            plan.says_more(args, &loaded.inputs.project.making()),
+            failed,
+        )?),
         None => None,
     };
     let outlet = Outlet::open(args, &plan)?;
@@ -192,22 +196,24 @@ fn build(
                 forces: [args.force[0], args.force[1]],
                 ramps: [args.ramp[0] * 1e-3, args.ramp[1] * 1e-3],
                 tilt_deg: args.tilt,
+                making: args.making(&inputs.project.making()),
             },
             script_seed(seed),
         ),
     };
     let hardest = strongest(&script).unwrap_or(args.force[1]);
+    let usual = options(inputs, plan.channels);
     let options = Options {
         rate_hz: args.rate,
         noise: args.noise.unwrap_or(inputs.project.gauge.noise_microstrain) * 1e-6,
         drift: args.drift * 1e-6,
-        disturbances: args.disturbed.disturbances(),
+        disturbances: args.disturbed.disturbances(&usual.disturbances),
         chain: Chain {
             bits: args.bits,
             gain: args.gain.unwrap_or(Chain::default().gain),
             ..Chain::default()
         },
-        ..options(inputs, plan.channels)
+        ..usual
     };
     Ok(simulated(
         inputs,

@@ -8,7 +8,7 @@ use clap::Args;
 use super::common::{Common, SelectorArg, prepare_folder};
 use super::{out, progress::Bar};
 use crate::design::{self, Design};
-use crate::evaluation::{BASELINE, EvaluationRow};
+use crate::evaluation::{BASELINE, EvaluationRow, MatchedRow};
 use crate::io::artifacts::{self, Provenance};
 use crate::io::together::Together;
 use crate::paper::Format;
@@ -162,14 +162,28 @@ fn print_forces(design: &Design, chosen: usize) -> anyhow::Result<()> {
         let calibrated = row.calibrated_mm;
         let calibrated = calibrated.map_or(String::new(), |mm| format!(", {mm:.2} mm calibrated"));
         out::line(&format!(
-            "touches of {} N, by matching: {:.2} mm mean as drawn, {:.2} mm as built{calibrated}",
-            row.force_n, row.error_mm, row.as_built_mm
+            "touches of {} N, by matching: {:.2} mm mean as drawn{}, {:.2} mm as built{calibrated}",
+            row.force_n,
+            row.error_mm,
+            without_blind(row),
+            row.as_built_mm
         ))?;
     }
     if let Some(force) = design.evaluation.judging.middle_n() {
         out::line(&format!("touches of {force} N:"))?;
     }
     Ok(())
+}
+
+/// The error of the touches that are felt, where many are not.
+fn without_blind(row: &MatchedRow) -> String {
+    /// Share of the touches.
+    const MANY: f64 = 0.01;
+    let sighted = row.sighted_mm.filter(|_| row.blind >= MANY);
+    sighted.map_or(String::new(), |mm| {
+        let percent = 100.0 * row.blind;
+        format!(" ({mm:.2} mm without the {percent:.0} % that move no gauge)")
+    })
 }
 
 fn print_gauges(design: &Design) -> anyhow::Result<()> {

@@ -7,13 +7,13 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::as_built::{WORKSHOPS, gains, of_workshop, sites_as_built};
-use super::as_made::as_made;
 use super::drawn::{gauge_at, proposed};
 use super::known;
 use super::layout::test_touches;
 use super::presses::{self, Press, Pressed};
 use super::reference::{Reference, grid, regions};
 use super::{DesignError, Inputs, MADE_SEED, NOISE_SEED, PRESS_SEED, Reduced, Simulated};
+use crate::as_made::as_made;
 use crate::budget::{Budget, Cancelled, Watch, Work};
 use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
 use crate::elasticity::Model;

@@ -228,13 +228,15 @@ impl Design {
         notes
     }
 
-    /// All words, those that may change a decision first; at most three of them are to be read at once.
+    /// All words, those that may change a decision first; at most three of them are to be read at once, and where there are
+    /// doubts, those before them.
     #[must_use]
     pub fn words(&self) -> Words {
         /// More than that nobody reads before a decision.
         const OPEN: usize = 3;
         let mut open = self.cautions();
-        let mut folded = open.split_off(open.len().min(OPEN));
+        let room = OPEN.saturating_sub(self.doubts().len());
+        let mut folded = open.split_off(open.len().min(room));
         folded.extend(self.notes());
         Words { open, folded }
     }

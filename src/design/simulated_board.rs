@@ -3,9 +3,9 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::as_made::as_made;
 use super::presses::{self, Press};
 use super::{DesignError, Inputs, PRESS_SEED, Sensing, Workshop};
+use crate::as_made::as_made;
 use crate::board::{Disturbances, Faults, Options, Script, SimulatedBoard, fitting_gain};
 use crate::budget::Watch;
 use crate::draw::normal;
@@ -14,6 +14,9 @@ use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Push, Touch};
 use crate::inference::calibration::noise_of_mean;
 use crate::inference::{Chain, Known};
+
+/// In which what all channels drift by comes and goes (s).
+const WANDER_S: f64 = 10.0;
 
 /// What a simulated board of a project is like where nothing else is asked for.
 #[must_use]
@@ -26,9 +29,17 @@ pub fn options(inputs: &Inputs, channels: usize) -> Options {
         noise: inputs.project.gauge.noise_microstrain * 1e-6,
         drift: 0.1e-6,
         offset: 100e-6,
-        disturbances: Disturbances::default(),
+        disturbances: wandering(inputs.project.uncertainty().drift),
         tip_n: None,
         name: "Simulated board".into(),
+    }
+}
+
+/// What all channels drift by together, as it comes and goes.
+fn wandering(drift: f64) -> Disturbances {
+    Disturbances {
+        wander: (drift > 0.0).then_some((drift, WANDER_S)),
+        ..Disturbances::default()
     }
 }
 

@@ -58,6 +58,7 @@ struct Off {
     tip_tolerance_mm: f64,
     friction_percent: f64,
     allowed_percent: f64,
+    model_error: f64,
 }
 
 impl Off {
@@ -69,6 +70,7 @@ impl Off {
             tip_tolerance_mm: project.touch.tip_tolerance_mm,
             friction_percent: project.touch.friction_percent,
             allowed_percent: project.live.friction_percent,
+            model_error: project.live.model_error_of_any(),
         }
     }
 }
@@ -158,6 +160,7 @@ pub struct ExpectedInputs {
     touch: TouchKeys,
     largest_force_n: f64,
     allowed_percent: f64,
+    model_error: f64,
     /// Gauges off the lattice are of one design alone.
     off_lattice: Vec<Site>,
 }
@@ -364,6 +367,7 @@ impl Document {
             touch: p.touch.clone(),
             largest_force_n: p.live.largest_force_n,
             allowed_percent: p.live.friction_percent,
+            model_error: p.live.model_error_of_any(),
             off_lattice: off_lattice.to_vec(),
         }
     }

@@ -18,7 +18,7 @@ use crate::statistics::median;
 const DISPLACEMENT: f64 = 2.0;
 /// Strains a little slower, near the borders of supports and at slot ends.
 const STRAIN: f64 = 2.0;
-/// A load is judged by what it moves, but by no less than this share of what the middle one moves.
+/// A load is judged by what it moves and strains, but by no less than this share of what the middle one moves.
 const LEAST_MOVED: f64 = 0.05;
 /// What gauges that are chosen read wrongly, over what those at any place do: they are where strains are large and smooth.
 /// Against finer elements it was 0.52 to 0.65 (bundled limb at Draft and Standard, `assets/barrel`, the paper's limb).
@@ -35,7 +35,7 @@ pub struct Discretization {
     /// moves less: what presses beside or on a support moves next to nothing, and nobody reads that.
     pub displacement_percent: f64,
     /// Rms over loads and places of the strain's error on the inside, farther than two tip radii from
-    /// the touch, as a share of the load's largest strain there (%).
+    /// the touch, as a share of the load's largest strain there (%), or of a twentieth of the middle load's.
     pub strain_percent: f64,
     /// What a gauge reads wrongly there, as a share of what it reads (%): rms over loads, of the place in the middle.
     pub reading_percent: f64,
@@ -218,26 +218,34 @@ pub fn of(
     }
 }
 
-/// Rms over loads and places beyond the tip (NaN where there is none) of what strains are off by over the load's
-/// largest.
+/// Rms over loads and places beyond the tip (NaN where there is none) of what strains are off by over the load's largest,
+/// or over a twentieth of the middle load's where a load strains less: what presses on a support strains next to nothing,
+/// and what is off by as little is no share of anything that gauges read.
 fn strain_apart(
     fine: &Sample,
     touches: &[Touch],
     places: &[DVec3],
     off: impl Fn(usize, usize) -> [f64; 3],
 ) -> f64 {
+    let far = |touch: &Touch| {
+        let is_far = |i: &usize| places[*i].distance(touch.position) > BEYOND * touch.tip_radius;
+        (0..places.len()).filter(is_far).collect::<Vec<_>>()
+    };
+    let far: Vec<Vec<usize>> = touches.iter().map(far).collect();
+    let largest = |(load, far): (usize, &Vec<usize>)| {
+        let strains = far.iter().map(|&i| norm(fine.strains[load][i]));
+        strains.fold(0.0, f64::max)
+    };
+    let largest: Vec<f64> = far.iter().enumerate().map(largest).collect();
+    let least = LEAST_MOVED * median(largest.iter().copied()).unwrap_or(0.0);
     let (mut sum, mut count) = (0.0, 0usize);
-    for (load, touch) in touches.iter().enumerate() {
-        let far = |i: &usize| places[*i].distance(touch.position) > BEYOND * touch.tip_radius;
-        let largest = (0..places.len())
-            .filter(far)
-            .map(|i| norm(fine.strains[load][i]))
-            .fold(0.0, f64::max);
-        if largest == 0.0 {
+    for (load, (far, largest)) in far.iter().zip(&largest).enumerate() {
+        let strained = largest.max(least);
+        if strained == 0.0 {
             continue;
         }
-        for i in (0..places.len()).filter(far) {
-            sum += (norm(off(load, i)) / largest).powi(2);
+        for &i in far {
+            sum += (norm(off(load, i)) / strained).powi(2);
             count += 1;
         }
     }
@@ -316,5 +324,34 @@ mod tests {
         assert!((said.scaled(1.0, 2.0).reading_percent / said.reading_percent - 2.0).abs() < 1e-12);
         let said = super::of(&fine, &touches, &[], &[0.0; 2], off);
         assert!(said.reading_percent.is_nan());
+    }
+
+    /// What presses on a support strains nothing, and is off by as little: that is no share of what gauges read.
+    #[test]
+    fn a_load_that_strains_nothing_does_not_decide() {
+        let touch = Touch {
+            position: DVec3::ZERO,
+            normal: DVec3::Z,
+            force: 1.0,
+            tip_radius: 1e-3,
+        };
+        let (touches, places) = ([touch; 3], [DVec3::X]);
+        let strains = [1e-4, 1e-4, 1e-9];
+        let fine = Sample {
+            under: vec![1e-3; 3],
+            strains: strains.map(|strain| vec![[strain, 0.0, 0.0]]).into(),
+            frames: Vec::new(),
+        };
+        // A hundredth of the first two, and of the last one twice as much as it strains.
+        let off = |load: usize, _: usize| [[1e-6, 1e-6, 2e-9][load], 0.0, 0.0];
+        let said = super::of(&fine, &touches, &places, &[0.0; 3], off).strain_percent;
+        assert!((0.7..1.0).contains(&said), "{said}");
+        // Where none strains anything there is no share.
+        let still = Sample {
+            strains: vec![vec![[0.0; 3]]; 3],
+            ..fine
+        };
+        let said = super::of(&still, &touches, &places, &[0.0; 3], off).strain_percent;
+        assert!(said.is_nan());
     }
 }

@@ -3,13 +3,13 @@
 mod certificate;
 mod matched;
 pub mod part;
+mod regression;
 pub mod settings;
 mod words;
 
 use std::fmt::Write as _;
 
 use self::settings::settings;
-use self::words::judged_on;
 use super::run::{Provenance, range, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Paint, Series, escape};
 use crate::colormap::ColorMap;
@@ -21,7 +21,6 @@ use crate::mesh::flatten::Flat;
 use crate::placement::candidates::Candidates;
 use crate::plain::robust_top;
 use crate::project::PartModel;
-use crate::regression::Hyper;
 
 const STYLE: &str = "
 :root{color-scheme:light}body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1080px;margin:32px auto;padding:0 20px}
@@ -55,6 +54,7 @@ pub fn html(inputs: &Inputs, design: &Design, provenance: &Provenance) -> String
     head(&mut page, inputs, design);
     pictures(&mut page, inputs, design);
     sites(&mut page, inputs, design);
+    regression::comparison(&mut page, design);
     plots(&mut page, design);
     errors(&mut page, design);
     error_map(&mut page, inputs, design);
@@ -452,48 +452,10 @@ fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
     })
 }
 
+/// How sets were judged, and every figure.
 fn errors(page: &mut String, design: &Design) {
-    if design.evaluation.judging.estimator() == EstimatorKind::Matching {
-        matched::errors(page, design);
-        return;
+    match design.evaluation.judging.estimator() {
+        EstimatorKind::Matching => matched::errors(page, design),
+        EstimatorKind::Svr => regression::errors(page, design),
     }
-    let _ = write!(
-        page,
-        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, {}. “As built”: every gauge {}, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
-        design.simulated.dataset.touches.len(),
-        design.simulated.element_mm,
-        design.reference.touches.len(),
-        judged_on(design),
-        design.reference.off.gluing.in_words()
-    );
-    for r in &design.evaluation.rows {
-        let [c, epsilon, gamma] = settings_of(r.hyper);
-        let _ = write!(
-            page,
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td>{c}</td><td>{epsilon}</td><td>{gamma}</td></tr>",
-            escape(title_of(&r.selector)),
-            r.sensors,
-            escape(&r.region),
-            r.error_mm,
-            r.median_mm,
-            r.p95_mm,
-            r.workshop_mm,
-            r.touches
-        );
-    }
-    page.push_str("</table></details>");
-}
-
-/// C, ε and γ of a regression.
-fn settings_of(hyper: Option<Hyper>) -> [String; 3] {
-    hyper.map_or_else(
-        || ["–"; 3].map(Into::into),
-        |h| {
-            [
-                h.c.to_string(),
-                h.epsilon.to_string(),
-                format!("{:.3}", h.gamma),
-            ]
-        },
-    )
 }

@@ -119,6 +119,17 @@ impl LiveKeys {
         self.model_error = calibration.relative;
     }
 
+    /// What the model is off by for gauges anywhere (share of a reading): what somebody has said. What a calibration found
+    /// is of the gauges that are glued, and no reason to choose others.
+    #[must_use]
+    pub fn model_error_of_any(&self) -> f64 {
+        if self.glued.is_empty() {
+            self.model_error
+        } else {
+            0.0
+        }
+    }
+
     /// Forgets it.
     pub fn forget(&mut self) {
         self.glued.clear();

@@ -310,7 +310,11 @@ impl Session {
 fn board(inputs: &Inputs, sensing: &Sensing, r: &Reporter) -> Result<SimulatedBoard, Stop> {
     let seed = inputs.project.budget.seed;
     let places = places(inputs, sensing, seed).map_err(|e| stop(&e))?;
-    let script = Script::random(places, Drawn::straight(FORCES_N), script_seed(seed));
+    let script = Script::random(
+        places,
+        Drawn::usual(FORCES_N, inputs.project.making()),
+        script_seed(seed),
+    );
     let made = simulated(
         inputs,
         sensing,

@@ -9,6 +9,7 @@ use crate::board::{Fault, PRESSES};
 use crate::cli::common::Common;
 use crate::cli::ranges::{between, whole};
 use crate::design::Workshop;
+use crate::uncertainty::Making;
 use crate::wire::MOST_CHANNELS;
 
 #[derive(Args, Debug, Clone)]
@@ -54,6 +55,13 @@ pub struct BoardArgs {
     /// How far random touches may push aside (degrees off the upright, in any direction).
     #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 80.0))]
     pub tilt: f64,
+    /// How much of their force random touches push along the surface with (%, rms, in any direction); as
+    /// touch.friction_percent says when left out.
+    #[arg(long, value_parser = between(0.0, 100.0))]
+    pub friction: Option<f64>,
+    /// How far off the radius of their tips is (mm, standard deviation); as touch.tip_tolerance_mm says when left out.
+    #[arg(long, value_parser = between(0.0, 100.0))]
+    pub tip_tolerance: Option<f64>,
     #[command(flatten)]
     pub disturbed: DisturbanceArgs,
     /// Touches instead of random ones (.csv): `start_s,duration_s,x_mm,y_mm,z_mm,force_n`, and if wanted
@@ -82,6 +90,18 @@ pub struct BoardArgs {
     /// Seconds after which it ends by itself; a recording ends a second after the last touch of a script.
     #[arg(long, value_parser = between(0.0, 1e9))]
     pub seconds: Option<f64>,
+}
+
+impl BoardArgs {
+    /// How far off random touches are made, where the project says so much.
+    pub fn making(&self, usual: &Making) -> Making {
+        Making {
+            tip: self.tip_tolerance.map_or(usual.tip, |mm| mm * 1e-3),
+            friction: self
+                .friction
+                .map_or(usual.friction, |percent| percent / 100.0),
+        }
+    }
 }
 
 /// What the gauges are off by, as it is written.

@@ -16,6 +16,10 @@ pub struct DisturbanceArgs {
     /// What all channels drift by together (microstrain a second), as a part that is warmed.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-MOST_MICROSTRAIN, MOST_MICROSTRAIN))]
     pub warming: f64,
+    /// What all channels are off by together as it comes and goes (microstrain, standard deviation) and the time in which
+    /// it does (s; 10 when left out), as 4 or 4@30; as gauge.drift_microstrain says when left out.
+    #[arg(long, value_parser = wander)]
+    pub wander: Option<(f64, f64)>,
     /// What each channel drifts by alone (microstrain a second, standard deviation over the channels).
     #[arg(long, default_value_t = 0.0, value_parser = between(0.0, MOST_MICROSTRAIN))]
     pub warming_apart: f64,
@@ -29,10 +33,14 @@ pub struct DisturbanceArgs {
 }
 
 impl DisturbanceArgs {
-    /// In SI units.
-    pub fn disturbances(&self) -> Disturbances {
+    /// In SI units; where nothing is said, as is usual.
+    pub fn disturbances(&self, usual: &Disturbances) -> Disturbances {
+        let wander = self
+            .wander
+            .map(|(deviation, time)| (deviation * 1e-6, time));
         Disturbances {
             hum: self.hum.map(|(amplitude, hertz)| (amplitude * 1e-6, hertz)),
+            wander: wander.or(usual.wander),
             warming: self.warming * 1e-6,
             warming_apart: self.warming_apart * 1e-6,
             creep: self.creep.map(|(percent, time)| (percent / 100.0, time)),
@@ -44,6 +52,11 @@ impl DisturbanceArgs {
 fn hum(text: &str) -> Result<(f64, f64), String> {
     let wanted = "write MICROSTRAIN or MICROSTRAIN@HERTZ, as 20@50, up to 100000 and 5000";
     pair(text, 50.0, MOST_MICROSTRAIN, 0.01..=5000.0).ok_or_else(|| wanted.into())
+}
+
+fn wander(text: &str) -> Result<(f64, f64), String> {
+    let wanted = "write MICROSTRAIN or MICROSTRAIN@SECONDS, as 4@10, up to 100000 and 1000000";
+    pair(text, 10.0, MOST_MICROSTRAIN, 1e-3..=1e6).ok_or_else(|| wanted.into())
 }
 
 fn creep(text: &str) -> Result<(f64, f64), String> {
@@ -73,6 +86,7 @@ mod tests {
         assert_eq!(hum("20"), Ok((20.0, 50.0)));
         assert_eq!(hum("5@60.02"), Ok((5.0, 60.02)));
         assert_eq!(creep("3@20"), Ok((3.0, 20.0)));
+        assert_eq!(wander("4"), Ok((4.0, 10.0)));
         for wrong in [
             "", "@50", "nan", "20@", "20@0", "20@nan", "1e9", "-1", "20@50@60",
         ] {

@@ -9,6 +9,7 @@ use crate::design::{self, Inputs, Sensing};
 use crate::elasticity::Touch;
 use crate::io::points;
 use crate::mesh::TriMesh;
+use crate::uncertainty::Making;
 use crate::wire::MOST_CHANNELS;
 
 /// What was asked for, as far as it can be known to make sense without the model.
@@ -55,14 +56,15 @@ impl Plan {
     }
 
     /// Whether touches overlap or push aside.
-    pub fn says_more(&self, args: &BoardArgs) -> bool {
+    pub fn says_more(&self, args: &BoardArgs, usual: &Making) -> bool {
         let presses = self.presses.as_deref().unwrap_or_default();
         let mut spans: Vec<[f64; 2]> = (presses.iter())
             .map(|p| [p.start_s, p.start_s + p.duration_s])
             .collect();
         spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let overlap = spans.windows(2).any(|pair| pair[1][0] < pair[0][1]);
-        overlap || args.tilt > 0.0 || presses.iter().any(|p| p.tilt_deg > 0.0)
+        let aside = self.presses.is_none() && args.making(usual).friction > 0.0;
+        overlap || aside || args.tilt > 0.0 || presses.iter().any(|p| p.tilt_deg > 0.0)
     }
 }
 

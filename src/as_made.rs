@@ -12,25 +12,27 @@ use crate::uncertainty::Making;
 const LEAST: f64 = 0.1;
 
 /// Touches that press where and as hard as they are said to, made as far off as is usual. The same seed, the same draws.
-pub(super) fn as_made(touches: &[Touch], making: &Making, seed: u64) -> Vec<Push> {
+pub(crate) fn as_made(touches: &[Touch], making: &Making, seed: u64) -> Vec<Push> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut made = |touch: &Touch| {
-        let radius = touch.tip_radius + making.tip * normal(&mut rng);
-        let along = touch.normal.any_orthonormal_vector();
-        let across = touch.normal.cross(along);
-        let drag: DVec3 = along * normal(&mut rng) + across * normal(&mut rng);
-        let touch = Touch {
-            tip_radius: radius.max(LEAST * touch.tip_radius),
-            ..*touch
-        };
-        let straight = Push::from(&touch);
-        let drag = drag * (making.friction / 2.0_f64.sqrt() * touch.force);
-        Push {
-            force: straight.force + drag,
-            ..straight
-        }
+    touches.iter().map(|t| made(t, making, &mut rng)).collect()
+}
+
+/// One of them.
+pub(crate) fn made(touch: &Touch, making: &Making, rng: &mut ChaCha8Rng) -> Push {
+    let radius = touch.tip_radius + making.tip * normal(rng);
+    let along = touch.normal.any_orthonormal_vector();
+    let across = touch.normal.cross(along);
+    let drag: DVec3 = along * normal(rng) + across * normal(rng);
+    let touch = Touch {
+        tip_radius: radius.max(LEAST * touch.tip_radius),
+        ..*touch
     };
-    touches.iter().map(&mut made).collect()
+    let straight = Push::from(&touch);
+    let drag = drag * (making.along_either() * touch.force);
+    Push {
+        force: straight.force + drag,
+        ..straight
+    }
 }
 
 #[cfg(test)]
