@@ -8,7 +8,7 @@ use crate::dataset::Site;
 use crate::uncertainty::Gluing;
 
 /// How many workshops glue the gauges that are judged: one alone is a tenth better or worse than they are in the mean.
-pub(super) const WORKSHOPS: u64 = 3;
+pub(super) const WORKSHOPS: u64 = 8;
 
 /// The seed of one of the workshops that a design is judged by.
 pub(super) fn of_workshop(seed: u64, workshop: u64) -> u64 {

@@ -256,6 +256,50 @@ fn an_unplugged_board_is_found_again() {
 }
 
 /// A recording outlives the program that is killed while it writes it, and says the same each time.
+/// What a board says when it has recorded a minute with some options more, and the rms of what presses along the surface over
+/// what presses, by its truth; nothing where that is not told.
+fn recorded_with(more: &[&str]) -> (Value, Option<f64>) {
+    let folder = tempfile::tempdir().unwrap();
+    let [recording, truth] = ["b.hapdrec", "t.csv"].map(|name| folder.path().join(name));
+    let minute = ["board", "--simulate", "--quality", "draft", "--rate", "20"];
+    let files = ["--seconds", "60", "--record", recording.to_str().unwrap()];
+    let truth_args = ["--truth", truth.to_str().unwrap()];
+    let said = start(&[&minute[..], &files, &truth_args, more].concat()).json();
+    let text = std::fs::read_to_string(&truth).unwrap();
+    let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let column = |name: &str| header.iter().position(|h| *h == name);
+    let force = column("force_n").unwrap();
+    let Some(first) = column("fx_n") else {
+        return (said, None);
+    };
+    let squares = text.lines().skip(1).filter_map(|line| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let number = |k: usize| cells[k].parse::<f64>().ok();
+        let pressing = number(force)?;
+        let whole: f64 = (first..first + 3).filter_map(number).map(|f| f * f).sum();
+        Some((whole / (pressing * pressing) - 1.0).max(0.0))
+    });
+    let squares: Vec<f64> = squares.collect();
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    (said, Some(mean.sqrt()))
+}
+
+#[test]
+fn a_board_has_the_gain_and_its_touches_the_friction_that_were_asked_for() {
+    let (weak, straight) = recorded_with(&["--gain", "5"]);
+    let (strong, aside) = recorded_with(&["--gain", "50", "--friction", "30"]);
+    assert_eq!(
+        (&weak["gain"], &strong["gain"]),
+        (&5.0.into(), &50.0.into())
+    );
+    let count = |said: &Value| said["microstrain_per_count"].as_f64().unwrap();
+    // To three digits.
+    assert!((count(&weak) / count(&strong) - 10.0).abs() < 0.1);
+    assert_eq!(straight, None);
+    let aside = aside.unwrap();
+    assert!((0.2..0.4).contains(&aside), "{aside}");
+}
+
 #[test]
 fn a_recording_survives_a_kill() {
     let folder = tempfile::tempdir().unwrap();
@@ -403,6 +447,9 @@ fn numbers_out_of_range_are_wrong_usage() {
         ("board", "--channels", "65", "1..=64"),
         ("board", "--noise", "nan", "from 0 to 100000"),
         ("board", "--drift", "inf", "from 0 to 100000"),
+        ("board", "--drift", "-1", "from 0 to 100000"),
+        ("board", "--wander", "4@0", "as 4@10"),
+        ("board", "--friction", "101", "from 0 to 100"),
         ("board", "--flip", "1.5", "from 0 to 1"),
         ("board", "--drop", "nan", "from 0 to 1"),
         ("board", "--duplicate", "nan", "from 0 to 1"),
