@@ -25,7 +25,7 @@ use hapdef::inference::{
 use hapdef::link::{Address, BAUD, Doorway, Listener, Pace, SessionEvent, State, host};
 use hapdef::live::{Input, Pipeline, Receiver};
 use hapdef::regression::Hyper;
-use hapdef::uncertainty::{Gluing, Pressing, Uncertainty};
+use hapdef::uncertainty::{Gluing, Making, Pressing, Uncertainty};
 use hapdef::wire::{Hello, Message, VERSION, encode};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -399,7 +399,7 @@ impl Lab {
     /// A board that is unplugged three times, and how soon that is noticed and mended.
     fn unplug(&mut self, text: &mut String) {
         let places = board::places(&self.inputs, &self.sensing, SEED).expect("places");
-        let script = Script::random(places, Drawn::straight([2.0, 15.0]), 1);
+        let script = Script::random(places, Drawn::usual([2.0, 15.0], Making::EXACT), 1);
         let mut faults = Faults::default();
         let plugs = [(4.0, 5.0), (8.0, 8.5), (12.0, 14.0)];
         faults.unplugged = plugs.to_vec();

@@ -392,6 +392,12 @@ mod tests {
         assert_eq!(with(0.0), Gluing::EXACT);
         assert_eq!(with(f64::INFINITY), as_glued(1.0, 5e-3));
         assert_eq!(off.with_elements_of_gauges(f64::NAN, f64::NAN), off);
+        // A model that is known to be worse than its elements say.
+        let poor = Uncertainty { model: 0.1, ..off };
+        assert_eq!(poor.with_elements(4.0).elements, 0.1);
+        assert_eq!(poor.with_elements(20.0).elements, 0.2);
+        let of_gauges = poor.with_elements_of_gauges(4.0, 5e-3).as_glued;
+        assert_eq!(of_gauges, as_glued(0.1, 5e-3));
         assert_eq!(off.with_elements_of_gauges(f64::NAN, f64::INFINITY), off);
     }
 

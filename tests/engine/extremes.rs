@@ -627,6 +627,43 @@ fn sites_are_reduced_only_where_somebody_asks_for_candidates() {
         let kept = design.candidates.as_ref().unwrap().rows.len();
         assert!(reduces(&design) && kept < feasible && kept == design.candidate_count());
         assert!(count.is_none_or(|count| count == kept), "{kept}");
-        assert!(report::html(inputs, &design, &written).contains("left unexplained"));
+        let page = report::html(inputs, &design, &written);
+        assert!(page.contains("left unexplained") && !page.contains("The paper's comparison"));
     }
+    let four = design::run_from(
+        &trained,
+        Arc::clone(&simulated),
+        &SelectorKind::PAPER,
+        &budget(),
+        &|| 0.0,
+        &unwatched,
+    );
+    let page = report::html(&trained, &four.unwrap(), &written);
+    let (_, section) = page.split_once("The paper's comparison").unwrap();
+    let table = section.split_once("</table>").unwrap().0;
+    for kind in SelectorKind::PAPER {
+        assert!(table.contains(kind.title()), "{table}");
+    }
+    assert!(!table.contains("NaN") && table.contains(" / "), "{table}");
+    no_more_than_three_notes_are_read_at_once(all);
+}
+
+/// What cannot be trusted counts among them.
+fn no_more_than_three_notes_are_read_at_once(mut design: Design) {
+    let cautions = (0..5).map(|k| format!("caution {k}")).collect();
+    let simulated = Arc::make_mut(&mut design.simulated);
+    simulated.achieved.cautions = cautions;
+    simulated.discretization.displacement_percent = 1.0;
+    let (sound, all) = (design.doubts().len(), design.words());
+    assert_eq!(all.open.len(), 3 - sound.min(3));
+    Arc::make_mut(&mut design.simulated)
+        .discretization
+        .displacement_percent = 90.0;
+    let words = design.words();
+    assert_eq!(design.doubts().len(), sound + 1);
+    assert_eq!(words.open.len(), 3 - (sound + 1).min(3));
+    assert_eq!(
+        words.open.len() + words.folded.len(),
+        all.open.len() + all.folded.len()
+    );
 }

@@ -2,6 +2,7 @@
 
 use hapdef::board::{Drawn, Faults, Script};
 use hapdef::live::News;
+use hapdef::uncertainty::Making;
 
 use crate::inference::{Bench, press};
 
@@ -53,7 +54,7 @@ fn a_simulated_board_is_left_alone_at_first() {
     for seed in 0..20_u32 {
         let mut script = Script::random(
             vec![place; 3],
-            Drawn::straight([2.0, 15.0]),
+            Drawn::usual([2.0, 15.0], Making::EXACT),
             u64::from(seed),
         );
         // Nobody has listened so far.
