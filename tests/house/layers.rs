@@ -25,7 +25,7 @@ const ORDER: [&[&str]; 14] = [
     ],
     &["mesh"],
     &["limb", "elasticity", "jig"],
-    &["dataset"],
+    &["dataset", "as_made"],
     &["feasible", "regression"],
     &["learning", "pca"],
     &["gaussian_process"],

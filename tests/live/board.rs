@@ -252,7 +252,8 @@ fn an_unplugged_board_is_found_again() {
         .try_iter()
         .last()
         .map(|l| serde_json::from_str::<Value>(&l).unwrap());
-    assert!(last.unwrap()["t_us"].as_u64().unwrap() > before);
+    let last = last.unwrap()["t_us"].as_u64().unwrap();
+    assert!(last > before, "{last} after {before}");
 }
 
 /// A recording outlives the program that is killed while it writes it, and says the same each time.

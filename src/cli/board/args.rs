@@ -55,11 +55,11 @@ pub struct BoardArgs {
     /// How far random touches may push aside (degrees off the upright, in any direction).
     #[arg(long, default_value_t = 0.0, value_parser = between(0.0, 80.0))]
     pub tilt: f64,
-    /// How much of their force random touches push along the surface with (%, rms, in any direction); as
-    /// touch.friction_percent says when left out.
+    /// How much of their force random touches push along the surface with (%, rms, in any direction); the project's when
+    /// left out.
     #[arg(long, value_parser = between(0.0, 100.0))]
     pub friction: Option<f64>,
-    /// How far off the radius of their tips is (mm, standard deviation); as touch.tip_tolerance_mm says when left out.
+    /// How far off the radius of their tips is (mm, standard deviation); the project's when left out.
     #[arg(long, value_parser = between(0.0, 100.0))]
     pub tip_tolerance: Option<f64>,
     #[command(flatten)]
@@ -94,6 +94,7 @@ pub struct BoardArgs {
 
 impl BoardArgs {
     /// How far off random touches are made, where the project says so much.
+    #[must_use]
     pub fn making(&self, usual: &Making) -> Making {
         Making {
             tip: self.tip_tolerance.map_or(usual.tip, |mm| mm * 1e-3),

@@ -17,7 +17,7 @@ pub struct DisturbanceArgs {
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-MOST_MICROSTRAIN, MOST_MICROSTRAIN))]
     pub warming: f64,
     /// What all channels are off by together as it comes and goes (microstrain, standard deviation) and the time in which
-    /// it does (s; 10 when left out), as 4 or 4@30; as gauge.drift_microstrain says when left out.
+    /// it does (s; 10 when left out), as 4 or 4@30; the project's when left out.
     #[arg(long, value_parser = wander)]
     pub wander: Option<(f64, f64)>,
     /// What each channel drifts by alone (microstrain a second, standard deviation over the channels).
