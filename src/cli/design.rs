@@ -146,10 +146,8 @@ fn print_summary(design: &Design) -> anyhow::Result<()> {
         out::line(&format!("note: {note}"))?;
     }
     if !words.folded.is_empty() {
-        let more = words.folded.len();
-        out::line(&format!(
-            "{more} more notes on how this came about stand in the report"
-        ))?;
+        let more = plain::count(words.folded.len(), "more note");
+        out::line(&format!("{more} on how this came about in the report"))?;
     }
     let total: f64 = design.seconds.iter().map(|s| s.seconds).sum();
     out::say(&format!("{total:.1} s"));
