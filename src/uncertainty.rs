@@ -8,6 +8,7 @@
 //! | noise, resolution | a variance of each reading, the same for every touch |
 //! | gluing | by the reading's slopes over the gauge's place and direction, and by its gain: grows with the force |
 //! | elements | as if each gauge was glued off its place and its gain was off: grows with the force |
+//! | model | elements that leave at least so much, where somebody says so |
 //! | tip | by the reading's slope over the tip's radius: grows with the force |
 //! | friction | by what a force along the surface reads there: grows with the force |
 //! | drift | common to all channels: a matrix of rank one beside the diagonal |

@@ -7,7 +7,7 @@ use super::{Simulated, WORKSHOP_SEED};
 use crate::dataset::Site;
 use crate::uncertainty::Gluing;
 
-/// How many workshops glue the gauges that are judged: one alone is a tenth better or worse than they are in the mean.
+/// How many workshops glue the gauges that are judged: one alone is a seventh better or worse than they are in the mean.
 pub(super) const WORKSHOPS: u64 = 8;
 
 /// The seed of one of the workshops that a design is judged by.

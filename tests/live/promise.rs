@@ -14,7 +14,7 @@ use hapdef::io::project_file;
 use serde_json::Value;
 
 const FORCES_N: [f64; 3] = [3.0, 10.0, 25.0];
-/// Workshops that the gauges are glued by: a single one is a tenth better or worse than they are in the mean.
+/// Workshops that the gauges are glued by: a single one is a seventh better or worse than they are in the mean.
 const WORKSHOPS: [u64; 3] = [1, 2, 3];
 /// Where errors are compared: outside it are touches that move no gauge. Live says of them that nothing touches, and
 /// there is nothing to compare with the error that a judge gives to their best guess.

@@ -121,7 +121,51 @@ pub(super) fn on_surface(presses: &[GivenPress], inputs: &Inputs, sensing: &Sens
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser as _;
+
     use super::*;
+    use crate::cli::{Cli, Command};
+
+    #[test]
+    fn a_board_is_touched_and_drifts_as_the_project_says_or_as_it_is_told() {
+        let mut inputs = crate::io::opening::bundled().unwrap().inputs;
+        let project = &mut inputs.project;
+        (
+            project.touch.friction_percent,
+            project.touch.tip_tolerance_mm,
+        ) = (20.0, 0.5);
+        project.gauge.drift_microstrain = 4.0;
+        let asked = |more: &[&str]| {
+            let words = [&["hapdef", "board", "--simulate"][..], more].concat();
+            match Cli::parse_from(words).command {
+                Some(Command::Board(args)) => args,
+                other => panic!("{other:?}"),
+            }
+        };
+        let (plain, told) = (
+            asked(&[]),
+            asked(&[
+                "--friction",
+                "30",
+                "--wander",
+                "1@5",
+                "--tip-tolerance",
+                "0",
+            ]),
+        );
+        let usual = inputs.project.making();
+        assert_eq!(plain.making(&usual), usual);
+        assert_eq!((usual.tip, usual.friction), (0.5e-3, 0.2));
+        let making = told.making(&usual);
+        assert_eq!((making.tip, making.friction), (0.0, 0.3));
+        let usual = design::simulated_board::options(&inputs, 10).disturbances;
+        let wander = |args: &BoardArgs| args.disturbed.disturbances(&usual).wander.unwrap();
+        assert!((wander(&plain).0 - 4e-6).abs() < 1e-15 && wander(&plain).1 > 0.0);
+        assert!((wander(&told).0 - 1e-6).abs() < 1e-15 && wander(&told).1 == 5.0);
+        // Touches that push aside have more columns in the truth.
+        let plan = Plan::new(&plain, &inputs).unwrap();
+        assert!(plan.says_more(&plain, &inputs.project.making()));
+    }
 
     #[test]
     fn presses_far_from_the_part_are_refused_with_their_line() {

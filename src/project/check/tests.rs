@@ -1,5 +1,5 @@
 use super::*;
-use crate::project::{ChosenSite, CostKeys, RegionKeys};
+use crate::project::{ChosenSite, CostKeys, GluedKeys, RegionKeys};
 use crate::uncertainty::{Gluing, Making, Pressing};
 
 fn project() -> Project {
@@ -201,6 +201,7 @@ fn what_is_off_is_what_the_keys_say() {
     project.calibration.friction_percent = 5.0;
     project.live.friction_percent = 30.0;
     project.live.stiffness_percent = 20.0;
+    project.live.model_error = 0.08;
     assert_eq!(project.check(), Ok(()));
     let off = project.uncertainty();
     let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-15, "{a} {b}");
@@ -214,6 +215,17 @@ fn what_is_off_is_what_the_keys_say() {
     close(off.making_of_presses().friction, 0.05);
     close(off.making_allowed().friction, 0.3);
     close(off.stiffness, 0.2);
+    close(off.model, 0.08);
+    // What a calibration found is of the gauges that are glued.
+    project.live.glued.push(GluedKeys {
+        gain: 1.0,
+        along_mm: 0.0,
+        across_mm: 0.0,
+        turned_degrees: 0.0,
+        covariance: None,
+        site: None,
+    });
+    close(project.uncertainty().model, 0.0);
 }
 
 #[test]
