@@ -1,5 +1,6 @@
 //! What every site reports under every touch, and where the touches were.
 
+mod columns;
 mod making;
 mod site;
 mod slopes;
@@ -22,6 +23,7 @@ use crate::uncertainty::Making;
 use site::{Moments, gauges_on};
 use std::f64::consts::PI;
 
+pub use columns::Columns;
 pub use making::{MakingSlope, MakingSlopes};
 pub use site::Site;
 pub use slopes::GluingSlopes;

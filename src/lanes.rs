@@ -61,6 +61,32 @@ pub(crate) fn logarithm(x: f32) -> f32 {
     power * std::f32::consts::LN_2 + 2.0 * s * series
 }
 
+/// The natural logarithm of a normal number above zero, to rounding: as [`logarithm`], with more terms.
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
+#[inline(always)]
+pub(crate) fn logarithm_to_rounding(x: f64) -> f64 {
+    /// Bits of the square root of a half: mantissas lie around one.
+    const ROOT: u64 = 0x3fe6_a09e_667f_3bcd;
+    /// Added, it makes powers of two positive.
+    const RAISED: u64 = 1024;
+    const MANTISSA: u64 = (1 << 52) - 1;
+    /// With a whole number in its lowest bits it is greater by that number.
+    const WHOLE: f64 = 4_503_599_627_370_496.0;
+    let from_root = (x.to_bits().wrapping_sub(ROOT)).wrapping_add(RAISED << 52);
+    let power = f64::from_bits(WHOLE.to_bits() | (from_root >> 52)) - (WHOLE + RAISED as f64);
+    let mantissa = f64::from_bits((from_root & MANTISSA) + ROOT);
+    let s = (mantissa - 1.0) / (mantissa + 1.0);
+    let q = s * s;
+    // Written out: a loop over its terms keeps compilers from making vectors of the loop around it.
+    let high = 1.0 / 13.0 + q * (1.0 / 15.0 + q * (1.0 / 17.0 + q * (1.0 / 19.0)));
+    let low = 1.0 / 5.0 + q * (1.0 / 7.0 + q * (1.0 / 9.0 + q * (1.0 / 11.0 + q * high)));
+    let series = 1.0 + q * (1.0 / 3.0 + q * low);
+    power * std::f64::consts::LN_2 + 2.0 * s * series
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -76,6 +102,9 @@ mod tests {
             );
             let y = (k as f32 * 0.15).exp();
             assert!((logarithm(y) - x).abs() < 1e-5 * (1.0 + x.abs()), "{x}");
+            let y = (7.0 * f64::from(x)).exp();
+            let off = logarithm_to_rounding(y) - y.ln();
+            assert!(off.abs() < 4e-15 * (1.0 + y.ln().abs()), "{y}: {off}");
         }
         assert!(exponential(-1e30) < 1e-37);
     }

@@ -3,6 +3,7 @@
 //!
 //! Under some of the touches of a dataset, and solved for only where either may be off: they are other loads.
 
+use super::columns::Columns;
 use super::site::{Site, gauges_on};
 use crate::budget::{Cancelled, Watch};
 use crate::elasticity::respond::{Reading, Responses, respond};
@@ -19,7 +20,7 @@ const WAYS: usize = 2;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MakingSlopes {
     /// The touches of the dataset, rising.
-    touches: Vec<usize>,
+    columns: Columns,
     /// Sites × touches: strain a metre of the tip's radius.
     tip: Vec<f32>,
     /// Sites × touches, for each of two directions along the surface: strain where as much force acts that way as presses.
@@ -60,7 +61,7 @@ impl MakingSlopes {
             respond(model, &pushes, &observer, reading, watch).map(Some)
         };
         let mut found = Self {
-            touches: columns.to_vec(),
+            columns: Columns::new(columns.to_vec()),
             ..Self::default()
         };
         let mut solves = 0;
@@ -81,16 +82,16 @@ impl MakingSlopes {
         Ok((found, solves))
     }
 
-    /// The touches of the dataset that they are known for, column by column.
+    /// The touches of the dataset that they are known for.
     #[must_use]
-    pub fn touches(&self) -> &[usize] {
-        &self.touches
+    pub fn columns(&self) -> &Columns {
+        &self.columns
     }
 
     /// What a site's reading of the touch of a column changes by.
     #[must_use]
     pub fn of_touch(&self, site: usize, column: usize) -> MakingSlope {
-        let at = site * self.touches.len() + column;
+        let at = site * self.columns.len() + column;
         let of = |values: &Vec<f32>| values.get(at).map_or(0.0, |v| f64::from(*v));
         MakingSlope {
             tip: of(&self.tip),
@@ -101,13 +102,13 @@ impl MakingSlopes {
     /// Those of one site alone.
     #[must_use]
     pub(super) fn only(&self, site: usize) -> Self {
-        let count = self.touches.len();
+        let count = self.columns.len();
         let own = |values: &Vec<f32>| match &values[..] {
             [] => Vec::new(),
             all => all[site * count..][..count].to_vec(),
         };
         Self {
-            touches: self.touches.clone(),
+            columns: self.columns.clone(),
             tip: own(&self.tip),
             shear: self.shear.each_ref().map(own),
         }
@@ -115,7 +116,7 @@ impl MakingSlopes {
 
     /// Forgets all sites but the first.
     pub(super) fn truncate(&mut self, sites: usize) {
-        let count = sites * self.touches.len();
+        let count = sites * self.columns.len();
         let [along, across] = &mut self.shear;
         for values in [&mut self.tip, along, across] {
             values.truncate(count);
@@ -127,7 +128,12 @@ impl MakingSlopes {
         let [along, across] = &mut self.shear;
         let rows = [&site.tip, &site.shear[0], &site.shear[1]];
         for (values, row) in [&mut self.tip, along, across].into_iter().zip(rows) {
-            values.extend(self.touches.iter().filter_map(|&touch| row.get(touch)));
+            values.extend(
+                self.columns
+                    .touches()
+                    .iter()
+                    .filter_map(|&touch| row.get(touch)),
+            );
         }
     }
 }

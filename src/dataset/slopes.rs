@@ -6,6 +6,7 @@
 
 use rayon::prelude::*;
 
+use super::columns::Columns;
 use super::site::{Site, gauges_on};
 use crate::budget::{Cancelled, Watch};
 use crate::elasticity::respond::{Pressed, Reading, Responses, respond};
@@ -21,7 +22,7 @@ const MOVES: usize = 4;
 /// at their force. In single precision: they make up variances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GluingSlopes {
-    touches: Vec<usize>,
+    columns: Columns,
     /// Sites × touches: strain a metre along the gauge, a metre across it, and strain a radian.
     along: Vec<f32>,
     across: Vec<f32>,
@@ -93,7 +94,7 @@ impl GluingSlopes {
             },
         );
         Self {
-            touches,
+            columns: Columns::new(touches),
             along,
             across,
             turned,
@@ -104,7 +105,7 @@ impl GluingSlopes {
     #[cfg(test)]
     pub(super) fn known(touches: Vec<usize>, [along, across, turned]: [Vec<f32>; 3]) -> Self {
         Self {
-            touches,
+            columns: Columns::new(touches),
             along,
             across,
             turned,
@@ -113,7 +114,7 @@ impl GluingSlopes {
 
     /// Forgets all sites but the first.
     pub(super) fn truncate(&mut self, sites: usize) {
-        let count = sites * self.touches.len();
+        let count = sites * self.columns.len();
         for values in [&mut self.along, &mut self.across, &mut self.turned] {
             values.truncate(count);
         }
@@ -122,24 +123,24 @@ impl GluingSlopes {
     /// One site more, of which the slopes are known under every touch.
     pub(super) fn push(&mut self, site: &Self) {
         let [along, across, turned] = site.row(0);
-        for &touch in &self.touches {
+        for &touch in self.columns.touches() {
             self.along.push(along[touch]);
             self.across.push(across[touch]);
             self.turned.push(turned[touch]);
         }
     }
 
-    /// The touches of the dataset that slopes are known for, column by column.
+    /// The touches of the dataset that they are known for.
     #[must_use]
-    pub fn touches(&self) -> &[usize] {
-        &self.touches
+    pub fn columns(&self) -> &Columns {
+        &self.columns
     }
 
     /// Of one site, column by column: strain a metre along the gauge, strain a metre across it (normal × direction),
     /// and strain a radian from the one to the other.
     #[must_use]
     pub fn row(&self, site: usize) -> [&[f32]; 3] {
-        let count = self.touches.len();
+        let count = self.columns.len();
         [&self.along, &self.across, &self.turned].map(|values| &values[site * count..][..count])
     }
 
@@ -151,10 +152,14 @@ impl GluingSlopes {
             let readings = row(site);
             let [along, across, _] = self.row(site);
             let moved = along.iter().chain(across).map(|v| f64::from(*v).powi(2));
-            let read = self.touches.iter().map(|&touch| readings[touch].powi(2));
+            let read = self
+                .columns
+                .touches()
+                .iter()
+                .map(|&touch| readings[touch].powi(2));
             [read.sum::<f64>(), moved.sum::<f64>()]
         };
-        let sites = self.along.len() / self.touches.len().max(1);
+        let sites = self.along.len() / self.columns.len().max(1);
         let all: Vec<[f64; 2]> = (0..sites).into_par_iter().map(squares).collect();
         let [read, moved] = [0, 1].map(|k| all.iter().map(|squares| squares[k]).sum::<f64>());
         (read / moved).sqrt()
@@ -175,7 +180,7 @@ impl GluingSlopes {
             rows.copied().collect()
         };
         Self {
-            touches: self.touches.clone(),
+            columns: self.columns.clone(),
             along: chosen(0),
             across: chosen(1),
             turned: chosen(2),
@@ -223,7 +228,7 @@ mod tests {
     #[test]
     fn rows_are_of_their_sites() {
         let slopes = GluingSlopes {
-            touches: vec![3, 8],
+            columns: Columns::new(vec![3, 8]),
             along: vec![0.0, 1.0, 2.0, 3.0],
             across: vec![0.0, 10.0, 20.0, 30.0],
             turned: vec![0.0, 100.0, 200.0, 300.0],
@@ -248,6 +253,6 @@ mod tests {
             (scale - (54.0_f64 / 1414.0).sqrt()).abs() < 1e-12,
             "{scale}"
         );
-        assert_eq!(slopes.select_rows(&[1, 0]).touches(), [3, 8]);
+        assert_eq!(slopes.select_rows(&[1, 0]).columns().touches(), [3, 8]);
     }
 }

@@ -66,7 +66,7 @@ impl<'a> Known<'a> {
     ) -> f64 {
         let off = &self.off.of_gauges();
         let known = changes.and_then(|slopes| {
-            let column = slopes.touches().binary_search(&touch).ok()?;
+            let column = slopes.columns().of(touch)?;
             Some(slopes.variance(site, column, reading, off))
         });
         known.unwrap_or_else(|| off.variance(reading, 0.0, 0.0, 0.0))
@@ -81,7 +81,7 @@ impl<'a> Known<'a> {
 
     /// The same of a site among some: by a tip as much larger, and forces along the surface as large, as is allowed for.
     pub fn felt_of(&self, made: &MakingSlopes, site: usize, touch: usize) -> [f64; NUISANCES] {
-        let Ok(column) = made.touches().binary_search(&touch) else {
+        let Some(column) = made.columns().of(touch) else {
             return [0.0; NUISANCES];
         };
         let allowed = self.off.making_allowed();
@@ -116,7 +116,8 @@ impl<'a> Known<'a> {
             variance: Some(variance),
             shared: Some(shared),
             density: self.density.as_deref(),
-            among: (self.simulated.dataset.slopes.as_ref()).map(GluingSlopes::touches),
+            among: (self.simulated.dataset.slopes.as_ref())
+                .map(|slopes| slopes.columns().touches()),
             forces: Some(Forces {
                 touches: &self.forces,
                 coming: self.range,

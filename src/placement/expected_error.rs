@@ -11,6 +11,7 @@ mod certificate;
 mod elliptic;
 mod expectation;
 mod hand;
+mod losses;
 mod mistaken;
 mod moving;
 mod scene;

@@ -115,7 +115,7 @@ impl Trial {
             }
             Touched::AsPromised(count) => {
                 let dataset = &self.simulated.dataset;
-                let all = dataset.slopes.as_ref().unwrap().touches();
+                let all = dataset.slopes.as_ref().unwrap().columns().touches();
                 (evenly(all.len(), count).into_iter())
                     .map(|k| map.mesh.index().nearest(dataset.touches[all[k]].position).0)
                     .collect()

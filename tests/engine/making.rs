@@ -73,7 +73,12 @@ fn chosen(inputs: &Inputs) -> Vec<usize> {
 fn variances_are_those_of_touches_that_are_made_so() {
     let all = &simulated().dataset;
     let (slopes, made) = (all.slopes.as_ref().unwrap(), all.making.as_ref().unwrap());
-    let touches: Vec<Touch> = slopes.touches().iter().map(|&t| all.touches[t]).collect();
+    let touches: Vec<Touch> = slopes
+        .columns()
+        .touches()
+        .iter()
+        .map(|&t| all.touches[t])
+        .collect();
     let model = simulated().model().unwrap();
     let friction = 0.2;
     // Four ways round, each as likely: their mean is what any way has.
@@ -92,7 +97,7 @@ fn variances_are_those_of_touches_that_are_made_so() {
         let pushes: Vec<Push> = touches.iter().map(drag).collect();
         let sites = &all.sites[17..18];
         let read = dataset::measure(&*model, &pushes, sites, Signal::Strain, &unwatched).unwrap();
-        let columns = slopes.touches().iter().zip(read.0.row(0));
+        let columns = slopes.columns().touches().iter().zip(read.0.row(0));
         for (square, (&t, read)) in squares.iter_mut().zip(columns) {
             *square += (read - all.x.row(17)[t]).powi(2) / 4.0;
         }

@@ -324,7 +324,12 @@ fn slopes_of_gluing_are_what_moved_gauges_read() {
     let simulated = design::simulate(&inputs, &budget, &unwatched).unwrap();
     let all = &simulated.dataset;
     let slopes = all.slopes.as_ref().unwrap();
-    let touches: Vec<Touch> = slopes.touches().iter().map(|&t| all.touches[t]).collect();
+    let touches: Vec<Touch> = slopes
+        .columns()
+        .touches()
+        .iter()
+        .map(|&t| all.touches[t])
+        .collect();
     let sites: Vec<usize> = (0..all.sites.len()).step_by(61).collect();
     let gauges: Vec<Site> = sites.iter().flat_map(|&s| moved(&all.sites[s])).collect();
     let model = simulated.model().unwrap();
@@ -346,7 +351,10 @@ fn slopes_of_gluing_are_what_moved_gauges_read() {
         let share = (apart / whole).sqrt();
         assert!(share < limit, "{kind}: {share}");
     }
-    assert_eq!(slopes.touches(), (0..200_usize).collect::<Vec<_>>());
+    assert_eq!(
+        slopes.columns().touches(),
+        (0..200_usize).collect::<Vec<_>>()
+    );
     let (other, budget) = small(Signal::NormalDisplacement);
     let simulated = design::simulate(&other, &budget, &unwatched).unwrap();
     assert!(simulated.dataset.slopes.is_none());

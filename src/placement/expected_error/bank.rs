@@ -12,19 +12,22 @@
 //! of unit variance for an unknown that really has t², that is less by (1 − t²) c cᵀ, c being C's column of the unknown.
 
 mod filters;
+mod single;
+mod truth;
+mod unknowns;
 
 use glam::DVec3;
-use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
-use self::filters::{Filters, correct, corrections, predict, sharpness, shrink, sum_masses_with};
-pub(super) use self::filters::{MOST, PLAIN, Rows};
+use self::filters::{
+    FORCE, Filters, Lane, Thought, correct, corrections, predict, shrink, sum_masses_with,
+};
+pub(super) use self::filters::{MOST, PLAIN};
+use self::single::Single;
+use self::truth::{Read, TrueFilters};
+pub(super) use self::unknowns::{Unknowns, prior, row};
 use super::elliptic::mean_length;
-use super::scene::{LANES, Neighbourhood, Place, Report, Scene};
-
-/// Of all unknowns that there may be; zero of those that are not asked for.
-pub(super) type Unknowns = SVector<f64, MOST>;
-type Covariance = SMatrix<f64, MOST, MOST>;
+use super::scene::{LANES, Place, Scene};
 
 /// Added to the cost of a place that a press already stands for.
 const NEVER: f32 = 1e30;
@@ -33,15 +36,24 @@ const NEVER: f32 = 1e30;
 #[derive(Clone)]
 struct Press {
     /// Where each place thinks the touch is from its middle (mm, mm), how hard it was (N) and what else there is to
-    /// find: one after the other, of all places; and its cost.
-    estimates: Vec<f32>,
-    costs: Vec<f32>,
+    /// find, block of places by block; and its cost.
+    estimates: Vec<Lane>,
+    costs: Vec<Lane>,
     /// Blocks of places that may still be meant.
     blocks: Vec<u32>,
-    /// The filter at the true place.
-    covariance: Covariance,
-    estimate: Unknowns,
-    cost: f64,
+}
+
+/// Sites that are tried side by side: what is thought of a press then stays near while all of them ask for it, and is
+/// megabytes for all presses.
+const TILE: usize = 8;
+
+/// Working memory of whoever tries gauges.
+pub(super) struct Rows(Vec<Tried>);
+
+/// What a gauge does to the filters at all places, for one force, and to those at the true places.
+struct Tried {
+    places: filters::Rows,
+    read: Read,
 }
 
 /// All presses of a scene, read by the gauges of a set.
@@ -49,9 +61,10 @@ struct Press {
 pub(super) struct Bank<'a> {
     scene: &'a Scene,
     /// Of the places.
-    positions: Vec<f32>,
+    positions: Vec<[Lane; 3]>,
     filters: Vec<Filters>,
     presses: Vec<Press>,
+    truth: TrueFilters,
     mass: f64,
     /// How many there are.
     gauges: usize,
@@ -62,10 +75,12 @@ impl<'a> Bank<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         // Any force up to the hardest; or the one there is.
         let (mean, deviation) = scene.hardest.map_or((1.0, 0.0), |hardest| (0.0, hardest));
-        let count = scene.places.len().next_multiple_of(LANES);
-        let padded = |value: &dyn Fn(&Place) -> f64, rest: f32| -> Vec<f32> {
-            let mut values: Vec<f32> = scene.places.iter().map(|p| value(p) as f32).collect();
-            values.resize(count, rest);
+        let blocks = scene.places.len().div_ceil(LANES);
+        let padded = |value: &dyn Fn(&Place) -> f64, rest: f32| -> Vec<Lane> {
+            let mut values = vec![[rest; LANES]; blocks];
+            for (lane, place) in values.as_flattened_mut().iter_mut().zip(&scene.places) {
+                *lane = value(place) as f32;
+            }
             values
         };
         let unknowns = PLAIN + scene.unknowns.len();
@@ -73,29 +88,27 @@ impl<'a> Bank<'a> {
         let filters = || Filters::new(scene, &reaches, (deviation * deviation) as f32);
         // The same for all presses: there are hundreds of them, and a hand waits for this.
         let unlikely = padded(&|p| -p.mass.max(1e-12).ln(), NEVER);
+        let mut thought = vec![[0.0; LANES]; unknowns * blocks];
+        for block in thought.chunks_exact_mut(unknowns) {
+            block[FORCE] = [mean as f32; LANES];
+        }
         let presses = scene.around.iter().map(|around| {
             let mut costs = unlikely.clone();
             for &own in &around.own {
-                costs[own as usize] = NEVER;
+                costs.as_flattened_mut()[own as usize] = NEVER;
             }
-            let known = prior(scene, around);
-            let mut estimates = vec![0.0; unknowns * count];
-            estimates[2 * count..3 * count].fill(mean as f32);
             Press {
-                estimates,
+                estimates: thought.clone(),
                 costs,
-                blocks: (0..(count / LANES) as u32).collect(),
-                covariance: Covariance::from_diagonal(&known.component_mul(&known)),
-                estimate: thought(mean),
-                cost: -around.own_mass.ln(),
+                blocks: (0..blocks as u32).collect(),
             }
         });
+        let [x, y, z] = [0, 1, 2].map(|k| padded(&|p| p.position[k], 0.0));
         Self {
-            positions: (0..3)
-                .flat_map(|k| padded(&|p| p.position[k], 0.0))
-                .collect(),
+            positions: (0..blocks).map(|b| [x[b], y[b], z[b]]).collect(),
             filters: scene.levels.iter().map(|_| filters()).collect(),
             presses: presses.collect(),
+            truth: TrueFilters::new(scene, mean),
             mass: scene.presses.iter().map(|p| p.mass).sum(),
             gauges: 0,
             scene,
@@ -120,7 +133,14 @@ impl<'a> Bank<'a> {
 
     /// Working memory of [`Self::with`].
     pub fn rows(&self) -> Rows {
-        Rows::with(PLAIN + self.scene.unknowns.len(), self.positions.len() / 3)
+        Rows((0..TILE).map(|_| self.tried()).collect())
+    }
+
+    fn tried(&self) -> Tried {
+        Tried {
+            places: self.filters[0].rows(),
+            read: Read::default(),
+        }
     }
 
     /// The expected error (mm) of the set.
@@ -132,106 +152,125 @@ impl<'a> Bank<'a> {
 
     /// The part of [`Self::error`] (mm) that is left where one place is meant.
     pub fn local(&self) -> f64 {
-        let places = self.presses.iter().zip(&self.scene.presses);
-        let off = |press: &Press| local(&self.off_by(|i, j| press.covariance[(i, j)]));
-        let weighed = places.map(|(press, place)| place.mass * off(press));
+        let presses = self.scene.presses.iter().enumerate();
+        let weighed = presses.map(|(k, press)| press.mass * self.length(k));
         weighed.sum::<f64>() / self.mass
+    }
+
+    /// How far off (mm) a press is expected to be found where its own place is meant.
+    fn length(&self, press: usize) -> f64 {
+        let [along, both, across] = self.truth.off_by(self.scene, press);
+        mean_length(along, both, across)
     }
 
     /// Expected error (mm) of each press.
     pub fn errors(&self) -> Vec<f64> {
         let mut errors = Vec::with_capacity(self.presses.len());
         for (filters, level) in self.filters.iter().zip(&self.scene.levels) {
-            let nothing = Rows {
-                sharpness: filters.of_force().iter().map(|&v| sharpness(v)).collect(),
-                ..self.rows()
-            };
+            let nothing = filters.unread();
             errors.extend(level.presses.clone().map(|k| {
-                let press = &self.presses[k];
-                let total = masses_with(press, &nothing, &self.positions, 0.0, press.cost as f32);
-                self.error_of(k, &self.off_by(|i, j| press.covariance[(i, j)]), total)
+                let cost = self.truth.cost(k) as f32;
+                let total = self.masses_with(k, &nothing, 0.0, cost);
+                self.error_of(k, self.length(k), total)
             }));
         }
         errors
     }
 
-    /// The expected error (mm) of the set with one more gauge.
-    pub fn with(&self, site: usize, rows: &mut Rows) -> f64 {
-        let mut sum = 0.0;
-        for (filters, level) in self.filters.iter().zip(&self.scene.levels) {
-            predict(
-                filters,
-                &self.scene.at_places.of(site),
-                level.force as f32,
-                rows,
-            );
-            for k in level.presses.clone() {
-                sum += self.scene.presses[k].mass * self.error_with(site, k, level.force, rows);
+    /// The expected error (mm) of the set with one more gauge, at each of some sites.
+    pub fn with(&self, sites: &[usize], rows: &mut Rows) -> Vec<f64> {
+        let mut sums = vec![0.0; sites.len()];
+        self.each_with(sites, rows, |which, press, error| {
+            sums[which] += self.scene.presses[press].mass * error;
+        });
+        sums.into_iter().map(|sum| sum / self.mass).collect()
+    }
+
+    /// Expected error (mm) of each press with one more gauge.
+    pub(super) fn errors_with(&self, site: usize) -> Vec<f64> {
+        let mut errors = vec![0.0; self.presses.len()];
+        let mut rows = Rows(vec![self.tried()]);
+        self.each_with(&[site], &mut rows, |_, press, error| errors[press] = error);
+        errors
+    }
+
+    /// Tells of each of some sites and each press in its order the expected error (mm) with a gauge more there.
+    fn each_with(
+        &self,
+        sites: &[usize],
+        Rows(rows): &mut Rows,
+        mut told: impl FnMut(usize, usize, f64),
+    ) {
+        let scene = self.scene;
+        for (tile, sites) in sites.chunks(rows.len()).enumerate() {
+            let first = tile * rows.len();
+            for (tried, &site) in rows.iter_mut().zip(sites) {
+                self.truth.read(scene, (site, self.gauges), &mut tried.read);
+            }
+            for (filters, level) in self.filters.iter().zip(&scene.levels) {
+                for (tried, &site) in rows.iter_mut().zip(sites) {
+                    let report = scene.at_places.of(site);
+                    predict(filters, &report, level.force as f32, &mut tried.places);
+                }
+                for k in level.presses.clone() {
+                    for (t, tried) in rows[..sites.len()].iter().enumerate() {
+                        told(first + t, k, self.error_with(k, tried));
+                    }
+                }
             }
         }
-        sum / self.mass
+    }
+
+    /// Expected error (mm) of a press with a gauge that is tried.
+    fn error_with(&self, press: usize, Tried { places, read }: &Tried) -> f64 {
+        let (reading, cost) = (read.readings[press], read.costs[press]);
+        let total = self.masses_with(press, places, reading, cost);
+        self.error_of(press, read.lengths[press], total)
     }
 
     /// Adds a gauge.
     pub fn add(&mut self, site: usize) {
-        let mut rows = self.rows();
-        let (scene, turn) = (self.scene, self.gauges);
+        let Tried {
+            mut places,
+            mut read,
+        } = self.tried();
+        let scene = self.scene;
+        self.truth.read(scene, (site, self.gauges), &mut read);
+        self.truth.take(&read);
+        let report = scene.at_places.of(site);
         for (filters, level) in self.filters.iter_mut().zip(&scene.levels) {
-            let report = scene.at_places.of(site);
-            predict(filters, &report, level.force as f32, &mut rows);
-            let gains = corrections(filters, &rows);
-            let first = level.presses.start;
+            predict(filters, &report, level.force as f32, &mut places);
+            let gains = corrections(filters, &places);
+            let (first, truth) = (level.presses.start, &self.truth);
             let presses = self.presses[level.presses.clone()].par_iter_mut();
             presses.enumerate().for_each(|(k, press)| {
-                let (own, reading) = Own::of(scene, (site, turn), first + k, level.force);
-                let (covariance, estimate, cost) = own.corrected(press);
-                (press.covariance, press.estimate, press.cost) = (covariance, estimate, cost);
-                press.correct(&rows, &gains, reading as f32);
-                press.close();
+                press.correct(&places, &gains, read.readings[first + k]);
+                press.close(truth.cost(first + k));
             });
-            shrink(filters, &rows, &gains);
+            shrink(filters, &places, &gains);
         }
         self.gauges += 1;
     }
 
-    /// Expected error (mm) of a press of some force (N) with a gauge at a site more, of which the rows are.
-    fn error_with(&self, site: usize, press: usize, force: f64, rows: &Rows) -> f64 {
-        let (own, reading) = Own::of(self.scene, (site, self.gauges), press, force);
-        let known = &self.presses[press];
-        let weighed = own.weighed(known);
-        let total = masses_with(
-            known,
-            rows,
-            &self.positions,
-            reading as f32,
-            weighed.cost as f32,
-        );
-        let entry = |i: usize, j: usize| {
-            known.covariance[(i, j)] - weighed.spread[i] * weighed.spread[j] / weighed.predicted
+    /// The probability of all places over that of the true one of a press, which costs `own`, and its first moments.
+    fn masses_with(&self, press: usize, rows: &filters::Rows, reading: f32, own: f32) -> [f64; 4] {
+        let press = &self.presses[press];
+        let thought = Thought {
+            estimates: &press.estimates,
+            costs: &press.costs,
+            blocks: &press.blocks,
         };
-        self.error_of(press, &self.off_by(entry), total)
+        let unknowns = PLAIN + self.scene.unknowns.len();
+        sum_masses_with(unknowns, thought, rows, &self.positions, reading, own)
     }
 
-    /// Of where an estimate is that has this covariance for whoever makes it: along, along-across, across (mm²).
-    fn off_by(&self, covariance: impl Fn(usize, usize) -> f64) -> [f64; 3] {
-        let mut off = [covariance(0, 0), covariance(0, 1), covariance(1, 1)];
-        for (k, unknown) in self.scene.unknowns.iter().enumerate() {
-            let [along, across] = [0, 1].map(|i| covariance(i, PLAIN + k));
-            let less = 1.0 - unknown.made().powi(2);
-            off[0] -= less * along * along;
-            off[1] -= less * along * across;
-            off[2] -= less * across * across;
-        }
-        off
-    }
-
-    /// From how far off the filter at the true place is, and the probability (over the one there) and its first moments of all
+    /// From how far off (mm) the filter at the true place is, and the probability (over the one there) and its first moments of all
     /// others.
-    fn error_of(&self, press: usize, off: &[f64; 3], [mass, x, y, z]: [f64; 4]) -> f64 {
+    fn error_of(&self, press: usize, length: f64, [mass, x, y, z]: [f64; 4]) -> f64 {
         let there = self.scene.presses[press].position;
         let own = (1.0 + mass).recip();
         let elsewhere = (DVec3::new(x, y, z) - there * mass) * own;
-        (elsewhere.length_squared() + (own * local(off)).powi(2)).sqrt()
+        (elsewhere.length_squared() + (own * length).powi(2)).sqrt()
     }
 
     /// Which turn the next gauge has: a set hears the same noise whichever of its gauges is added last.
@@ -239,218 +278,43 @@ impl<'a> Bank<'a> {
         self.gauges = turn;
     }
 
-    /// Expected error (mm) of each press with one more gauge.
-    pub(super) fn errors_with(&self, site: usize, rows: &mut Rows) -> Vec<f64> {
-        let mut errors = Vec::with_capacity(self.presses.len());
-        for (filters, level) in self.filters.iter().zip(&self.scene.levels) {
-            let report = self.scene.at_places.of(site);
-            predict(filters, &report, level.force as f32, rows);
-            let rows = &*rows;
-            let error = |k| self.error_with(site, k, level.force, rows);
-            errors.extend(level.presses.clone().map(error));
-        }
-        errors
-    }
-
     /// What each place costs (minus the logarithm of its probability, up to what is the same for all) when the gauges
     /// of a set read a press of some force (N) without noise.
     pub(super) fn costs(scene: &Scene, set: &[usize], press: usize, force: f64) -> Vec<f64> {
-        let mut filters: Vec<Press> = scene
-            .places
-            .iter()
-            .map(|place| Press::at_rest(scene, place))
-            .collect();
+        let places = scene.places.iter();
+        let mut filters: Vec<Single> = places.map(|p| Single::at_rest(scene, p)).collect();
         for &site in set {
             let (there, here) = (scene.at_presses.of(site), scene.at_places.of(site));
             let reading = force * f64::from(there.value[press]);
-            for (k, filter) in filters.iter_mut().enumerate() {
-                let own = Own::at_place(scene, &here, k, (force, reading));
-                (filter.covariance, filter.estimate, filter.cost) = own.corrected(filter);
+            for (place, filter) in filters.iter_mut().enumerate() {
+                filter.correct(scene, (&here, place), (force, reading));
             }
         }
-        filters.iter().map(Press::cost_without_pulls).collect()
+        filters.iter().map(Single::cost_without_pulls).collect()
     }
-}
-
-/// How far off (mm) an estimate of this covariance is: along, along-across, across.
-fn local(&[along, both, across]: &[f64; 3]) -> f64 {
-    mean_length(along, both, across)
-}
-
-/// Deviations of what is known of a press before anything is read: along, across (mm), force (N), and the rest.
-pub(super) fn prior(scene: &Scene, around: &Neighbourhood) -> Unknowns {
-    within(scene, around.reach)
-}
-
-/// The same of a touch within some reach (mm).
-fn within(scene: &Scene, reach: f64) -> Unknowns {
-    let mut known = Unknowns::zeros();
-    known.fixed_rows_mut::<2>(0).fill(reach);
-    known[2] = scene.hardest.unwrap_or(0.0);
-    known.rows_mut(PLAIN, scene.unknowns.len()).fill(1.0);
-    known
-}
-
-/// What is thought of a touch of which nothing was read: as hard as that, in the middle of its place.
-fn thought(force: f64) -> Unknowns {
-    let mut thought = Unknowns::zeros();
-    thought[2] = force;
-    thought
-}
-
-/// What a site's reading of a press of some force says of each unknown, over the reading's deviation, and the square of
-/// that.
-pub(super) fn row(scene: &Scene, report: &Report, press: usize, force: f64) -> (Unknowns, f64) {
-    let variance = 1.0 + force * force * f64::from(report.variance[press]);
-    let mut row = Unknowns::zeros();
-    row[0] = force * f64::from(report.slopes[0][press]);
-    row[1] = force * f64::from(report.slopes[1][press]);
-    row[2] = f64::from(report.value[press]);
-    let mut nuisances = report.nuisances();
-    for (entry, unknown) in row.iter_mut().skip(PLAIN).zip(&scene.unknowns) {
-        let mut of_touch = || nuisances.next().map_or(0.0, |n| f64::from(n[press]));
-        *entry = unknown.drift().unwrap_or_else(|| force * of_touch());
-    }
-    (row * variance.sqrt().recip(), variance)
 }
 
 impl Press {
     /// Takes a reading into account at all places that may still be meant.
-    fn correct(&mut self, rows: &Rows, gains: &[f32], reading: f32) {
+    fn correct(&mut self, rows: &filters::Rows, gains: &[Lane], reading: f32) {
         let Self {
             estimates,
             costs,
             blocks,
-            ..
         } = self;
-        correct(estimates, costs, rows, gains, blocks, reading);
+        let unknowns = estimates.len() / costs.len().max(1);
+        correct(unknowns, estimates, costs, rows, gains, blocks, reading);
     }
 
-    /// Leaves out blocks of places that are so unlikely that no more gauges will bring them back.
-    fn close(&mut self) {
+    /// Leaves out blocks of places that are so unlikely beside the cost of the true one that no more gauges will bring
+    /// them back.
+    fn close(&mut self, own: f64) {
         /// In logarithms of the probability over that of the true place.
         const UNLIKELY: f64 = 30.0;
-        let (costs, limit) = (&self.costs, (self.cost + UNLIKELY) as f32);
-        let likely = |block: &u32| {
-            let first = *block as usize * LANES;
-            costs[first..first + LANES].iter().any(|c| *c < limit)
-        };
+        let (costs, limit) = (&self.costs, (own + UNLIKELY) as f32);
+        let likely = |block: &u32| costs[*block as usize].iter().any(|c| *c < limit);
         self.blocks.retain(likely);
     }
-
-    /// A touch around a place of which nothing was read yet; it compares itself with no other place.
-    fn at_rest(scene: &Scene, place: &Place) -> Self {
-        let known = within(scene, place.reach);
-        Self {
-            estimates: Vec::new(),
-            costs: Vec::new(),
-            blocks: Vec::new(),
-            covariance: Covariance::from_diagonal(&known.component_mul(&known)),
-            estimate: thought(if scene.hardest.is_some() { 0.0 } else { 1.0 }),
-            cost: -place.mass.max(1e-12).ln(),
-        }
-    }
-
-    /// What a touch costs that would have to pull, beside what it costs already.
-    fn cost_without_pulls(&self) -> f64 {
-        let variance = self.covariance[(2, 2)];
-        let pulls = if variance > 0.0 {
-            (self.estimate[2] / variance.sqrt()).min(0.0)
-        } else {
-            0.0
-        };
-        self.cost + 0.5 * pulls * pulls
-    }
-}
-
-/// What is measured at the true place.
-struct Own {
-    row: Unknowns,
-    reading: f64,
-    variance: f64,
-}
-
-/// A reading beside what was thought of a press.
-struct Weighed {
-    /// Covariance of the reading with each unknown.
-    spread: Unknowns,
-    /// Variance of the reading.
-    predicted: f64,
-    /// How far the reading is from what was predicted.
-    off: f64,
-    /// What the press costs with it.
-    cost: f64,
-}
-
-impl Own {
-    /// A site's reading of a press, as the filter at the true place takes it.
-    /// The reading is that of the gauge of a turn.
-    fn of(scene: &Scene, (site, turn): (usize, usize), press: usize, force: f64) -> (Self, f64) {
-        let report = scene.at_presses.of(site);
-        let (row, variance) = row(scene, &report, press, force);
-        let deviation = variance.sqrt();
-        // Of the gauge's turn and not of its site: else the sites with the luckiest noise would be chosen.
-        let draw = scene.draw(turn, press);
-        let made = |k: usize| row[PLAIN + k] * f64::from(scene.made(k, press));
-        let made: f64 = (0..scene.unknowns.len()).map(made).sum();
-        let value = f64::from(report.value[press]);
-        let reading = force * value + deviation * (made + f64::from(draw));
-        let own = Self {
-            row,
-            reading: reading / deviation,
-            variance,
-        };
-        (own, reading)
-    }
-
-    fn weighed(&self, press: &Press) -> Weighed {
-        let spread = press.covariance * self.row;
-        // Never less than the noise: rounding would take more.
-        let predicted = (1.0 + self.row.dot(&spread)).max(1.0);
-        let off = self.reading - self.row.dot(&press.estimate);
-        let log = 0.5 * (predicted * self.variance).ln();
-        Weighed {
-            cost: press.cost + off * off / (2.0 * predicted) + log,
-            spread,
-            predicted,
-            off,
-        }
-    }
-
-    fn corrected(&self, press: &Press) -> (Covariance, Unknowns, f64) {
-        let Weighed {
-            spread,
-            predicted,
-            off,
-            cost,
-        } = self.weighed(press);
-        (
-            press.covariance - spread * spread.transpose() / predicted,
-            press.estimate + spread * (off / predicted),
-            cost,
-        )
-    }
-
-    /// What a site would measure of a touch of some force (N) around a place, for a reading (in units of the noise).
-    fn at_place(scene: &Scene, here: &Report, place: usize, (force, reading): (f64, f64)) -> Self {
-        let (row, variance) = row(scene, here, place, force);
-        Self {
-            row,
-            reading: reading / variance.sqrt(),
-            variance,
-        }
-    }
-}
-
-/// Probability over that of the true place, and its first moments, of all places.
-fn masses_with(press: &Press, rows: &Rows, positions: &[f32], reading: f32, own: f32) -> [f64; 4] {
-    let Press {
-        estimates,
-        costs,
-        blocks,
-        ..
-    } = press;
-    sum_masses_with(estimates, costs, rows, positions, blocks, reading, own)
 }
 
 #[cfg(test)]

@@ -128,11 +128,13 @@ pub fn certify(
         return Ok(None);
     }
     // Nothing is worth computing of what is never off.
-    let plain = scene.unknowns.iter().all(|u| u.made() == 0.0);
-    let bound = if plain {
-        bounded::<PLAIN>
-    } else {
-        bounded::<MOST>
+    let off = scene.unknowns.iter().filter(|u| u.made() > 0.0).count();
+    let bound = match off {
+        0 => bounded::<PLAIN>,
+        1 => bounded::<4>,
+        2 => bounded::<5>,
+        3 => bounded::<6>,
+        _ => bounded::<MOST>,
     };
     bound(scene, &free, (&held, &own), watch)
 }
@@ -180,12 +182,17 @@ struct Expected<const N: usize> {
 impl<const N: usize> Relaxed<N> {
     /// With the sites that are `free`, and those that are `held` in any case.
     fn new(scene: &Scene, free: &[usize], held: &[usize]) -> Self {
-        let first = |all: Unknowns| SVector::<f64, N>::from_fn(|k, _| all[k]);
         let mut made = Unknowns::repeat(1.0);
-        for (entry, unknown) in made.iter_mut().skip(PLAIN).zip(&scene.unknowns) {
-            *entry = unknown.made();
+        // Which unknowns are looked at.
+        let mut which: Vec<usize> = (0..PLAIN).collect();
+        for (k, unknown) in (PLAIN..).zip(&scene.unknowns) {
+            made[k] = unknown.made();
+            which.extend((made[k] > 0.0).then_some(k));
         }
-        let really = |around| first(prior(scene, around).component_mul(&made));
+        let some = |all: Unknowns| {
+            SVector::<f64, N>::from_fn(|k, _| which.get(k).map_or(0.0, |&unknown| all[unknown]))
+        };
+        let really = |around| some(prior(scene, around).component_mul(&made));
         let priors: Vec<SVector<f64, N>> = scene.around.iter().map(really).collect();
         let forces: Vec<f64> = (scene.levels.iter())
             .flat_map(|level| level.presses.clone().map(move |_| level.force))
@@ -194,7 +201,7 @@ impl<const N: usize> Relaxed<N> {
             let report = scene.at_presses.of(site);
             let of = |p: usize| {
                 let (row, _) = row(scene, &report, p, forces[p]);
-                <[f64; N]>::from(first(row).component_mul(&priors[p])).map(|r| r as f32)
+                <[f64; N]>::from(some(row).component_mul(&priors[p])).map(|r| r as f32)
             };
             (0..priors.len()).map(of).collect()
         };

@@ -12,13 +12,17 @@ use nalgebra::Matrix2;
 const FLAT: f64 = 1.0 - 1e-14;
 
 /// E|e| for a normal e of mean zero and covariance [[a, b], [b, c]].
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
 #[must_use]
+#[inline(always)]
 pub fn mean_length(a: f64, b: f64, c: f64) -> f64 {
     let (large, small) = Ellipse::of(a, b, c).eigenvalues();
-    if large <= 0.0 {
-        return 0.0;
-    }
-    (2.0 * large / PI).sqrt() * second_kind(1.0 - small / large)
+    let m = (1.0 - small / large).clamp(0.0, 1.0);
+    let length = (2.0 * large / PI).sqrt() * second_kind(m);
+    if large > 0.0 { length } else { 0.0 }
 }
 
 /// [`mean_length`] and its derivative G by the covariance: what a small symmetric change dC adds is tr(G dC).
@@ -50,47 +54,60 @@ struct Ellipse {
 }
 
 impl Ellipse {
+    #[allow(
+        clippy::inline_always,
+        reason = "part of loops that are compiled for several instruction sets"
+    )]
+    #[inline(always)]
     fn of(a: f64, b: f64, c: f64) -> Self {
         Self {
-            middle: f64::midpoint(a, c),
+            middle: 0.5 * (a + c),
             half: (((a - c) / 2.0).powi(2) + b * b).sqrt(),
         }
     }
 
     /// The larger and the smaller.
+    #[allow(
+        clippy::inline_always,
+        reason = "part of loops that are compiled for several instruction sets"
+    )]
+    #[inline(always)]
     fn eigenvalues(&self) -> (f64, f64) {
         let small = (self.middle - self.half).max(0.0);
         (self.middle + self.half, small)
     }
 }
 
-/// The complete elliptic integral of the second kind by its parameter m = k².
+/// The complete elliptic integral of the second kind by its parameter m = k² of 0 to 1.
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
+#[inline(always)]
 fn second_kind(m: f64) -> f64 {
-    let m = m.clamp(0.0, 1.0);
-    if m > FLAT {
-        return 1.0;
-    }
     let (first, tail) = first_kind(m);
-    first * (1.0 - m / 2.0 - tail)
+    let second = first * (1.0 - m / 2.0 - tail);
+    if m > FLAT { 1.0 } else { second }
 }
 
 /// The complete elliptic integral of the first kind K by its parameter m = k² < 1, and what 1 − E/K is beyond m/2: by
 /// arithmetic–geometric means (Abramowitz and Stegun, 17.6.3 and 17.6.4).
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
+#[inline(always)]
 fn first_kind(m: f64) -> (f64, f64) {
-    /// More than enough for doubles: the difference squares at every step.
+    /// Enough for doubles: the difference squares at every step. As many for every parameter, so that some can be computed
+    /// side by side.
     const STEPS: usize = 6;
-    /// What is left after a difference like this is rounding.
-    const SMALL: f64 = 1e-9;
     let (mut a, mut g) = (1.0, (1.0 - m).sqrt());
     let (mut tail, mut power) = (0.0, 1.0);
     for _ in 0..STEPS {
         let c = (a - g) / 2.0;
-        (a, g) = (f64::midpoint(a, g), (a * g).sqrt());
+        (a, g) = (0.5 * (a + g), (a * g).sqrt());
         tail += power * c * c;
         power *= 2.0;
-        if c < SMALL {
-            break;
-        }
     }
     (FRAC_PI_2 / a, tail)
 }

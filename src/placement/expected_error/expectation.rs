@@ -4,9 +4,9 @@
 use rayon::prelude::*;
 
 use super::bank::{Bank, Rows};
+use super::losses::Losses;
 use super::scene::{Detail, Knowledge, Scene};
 use crate::budget::{Cancelled, Watch, report};
-use crate::draw::subsets;
 use crate::placement::constraints::{Constraints, Field, LostBy, reached};
 use crate::placement::exchange::{Criterion, gains};
 use crate::placement::margin::Best;
@@ -15,6 +15,8 @@ use crate::placement::{PlacementError, Pool, Request, SensorSet};
 const SELECTING: &str = "Selecting by expected error";
 /// Sites that are looked at in fine detail.
 const PROMISING: usize = 64;
+/// Of these, when the same gauge is looked at again.
+const AGAIN: usize = 24;
 /// And of these with gauges lost.
 const WITH_LOSSES: usize = 48;
 
@@ -51,39 +53,6 @@ impl Scenes {
             coarse: scene(detail.coarse())?,
             fine: scene(detail)?,
         })
-    }
-}
-
-/// Sets of gauges that may be lost.
-pub(super) struct Losses {
-    /// How many together.
-    gauges: usize,
-    seed: u64,
-    /// Whether there are so many that what is left is looked at in coarse detail.
-    pub many: bool,
-}
-
-impl Losses {
-    /// Nothing where no gauge may be lost.
-    pub fn of(constraints: &Constraints, seed: u64) -> Option<Self> {
-        /// From so many on they are many.
-        const MANY: usize = 12;
-        let losses = Self {
-            gauges: constraints.loss.gauges,
-            seed,
-            many: false,
-        };
-        (constraints.failure > 0.0).then(|| Self {
-            many: losses.all(constraints.sensors).len() > MANY,
-            ..losses
-        })
-    }
-
-    /// Numbers of the gauges lost, out of a set of so many: all that may be, or a sample.
-    fn all(&self, count: usize) -> Vec<Vec<usize>> {
-        /// All pairs of ten gauges.
-        const MOST: usize = 45;
-        subsets(count, self.gauges.min(count), MOST, self.seed)
     }
 }
 
@@ -230,9 +199,7 @@ impl<'a> Expectation<'a> {
         }
         // None of the open ones is dearer than what it replaces.
         let gain = |_: usize, gain: f64| gain;
-        let places = self.promising(banks, others.chosen.len(), (&open, Some(here)), &gain)?;
-        self.promising[number] = Some(places.clone());
-        Ok(places)
+        self.promising(banks, others.chosen.len(), (&open, Some(here)), &gain)
     }
 
     /// The criterion (mm) with the gauge of a number at some places more; where gauges may be lost, at those of them that
@@ -275,6 +242,7 @@ impl<'a> Expectation<'a> {
         whole: &[(usize, f64)],
     ) -> Result<Vec<(usize, f64)>, Cancelled> {
         let scene = self.scene_of(losses);
+        let places: Vec<usize> = whole.iter().map(|w| w.0).collect();
         let after = |lost: &Vec<usize>| -> Result<Vec<f64>, Cancelled> {
             self.report(others.len())?;
             let mut bank = left(scene, seats(others, number), lost);
@@ -283,7 +251,7 @@ impl<'a> Expectation<'a> {
             }
             bank.take_turn(number);
             let mut rows = bank.rows();
-            Ok(whole.iter().map(|w| bank.with(w.0, &mut rows)).collect())
+            Ok(bank.with(&places, &mut rows))
         };
         let all = losses.all(others.len() + 1);
         let errors: Result<Vec<Vec<f64>>, Cancelled> = all.par_iter().map(after).collect();
@@ -357,6 +325,7 @@ impl Criterion for Expectation<'_> {
         let gain = |_: usize, gain: f64| gain;
         let places = (&places[..], Some(here));
         let errors = self.scan(&banks, (&others.chosen, number), places, &gain)?;
+        self.promising[number] = Some(best_of(&errors, here));
         let now = errors.iter().find(|(place, _)| *place == here);
         let value = now.map_or(f64::INFINITY, |(_, error)| *error);
         let best = errors.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
@@ -394,6 +363,15 @@ impl Criterion for Expectation<'_> {
         }
         Ok((field, sets))
     }
+}
+
+/// The best of some places, rising, and one that stays among them.
+fn best_of(errors: &[(usize, f64)], here: usize) -> Vec<usize> {
+    let keep = |_: usize, gain: f64| gain;
+    let best = foremost(errors.to_vec(), 0.0, (&keep, Some(here)), AGAIN);
+    let mut places: Vec<usize> = best.into_iter().map(|p| p.0).collect();
+    places.sort_unstable();
+    places
 }
 
 fn set_of(pool: &Pool, chosen: &[usize], error: f64, margin: Option<f64>) -> SensorSet {
@@ -481,8 +459,23 @@ pub(super) fn scan(
     let piece = |places: &[usize]| -> Result<Vec<f64>, Cancelled> {
         report(watch, SELECTING, step.0, step.1)?;
         let mut rows: Rows = bank.rows();
-        Ok(places.iter().map(|&p| bank.with(p, &mut rows)).collect())
+        Ok(bank.with(places, &mut rows))
     };
     let pieces: Result<Vec<Vec<f64>>, Cancelled> = open.par_chunks(PIECE).map(piece).collect();
     Ok(pieces?.concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gauge_looked_at_again_keeps_its_place_and_the_best_others() {
+        let errors: Vec<(usize, f64)> = (0..100).map(|k| (k, (k as f64 - 50.0).abs())).collect();
+        let places = best_of(&errors, 3);
+        assert_eq!(places.len(), AGAIN);
+        assert_eq!(places[0], 3);
+        let others: Vec<usize> = (50 - 11..50 + 12).collect();
+        assert_eq!(places[1..], others);
+    }
 }

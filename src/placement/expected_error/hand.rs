@@ -34,7 +34,7 @@ impl<'a> Hand<'a> {
     /// The expected error (mm) of each press with the gauge that moves at a site.
     #[must_use]
     pub fn errors_with(&self, site: usize) -> Vec<f64> {
-        self.others.errors_with(site, &mut self.others.rows())
+        self.others.errors_with(site)
     }
 
     /// The expected error (mm) without it.
@@ -193,7 +193,7 @@ pub(super) mod tests {
         // What a choice expects of the same gauge more.
         let last = Hand::around(&scene, &set, 3).errors_with(3);
         let others = Bank::of(&scene, &set[..3]);
-        let chosen = others.with(3, &mut others.rows());
+        let chosen = others.with(&[3], &mut others.rows())[0];
         assert!((everything(&scene, &last) / chosen - 1.0).abs() < 1e-6);
         // And of the whole set: the same filters, corrected on the way or before, in single precision.
         for (a, b) in last.iter().zip(&errors) {

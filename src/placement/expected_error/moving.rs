@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use super::bank::Bank;
-use super::expectation::{Expected, Losses};
+use super::expectation::Expected;
 use super::hand::Hand;
+use super::losses::Losses;
 use super::scene::{Beside, NUISANCES, Outlook, Scene, Shared, Variance};
 use super::{Detail, Knowledge};
 use crate::budget::{Cancelled, Watch};

@@ -4,6 +4,7 @@
 mod around;
 mod merged;
 mod places;
+mod reports;
 mod scatter;
 mod shared;
 
@@ -19,6 +20,8 @@ pub(super) use self::places::{Level, Neighbourhood, OWN, Place};
 use self::places::{
     REACH, draws, farthest_first, in_neighbourhoods, in_turns, levels, spacing, standing,
 };
+use self::reports::ROWS;
+pub(super) use self::reports::{LANES, Report, Reports};
 use self::shared::Unknown;
 use crate::budget::{Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
@@ -92,60 +95,6 @@ pub struct Knowledge<'a> {
     pub seed: u64,
 }
 
-/// What every site reports, per newton and in units of the noise, at some places: how much, how that changes over
-/// the surface (a millimetre along two directions), the variance of what else is off, and what a deviation of each
-/// nuisance of the touch adds. Filled up with silence to whole blocks of places.
-#[derive(Default)]
-pub(super) struct Reports {
-    /// Places, filled up.
-    count: usize,
-    rows: usize,
-    /// Site by site: values, slopes along, slopes across, variances, nuisances.
-    values: Vec<f32>,
-}
-
-/// Places that are computed side by side.
-pub(super) const LANES: usize = 16;
-/// Rows that every site has.
-const ROWS: usize = 4;
-
-/// Rows of [`Reports`] of one site.
-pub(super) struct Report<'a> {
-    pub value: &'a [f32],
-    pub slopes: [&'a [f32]; 2],
-    pub variance: &'a [f32],
-    /// One row after the other.
-    nuisances: &'a [f32],
-}
-
-impl<'a> Report<'a> {
-    /// What a deviation of each nuisance adds.
-    pub fn nuisances(&self) -> impl Iterator<Item = &'a [f32]> + use<'a> {
-        self.nuisances.chunks_exact(self.value.len().max(1))
-    }
-}
-
-impl Reports {
-    /// The rows of one site, one after the other.
-    pub(super) fn of_mut(&mut self, site: usize) -> &mut [f32] {
-        let length = self.rows * self.count;
-        &mut self.values[site * length..][..length]
-    }
-
-    /// What one site reports.
-    pub fn of(&self, site: usize) -> Report<'_> {
-        let length = self.rows * self.count;
-        let all = &self.values[site * length..][..length];
-        let row = |k: usize| &all[k * self.count..][..self.count];
-        Report {
-            value: row(0),
-            slopes: [row(1), row(2)],
-            variance: row(3),
-            nuisances: &all[ROWS * self.count..],
-        }
-    }
-}
-
 /// Everything that a choice needs to know of the touches; the readings of all sites are in it.
 pub struct Scene {
     pub(super) places: Vec<Place>,
@@ -183,14 +132,15 @@ impl Scene {
         Outlook::new(x, targets, known, detail, watch)?.scene(x, known.beside(), watch)
     }
 
-    /// Noise of unit deviation in what the gauge of a turn reads of a press.
-    pub(super) fn draw(&self, turn: usize, press: usize) -> f32 {
-        self.draws[turn % TURNS * self.presses.len() + press]
+    /// Noise of unit deviation in what the gauge of a turn reads of each press.
+    pub(super) fn draws(&self, turn: usize) -> &[f32] {
+        let presses = self.presses.len();
+        &self.draws[turn % TURNS * presses..][..presses]
     }
 
-    /// An unknown of a press, as far off as it really is, over what is allowed for.
-    pub(super) fn made(&self, unknown: usize, press: usize) -> f32 {
-        self.made[unknown * self.presses.len() + press]
+    /// The unknowns of all presses, as far off as they really are, over what is allowed for: unknowns × presses.
+    pub(super) fn made(&self) -> &[f32] {
+        &self.made
     }
 
     /// How many sites there are.
@@ -375,8 +325,9 @@ impl Reader<'_> {
     fn rows(&self, site: usize, at: &Spots) -> Vec<f32> {
         let count = at.numbers.len().next_multiple_of(LANES);
         let mut rows = vec![0.0; (ROWS + self.nuisances.len()) * count];
+        let values = self.values(site);
         for (k, (&place, neighbours)) in at.numbers.iter().zip(&at.neighbours).enumerate() {
-            let of = self.report(site, place, neighbours);
+            let of = self.report(&values, site, place, neighbours);
             let felt = self.felt(site, place);
             for (row, value) in of.into_iter().chain(felt).enumerate() {
                 rows[row * count + k] = value as f32;
@@ -385,22 +336,24 @@ impl Reader<'_> {
         rows
     }
 
-    fn report(&self, site: usize, place: usize, around: &[Neighbour]) -> [f64; 4] {
-        let value = self.value(site, place);
-        let rises: Vec<f64> = (around.iter())
-            .map(|n| self.value(site, n.place) - value)
-            .collect();
-        let slope = |k: usize| {
-            (around.iter().zip(&rises))
-                .map(|(n, r)| n.slopes[k] * r)
-                .sum::<f64>()
-        };
-        let slopes = [slope(0), slope(1)];
-        [value, slopes[0], slopes[1], self.variance(site, place)]
+    /// What a site reads at every place.
+    fn values(&self, site: usize) -> Vec<f64> {
+        let readings = self.x.row(site);
+        let value = |place| self.merged.value(readings, place) * self.unit;
+        (0..self.merged.len()).map(value).collect()
     }
 
-    fn value(&self, site: usize, place: usize) -> f64 {
-        self.merged.value(self.x.row(site), place) * self.unit
+    /// Value, slopes and variance of a site of these values.
+    fn report(&self, values: &[f64], site: usize, place: usize, around: &[Neighbour]) -> [f64; 4] {
+        let value = values[place];
+        let mut slopes = [0.0; 2];
+        for neighbour in around {
+            let rise = values[neighbour.place] - value;
+            for (slope, by) in slopes.iter_mut().zip(neighbour.slopes) {
+                *slope += by * rise;
+            }
+        }
+        [value, slopes[0], slopes[1], self.variance(site, place)]
     }
 
     /// Per newton squared.
@@ -475,12 +428,13 @@ pub fn templates(
         forces: known.forces,
         unit: unit.recip(),
     };
+    let values: Vec<Vec<f64>> = (0..x.rows()).map(|site| reader.values(site)).collect();
     let template = |place: usize| {
         let surroundings = around.of(place);
         let near = surroundings.neighbours.iter().map(|n| n.place);
         let reading = |site: usize| {
             let [value, along, across, variance] =
-                reader.report(site, place, &surroundings.neighbours);
+                reader.report(&values[site], site, place, &surroundings.neighbours);
             Reading {
                 value,
                 slopes: [along, across],

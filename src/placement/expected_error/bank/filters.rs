@@ -9,66 +9,69 @@ use crate::placement::expected_error::scene::{LANES, NUISANCES, Report, Scene};
 pub(in crate::placement::expected_error) const PLAIN: usize = 3;
 /// No filter has more of them: those, nuisances of the touch, and a drift.
 pub(in crate::placement::expected_error) const MOST: usize = PLAIN + NUISANCES + 1;
+/// Places side by side.
+pub(super) type Lane = [f32; LANES];
+
 /// Which of them is the force.
-const FORCE: usize = 2;
+pub(super) const FORCE: usize = 2;
 
 /// The filters at all places, for one force.
 #[derive(Clone)]
 pub(super) struct Filters {
     /// Unknowns of each.
-    pub(super) unknowns: usize,
-    /// Upper triangles of the covariances, entry by entry at all places: of along, across, force, and what else there is
-    /// to find.
-    pub(super) covariances: Vec<f32>,
+    unknowns: usize,
+    /// Upper triangles of the covariances, block by block: of along, across, force, and what else there is to find.
+    covariances: Vec<Lane>,
     /// What a drift reads of one deviation; nothing where none is to be found.
-    pub(super) drift: Option<f32>,
+    drift: Option<f32>,
 }
 
 /// What a site's reading does to the filters at all places, for one force.
-#[derive(Default)]
-pub(in crate::placement::expected_error) struct Rows {
-    /// Of the reading over its deviation: by each unknown at all places.
-    pub(super) slopes: Vec<f32>,
-    /// One over the deviation.
-    pub(super) scale: Vec<f32>,
-    /// Half over the variance of what is predicted, and the logarithm that belongs to it.
-    pub(super) half: Vec<f32>,
-    pub(super) log: Vec<f32>,
-    /// By how much the force is corrected, and one over its deviation after that.
-    pub(super) gain: Vec<f32>,
-    pub(super) sharpness: Vec<f32>,
+pub(super) struct Rows {
+    /// Block by block: of the reading over its deviation, by each unknown.
+    slopes: Vec<Lane>,
+    /// Of each block.
+    said: Vec<Said>,
 }
 
-impl Rows {
-    /// Of so many unknowns at so many places.
-    pub(super) fn with(unknowns: usize, count: usize) -> Self {
-        let zeros = || vec![0.0; count];
-        Self {
-            slopes: vec![0.0; unknowns * count],
-            scale: zeros(),
-            half: zeros(),
-            log: zeros(),
-            gain: zeros(),
-            sharpness: zeros(),
-        }
-    }
+/// What there is to know of a reading at the places of a block, whatever it is.
+#[derive(Clone)]
+struct Said {
+    /// One over the deviation.
+    scale: Lane,
+    /// Half over the variance of what is predicted, and the logarithm that belongs to it.
+    half: Lane,
+    log: Lane,
+    /// By how much the force is corrected, and one over its deviation after that.
+    gain: Lane,
+    sharpness: Lane,
+}
+
+impl Said {
+    const NOTHING: Self = Self {
+        scale: [0.0; LANES],
+        half: [0.0; LANES],
+        log: [0.0; LANES],
+        gain: [0.0; LANES],
+        sharpness: [0.0; LANES],
+    };
 }
 
 impl Filters {
     /// Before anything is read, at the places of a scene: within their reach (filled up with 1), with a force of some
     /// variance, and all else of unit variance.
-    pub(super) fn new(scene: &Scene, reaches: &[f32], force: f32) -> Self {
+    pub(super) fn new(scene: &Scene, reaches: &[Lane], force: f32) -> Self {
         let unknowns = PLAIN + scene.unknowns.len();
-        let squares: Vec<f32> = reaches.iter().map(|r| r * r).collect();
-        let entry = |(i, j): (usize, usize)| match i {
-            _ if i != j => vec![0.0; squares.len()],
-            FORCE => vec![force; squares.len()],
-            _ if i < FORCE => squares.clone(),
-            _ => vec![1.0; squares.len()],
+        let entry = |reaches: &Lane, (i, j): (usize, usize)| match i {
+            _ if i != j => [0.0; LANES],
+            FORCE => [force; LANES],
+            _ if i < FORCE => reaches.map(|r| r * r),
+            _ => [1.0; LANES],
         };
+        let block = |reaches| entries(unknowns).map(move |at| entry(reaches, at));
         Self {
             unknowns,
-            covariances: entries(unknowns).flat_map(entry).collect(),
+            covariances: reaches.iter().flat_map(block).collect(),
             drift: scene
                 .unknowns
                 .iter()
@@ -77,33 +80,55 @@ impl Filters {
         }
     }
 
-    /// Variances of the force.
-    pub(super) fn of_force(&self) -> &[f32] {
-        let count = self.covariances.len() / entries(self.unknowns).count();
-        &self.covariances[place_of(self.unknowns, FORCE, FORCE) * count..][..count]
+    fn blocks(&self) -> usize {
+        self.covariances.len() / triangle(self.unknowns)
+    }
+
+    /// Room for what a reading does to them.
+    pub(super) fn rows(&self) -> Rows {
+        let blocks = self.blocks();
+        Rows {
+            slopes: vec![[0.0; LANES]; self.unknowns * blocks],
+            said: vec![Said::NOTHING; blocks],
+        }
+    }
+
+    /// What is to be known of no reading at all.
+    pub(super) fn unread(&self) -> Rows {
+        let mut rows = self.rows();
+        let blocks = self.covariances.chunks_exact(triangle(self.unknowns));
+        for (said, covariance) in rows.said.iter_mut().zip(blocks) {
+            said.sharpness = covariance[place_of(self.unknowns, FORCE, FORCE)].map(sharpness);
+        }
+        rows
     }
 }
 
 /// Entries of an upper triangle, as they are kept.
-fn entries(unknowns: usize) -> impl Iterator<Item = (usize, usize)> {
+pub(super) fn entries(unknowns: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..unknowns).flat_map(move |i| (i..unknowns).map(move |j| (i, j)))
 }
 
-/// Where the entry (i, j ≥ i) is kept.
-const fn place_of(unknowns: usize, i: usize, j: usize) -> usize {
+/// How many there are.
+pub(super) const fn triangle(unknowns: usize) -> usize {
+    unknowns * (unknowns + 1) / 2
+}
+
+/// Where the entry (i, j) is kept.
+pub(super) const fn place_of(unknowns: usize, i: usize, j: usize) -> usize {
+    let (i, j) = if i < j { (i, j) } else { (j, i) };
     i * unknowns + j - i * (i + 1) / 2
 }
 
-/// Fills in what a reading does to the filters at all places.
-pub(super) fn predict(filters: &Filters, report: &Report, force: f32, rows: &mut Rows) {
-    let into = [
-        &mut rows.scale[..],
-        &mut rows.half,
-        &mut rows.log,
-        &mut rows.gain,
-        &mut rows.sharpness,
-    ];
-    fill(filters, report, &mut rows.slopes, into, force);
+/// A covariance of some filters side by side, by row and column: looked up before it is used, so that no loop over places
+/// has to ask whether an entry is there.
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
+#[inline(always)]
+pub(super) fn square<const N: usize, T>(triangle: &[T]) -> [[&T; N]; N] {
+    from_fn(|i| from_fn(|j| &triangle[place_of(N, i, j)]))
 }
 
 /// One over the deviation; nothing where there is none to know.
@@ -112,7 +137,7 @@ pub(super) fn predict(filters: &Filters, report: &Report, force: f32, rows: &mut
     reason = "part of loops that are compiled for several instruction sets"
 )]
 #[inline(always)]
-pub(super) fn sharpness(variance: f32) -> f32 {
+fn sharpness(variance: f32) -> f32 {
     if variance > 0.0 {
         variance.sqrt().recip()
     } else {
@@ -120,53 +145,25 @@ pub(super) fn sharpness(variance: f32) -> f32 {
     }
 }
 
-/// By how much the filters at all places correct each unknown.
-pub(super) fn corrections(filters: &Filters, rows: &Rows) -> Vec<f32> {
-    let count = rows.half.len();
-    let mut gains = vec![0.0; filters.unknowns * count];
-    spread(filters, rows, &mut gains);
-    gains[FORCE * count..][..count].copy_from_slice(&rows.gain);
-    gains
-}
-
-wide! {
-    fn spread<'a>(filters: &'a Filters, rows: &'a Rows, gains: &'a mut [f32]) {
-        let count = rows.half.len();
-        let covariances = filters.covariances.chunks_exact(count.max(1));
-        for ((i, j), values) in entries(filters.unknowns).zip(covariances) {
-            let ways = [(i, j), (j, i)];
-            for (i, j) in ways.into_iter().take(if i == j { 1 } else { 2 }) {
-                let slopes = &rows.slopes[j * count..][..count];
-                let terms = values.iter().zip(slopes).zip(&rows.half);
-                for (gain, ((value, slope), half)) in gains[i * count..][..count].iter_mut().zip(terms) {
-                    *gain += value * slope * 2.0 * half;
-                }
+fn folded(lanes: [Lane; 4]) -> [f64; 4] {
+    lanes.map(|lane| {
+        let mut all = lane.map(f64::from);
+        let mut count = LANES;
+        while count > 1 {
+            count /= 2;
+            for l in 0..count {
+                all[l] += all[l + count];
             }
         }
-    }
-}
-
-wide! {
-    /// What a reading leaves of the filters' covariances at all places.
-    pub(super) fn shrink<'a>(filters: &'a mut Filters, rows: &'a Rows, gains: &'a [f32]) {
-        let count = rows.half.len();
-        let covariances = filters.covariances.chunks_exact_mut(count.max(1));
-        for ((i, j), values) in entries(filters.unknowns).zip(covariances) {
-            let [a, b] = [i, j].map(|i| &gains[i * count..][..count]);
-            let terms = a.iter().zip(b).zip(&rows.half);
-            for (value, ((a, b), half)) in values.iter_mut().zip(terms) {
-                // Nothing where so much was predicted that half over it is no number any more.
-                *value -= a * b / (2.0 * half).max(f32::MIN_POSITIVE);
-            }
-        }
-    }
-}
-
-fn folded(lanes: [[f32; LANES]; 4]) -> [f64; 4] {
-    lanes.map(|lane| lane.iter().map(|v| f64::from(*v)).sum())
+        all[0]
+    })
 }
 
 /// Calls a function for as many unknowns as there are, so that its loops over them are unrolled.
+///
+/// In these functions all that is computed of one place stands in one loop over the places of a block, and goes into
+/// arrays of that loop's own: it is what compilers make vectors of. What may lie behind one reference is not known to lie
+/// behind no other.
 macro_rules! for_unknowns {
     ($count:expr, $name:ident($($arg:expr),*)) => {
         match $count {
@@ -178,20 +175,30 @@ macro_rules! for_unknowns {
         }
     };
 }
+pub(super) use for_unknowns;
+
+/// What is thought of a press at some places.
+pub(super) struct Thought<'a> {
+    /// Block by block, of each unknown.
+    pub estimates: &'a [Lane],
+    /// What each place costs, before a reading.
+    pub costs: &'a [Lane],
+    /// Blocks that may still be meant.
+    pub blocks: &'a [u32],
+}
 
 wide! {
-    /// The probability (over that of the true place) and its first moments, summed over some blocks of places: what is
-    /// thought of each unknown there and what the place costs, before a reading.
+    /// The probability (over that of the true place) and its first moments, summed over some blocks of places, with a
+    /// reading; `own` is the cost of the true place.
     pub(super) fn sum_masses_with<'a>(
-        estimates: &'a [f32],
-        cost: &'a [f32],
+        unknowns: usize,
+        thought: Thought<'a>,
         rows: &'a Rows,
-        positions: &'a [f32],
-        blocks: &'a [u32],
+        positions: &'a [[Lane; 3]],
         reading: f32,
         own: f32,
     ) -> [f64; 4] {
-        for_unknowns!(estimates.len() / cost.len().max(1), sum_of(estimates, cost, rows, positions, blocks, reading, own))
+        for_unknowns!(unknowns, sum_of(&thought, rows, positions, reading, own))
     }
 }
 
@@ -201,43 +208,26 @@ wide! {
 )]
 #[inline(always)]
 fn sum_of<const N: usize>(
-    estimates: &[f32],
-    cost: &[f32],
+    thought: &Thought,
     rows: &Rows,
-    positions: &[f32],
-    blocks: &[u32],
+    positions: &[[Lane; 3]],
     reading: f32,
     own: f32,
 ) -> [f64; 4] {
     let mut sums = [[0.0_f32; LANES]; 4];
-    let [scale, half, log, gain, sharpness, cost] = [
-        &rows.scale[..],
-        &rows.half,
-        &rows.log,
-        &rows.gain,
-        &rows.sharpness,
-        cost,
-    ]
-    .map(|v| v.as_chunks::<LANES>().0);
-    let [estimates, slopes, positions] =
-        [estimates, &rows.slopes, positions].map(|v| v.as_chunks::<LANES>().0);
-    // Blocks of one row.
-    let row = cost.len();
-    for &block in blocks {
+    let [estimates, slopes] = [thought.estimates, &rows.slopes].map(|v| v.as_chunks::<N>().0);
+    for &block in thought.blocks {
         let b = block as usize;
-        let estimates: [&[f32; LANES]; N] = from_fn(|i| &estimates[i * row + b]);
-        let slopes: [&[f32; LANES]; N] = from_fn(|i| &slopes[i * row + b]);
-        let [scale, half, log, gain] = [&scale[b], &half[b], &log[b], &gain[b]];
-        let [sharpness, cost] = [&sharpness[b], &cost[b]];
-        let [x, y, z]: [&[f32; LANES]; 3] = from_fn(|k| &positions[k * row + b]);
+        let (estimates, slopes, cost) = (&estimates[b], &slopes[b], &thought.costs[b]);
+        let (said, [x, y, z]) = (&rows.said[b], &positions[b]);
         for l in 0..LANES {
             let mut predicted = 0.0;
             for i in 0..N {
                 predicted += slopes[i][l] * estimates[i][l];
             }
-            let off = reading * scale[l] - predicted;
-            let pulls = ((estimates[FORCE][l] + gain[l] * off) * sharpness[l]).min(0.0);
-            let costs = cost[l] + off * off * half[l] + log[l] + 0.5 * pulls * pulls;
+            let off = reading * said.scale[l] - predicted;
+            let pulls = ((estimates[FORCE][l] + said.gain[l] * off) * said.sharpness[l]).min(0.0);
+            let costs = cost[l] + off * off * said.half[l] + said.log[l] + 0.5 * pulls * pulls;
             let w = exponential((own - costs).min(60.0));
             sums[0][l] += w;
             sums[1][l] += w * x[l];
@@ -249,55 +239,18 @@ fn sum_of<const N: usize>(
 }
 
 wide! {
-    /// Takes a reading into account at the places of some blocks.
+    /// Takes a reading into account at the places of some blocks: what is thought of each unknown there (block by block),
+    /// and what places cost.
     pub(super) fn correct<'a>(
-        estimates: &'a mut [f32],
-        cost: &'a mut [f32],
+        unknowns: usize,
+        estimates: &'a mut [Lane],
+        costs: &'a mut [Lane],
         rows: &'a Rows,
-        gains: &'a [f32],
+        gains: &'a [Lane],
         blocks: &'a [u32],
         reading: f32,
     ) {
-        let cost = cost.as_chunks_mut::<LANES>().0;
-        let estimates = estimates.as_chunks_mut::<LANES>().0;
-        let [scale, half, log] = [&rows.scale, &rows.half, &rows.log].map(|v| v.as_chunks::<LANES>().0);
-        let [slopes, gains] = [&rows.slopes, gains].map(|v| v.as_chunks::<LANES>().0);
-        let row = cost.len();
-        for &block in blocks {
-            let b = block as usize;
-            let mut off = [0.0_f32; LANES];
-            for l in 0..LANES {
-                off[l] = reading * scale[b][l];
-            }
-            for at in (b..estimates.len()).step_by(row) {
-                let (estimate, slope) = (&estimates[at], &slopes[at]);
-                for l in 0..LANES {
-                    off[l] -= slope[l] * estimate[l];
-                }
-            }
-            let (cost, half, log) = (&mut cost[b], &half[b], &log[b]);
-            for l in 0..LANES {
-                cost[l] += off[l] * off[l] * half[l] + log[l];
-            }
-            for at in (b..estimates.len()).step_by(row) {
-                let (estimate, gain) = (&mut estimates[at], &gains[at]);
-                for l in 0..LANES {
-                    estimate[l] += gain[l] * off[l];
-                }
-            }
-        }
-    }
-}
-
-wide! {
-    fn fill<'a>(
-        filters: &'a Filters,
-        report: &'a Report<'a>,
-        slopes: &'a mut [f32],
-        into: [&'a mut [f32]; 5],
-        force: f32,
-    ) {
-        for_unknowns!(filters.unknowns, fill_of(filters, report, slopes, into, force));
+        for_unknowns!(unknowns, correct_of(estimates, costs, rows, gains, blocks, reading));
     }
 }
 
@@ -306,80 +259,162 @@ wide! {
     reason = "part of loops that are compiled for several instruction sets"
 )]
 #[inline(always)]
-fn fill_of<const N: usize>(
-    filters: &Filters,
-    report: &Report,
-    slopes: &mut [f32],
-    into: [&mut [f32]; 5],
-    force: f32,
+fn correct_of<const N: usize>(
+    estimates: &mut [Lane],
+    costs: &mut [Lane],
+    rows: &Rows,
+    gains: &[Lane],
+    blocks: &[u32],
+    reading: f32,
 ) {
-    let covariances = filters.covariances.as_chunks::<LANES>().0;
-    let plain = [report.slopes[0], report.slopes[1], report.value];
-    let mut by: [&[[f32; LANES]]; N] = [&[]; N];
-    for (by, row) in by
-        .iter_mut()
-        .zip(plain.into_iter().chain(report.nuisances()))
-    {
-        *by = row.as_chunks::<LANES>().0;
+    let estimates = estimates.as_chunks_mut::<N>().0;
+    let [slopes, gains] = [&rows.slopes, gains].map(|v| v.as_chunks::<N>().0);
+    for &block in blocks {
+        let b = block as usize;
+        let (slopes, gains, said) = (&slopes[b], &gains[b], &rows.said[b]);
+        let (mut estimate, mut cost) = (estimates[b], costs[b]);
+        for l in 0..LANES {
+            let mut off = reading * said.scale[l];
+            for i in 0..N {
+                off -= slopes[i][l] * estimate[i][l];
+            }
+            cost[l] += off * off * said.half[l] + said.log[l];
+            for i in 0..N {
+                estimate[i][l] += gains[i][l] * off;
+            }
+        }
+        (estimates[b], costs[b]) = (estimate, cost);
     }
-    let drift = filters.drift.unwrap_or(0.0);
+}
+
+wide! {
+    /// Fills in what a reading of presses of some force (N) does to the filters at all places.
+    pub(super) fn predict<'a>(
+        filters: &'a Filters,
+        report: &'a Report<'a>,
+        force: f32,
+        rows: &'a mut Rows,
+    ) {
+        for_unknowns!(filters.unknowns, predict_of(filters, report, force, rows));
+    }
+}
+
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
+#[inline(always)]
+fn predict_of<const N: usize>(filters: &Filters, report: &Report, force: f32, rows: &mut Rows) {
+    let plain = [report.slopes[0], report.slopes[1], report.value];
+    let drift = [filters.drift.unwrap_or(0.0); LANES];
+    let mut by: [&[Lane]; N] = [&[]; N];
+    // Readings grow with the force; along and across change them the more, and the force itself by its unit. A drift is
+    // what it is.
+    let mut times = [1.0; N];
+    let of_touch = plain.into_iter().chain(report.nuisances());
+    for (i, ((by, times), row)) in by.iter_mut().zip(&mut times).zip(of_touch).enumerate() {
+        *by = row.as_chunks::<LANES>().0;
+        *times = if i == FORCE { 1.0 } else { force };
+    }
     let variances = report.variance.as_chunks::<LANES>().0;
-    let [scales, halves, logs, gains, sharps] = into.map(|v| v.as_chunks_mut::<LANES>().0);
-    let slopes = slopes.as_chunks_mut::<LANES>().0;
-    // Blocks of one row.
-    let row = variances.len();
-    for (b, variance) in variances.iter().enumerate() {
-        let mut scale = [0.0_f32; LANES];
+    let blocks = filters.covariances.chunks_exact(triangle(N));
+    let slopes = rows.slopes.as_chunks_mut::<N>().0.iter_mut();
+    let out = slopes.zip(&mut rows.said);
+    for (b, ((covariance, variance), (slopes, said))) in blocks.zip(variances).zip(out).enumerate()
+    {
+        let by: [&Lane; N] = from_fn(|i| by[i].get(b).unwrap_or(&drift));
+        let covariance = square::<N, Lane>(covariance);
+        let mut own_slopes = [[0.0; LANES]; N];
+        let mut own = Said::NOTHING;
         for l in 0..LANES {
-            scale[l] = (1.0 + force * force * variance[l]).sqrt().recip();
-        }
-        let mut rows = [[drift; LANES]; N];
-        for i in 0..N {
-            // Readings grow with the force; along and across change them the more, and the force itself by its unit.
-            let by_force = if i == FORCE { 1.0 } else { force };
-            if let Some(row) = by[i].get(b) {
-                for l in 0..LANES {
-                    rows[i][l] = by_force * row[l];
+            let scale = (1.0 + force * force * variance[l]).sqrt().recip();
+            let mut row = [0.0; N];
+            for i in 0..N {
+                row[i] = times[i] * by[i][l] * scale;
+                own_slopes[i][l] = row[i];
+            }
+            let mut predicted = 1.0;
+            let mut corrected = 0.0;
+            for i in 0..N {
+                let mut spread = 0.0;
+                for j in 0..N {
+                    spread += covariance[i][j][l] * row[j];
+                }
+                predicted += row[i] * spread;
+                if i == FORCE {
+                    corrected = spread;
                 }
             }
-            for l in 0..LANES {
-                rows[i][l] *= scale[l];
-            }
-            slopes[i * row + b] = rows[i];
-        }
-        let mut spread = [[0.0_f32; LANES]; N];
-        for i in 0..N {
-            for j in i..N {
-                let covariance = &covariances[place_of(N, i, j) * row + b];
-                for l in 0..LANES {
-                    spread[i][l] += covariance[l] * rows[j][l];
-                }
-                if i != j {
-                    for l in 0..LANES {
-                        spread[j][l] += covariance[l] * rows[i][l];
-                    }
-                }
-            }
-        }
-        let mut predicted = [1.0_f32; LANES];
-        for i in 0..N {
-            for l in 0..LANES {
-                predicted[l] += rows[i][l] * spread[i][l];
-            }
-        }
-        let force_variance = &covariances[place_of(N, FORCE, FORCE) * row + b];
-        let corrected = &spread[FORCE];
-        // Not written where they go at once: what may lie behind one reference is not known to lie behind no other.
-        let [mut half, mut log, mut gain, mut sharp] = [[0.0_f32; LANES]; 4];
-        for l in 0..LANES {
             // Never less than the noise: where signals are far above it, rounding would take more.
-            let predicted = predicted[l].max(1.0);
+            let predicted = predicted.max(1.0);
             let share = predicted.recip();
-            half[l] = 0.5 * share;
-            log[l] = 0.5 * logarithm(predicted / (scale[l] * scale[l]));
-            gain[l] = corrected[l] * share;
-            sharp[l] = sharpness(force_variance[l] - corrected[l] * corrected[l] * share);
+            own.scale[l] = scale;
+            own.half[l] = 0.5 * share;
+            own.log[l] = 0.5 * logarithm(predicted / (scale * scale));
+            own.gain[l] = corrected * share;
+            let known = covariance[FORCE][FORCE][l];
+            own.sharpness[l] = sharpness(known - corrected * corrected * share);
         }
-        (scales[b], halves[b], logs[b], gains[b], sharps[b]) = (scale, half, log, gain, sharp);
+        (*slopes, *said) = (own_slopes, own);
+    }
+}
+
+/// By how much the filters at all places correct each unknown, block by block.
+pub(super) fn corrections(filters: &Filters, rows: &Rows) -> Vec<Lane> {
+    let mut gains = vec![[0.0; LANES]; rows.slopes.len()];
+    gains_into(filters, rows, &mut gains);
+    gains
+}
+
+wide! {
+    fn gains_into<'a>(filters: &'a Filters, rows: &'a Rows, gains: &'a mut [Lane]) {
+        for_unknowns!(filters.unknowns, gains_of(filters, rows, gains));
+    }
+}
+
+#[allow(
+    clippy::inline_always,
+    reason = "part of loops that are compiled for several instruction sets"
+)]
+#[inline(always)]
+fn gains_of<const N: usize>(filters: &Filters, rows: &Rows, gains: &mut [Lane]) {
+    let blocks = filters.covariances.chunks_exact(triangle(N));
+    let rows = rows.slopes.as_chunks::<N>().0.iter().zip(&rows.said);
+    for ((covariance, (slopes, said)), gains) in blocks.zip(rows).zip(gains.as_chunks_mut().0) {
+        let covariance = square::<N, Lane>(covariance);
+        let mut own = [[0.0; LANES]; N];
+        for l in 0..LANES {
+            for i in 0..N {
+                let mut spread = 0.0;
+                for j in 0..N {
+                    spread += covariance[i][j][l] * slopes[j][l];
+                }
+                own[i][l] = spread * (2.0 * said.half[l]);
+            }
+        }
+        *gains = own;
+    }
+}
+
+wide! {
+    /// What a reading leaves of the filters' covariances at all places.
+    pub(super) fn shrink<'a>(filters: &'a mut Filters, rows: &'a Rows, gains: &'a [Lane]) {
+        let unknowns = filters.unknowns;
+        let blocks = filters.covariances.chunks_exact_mut(triangle(unknowns));
+        let gains = gains.chunks_exact(unknowns);
+        for ((covariance, said), gains) in blocks.zip(&rows.said).zip(gains) {
+            let mut share = [0.0; LANES];
+            for l in 0..LANES {
+                // Nothing where so much was predicted that half over it is no number any more.
+                share[l] = (2.0 * said.half[l]).max(f32::MIN_POSITIVE);
+            }
+            for ((i, j), entry) in entries(unknowns).zip(covariance) {
+                let mut own = *entry;
+                for l in 0..LANES {
+                    own[l] -= gains[i][l] * gains[j][l] / share[l];
+                }
+                *entry = own;
+            }
+        }
     }
 }

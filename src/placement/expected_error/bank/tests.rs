@@ -1,3 +1,5 @@
+use nalgebra::SMatrix;
+
 use super::*;
 use crate::budget::unwatched;
 use crate::dataset::SignalMatrix;
@@ -47,19 +49,29 @@ fn scene(felt: f64, nuisances: [Option<f64>; NUISANCES], drift: f64) -> Scene {
     Scene::new(&x, &targets, &known, detail, &unwatched).unwrap()
 }
 
+/// What a site reads of a press as the gauge of a turn.
+fn reading(scene: &Scene, (site, turn): (usize, usize), press: usize, force: f64) -> f64 {
+    let report = scene.at_presses.of(site);
+    let (row, variance) = row(scene, &report, press, force);
+    let made = |k: usize| row[PLAIN + k] * f64::from(scene.made()[k * scene.presses.len() + press]);
+    let made: f64 = (0..scene.unknowns.len()).map(made).sum();
+    let off = made + f64::from(scene.draws(turn)[press]);
+    force * f64::from(report.value[press]) + variance.sqrt() * off
+}
+
 /// How far off the linear estimator of the bank's own prior is at a press (mm²), where the unknowns really have other
 /// variances: C (Σ r rᵀ + P⁻¹ S P⁻¹) C, with C = (P⁻¹ + Σ r rᵀ)⁻¹.
 fn by_algebra(scene: &Scene, level: usize, press: usize) -> [f64; 3] {
     let known = prior(scene, &scene.around[press]);
     let used = PLAIN + scene.unknowns.len();
     let invert = |v: f64| if v > 0.0 { v.powi(-2) } else { 0.0 };
-    let before = Covariance::from_diagonal(&known.map(invert));
+    let before = SMatrix::<f64, MOST, MOST>::from_diagonal(&known.map(invert));
     let mut really = known;
     for (k, unknown) in scene.unknowns.iter().enumerate() {
         really[PLAIN + k] *= unknown.made();
     }
-    let really = Covariance::from_diagonal(&really.component_mul(&really));
-    let mut read = Covariance::zeros();
+    let really = SMatrix::<f64, MOST, MOST>::from_diagonal(&really.component_mul(&really));
+    let mut read = SMatrix::<f64, MOST, MOST>::zeros();
     for site in 0..SITES {
         let report = scene.at_presses.of(site);
         let (r, _) = row(scene, &report, press, scene.levels[level].force);
@@ -81,8 +93,7 @@ fn whoever_allows_for_more_than_comes_is_as_far_off_as_algebra_says() {
         let bank = Bank::of(&scene, &[0, 1, 2, 3, 4]);
         for (level, of) in scene.levels.iter().enumerate() {
             for press in of.presses.clone() {
-                let covariance = &bank.presses[press].covariance;
-                let off = bank.off_by(|i, j| covariance[(i, j)]);
+                let off = bank.truth.off_by(&scene, press);
                 let wanted = by_algebra(&scene, level, press);
                 for (a, b) in off.iter().zip(wanted) {
                     let size = wanted[0] + wanted[2];
@@ -151,7 +162,7 @@ fn what_places_think_in_lanes_is_what_one_filter_thinks() {
             let scene = scene(2.0, nuisances, drift);
             let set = [0, 1, 2, 3, 4];
             let bank = Bank::of(&scene, &set);
-            let count = bank.positions.len() / 3;
+            let unknowns = PLAIN + scene.unknowns.len();
             let press = scene.levels[0].presses.start;
             let force = scene.levels[0].force;
             let mut looked_at = 0;
@@ -159,27 +170,26 @@ fn what_places_think_in_lanes_is_what_one_filter_thinks() {
                 let known = &bank.presses[press];
                 // What stands for the press itself, or is too unlikely, is not looked at.
                 let open = known.blocks.contains(&((k / LANES) as u32));
-                if known.costs[k] > 1e20 || !open {
+                if known.costs.as_flattened()[k] > 1e20 || !open {
                     continue;
                 }
                 looked_at += 1;
-                let mut one = Press::at_rest(&scene, place);
+                let mut one = Single::at_rest(&scene, place);
                 for (turn, &site) in set.iter().enumerate() {
-                    let (_, reading) = Own::of(&scene, (site, turn), press, force);
+                    let reading = reading(&scene, (site, turn), press, force);
                     let here = scene.at_places.of(site);
-                    let own = Own::at_place(&scene, &here, k, (force, reading));
-                    (one.covariance, one.estimate, one.cost) = own.corrected(&one);
+                    one.correct(&scene, (&here, k), (force, reading));
                 }
                 let off =
                     |a: f32, b: f64, size: f64| (f64::from(a) - b).abs() < 2e-2 * size.max(1.0);
                 assert!(
-                    off(known.costs[k], one.cost, one.cost.abs()),
+                    off(known.costs.as_flattened()[k], one.cost, one.cost.abs()),
                     "{} {}",
-                    known.costs[k],
+                    known.costs.as_flattened()[k],
                     one.cost
                 );
                 for i in 0..PLAIN + scene.unknowns.len() {
-                    let thought = known.estimates[i * count + k];
+                    let thought = known.estimates[k / LANES * unknowns + i][k % LANES];
                     let size = one.estimate.abs().max();
                     assert!(
                         off(thought, one.estimate[i], size),
@@ -199,9 +209,58 @@ fn a_gauge_tried_is_the_gauge_added() {
     for site in 0..SITES {
         let set: Vec<usize> = (0..SITES).filter(|s| *s != site).collect();
         let mut bank = Bank::of(&scene, &set);
-        let tried = bank.with(site, &mut bank.rows());
+        let tried = bank.with(&[site], &mut bank.rows())[0];
         bank.add(site);
         let added = bank.error();
         assert!((tried / added - 1.0).abs() < 1e-3, "{tried} {added}");
+    }
+}
+
+#[test]
+fn presses_side_by_side_are_what_one_filter_says() {
+    for made in [None, Some(0.4)] {
+        let scene = scene(2.0, [None, made, made], 3.0);
+        let set = [3, 0, 4, 1];
+        let bank = Bank::of(&scene, &set);
+        let mut read = Read::default();
+        bank.truth.read(&scene, (2, set.len()), &mut read);
+        for level in &scene.levels {
+            for press in level.presses.clone() {
+                let around = &scene.around[press];
+                let place = Place {
+                    position: scene.presses[press].position,
+                    reach: around.reach,
+                    mass: around.own_mass,
+                };
+                let mut one = Single::at_rest(&scene, &place);
+                let tell = |one: &mut Single, turn: usize, site: usize| {
+                    let reading = reading(&scene, (site, turn), press, level.force);
+                    let there = scene.at_presses.of(site);
+                    one.correct(&scene, (&there, press), (level.force, reading));
+                    reading
+                };
+                for (turn, &site) in set.iter().enumerate() {
+                    tell(&mut one, turn, site);
+                }
+                assert!((bank.truth.cost(press) - one.cost).abs() < 1e-9 * one.cost.abs().max(1.0));
+                let told = tell(&mut one, set.len(), 2);
+                let near = |a: f32, b: f64| (f64::from(a) - b).abs() < 1e-6 * b.abs().max(1.0);
+                assert!(near(read.readings[press], told), "{told}");
+                assert!(near(read.costs[press], one.cost), "{}", one.cost);
+                let mut off = [(0, 0), (0, 1), (1, 1)].map(|at| one.covariance[at]);
+                for (k, unknown) in scene.unknowns.iter().enumerate() {
+                    let less = 1.0 - unknown.made().powi(2);
+                    let [a, b] = [0, 1].map(|i| one.covariance[(i, PLAIN + k)]);
+                    for (off, by) in off.iter_mut().zip([a * a, a * b, b * b]) {
+                        *off -= less * by;
+                    }
+                }
+                let length = mean_length(off[0], off[1], off[2]);
+                assert!(
+                    (read.lengths[press] / length - 1.0).abs() < 1e-9,
+                    "{length}"
+                );
+            }
+        }
     }
 }
