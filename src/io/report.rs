@@ -19,7 +19,7 @@ use crate::evaluation::{BASELINE, EstimatorKind};
 use crate::gaussian_process::GpTrial;
 use crate::mesh::flatten::Flat;
 use crate::placement::candidates::Candidates;
-use crate::plain::robust_top;
+use crate::plain::{count, robust_top};
 use crate::project::PartModel;
 
 const STYLE: &str = "
@@ -125,8 +125,8 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
     if !words.folded.is_empty() {
         let _ = write!(
             page,
-            "<details><summary>How this came about: {} notes</summary>",
-            words.folded.len()
+            "<details><summary>How this came about: {}</summary>",
+            count(words.folded.len(), "note")
         );
         list(page, "more", &words.folded);
         page.push_str("</details>");

@@ -105,6 +105,10 @@ pub fn paint_hint(look: Look<'_>, painter: &Painter, rect: Rect) {
     );
 }
 
+/// Of the limb where touches come, and beside where they come often.
+const TOUCHES_COME: Color32 = Color32::from_rgb(128, 153, 230);
+const BESIDE_OFTEN: Color32 = Color32::from_rgb(165, 178, 216);
+
 /// What the colours of the regions mean, of those that are there.
 pub fn paint_region_key(look: Look<'_>, painter: &Painter, rect: Rect) {
     if look.view.field == Field::Faces && look.scene.shows_field() {
@@ -118,12 +122,15 @@ pub fn paint_region_key(look: Look<'_>, painter: &Painter, rect: Rect) {
     if look.view.field != Field::Region {
         return;
     }
-    let verdicts = look.session.results.feasibility.is_some()
-        || look.session.document.layer(Layer::Feasible).is_some();
+    let painted = |layer: Layer| look.session.document.layer(layer).is_some();
+    // The filters' verdicts are shown while they hold; what is painted, always.
+    let verdicts = look.session.current_verdicts().is_some() || painted(Layer::Feasible);
+    let often = painted(Layer::Often);
+    let touches_come = if often { BESIDE_OFTEN } else { TOUCHES_COME };
     let rows = [
         (verdicts, "Gauges may go", Color32::from_rgb(107, 191, 173)),
         (
-            look.session.document.layer(Layer::KeepOut).is_some(),
+            painted(Layer::KeepOut),
             "Keep out",
             Color32::from_rgb(219, 115, 92),
         ),
@@ -132,12 +139,8 @@ pub fn paint_region_key(look: Look<'_>, painter: &Painter, rect: Rect) {
             "Held",
             Color32::from_rgb(219, 189, 87),
         ),
-        (
-            look.session.document.layer(Layer::Touch).is_some()
-                || look.session.document.layer(Layer::Often).is_some(),
-            "Touches come",
-            Color32::from_rgb(128, 153, 230),
-        ),
+        (painted(Layer::Touch), "Touches come", touches_come),
+        (often, "Touches come often", TOUCHES_COME),
     ];
     let there = rows.into_iter().filter(|r| r.0);
     colour_key(painter, rect, there.map(|(_, name, colour)| (name, colour)));

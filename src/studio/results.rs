@@ -185,10 +185,8 @@ fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
         format!("; as selected judged {:.2} mm", r.error_mm)
     });
     divide(ui);
-    // The first figure is the same while the hand moves and after.
-    let brief = text
-        .split_once(" mm")
-        .map_or(text.clone(), |(mm, _)| format!("{mm} mm"));
+    // What is expected is the same while the hand moves and after.
+    let brief = text.split([';', ',']).next().unwrap_or(&text).to_owned();
     ui.add(cut(RichText::new(brief).color(super::theme::TOUCHED)))
         .on_hover_text(text + &beside);
 }

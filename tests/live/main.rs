@@ -14,3 +14,4 @@ mod firmware;
 mod live;
 mod promise;
 mod rows;
+mod stranger;
