@@ -15,7 +15,7 @@ use super::promise::text;
 
 /// Until when a right touch must have been shown, and for how long what follows is looked at (s).
 const WITHIN_S: f64 = 60.0;
-const THEN_S: f64 = 20.0;
+const THEN_S: f64 = 10.0;
 /// How far off (mm) a touch that is right may be: on a limb of 120 mm with gauges as a workshop glues them, which are not
 /// calibrated.
 const RIGHT_MM: f64 = 10.0;
