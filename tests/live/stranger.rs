@@ -98,7 +98,10 @@ fn first_minute(seed: u64) -> (f64, f64) {
         text(&table),
     ]);
     let said: Value = serde_json::from_str(&board.lines().next().unwrap()).unwrap();
-    let mut listener = Running::start(&["listen", said["port"].as_str().unwrap(), "--json"]);
+    // It ends by itself, so that one that never shows a line is told from one that is waited for.
+    let ends = (WITHIN_S + THEN_S).to_string();
+    let port = said["port"].as_str().unwrap();
+    let mut listener = Running::start(&["listen", port, "--json", "--seconds", &ends]);
     let mut shown: Vec<(f64, Shown)> = Vec::new();
     for line in listener.lines() {
         let now = begun.elapsed().as_secs_f64();
