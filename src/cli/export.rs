@@ -179,8 +179,5 @@ fn pressed(
         force: args.force,
         tip_radius: loaded.inputs.project.touch.tip_radius_mm * 1e-3,
     };
-    let solved = model.press(&touch);
-    let solved = model.system().widened(&[solved]);
-    let moved = model.translations(&solved, 1).swap_remove(0);
-    Ok(((**mesh).clone(), moved, touch))
+    Ok(((**mesh).clone(), model.moved(&touch), touch))
 }

@@ -9,7 +9,6 @@ use crate::as_made::as_made;
 use crate::board::{Disturbances, Faults, Options, Script, SimulatedBoard, fitting_gain};
 use crate::budget::Watch;
 use crate::draw::normal;
-use crate::elasticity::estimate::under_load;
 use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Push, Touch};
 use crate::inference::calibration::noise_of_mean;
@@ -93,17 +92,9 @@ pub fn gives_way(
     touches: &[Touch],
     watch: Watch,
 ) -> Result<Vec<f64>, DesignError> {
-    /// Solutions that are held at a time.
-    const BLOCK: usize = 64;
     let model = sensing.model(inputs, watch)?;
-    let mut gives = Vec::with_capacity(touches.len());
-    for block in touches.chunks(BLOCK) {
-        let loads: Vec<_> = block.iter().map(|t| model.load(t)).collect();
-        let solutions = model.system().solve_loads(&loads);
-        let own = block.iter().zip(&loads).zip(&solutions);
-        gives.extend(own.map(|((touch, load), u)| under_load(load, touch, u) / touch.force));
-    }
-    Ok(gives)
+    let gives = model.gives_way(touches).into_iter().zip(touches);
+    Ok(gives.map(|(give, touch)| give / touch.force).collect())
 }
 
 /// The known presses that are proposed, made by hand on such a board, as they are read: what the judge foresees of a

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
+use super::estimate::under_load;
 use super::load::{Push, Touch};
 use super::observe::{Face, Observer};
+use super::solver::BLOCK;
 use super::system::System;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
@@ -18,6 +20,25 @@ pub struct LoadCheck {
     pub reaction_error: f64,
     /// |½ u·f - strain energy| over the energy.
     pub energy_error: f64,
+}
+
+/// A coarser model of the same part, on the same surface, from which displacements are carried on: where errors fall by about
+/// the same share from one order of the elements to the next, u + s (u - u of the coarser one) is nearer to the converged
+/// answer than either (B. Szabó and I. Babuška, Finite Element Analysis, 1991, chapter 4).
+#[derive(Clone, Copy)]
+pub struct Coarser<'a> {
+    /// The coarser model.
+    pub model: &'a dyn Model,
+    /// s: of what changed from it to the finer one, so much is still to come.
+    pub share: f64,
+}
+
+impl Coarser<'_> {
+    /// What a displacement comes to.
+    #[must_use]
+    pub fn carried(&self, fine: f64, coarse: f64) -> f64 {
+        fine + self.share * (fine - coarse)
+    }
 }
 
 /// A factored model of a part. Touches press on the surface of its mesh, and points to read lie on it.
@@ -32,6 +53,12 @@ pub trait Model: Send + Sync {
 
     /// The factored stiffness.
     fn system(&self) -> &System;
+
+    /// What its displacements are carried on from, where there is such a model. Strains are not: they scatter by more
+    /// than what is left of them.
+    fn coarser(&self) -> Option<Coarser<'_>> {
+        None
+    }
 
     /// Forces of a push by degree of freedom (N).
     fn push(&self, push: &Push) -> Vec<(usize, f64)>;
@@ -59,9 +86,40 @@ pub trait Model: Send + Sync {
 }
 
 impl dyn Model + '_ {
-    /// Displacements by degree of freedom under one touch.
+    /// Displacements by degree of freedom under one touch, as its own elements have them.
     #[must_use]
     pub fn press(&self, touch: &Touch) -> Vec<f64> {
         self.system().solve_dofs(&self.load(touch))
+    }
+
+    /// How far the part gives way under each touch, along its force (m): the mean under the tip.
+    #[must_use]
+    pub fn gives_way(&self, touches: &[Touch]) -> Vec<f64> {
+        let mut gives = Vec::with_capacity(touches.len());
+        for block in touches.chunks(BLOCK) {
+            let loads: Vec<_> = block.iter().map(|t| self.load(t)).collect();
+            let solutions = self.system().solve_loads(&loads);
+            let own = block.iter().zip(&loads).zip(&solutions);
+            gives.extend(own.map(|((touch, load), u)| under_load(load, touch, u)));
+        }
+        if let Some(coarser) = self.coarser() {
+            for (fine, coarse) in gives.iter_mut().zip(coarser.model.gives_way(touches)) {
+                *fine = coarser.carried(*fine, coarse);
+            }
+        }
+        gives
+    }
+
+    /// How every vertex of the surface moves under a touch (m).
+    #[must_use]
+    pub fn moved(&self, touch: &Touch) -> Vec<DVec3> {
+        let solved = self.system().widened(&[self.press(touch)]);
+        let mut moved = self.translations(&solved, 1).swap_remove(0);
+        if let Some(coarser) = self.coarser() {
+            for (fine, coarse) in moved.iter_mut().zip(coarser.model.moved(touch)) {
+                *fine += coarser.share * (*fine - coarse);
+            }
+        }
+        moved
     }
 }

@@ -53,6 +53,8 @@ pub struct Observer {
     strains: Rows,
     /// Displacement (x, y, z) of the face at the points, from the degrees of freedom.
     displacements: Rows,
+    /// The same of the coarser model that displacements are carried on from.
+    coarser: Option<Rows>,
     frames: Vec<SiteFrame>,
 }
 
@@ -93,6 +95,7 @@ impl Observer {
             corners: builder.rows,
             strains,
             displacements,
+            coarser: None,
             frames,
         }
     }
@@ -107,8 +110,14 @@ impl Observer {
             corners: strains,
             strains: same,
             displacements,
+            coarser: None,
             frames,
         }
+    }
+
+    /// The same, with the displacement rows of the coarser model that displacements are carried on from.
+    pub(super) fn with_coarser(self, coarser: Option<Rows>) -> Self {
+        Self { coarser, ..self }
     }
 
     /// The frames that strains are given in.
@@ -125,6 +134,11 @@ impl Observer {
     /// The displacement rows on solved blocks, three (x, y, z) a point.
     pub(super) fn displacement_rows(&self) -> &Rows {
         &self.displacements
+    }
+
+    /// As [`Self::displacement_rows`] of the coarser model, on blocks that it solved.
+    pub(super) fn coarser_rows(&self) -> Option<&Rows> {
+        self.coarser.as_ref()
     }
 
     /// Strains of a solved block: three rows (xx, yy, 2xy) of [`BLOCK`] values a point.

@@ -48,6 +48,14 @@ pub struct Responses {
     blocks: Vec<(Vec<u32>, Vec<f64>)>,
     /// Where each output is when outputs were solved for.
     found: Vec<(u32, u32)>,
+    carried: Option<Box<Carried>>,
+}
+
+/// What displacements, from the row `first` on, are carried on from: those of a coarser model ([`super::model::Coarser`]).
+struct Carried {
+    first: usize,
+    share: f64,
+    coarse: Responses,
 }
 
 impl Responses {
@@ -59,6 +67,20 @@ impl Responses {
 
     /// One output under all loads, in their order; `into` has a place for each load.
     pub fn row_into(&self, row: usize, into: &mut [f64]) {
+        self.own_row_into(row, into);
+        if let Some(carried) = &self.carried
+            && row >= carried.first
+        {
+            let mut coarse = vec![0.0; self.loads];
+            (carried.coarse).row_into(row - carried.first, &mut coarse);
+            for (fine, coarse) in into.iter_mut().zip(coarse) {
+                *fine += carried.share * (*fine - coarse);
+            }
+        }
+    }
+
+    /// As its own model has it.
+    fn own_row_into(&self, row: usize, into: &mut [f64]) {
         if self.side == Side::Outputs {
             let (block, place) = self.found[row];
             let values = &self.blocks[block as usize].1;
@@ -134,23 +156,11 @@ pub fn respond_from(
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
     let loads = touch_rows(model, touches);
-    if side == Side::Outputs {
-        return Pressed { model, loads }.read(observer, reading, watch);
-    }
-    let points = observer.frames().len();
-    let blocks = model.system().solve_rows(
-        &loads,
-        "Solving touches",
-        watch,
-        |buffer, columns, solved| {
-            let width = columns.len();
-            // At its full size from the start: this is where the memory of a dataset goes.
-            let mut values = Vec::with_capacity(reading.rows(points) * width);
-            let mut keep = |rows: &[f64]| {
-                for row in rows.chunks_exact(BLOCK) {
-                    values.extend_from_slice(&row[..width]);
-                }
-            };
+    let mut responses = if side == Side::Outputs {
+        by_outputs(model, &loads, &output_rows(observer, reading), watch)?
+    } else {
+        let rows = reading.rows(observer.frames().len());
+        by_loads(model, &loads, rows, watch, |buffer, solved, keep| {
             match reading {
                 Reading::Strain | Reading::StrainAndDisplacement => {
                     keep(observer.strain_into(solved, buffer));
@@ -163,17 +173,71 @@ pub fn respond_from(
             if reading.displaces() {
                 keep(observer.displacement_into(solved, buffer));
             }
-            (columns.to_vec(), values)
-        },
-    )?;
-    let rows = blocks.first().map_or(0, |(c, v)| v.len() / c.len());
+        })?
+    };
+    if reading.displaces()
+        && let (Some(from), Some(rows)) = (model.coarser(), observer.coarser_rows())
+    {
+        let loads = touch_rows(from.model, touches);
+        let coarse = displacements(side, from.model, &loads, rows, watch)?;
+        responses.solves += coarse.solves;
+        responses.carried = Some(Box::new(Carried {
+            first: responses.rows - coarse.rows,
+            share: from.share,
+            coarse,
+        }));
+    }
+    Ok(responses)
+}
+
+/// Displacements by `rows` under loads.
+fn displacements(
+    side: Side,
+    model: &dyn Model,
+    loads: &Rows,
+    rows: &Rows,
+    watch: Watch,
+) -> Result<Responses, Cancelled> {
+    if side == Side::Outputs {
+        return by_outputs(model, loads, rows, watch);
+    }
+    by_loads(model, loads, rows.count(), watch, |buffer, solved, keep| {
+        buffer.resize(rows.count() * BLOCK, 0.0);
+        rows.apply(solved, buffer);
+        keep(buffer);
+    })
+}
+
+/// So many outputs from a solution for every load; `read` gives them of a solved block, [`BLOCK`] values each.
+fn by_loads(
+    model: &dyn Model,
+    loads: &Rows,
+    rows: usize,
+    watch: Watch,
+    read: impl Fn(&mut Vec<f64>, &[f64], &mut dyn FnMut(&[f64])) + Sync,
+) -> Result<Responses, Cancelled> {
+    let blocks =
+        model
+            .system()
+            .solve_rows(loads, "Solving touches", watch, |buffer, columns, solved| {
+                let width = columns.len();
+                // At its full size from the start: this is where the memory of a dataset goes.
+                let mut values = Vec::with_capacity(rows * width);
+                read(buffer, solved, &mut |rows| {
+                    for row in rows.chunks_exact(BLOCK) {
+                        values.extend_from_slice(&row[..width]);
+                    }
+                });
+                (columns.to_vec(), values)
+            })?;
     Ok(Responses {
-        loads: touches.len(),
-        rows,
-        side,
-        solves: touches.len(),
+        loads: loads.count(),
+        rows: if blocks.is_empty() { 0 } else { rows },
+        side: Side::Loads,
+        solves: loads.count(),
         blocks,
         found: Vec::new(),
+        carried: None,
     })
 }
 
@@ -203,7 +267,7 @@ impl<'a> Pressed<'a> {
         self.loads.count()
     }
 
-    /// Reads an observer's points under all of them.
+    /// Reads strains at an observer's points under all of them.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
@@ -213,6 +277,7 @@ impl<'a> Pressed<'a> {
         reading: Reading,
         watch: Watch,
     ) -> Result<Responses, Cancelled> {
+        debug_assert!(!reading.displaces(), "displacements may be carried on");
         let outputs = output_rows(observer, reading);
         by_outputs(self.model, &self.loads, &outputs, watch)
     }
@@ -248,6 +313,7 @@ fn by_outputs(
         solves: outputs.count(),
         blocks,
         found,
+        carried: None,
     })
 }
 

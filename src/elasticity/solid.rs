@@ -36,7 +36,7 @@ use self::pressed::nodal_shares;
 use super::Material;
 use super::error::ElasticError;
 use super::load::{Push, Touch, pressure};
-use super::model::{LoadCheck, Model};
+use super::model::{Coarser, LoadCheck, Model};
 use super::observe::{Face, Observer, tangent_frame};
 use super::rows::Rows;
 use super::solver::{BLOCK, FactorError, SymmetricMatrix, bytes, check_bytes};
@@ -52,6 +52,8 @@ pub struct SolidModel {
     material: Material,
     grip: Grip,
     system: System,
+    /// On elements of one order less, and the share of [`Coarser`].
+    coarser: Option<(Box<Self>, f64)>,
     /// Displacements at the vertices of the surface, as rows over solved blocks.
     vertices: Rows,
     pieces: usize,
@@ -90,6 +92,7 @@ impl SolidModel {
             material,
             grip,
             system,
+            coarser: None,
             vertices: Rows::default(),
             pieces,
             guesses: Vec::new(),
@@ -97,6 +100,15 @@ impl SolidModel {
         model.guesses = model.guesses();
         model.vertices = model.displacement_rows(&mesh.vertex_points());
         Ok(model)
+    }
+
+    /// The same, with displacements that are carried on from a coarser model of the same surface ([`Coarser`]).
+    #[must_use]
+    pub fn carried_on(self, coarser: Self, share: f64) -> Self {
+        Self {
+            coarser: Some((Box::new(coarser), share)),
+            ..self
+        }
     }
 
     /// What it was assembled from.
@@ -179,6 +191,13 @@ impl Model for SolidModel {
         &self.system
     }
 
+    fn coarser(&self) -> Option<Coarser<'_>> {
+        self.coarser.as_ref().map(|(model, share)| Coarser {
+            model: &**model,
+            share: *share,
+        })
+    }
+
     fn push(&self, push: &Push) -> Vec<(usize, f64)> {
         let force = push.force;
         let pressure = pressure(&self.mesh, &push.touch, self.elements.grain());
@@ -192,7 +211,9 @@ impl Model for SolidModel {
             .map(|&at| tangent_frame(self.mesh.normal(at)))
             .collect();
         let strains = self.strain_rows(points, &frames);
-        Observer::direct(strains, self.displacement_rows(points), frames)
+        let coarser = self.coarser.as_ref();
+        let coarser = coarser.map(|(model, _)| model.displacement_rows(points));
+        Observer::direct(strains, self.displacement_rows(points), frames).with_coarser(coarser)
     }
 
     fn check_all(&self, touches: &[Touch], solutions: &[Vec<f64>]) -> LoadCheck {

@@ -2,7 +2,6 @@
 
 use crate::design::{Design, DesignError, Inputs};
 use crate::elasticity::Touch;
-use crate::elasticity::estimate::under_load;
 use crate::placement::SensorSet;
 use crate::project::PartModel;
 use crate::regression::folds::evenly;
@@ -82,11 +81,7 @@ fn mechanics(inputs: &Inputs, design: &Design) -> Result<Vec<Figure>, DesignErro
     let model = design.simulated.model()?;
     let sample = evenly(dataset.touches.len(), PRESSED);
     let touches: Vec<Touch> = sample.iter().map(|&t| dataset.touches[t]).collect();
-    let loads: Vec<_> = touches.iter().map(|t| model.load(t)).collect();
-    let solutions = model.system().solve_loads(&loads);
-    let gives: Vec<f64> = (touches.iter().zip(&loads).zip(&solutions))
-        .map(|((touch, load), u)| under_load(load, touch, u))
-        .collect();
+    let gives = model.gives_way(&touches);
     let mean = gives.iter().sum::<f64>() / gives.len().max(1) as f64;
     let most = gives.iter().copied().fold(0.0, f64::max);
     let force = inputs.project.touch.force_n;

@@ -47,6 +47,9 @@ pub struct Fineness {
     pub least: f64,
     /// How often the tetrahedra of a part that has them are halved, instead of all that.
     pub halvings: u32,
+    /// Of what displacements changed from the order before to this one, the share that is still to come
+    /// ([`crate::elasticity::model::Coarser`]); nothing where they are taken as they are.
+    pub carried_on: f64,
 }
 
 impl Fineness {
@@ -62,7 +65,18 @@ impl Fineness {
             tolerance: 3e-3,
             least: (wall / OF_WALL).min(size / OF_CELL),
             halvings: 0,
+            carried_on: 0.0,
         }
+    }
+
+    /// What displacements are carried on from: the same of one order less.
+    #[must_use]
+    pub fn before(&self) -> Option<Self> {
+        (self.carried_on > 0.0).then_some(Self {
+            order: self.order - 1,
+            carried_on: 0.0,
+            ..*self
+        })
     }
 
     fn depth(&self) -> u32 {
@@ -153,7 +167,12 @@ impl Immersed {
         watch: Watch,
     ) -> Result<SolidModel, ElasticError> {
         if let Some(elements) = self.tetrahedra(fineness) {
-            return self.on_own(surface, elements, fineness, watch);
+            let model = self.on_own(surface, elements, fineness, watch)?;
+            let Some(before) = fineness.before() else {
+                return Ok(model);
+            };
+            let coarser = self.model(surface, &before, watch)?;
+            return Ok(model.carried_on(coarser, fineness.carried_on));
         }
         let cells = self.cells(fineness, watch)?;
         if cells.count() == 0 {

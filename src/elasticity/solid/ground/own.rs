@@ -67,9 +67,19 @@ impl Climb {
             .push(change(&from.sample, &to.sample, touches, places));
     }
 
-    /// What is left at the last order, or at the one before it.
+    /// What is left at the last order, from which displacements are carried on, or at the one before it, as it is.
     fn left(&self, before_last: bool) -> Discretization {
-        left(&self.changes, before_last)
+        let left = left(&self.changes, before_last);
+        left.scaled(if before_last { 1.0 } else { orders::OFF }, 1.0)
+    }
+
+    /// The share of the last change of displacements that is still to come.
+    fn carried_on(&self) -> f64 {
+        orders::left(&self.sizes(), orders::DISPLACEMENT)
+    }
+
+    fn sizes(&self) -> Vec<f64> {
+        (self.changes.iter()).map(|c| c.displacement_percent).collect()
     }
 }
 
@@ -153,7 +163,7 @@ impl SolidGround {
     }
 
     /// The part's own tetrahedra, their order raised until the error under these touches is small enough or the
-    /// effort spent. The second order is solved in any case: it judges the first.
+    /// effort spent; displacements are carried on from the last two. The second order is solved in any case: it judges the first.
     pub(super) fn raise(
         &self,
         touches: &[Touch],
@@ -177,17 +187,20 @@ impl SolidGround {
         if !affordable || estimate.excess(aim) <= SAFETY {
             return Ok(given.graded(&climb.touches, estimate, 2));
         }
-        drop(given);
+        let mut before = given;
         while climb.left(false).excess(aim) > SAFETY {
             let next = self.affordable(last.fineness.order + 1, touches.len(), aim);
             let Some(next) = self.try_own(next, &climb, watch)? else {
                 break;
             };
             climb.step(&last, &next);
-            last = next;
+            before = std::mem::replace(&mut last, next);
         }
         let models = 1 + climb.changes.len() as u64;
-        Ok(last.graded(&climb.touches, climb.left(false), models))
+        let mut graded = last.graded(&climb.touches, climb.left(false), models);
+        graded.fineness.carried_on = climb.carried_on();
+        graded.model = (graded.model).carried_on(before.model, graded.fineness.carried_on);
+        Ok(graded)
     }
 
     /// The part's own tetrahedra as they are, nothing solved; nothing for a part without.
