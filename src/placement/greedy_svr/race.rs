@@ -59,6 +59,8 @@ pub struct Rules {
     /// Candidates within this share of the best go on even if they cannot be better by this score: what
     /// later scores may still change.
     pub slack: f64,
+    /// The most candidates that are scored, whatever may be left behind then.
+    pub most: usize,
 }
 
 /// The outcome of a race.
@@ -120,7 +122,7 @@ pub fn race(
                 ..*s
             }) > best
         };
-        if !rest.iter().any(hopeful) {
+        if scored.len() >= rules.most || !rest.iter().any(hopeful) {
             break;
         }
     }
@@ -150,7 +152,7 @@ mod tests {
     use super::*;
 
     /// A cheap score that departs by up to `noise` from the true one, the best candidate at its worst.
-    fn run(noise: f64) -> (usize, usize) {
+    fn run(noise: f64, most: usize) -> (usize, usize) {
         let truth = |p: usize| 10.0 + 0.01 * p as f64;
         let departs = |p: usize| 1.0 + noise * if p == 0 { 1.0 } else { (p as f64 * 1.7).sin() };
         let cheap: Vec<Scored> = (0..400)
@@ -165,6 +167,7 @@ mod tests {
             audits: 4,
             least_deviation: 0.0,
             slack: 0.0,
+            most,
         };
         let raced = race(&cheap, &rules, &|s| -s.error, |places| {
             Ok(places.iter().map(|&p| truth(p)).collect())
@@ -180,13 +183,20 @@ mod tests {
 
     #[test]
     fn a_race_widens_as_far_as_the_cheap_score_departs() {
-        let (exact, few) = run(0.0);
-        let (near, more) = run(0.01);
-        let (rough, most) = run(0.1);
+        let (exact, few) = run(0.0, usize::MAX);
+        let (near, more) = run(0.01, usize::MAX);
+        let (rough, most) = run(0.1, usize::MAX);
         assert_eq!([exact, near, rough], [0, 0, 0]);
         assert!(
             few <= 12 && few < more && more < most,
             "{few} {more} {most}"
         );
+    }
+
+    #[test]
+    fn a_race_may_be_cut_off() {
+        let (_, all) = run(0.1, usize::MAX);
+        let (_, some) = run(0.1, 24);
+        assert!(all > 100 && some == 24, "{all} {some}");
     }
 }

@@ -142,7 +142,11 @@ impl<'a> Search<'a> {
             relations,
         };
         let step = field.chosen.len();
-        let winner = self.second_look(winner, &mut seen, &worth, step)?;
+        let winner = if self.settings.is_indistinct(before) {
+            winner
+        } else {
+            self.second_look(winner, &mut seen, &worth, step)?
+        };
         let Seen {
             waiting,
             compared,
@@ -185,6 +189,18 @@ impl<'a> Search<'a> {
             audits,
             least_deviation: self.relations.get(from).map_or(0.0, |r| 0.5 * r.deviation),
             slack: later.sqrt(),
+            most: self.most(from),
+        }
+    }
+
+    /// Candidates that a race onto a level (the last: exact fits) may score at most.
+    fn most(&self, level: usize) -> usize {
+        /// Where sets are hardly told apart: nobody waits for a proof that there is no better one, and the gap says so.
+        const MOST: [usize; LEVELS.len()] = [48, 24, 12, 6];
+        if self.settings.is_indistinct(self.base.error) {
+            MOST[level]
+        } else {
+            usize::MAX
         }
     }
 

@@ -31,6 +31,14 @@ pub struct GreedySvr {
 /// The default of [`GreedySvr::tolerance`].
 pub const TOLERANCE: f64 = 0.002;
 impl GreedySvr {
+    /// Whether sets of this criterion (mm) are hardly told apart: a regression does not see what is within its tube ε, so that
+    /// where criteria come near to that, how far they differ is chance. Data without noise get there.
+    pub(super) fn is_indistinct(&self, error: f64) -> bool {
+        /// In tubes.
+        const NEAR: f64 = 10.0;
+        error < NEAR * self.hyper.epsilon
+    }
+
     /// The folds of the criterion over touches at these positions (mm).
     ///
     /// # Errors
