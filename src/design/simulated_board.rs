@@ -9,6 +9,7 @@ use crate::as_made::as_made;
 use crate::board::{Disturbances, Faults, Options, Script, SimulatedBoard, fitting_gain};
 use crate::budget::Watch;
 use crate::draw::normal;
+use crate::elasticity::respond;
 use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Push, Touch};
 use crate::inference::calibration::noise_of_mean;
@@ -93,7 +94,9 @@ pub fn gives_way(
     watch: Watch,
 ) -> Result<Vec<f64>, DesignError> {
     let model = sensing.model(inputs, watch)?;
-    let gives = model.gives_way(touches).into_iter().zip(touches);
+    let gives = respond::gives_way(&*model, touches)
+        .into_iter()
+        .zip(touches);
     Ok(gives.map(|(give, touch)| give / touch.force).collect())
 }
 

@@ -10,7 +10,8 @@ use serde::Serialize;
 use super::Model;
 use super::load::Touch;
 use super::observe::{Face, turn};
-use crate::budget::Elements;
+use super::respond::{Reading, gives_way, respond};
+use crate::budget::{Cancelled, Elements, Watch};
 use crate::statistics::median;
 
 /// Change from 2h to h over the error at h. Displacements and smoothed strains converge with h² where all
@@ -113,6 +114,34 @@ pub struct Sample {
 }
 
 impl Sample {
+    /// Reads loads at places on the inside (m).
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch asks for it.
+    pub fn read(
+        model: &dyn Model,
+        touches: &[Touch],
+        places: &[DVec3],
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
+        let points: Vec<_> = places.iter().map(|&p| model.index().nearest(p).0).collect();
+        let observer = model.observer(&points, Face::Inside);
+        let responses = respond(model, touches, &observer, Reading::Strain, watch)?;
+        let mut strains = vec![vec![[0.0; 3]; places.len()]; touches.len()];
+        let mut row = vec![0.0; touches.len()];
+        for output in 0..responses.rows() {
+            responses.row_into(output, &mut row);
+            for (of_load, &strain) in strains.iter_mut().zip(&row) {
+                of_load[output / 3][output % 3] = strain;
+            }
+        }
+        Ok(Self {
+            under: gives_way(model, touches),
+            strains,
+            frames: observer.frames().to_vec(),
+        })
+    }
+
     /// Reads solved loads at places on the inside (m).
     #[must_use]
     pub fn of(

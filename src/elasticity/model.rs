@@ -5,10 +5,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::estimate::under_load;
 use super::load::{Push, Touch};
 use super::observe::{Face, Observer};
-use super::solver::BLOCK;
 use super::system::System;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
@@ -90,24 +88,6 @@ impl dyn Model + '_ {
     #[must_use]
     pub fn press(&self, touch: &Touch) -> Vec<f64> {
         self.system().solve_dofs(&self.load(touch))
-    }
-
-    /// How far the part gives way under each touch, along its force (m): the mean under the tip.
-    #[must_use]
-    pub fn gives_way(&self, touches: &[Touch]) -> Vec<f64> {
-        let mut gives = Vec::with_capacity(touches.len());
-        for block in touches.chunks(BLOCK) {
-            let loads: Vec<_> = block.iter().map(|t| self.load(t)).collect();
-            let solutions = self.system().solve_loads(&loads);
-            let own = block.iter().zip(&loads).zip(&solutions);
-            gives.extend(own.map(|((touch, load), u)| under_load(load, touch, u)));
-        }
-        if let Some(coarser) = self.coarser() {
-            for (fine, coarse) in gives.iter_mut().zip(coarser.model.gives_way(touches)) {
-                *fine = coarser.carried(*fine, coarse);
-            }
-        }
-        gives
     }
 
     /// How every vertex of the surface moves under a touch (m).

@@ -1,14 +1,17 @@
-//! What given outputs read under given loads, solving for whichever are fewer.
+//! What given outputs read under given loads, in the way that takes least.
 //!
 //! With K the stiffness, F the loads and B what is read, the answer is B K⁻¹ F. K is symmetric, so it may
-//! be had from a solution for every load or from one for every output (Maxwell–Betti reciprocity).
+//! be had from a solution for every load or from one for every output (Maxwell–Betti reciprocity), or from both with
+//! only the lower triangle divided out ([`super::both`]).
 
 use rayon::prelude::*;
 
+use super::both::{Blocks, Reaching};
 use super::load::{Push, Touch};
 use super::observe::Observer;
 use super::rows::Rows;
 use super::solver::BLOCK;
+use super::system::System;
 use super::{Model, observe};
 use crate::budget::{Cancelled, Watch};
 
@@ -19,6 +22,8 @@ pub enum Side {
     Loads,
     /// One solve an output, by reciprocity.
     Outputs,
+    /// Half a solve each.
+    Both,
 }
 
 /// What is read at the points of an observer.
@@ -42,12 +47,12 @@ pub struct Responses {
     rows: usize,
     /// Which side was cheaper and was solved for.
     pub side: Side,
-    /// Right-hand sides solved.
+    /// Right-hand sides solved, halves too.
     pub solves: usize,
     /// Which loads (outputs) a block holds and, by rows, outputs × its loads (its outputs × all loads).
-    blocks: Vec<(Vec<u32>, Vec<f64>)>,
-    /// Where each output is when outputs were solved for.
-    found: Vec<(u32, u32)>,
+    blocks: Blocks,
+    /// Where each output is when blocks are of outputs.
+    found: Option<Vec<(u32, u32)>>,
     carried: Option<Box<Carried>>,
 }
 
@@ -81,8 +86,8 @@ impl Responses {
 
     /// As its own model has it.
     fn own_row_into(&self, row: usize, into: &mut [f64]) {
-        if self.side == Side::Outputs {
-            let (block, place) = self.found[row];
+        if let Some(found) = &self.found {
+            let (block, place) = found[row];
             let values = &self.blocks[block as usize].1;
             into.copy_from_slice(&values[place as usize * self.loads..][..self.loads]);
             return;
@@ -97,16 +102,6 @@ impl Responses {
 }
 
 impl Reading<'_> {
-    /// Rows for so many points.
-    fn rows(&self, points: usize) -> usize {
-        match self {
-            Self::Strain | Self::Displacement => 3 * points,
-            Self::StrainAndDisplacement => 6 * points,
-            Self::Gauge(_) => points,
-            Self::GaugeAndDisplacement(_) => 4 * points,
-        }
-    }
-
     fn displaces(&self) -> bool {
         !matches!(self, Self::Strain | Self::Gauge(_))
     }
@@ -135,15 +130,10 @@ pub fn respond(
     reading: Reading,
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
-    let side = if reading.rows(observer.frames().len()) < touches.len() {
-        Side::Outputs
-    } else {
-        Side::Loads
-    };
-    respond_from(side, model, touches, observer, reading, watch)
+    by(None, model, touches, observer, reading, watch)
 }
 
-/// As [`respond`], solving for the side that is named: both give the same to rounding.
+/// As [`respond`], solving for the side that is named: all give the same to rounding.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
@@ -155,31 +145,44 @@ pub fn respond_from(
     reading: Reading,
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
+    by(Some(side), model, touches, observer, reading, watch)
+}
+
+fn by(
+    side: Option<Side>,
+    model: &dyn Model,
+    touches: &[impl Copy + Sync + Into<Push>],
+    observer: &Observer,
+    reading: Reading,
+    watch: Watch,
+) -> Result<Responses, Cancelled> {
     let loads = touch_rows(model, touches);
-    let mut responses = if side == Side::Outputs {
-        by_outputs(model, &loads, &output_rows(observer, reading), watch)?
-    } else {
-        let rows = reading.rows(observer.frames().len());
-        by_loads(model, &loads, rows, watch, |buffer, solved, keep| {
-            match reading {
-                Reading::Strain | Reading::StrainAndDisplacement => {
-                    keep(observer.strain_into(solved, buffer));
-                }
-                Reading::Gauge(angles) | Reading::GaugeAndDisplacement(angles) => {
-                    keep(&along_gauges(observer.strain_into(solved, buffer), angles));
-                }
-                Reading::Displacement => {}
+    let outputs = output_rows(observer, reading);
+    let read: Read = &|solved, buffer, keep| {
+        match reading {
+            Reading::Strain | Reading::StrainAndDisplacement => {
+                keep(observer.strain_into(solved, buffer));
             }
-            if reading.displaces() {
-                keep(observer.displacement_into(solved, buffer));
+            Reading::Gauge(angles) | Reading::GaugeAndDisplacement(angles) => {
+                keep(&along_gauges(observer.strain_into(solved, buffer), angles));
             }
-        })?
+            Reading::Displacement => {}
+        }
+        if reading.displaces() {
+            keep(observer.displacement_into(solved, buffer));
+        }
     };
+    let mut responses = between(side, model.system(), &loads, (&outputs, read), watch)?;
     if reading.displaces()
-        && let (Some(from), Some(rows)) = (model.coarser(), observer.coarser_rows())
+        && let (Some(from), Some(outputs)) = (model.coarser(), observer.coarser_rows())
     {
         let loads = touch_rows(from.model, touches);
-        let coarse = displacements(side, from.model, &loads, rows, watch)?;
+        let read: Read = &|solved, buffer, keep| {
+            buffer.resize(outputs.count() * BLOCK, 0.0);
+            outputs.apply(solved, buffer);
+            keep(buffer);
+        };
+        let coarse = between(side, from.model.system(), &loads, (outputs, read), watch)?;
         responses.solves += coarse.solves;
         responses.carried = Some(Box::new(Carried {
             first: responses.rows - coarse.rows,
@@ -190,55 +193,129 @@ pub fn respond_from(
     Ok(responses)
 }
 
-/// Displacements by `rows` under loads.
-fn displacements(
-    side: Side,
-    model: &dyn Model,
+/// Gives all outputs of a solved block, [`BLOCK`] values each, one part after the other, by way of a buffer.
+type Read<'a> = &'a (dyn Fn(&[f64], &mut Vec<f64>, &mut dyn FnMut(&[f64])) + Sync);
+
+const TOUCHES: &str = "Solving touches";
+const SITES: &str = "Solving sites";
+
+/// Outputs, as rows and as they are read of what is solved, under rows of loads, from the side that is named or the one that takes least.
+fn between(
+    side: Option<Side>,
+    system: &System,
     loads: &Rows,
-    rows: &Rows,
+    (outputs, read): (&Rows, Read),
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
-    if side == Side::Outputs {
-        return by_outputs(model, loads, rows, watch);
+    let of = |rows| Reaching::new(system, rows);
+    let (reached_loads, reached_outputs) = (of(loads), of(outputs));
+    let side = side.unwrap_or_else(|| {
+        let costs = reached_loads.costs(&reached_outputs, system);
+        if costs.both < costs.one.min(costs.other) {
+            Side::Both
+        } else if costs.other < costs.one {
+            Side::Outputs
+        } else {
+            Side::Loads
+        }
+    });
+    match side {
+        Side::Loads => by_loads(system, loads, (&reached_outputs, read), watch),
+        Side::Outputs => by_outputs(system, &reached_loads, outputs, watch),
+        Side::Both if outputs.count() <= loads.count() => {
+            let place = |load, width, output| output * width + load;
+            let blocks = reached_loads.read(&reached_outputs, system, TOUCHES, watch, place)?;
+            Ok(of_loads(side, loads, outputs, blocks))
+        }
+        Side::Both => {
+            let place = |output, _, load| output * loads.count() + load;
+            let blocks = reached_outputs.read(&reached_loads, system, SITES, watch, place)?;
+            Ok(of_outputs(side, loads, outputs, blocks))
+        }
     }
-    by_loads(model, loads, rows.count(), watch, |buffer, solved, keep| {
-        buffer.resize(rows.count() * BLOCK, 0.0);
-        rows.apply(solved, buffer);
-        keep(buffer);
-    })
 }
 
-/// So many outputs from a solution for every load; `read` gives them of a solved block, [`BLOCK`] values each.
 fn by_loads(
-    model: &dyn Model,
+    system: &System,
     loads: &Rows,
-    rows: usize,
+    (reached, read): (&Reaching, Read),
     watch: Watch,
-    read: impl Fn(&mut Vec<f64>, &[f64], &mut dyn FnMut(&[f64])) + Sync,
 ) -> Result<Responses, Cancelled> {
-    let blocks =
-        model
-            .system()
-            .solve_rows(loads, "Solving touches", watch, |buffer, columns, solved| {
-                let width = columns.len();
-                // At its full size from the start: this is where the memory of a dataset goes.
-                let mut values = Vec::with_capacity(rows * width);
-                read(buffer, solved, &mut |rows| {
-                    for row in rows.chunks_exact(BLOCK) {
-                        values.extend_from_slice(&row[..width]);
-                    }
-                });
-                (columns.to_vec(), values)
-            })?;
-    Ok(Responses {
+    let (outputs, needed) = (reached.rows(), reached.needed(system));
+    let blocks = system.solve_rows(
+        loads,
+        Some(&needed),
+        TOUCHES,
+        watch,
+        |buffer, columns, solved| {
+            // At its full size from the start: this is where the memory of a dataset goes.
+            let mut values = Vec::with_capacity(outputs.count() * columns.len());
+            read(solved, buffer, &mut |rows| {
+                for row in rows.chunks_exact(BLOCK) {
+                    values.extend_from_slice(&row[..columns.len()]);
+                }
+            });
+            (columns.to_vec(), values)
+        },
+    )?;
+    Ok(of_loads(Side::Loads, loads, outputs, blocks))
+}
+
+fn by_outputs(
+    system: &System,
+    reached: &Reaching,
+    outputs: &Rows,
+    watch: Watch,
+) -> Result<Responses, Cancelled> {
+    let (loads, needed) = (reached.rows(), reached.needed(system));
+    let blocks = system.solve_rows(
+        outputs,
+        Some(&needed),
+        SITES,
+        watch,
+        |wide, rows, solved| {
+            wide.resize(loads.count() * BLOCK, 0.0);
+            loads.apply(solved, wide);
+            let column = |k| wide.iter().skip(k).step_by(BLOCK).copied();
+            (rows.to_vec(), (0..rows.len()).flat_map(column).collect())
+        },
+    )?;
+    Ok(of_outputs(Side::Outputs, loads, outputs, blocks))
+}
+
+/// From blocks of loads, each outputs × its loads.
+fn of_loads(side: Side, loads: &Rows, outputs: &Rows, blocks: Blocks) -> Responses {
+    Responses {
         loads: loads.count(),
-        rows: if blocks.is_empty() { 0 } else { rows },
-        side: Side::Loads,
-        solves: loads.count(),
+        rows: outputs.count(),
+        side,
+        solves: solves(side, loads, outputs),
         blocks,
-        found: Vec::new(),
+        found: None,
         carried: None,
-    })
+    }
+}
+
+/// From blocks of outputs, each its outputs × loads.
+fn of_outputs(side: Side, loads: &Rows, outputs: &Rows, blocks: Blocks) -> Responses {
+    let mut found = vec![(0, 0); outputs.count()];
+    for (b, (rows, _)) in blocks.iter().enumerate() {
+        for (k, &row) in rows.iter().enumerate() {
+            found[row as usize] = (b as u32, k as u32);
+        }
+    }
+    Responses {
+        found: Some(found),
+        ..of_loads(side, loads, outputs, blocks)
+    }
+}
+
+fn solves(side: Side, loads: &Rows, outputs: &Rows) -> usize {
+    match side {
+        Side::Loads => loads.count(),
+        Side::Outputs => outputs.count(),
+        Side::Both => loads.count() + outputs.count(),
+    }
 }
 
 /// Touches that ever other gauges are read under: their forces are laid on the model once, and each gauge is solved for.
@@ -279,42 +356,25 @@ impl<'a> Pressed<'a> {
     ) -> Result<Responses, Cancelled> {
         debug_assert!(!reading.displaces(), "displacements may be carried on");
         let outputs = output_rows(observer, reading);
-        by_outputs(self.model, &self.loads, &outputs, watch)
+        let system = self.model.system();
+        by_outputs(system, &Reaching::new(system, &self.loads), &outputs, watch)
     }
 }
 
-fn by_outputs(
-    model: &dyn Model,
-    loads: &Rows,
-    outputs: &Rows,
-    watch: Watch,
-) -> Result<Responses, Cancelled> {
-    let blocks =
-        model
-            .system()
-            .solve_rows(outputs, "Solving sites", watch, |wide, rows, solved| {
-                wide.resize(loads.count() * BLOCK, 0.0);
-                loads.apply(solved, wide);
-                let values = (0..rows.len())
-                    .flat_map(|k| wide.iter().skip(k).step_by(BLOCK).copied())
-                    .collect();
-                (rows.to_vec(), values)
-            })?;
-    let mut found = vec![(0, 0); outputs.count()];
-    for (b, (rows, _)) in blocks.iter().enumerate() {
-        for (k, &row) in rows.iter().enumerate() {
-            found[row as usize] = (b as u32, k as u32);
+/// How far a part gives way under each touch, along its force (m): the mean under the tip.
+#[must_use]
+pub fn gives_way(model: &dyn Model, touches: &[Touch]) -> Vec<f64> {
+    let loads = touch_rows(model, touches);
+    let works = Reaching::new(model.system(), &loads).works(model.system());
+    let mut gives: Vec<f64> = (works.iter().zip(touches))
+        .map(|(work, touch)| work / touch.force)
+        .collect();
+    if let Some(coarser) = model.coarser() {
+        for (fine, coarse) in gives.iter_mut().zip(gives_way(coarser.model, touches)) {
+            *fine = coarser.carried(*fine, coarse);
         }
     }
-    Ok(Responses {
-        loads: loads.count(),
-        rows: outputs.count(),
-        side: Side::Outputs,
-        solves: outputs.count(),
-        blocks,
-        found,
-        carried: None,
-    })
+    gives
 }
 
 /// The touches' nodal forces as rows over solved blocks.

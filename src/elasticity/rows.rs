@@ -1,6 +1,6 @@
 //! Sparse rows that are applied to blocks of solutions.
 
-use std::collections::BTreeMap;
+use rayon::prelude::*;
 
 use super::solver::BLOCK;
 
@@ -37,6 +37,14 @@ impl Rows {
         &self.entries[self.starts[row]..self.starts[row + 1]]
     }
 
+    /// The numbers of the rows by blocks: those that begin near each other share one.
+    pub fn in_blocks(&self) -> Vec<Vec<u32>> {
+        let first = |row: u32| self.row(row as usize).iter().map(|e| e.0).min();
+        let mut order: Vec<u32> = (0..self.count() as u32).collect();
+        order.sort_by_key(|&row| (first(row), row));
+        order.chunks(BLOCK).map(<[u32]>::to_vec).collect()
+    }
+
     /// `into` (a row each of [`BLOCK`] values) = this matrix × `from` (rows of [`BLOCK`] values).
     pub fn apply(&self, from: &[f64], into: &mut [f64]) {
         // With the widest vectors this processor has; sums in the same order on all of them.
@@ -56,15 +64,25 @@ impl Rows {
 
     /// This matrix × `other`, columns of a row in rising order.
     pub fn times(&self, other: &Self) -> Self {
+        let row = |row: usize| -> Vec<(u32, f64)> {
+            let terms = self.row(row).iter().flat_map(|&(middle, weight)| {
+                let of = other.row(middle as usize).iter();
+                of.map(move |&(column, value)| (column, weight * value))
+            });
+            let mut terms: Vec<(u32, f64)> = terms.collect();
+            // What is added up stays in the order it came in.
+            terms.sort_by_key(|term| term.0);
+            terms.dedup_by(|next, sum| {
+                let same = next.0 == sum.0;
+                sum.1 += if same { next.1 } else { 0.0 };
+                same
+            });
+            terms
+        };
+        let rows: Vec<_> = (0..self.count()).into_par_iter().map(row).collect();
         let mut product = Self::default();
-        for row in 0..self.count() {
-            let mut sum: BTreeMap<u32, f64> = BTreeMap::new();
-            for &(middle, weight) in self.row(row) {
-                for &(column, value) in other.row(middle as usize) {
-                    *sum.entry(column).or_default() += weight * value;
-                }
-            }
-            product.push(sum);
+        for row in rows {
+            product.push(row);
         }
         product
     }

@@ -73,9 +73,10 @@ impl Sensitivity {
     pub fn new(model: &dyn Model, gauges: &[Gauge], watch: Watch) -> Result<Self, Cancelled> {
         let rows = mean_rows(model, gauges);
         let system = model.system();
-        let blocks = system.solve_rows(&rows, "Solving gauges", watch, |_, rows, solved| {
-            (rows.to_vec(), model.translations(solved, rows.len()))
-        })?;
+        let blocks =
+            system.solve_rows(&rows, None, "Solving gauges", watch, |_, rows, solved| {
+                (rows.to_vec(), model.translations(solved, rows.len()))
+            })?;
         let mesh = model.mesh();
         let vertices = mesh.positions().len();
         let mut weights = vec![DVec3::ZERO; vertices * gauges.len()];

@@ -217,24 +217,17 @@ impl Model for SolidModel {
     }
 
     fn check_all(&self, touches: &[Touch], solutions: &[Vec<f64>]) -> LoadCheck {
-        let mut internal = vec![vec![0.0; self.system.dofs()]; solutions.len()];
-        for first in (0..self.elements.count()).step_by(AT_ONCE) {
-            let last = (first + AT_ONCE).min(self.elements.count());
-            let forces: Vec<_> = (first..last)
-                .into_par_iter()
-                .map(|element| self.internal_forces(element, solutions))
-                .collect();
-            for (dofs, forces) in forces {
-                for (internal, forces) in internal.iter_mut().zip(forces) {
-                    for (&dof, force) in dofs.iter().zip(forces) {
-                        internal[dof] += force;
-                    }
-                }
+        let mut reactions = vec![DVec3::ZERO; solutions.len()];
+        for element in self.holding() {
+            for (sum, own) in reactions.iter_mut().zip(self.reactions(element, solutions)) {
+                *sum += own;
             }
         }
+        let energies = self.system.twice_energies(solutions);
         let mut worst = LoadCheck::default();
-        for ((touch, u), internal) in touches.iter().zip(solutions).zip(&internal) {
-            let check = self.balance(&self.load(touch), u, internal);
+        let held = reactions.into_iter().zip(energies);
+        for ((touch, u), (reaction, energy)) in touches.iter().zip(solutions).zip(held) {
+            let check = self.balance(&self.load(touch), u, reaction, energy);
             worst.reaction_error = worst.reaction_error.max(check.reaction_error);
             worst.energy_error = worst.energy_error.max(check.energy_error);
         }
@@ -269,32 +262,47 @@ impl Model for SolidModel {
 }
 
 impl SolidModel {
-    /// The degrees of freedom of an element, and the forces on them that hold each solution.
-    fn internal_forces(
-        &self,
-        element: usize,
-        solutions: &[Vec<f64>],
-    ) -> (Vec<usize>, Vec<Vec<f64>>) {
-        let stiffness = self.elements.stiffness(element, &self.material);
+    /// Degrees of freedom of an element.
+    fn dofs_of(&self, element: usize) -> Vec<usize> {
         let nodes = self.elements.nodes_of(element).iter();
-        let dofs: Vec<usize> = nodes
+        nodes
             .flat_map(|&n| (0..3).map(move |i| 3 * n as usize + i))
-            .collect();
-        let forces = |u: &Vec<f64>| {
-            let mut forces = vec![0.0; dofs.len()];
-            for (j, &from) in dofs.iter().enumerate() {
-                for (force, k) in forces.iter_mut().zip(stiffness.col_as_slice(j)) {
-                    *force += k * u[from];
-                }
-            }
-            forces
-        };
-        let forces = solutions.iter().map(forces).collect();
-        (dofs, forces)
+            .collect()
     }
 
-    fn balance(&self, load: &[(usize, f64)], u: &[f64], internal: &[f64]) -> LoadCheck {
-        let (mut reaction, mut total) = (DVec3::ZERO, DVec3::ZERO);
+    /// The elements that held degrees of freedom are of.
+    fn holding(&self) -> Vec<usize> {
+        let is_held = |&dof: &usize| self.system.is_held(dof);
+        let holds = |&element: &usize| self.dofs_of(element).iter().any(is_held);
+        (0..self.elements.count()).filter(holds).collect()
+    }
+
+    /// The force (N) on the held degrees of freedom of an element under each solution.
+    fn reactions(&self, element: usize, solutions: &[Vec<f64>]) -> Vec<DVec3> {
+        let stiffness = self.elements.stiffness(element, &self.material);
+        let dofs = self.dofs_of(element);
+        let reaction = |u: &Vec<f64>| {
+            let mut reaction = DVec3::ZERO;
+            for (i, &held) in dofs.iter().enumerate() {
+                if self.system.is_held(held) {
+                    let row = stiffness.col_as_slice(i).iter().zip(&dofs);
+                    reaction[held % 3] += row.map(|(k, &dof)| k * u[dof]).sum::<f64>();
+                }
+            }
+            reaction
+        };
+        solutions.iter().map(reaction).collect()
+    }
+
+    /// From what elements hold with (N) and twice the energy of all (J).
+    fn balance(
+        &self,
+        load: &[(usize, f64)],
+        u: &[f64],
+        by_elements: DVec3,
+        twice_energy: f64,
+    ) -> LoadCheck {
+        let (mut reaction, mut total) = (by_elements, DVec3::ZERO);
         let mut external = 0.0;
         for &(dof, force) in load {
             total[dof % 3] += force;
@@ -303,13 +311,7 @@ impl SolidModel {
                 reaction[dof % 3] -= force;
             }
         }
-        for (dof, force) in internal.iter().enumerate() {
-            if self.system.is_held(dof) {
-                reaction[dof % 3] += force;
-            }
-        }
-        let (held, stored) = self.grip.reaction(u, |dof| self.system.is_held(dof));
-        let twice_energy = internal.iter().zip(u).map(|(f, u)| f * u).sum::<f64>() + stored;
+        let held = self.grip.reaction(u, |dof| self.system.is_held(dof));
         let energy_error = if external == 0.0 && twice_energy == 0.0 {
             0.0 // pressed on the support itself
         } else {
@@ -401,10 +403,17 @@ fn assemble(
                 .flat_map(|&n| unknowns[3 * n as usize..][..3].iter().copied())
                 .collect();
             for (j, &column) in places.iter().enumerate().filter(|p| *p.1 != HELD) {
-                for (i, &row) in places.iter().enumerate().filter(|p| *p.1 != HELD) {
-                    if row >= column {
-                        into.add(row as usize, column as usize, k[(i, j)]);
-                    }
+                // The unknowns of a node follow each other in every column that has them.
+                let nodes = places
+                    .chunks_exact(3)
+                    .zip(k.col_as_slice(j).chunks_exact(3));
+                for (rows, k) in nodes {
+                    let below = |row: &u32| *row != HELD && *row >= column;
+                    let Some(first) = rows.iter().copied().find(below) else {
+                        continue;
+                    };
+                    let own = rows.iter().zip(k).filter(|(row, _)| below(row));
+                    into.add_run(first as usize, column as usize, own.map(|(_, k)| *k));
                 }
             }
         }

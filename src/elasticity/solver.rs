@@ -2,6 +2,7 @@
 
 mod matrix;
 mod numeric;
+mod reduced;
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{
@@ -10,7 +11,9 @@ use faer::linalg::triangular_solve::{
 use faer::perm::Perm;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
+use faer::sparse::linalg::cholesky::supernodal::{
+    SupernodalLltRef, SupernodeRef, SymbolicSupernodalCholesky,
+};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
@@ -21,10 +24,8 @@ use faer::{Accum, MatMut, MatRef, Par, Side};
 use crate::budget::Watch;
 use crate::memory;
 
-pub use self::matrix::{FactorError, SymmetricMatrix};
-
-/// Right-hand sides solved together. Fixed, so that a load gives the same bytes in any company.
-pub const BLOCK: usize = 64;
+pub use self::matrix::{FactorError, Scaled, SymmetricMatrix, bytes, bytes_with};
+pub use self::reduced::{BLOCK, Reduced, Scratch, common};
 
 /// L Lᵀ of the matrix scaled to a unit diagonal, its rows in the order of elimination.
 pub struct Factor {
@@ -61,13 +62,13 @@ impl Block {
 }
 
 impl Factor {
-    /// Factors. `order` names the row that is eliminated first, second …; without one, rows are taken by
-    /// approximate minimum degree.
+    /// Factors; what was factored comes back scaled. `order` names the row that is eliminated first, second …; without one, rows
+    /// are taken by approximate minimum degree.
     pub fn new(
-        matrix: &SymmetricMatrix,
+        matrix: SymmetricMatrix,
         order: Option<Vec<usize>>,
         watch: Watch,
-    ) -> Result<Self, FactorError> {
+    ) -> Result<(Self, Scaled), FactorError> {
         let n = matrix.dimension();
         if let Some(row) =
             (0..n).find(|&c| matrix.diagonal(c) <= 0.0 || !matrix.diagonal(c).is_finite())
@@ -75,35 +76,34 @@ impl Factor {
             return Err(FactorError::NotPositive { row });
         }
         let scale: Vec<f64> = (0..n).map(|c| matrix.diagonal(c).sqrt().recip()).collect();
-        let symbolic = symbolic(matrix, order, 1)?;
-        let factor_bytes = symbolic.len_val() as f64 * size_of::<f64>() as f64;
-        check_bytes(factor_bytes + bytes(matrix.rows.len() as f64))?;
+        let symbolic = symbolic(&matrix, order, 1)?;
+        let entries = symbolic.len_val();
+        check_bytes(bytes_with(entries as f64, matrix.rows.len() as f64))?;
+        let mut factor = Self::empty(symbolic, scale);
+        let scaled = Scaled::new(matrix, &factor.scale, &factor.order);
         let mut values = Vec::new();
         values
-            .try_reserve_exact(symbolic.len_val())
+            .try_reserve_exact(entries)
             .map_err(|_| FactorError::OutOfMemory)?;
-        values.resize(symbolic.len_val(), 0.0);
-        let mut factor = Self::empty(symbolic, scale);
         let nodes = nodes(&factor.symbolic);
-        let order = factor.symbolic.perm();
-        numeric::factorize(
-            nodes,
-            order,
-            matrix,
-            &factor.scale,
-            &factor.supernode,
-            &mut values,
-            watch,
-        )
-        .map_err(|error| match error {
-            FactorError::NotPositive { row } => FactorError::NotPositive {
-                row: order.map_or(row, |p| p.arrays().0[row]),
+        numeric::factorize(nodes, &scaled, &factor.supernode, &mut values, watch).map_err(
+            |error| match error {
+                FactorError::NotPositive { row } => FactorError::NotPositive {
+                    row: factor.row_at(row),
+                },
+                other => other,
             },
-            other => other,
-        })?;
+        )?;
         factor.smallest_pivot = smallest_pivot(nodes, &values);
         factor.values = values;
-        Ok(factor)
+        Ok((factor, scaled))
+    }
+
+    /// The row of the matrix that stands at a place in the order of elimination.
+    fn row_at(&self, place: usize) -> usize {
+        (self.order.iter())
+            .position(|&at| at as usize == place)
+            .unwrap_or(place)
     }
 
     fn empty(symbolic: SymbolicCholesky<usize>, scale: Vec<f64>) -> Self {
@@ -138,11 +138,6 @@ impl Factor {
         self.scale.len()
     }
 
-    /// Memory that it takes (bytes).
-    pub fn bytes(&self) -> f64 {
-        size_of_val(self.values.as_slice()) as f64
-    }
-
     /// An empty block; each thread has its own.
     pub fn block(&self) -> Block {
         let l = self.supernodes().symbolic();
@@ -169,6 +164,12 @@ impl Factor {
     /// Solves in place. Forward, only the supernodes that a load reaches do any work: loads that lie
     /// near each other, and so in the same branches of the elimination tree, should share a block.
     pub fn solve(&self, block: &mut Block) {
+        self.solve_for(|_| true, block);
+    }
+
+    /// As [`Self::solve`] for the rows of the supernodes that are needed, and of all above these, which are needed for them; the
+    /// others hold nothing that means anything.
+    pub fn solve_for(&self, is_needed: impl Fn(usize) -> bool, block: &mut Block) {
         let l = self.supernodes();
         let count = l.symbolic().n_supernodes();
         for s in 0..count {
@@ -176,32 +177,117 @@ impl Factor {
                 self.forward(l, s, block);
             }
         }
-        for s in (0..count).rev() {
+        for s in (0..count).rev().filter(|&s| is_needed(s)) {
             backward(l, s, block);
         }
     }
 
+    /// Divides the lower triangle out of right-hand sides, at most [`BLOCK`], with `values` (row in the order of elimination,
+    /// column, value); `nodes` are the supernodes that they reach ([`Self::reach`]).
+    pub fn reduce(
+        &self,
+        nodes: &[u32],
+        values: impl Iterator<Item = (u32, usize, f64)>,
+        scratch: &mut Scratch,
+        into: &mut Reduced,
+    ) {
+        let l = self.supernodes();
+        let begins = l.symbolic().supernode_begin();
+        into.lay_out(nodes, |node| self.extent(node).0);
+        scratch.lay_out(l.symbolic().n_supernodes(), into);
+        let place = |row: usize| {
+            let node = self.supernode[row] as usize;
+            (scratch.starts[node] as usize + row - begins[node]) * BLOCK
+        };
+        for (row, column, value) in values {
+            into.rows[place(row as usize) + column] += value;
+        }
+        for at in 0..nodes.len() {
+            let node = l.supernode(nodes[at] as usize);
+            let own = into.starts[at] * BLOCK..into.starts[at + 1] * BLOCK;
+            let below = divide(node, &mut into.rows[own], &mut scratch.below);
+            for (&row, part) in node.pattern().iter().zip(below.chunks_exact(BLOCK)) {
+                let x = &mut into.rows[place(row)..][..BLOCK];
+                for (x, p) in x.iter_mut().zip(part) {
+                    *x -= p;
+                }
+            }
+        }
+    }
+
+    /// The supernodes, rising, that right-hand sides with something in these rows (in the order of elimination) reach.
+    pub fn reach(&self, rows: impl Iterator<Item = u32>) -> Vec<u32> {
+        let l = self.supernodes().symbolic();
+        let mut is_reached = vec![false; l.n_supernodes()];
+        let mut reached = Vec::new();
+        for row in rows {
+            let mut at = Some(self.supernode[row as usize]);
+            while let Some(s) = at
+                && !std::mem::replace(&mut is_reached[s as usize], true)
+            {
+                reached.push(s);
+                let first = l.supernode(s as usize).pattern().first();
+                at = first.map(|&row| self.supernode[row]);
+            }
+        }
+        reached.sort_unstable();
+        reached
+    }
+
+    /// Columns of a supernode, and entries of the factor in them.
+    pub fn extent(&self, node: u32) -> (usize, f64) {
+        let values = self.supernodes().supernode(node as usize).val();
+        (
+            values.ncols(),
+            values.nrows() as f64 * values.ncols() as f64,
+        )
+    }
+
+    /// How many supernodes there are.
+    pub fn supernodes_count(&self) -> usize {
+        self.supernodes().symbolic().n_supernodes()
+    }
+
+    /// Entries of the factor.
+    pub fn entries(&self) -> f64 {
+        self.values.len() as f64
+    }
+
     fn forward(&self, l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut Block) {
         let node = l.supernode(s);
-        let columns = node.val().ncols();
-        let (top, bottom) = node.val().split_at_row(columns);
-        let own = &mut block.rows[node.start() * BLOCK..][..columns * BLOCK];
-        let mut x = MatMut::from_row_major_slice_mut(own, columns, BLOCK);
-        solve_lower_triangular_in_place(top, x.rb_mut(), Par::Seq);
-        let Some(&first) = node.pattern().first() else {
-            return;
-        };
-        let below = &mut block.below[..node.pattern().len() * BLOCK];
-        let product = MatMut::from_row_major_slice_mut(below, node.pattern().len(), BLOCK);
-        matmul(product, Accum::Replace, bottom, x.rb(), 1.0, Par::Seq);
+        let own = &mut block.rows[node.start() * BLOCK..][..node.val().ncols() * BLOCK];
+        let below = divide(node, own, &mut block.below);
         for (&row, part) in node.pattern().iter().zip(below.chunks_exact(BLOCK)) {
             let into = &mut block.rows[row * BLOCK..][..BLOCK];
             for (x, p) in into.iter_mut().zip(part) {
                 *x -= p;
             }
         }
-        block.active[self.supernode[first] as usize] = true;
+        if let Some(&first) = node.pattern().first() {
+            block.active[self.supernode[first] as usize] = true;
+        }
     }
+}
+
+/// Divides a supernode's triangle out of its own rows of right-hand sides; what they take from the rows of its pattern then, in
+/// a buffer.
+fn divide<'b>(
+    node: SupernodeRef<'_, usize, f64>,
+    own: &mut [f64],
+    below: &'b mut Vec<f64>,
+) -> &'b [f64] {
+    let columns = node.val().ncols();
+    let (top, bottom) = node.val().split_at_row(columns);
+    let mut x = MatMut::from_row_major_slice_mut(own, columns, BLOCK);
+    solve_lower_triangular_in_place(top, x.rb_mut(), Par::Seq);
+    let rows = node.pattern().len();
+    if below.len() < rows * BLOCK {
+        below.resize(rows * BLOCK, 0.0);
+    }
+    let below = &mut below[..rows * BLOCK];
+    let product = MatMut::from_row_major_slice_mut(below, rows, BLOCK);
+    matmul(product, Accum::Replace, bottom, x.rb(), 1.0, Par::Seq);
+    below
 }
 
 fn backward(l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut Block) {
@@ -226,13 +312,6 @@ fn backward(l: SupernodalLltRef<'_, usize, f64>, s: usize, block: &mut Block) {
         );
     }
     solve_upper_triangular_in_place(top.transpose(), x, Par::Seq);
-}
-
-/// Memory of a matrix of so many entries while it is factored.
-#[must_use]
-pub fn bytes(entries: f64) -> f64 {
-    let own = size_of::<usize>() + size_of::<f64>();
-    entries * (own + numeric::BYTES_AN_ENTRY) as f64
 }
 
 /// Refuses what takes too much memory, before it is taken.
@@ -293,7 +372,7 @@ impl Plan {
     /// Memory that the matrix and its factor take (bytes).
     #[must_use]
     pub fn bytes(&self) -> f64 {
-        self.entries * size_of::<f64>() as f64 + bytes(self.of_matrix)
+        bytes_with(self.entries, self.of_matrix)
     }
 }
 

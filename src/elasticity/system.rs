@@ -3,7 +3,9 @@
 use rayon::prelude::*;
 
 use super::rows::Rows;
-use super::solver::{BLOCK, Block, Factor, FactorError, SymmetricMatrix, bytes};
+use super::solver::{
+    BLOCK, Block, Factor, FactorError, Reduced, Scaled, Scratch, SymmetricMatrix, bytes_with,
+};
 use crate::budget::{Cancelled, Watch, Work, report};
 use crate::tally::{self, Done};
 
@@ -11,10 +13,13 @@ use crate::tally::{self, Done};
 pub struct System {
     /// Unknown of each degree of freedom, or `HELD`.
     unknowns: Vec<u32>,
-    stiffness: SymmetricMatrix,
+    stiffness: Scaled,
     factor: Factor,
     work: Work,
 }
+
+/// Which supernodes of solved blocks are read, and all above them.
+pub(super) struct Needed(Vec<bool>);
 
 pub(super) const HELD: u32 = u32::MAX;
 
@@ -41,8 +46,9 @@ impl System {
         watch: Watch,
     ) -> Result<Self, FactorError> {
         tally::count(Done::Factorization, 1);
+        let (factor, stiffness) = Factor::new(stiffness, order, watch)?;
         Ok(Self {
-            factor: Factor::new(&stiffness, order, watch)?,
+            factor,
             unknowns,
             stiffness,
             work: Work {
@@ -68,7 +74,7 @@ impl System {
     /// Memory that the matrix and its factor take while it is factored (bytes).
     #[must_use]
     pub fn bytes(&self) -> f64 {
-        self.factor.bytes() + bytes(self.stiffness.rows.len() as f64)
+        bytes_with(self.factor.entries(), self.stiffness.entries() as f64)
     }
 
     /// Freedoms, held ones too.
@@ -166,26 +172,25 @@ impl System {
 
     /// Solves for every row of `loads` (its entries by solver row, as [`Self::place`] gives them) and
     /// hands each block to `consume`: a buffer of the thread's own, which rows the block holds, column by
-    /// column, and the solved block. The rows are taken in an order in which neighbours share blocks; blocks come back in that order,
+    /// column, and the solved block, or what is needed of it. The rows are taken in an order in which neighbours share blocks; blocks come back in that order,
     /// which does not depend on the threads.
     pub(super) fn solve_rows<T: Send>(
         &self,
         loads: &Rows,
+        needed: Option<&Needed>,
         stage: &'static str,
         watch: Watch,
         consume: impl Fn(&mut Vec<f64>, &[u32], &[f64]) -> T + Sync,
     ) -> Result<Vec<T>, Cancelled> {
-        let first = |row: u32| loads.row(row as usize).iter().map(|e| e.0).min();
-        let mut order: Vec<u32> = (0..loads.count() as u32).collect();
-        order.sort_by_key(|&row| (first(row), row));
         let done = std::sync::atomic::AtomicUsize::new(0);
-        order
-            .par_chunks(BLOCK)
+        loads
+            .in_blocks()
+            .par_iter()
             .map_init(
                 || (self.factor.block(), Vec::new()),
                 |(block, buffer), chunk| {
                     let so_far = done.load(std::sync::atomic::Ordering::Relaxed);
-                    report(watch, stage, so_far, order.len())?;
+                    report(watch, stage, so_far, loads.count())?;
                     block.clear();
                     for (column, &row) in chunk.iter().enumerate() {
                         for &(place, value) in loads.row(row as usize) {
@@ -193,7 +198,8 @@ impl System {
                         }
                     }
                     tally::count(Done::Solve, chunk.len());
-                    self.factor.solve(block);
+                    let is_needed = |s: usize| needed.is_none_or(|needed| needed.0[s]);
+                    self.factor.solve_for(is_needed, block);
                     done.fetch_add(chunk.len(), std::sync::atomic::Ordering::Relaxed);
                     Ok(consume(buffer, chunk, &block.rows))
                 },
@@ -201,29 +207,81 @@ impl System {
             .collect()
     }
 
+    /// The lower triangle divided out of some rows of `loads`, one column each, which reach these supernodes.
+    pub(super) fn reduce(
+        &self,
+        (loads, rows): (&Rows, &[u32]),
+        nodes: &[u32],
+        scratch: &mut Scratch,
+        into: &mut Reduced,
+    ) {
+        let values = rows.iter().enumerate().flat_map(|(column, &row)| {
+            let row = loads.row(row as usize).iter();
+            row.map(move |&(place, value)| (place, column, value))
+        });
+        tally::count(Done::Solve, rows.len());
+        self.factor.reduce(nodes, values, scratch, into);
+    }
+
+    /// The supernodes that right-hand sides in these rows of solved blocks reach, rising.
+    pub(super) fn reach(&self, rows: impl Iterator<Item = u32>) -> Vec<u32> {
+        self.factor.reach(rows)
+    }
+
+    /// What is needed where these supernodes are, with all above them.
+    pub(super) fn needed<'a>(&self, nodes: impl Iterator<Item = &'a u32>) -> Needed {
+        let mut needed = vec![false; self.factor.supernodes_count()];
+        for &node in nodes {
+            needed[node as usize] = true;
+        }
+        Needed(needed)
+    }
+
+    /// Entries of the factor in what is needed.
+    pub(super) fn entries(&self, needed: &Needed) -> f64 {
+        let nodes = (0u32..).zip(&needed.0).filter(|(_, needed)| **needed);
+        nodes.map(|(node, _)| self.extent(node).1).sum()
+    }
+
+    /// Columns of a supernode, and entries of the factor in them.
+    pub(super) fn extent(&self, node: u32) -> (usize, f64) {
+        self.factor.extent(node)
+    }
+
+    /// Twice the energy (J) of displacements by degree of freedom.
+    #[must_use]
+    pub fn twice_energies(&self, displacements: &[Vec<f64>]) -> Vec<f64> {
+        let count = displacements.len();
+        let mut side_by_side = vec![0.0; self.dimension() * count];
+        for (column, displacement) in displacements.iter().enumerate() {
+            for (dof, &u) in displacement.iter().enumerate() {
+                if let Some((row, scale)) = self.place(dof) {
+                    side_by_side[row as usize * count + column] = u / scale;
+                }
+            }
+        }
+        self.stiffness.quadratic(&side_by_side, count)
+    }
+
     /// ‖K u - f‖ / ‖f‖ over the unknowns.
     #[must_use]
     pub fn residual(&self, loads: &[(usize, f64)], displacement: &[f64]) -> f64 {
-        let mut u = vec![0.0; self.dimension()];
-        for (dof, &unknown) in self.unknowns.iter().enumerate() {
-            if unknown != HELD {
-                u[unknown as usize] = displacement[dof];
+        let (mut u, mut f) = (vec![0.0; self.dimension()], vec![0.0; self.dimension()]);
+        for (dof, &displaced) in displacement.iter().enumerate() {
+            if let Some((row, scale)) = self.place(dof) {
+                u[row as usize] = displaced / scale;
             }
         }
-        let mut f = vec![0.0; self.dimension()];
         for &(dof, force) in loads {
-            if self.unknowns[dof] != HELD {
-                f[self.unknowns[dof] as usize] += force;
+            if let Some((row, _)) = self.place(dof) {
+                f[row as usize] += force;
             }
         }
-        let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let r: Vec<f64> = self
-            .stiffness
-            .multiply(&u)
-            .iter()
-            .zip(&f)
-            .map(|(a, b)| a - b)
-            .collect();
-        norm(&r) / norm(&f)
+        let mut left = 0.0;
+        let product = self.stiffness.multiply(&u);
+        for (&row, scale) in self.factor.order.iter().zip(&self.factor.scale) {
+            left += (product[row as usize] / scale - f[row as usize]).powi(2);
+        }
+        left.sqrt() / f.iter().map(|f| f * f).sum::<f64>().sqrt()
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::design::{Design, DesignError, Inputs};
 use crate::elasticity::Touch;
+use crate::elasticity::respond::gives_way;
 use crate::placement::SensorSet;
 use crate::project::PartModel;
 use crate::regression::folds::evenly;
@@ -81,7 +82,7 @@ fn mechanics(inputs: &Inputs, design: &Design) -> Result<Vec<Figure>, DesignErro
     let model = design.simulated.model()?;
     let sample = evenly(dataset.touches.len(), PRESSED);
     let touches: Vec<Touch> = sample.iter().map(|&t| dataset.touches[t]).collect();
-    let gives = model.gives_way(&touches);
+    let gives = gives_way(&*model, &touches);
     let mean = gives.iter().sum::<f64>() / gives.len().max(1) as f64;
     let most = gives.iter().copied().fold(0.0, f64::max);
     let force = inputs.project.touch.force_n;

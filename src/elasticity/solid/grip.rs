@@ -200,14 +200,10 @@ impl Grip {
         }
     }
 
-    /// What the springs push back with (N) at unknowns that are free, and twice the energy in them (J). What they do to
-    /// a node that is held goes into what holds it.
-    pub(super) fn reaction(
-        &self,
-        displacement: &[f64],
-        is_held: impl Fn(usize) -> bool,
-    ) -> (DVec3, f64) {
-        let (mut force, mut energy) = (DVec3::ZERO, 0.0);
+    /// What the springs push back with (N) at unknowns that are free. What they do to a node that is held goes into what
+    /// holds it.
+    pub(super) fn reaction(&self, displacement: &[f64], is_held: impl Fn(usize) -> bool) -> DVec3 {
+        let mut force = DVec3::ZERO;
         for spring in &self.springs {
             for axis in (0..3).filter(|&i| spring.held.holds(i)) {
                 let (mut u, mut free) = (0.0, 0.0);
@@ -219,10 +215,9 @@ impl Grip {
                     }
                 }
                 force[axis] -= spring.stiffness * u * free;
-                energy += spring.stiffness * u * u;
             }
         }
-        (force, energy)
+        force
     }
 
     /// The vertices of a surface that have springs on a facet around them.

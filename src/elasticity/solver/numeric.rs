@@ -10,13 +10,12 @@ use faer::linalg::cholesky::llt::factor::{
 };
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::perm::PermRef;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::{Accum, MatMut, MatRef, Par, Spec};
 use rayon::prelude::*;
 
-use super::matrix::{FactorError, SymmetricMatrix};
+use super::matrix::{FactorError, Scaled};
 use crate::budget::{Watch, report};
 
 /// Columns and rows that are worked on together.
@@ -27,89 +26,32 @@ const SHARED: f64 = 4e6;
 /// Progress is in so many parts of the multiplications.
 const PARTS: usize = 1000;
 
-/// The lower triangle with its rows in the order of elimination, scaled.
-struct Entries {
-    columns: Vec<usize>,
-    rows: Vec<u32>,
-    values: Vec<f64>,
-}
-
-impl Entries {
-    fn new(matrix: &SymmetricMatrix, scale: &[f64], order: Option<PermRef<'_, usize>>) -> Self {
-        let place = |row: usize| order.map_or(row, |p| p.arrays().1[row]);
-        let n = matrix.dimension();
-        let each = |visit: &mut dyn FnMut(usize, usize, f64)| {
-            for column in 0..n {
-                let (at, by) = (place(column), scale[column]);
-                for k in matrix.columns[column]..matrix.columns[column + 1] {
-                    let row = matrix.rows[k];
-                    let other = place(row);
-                    visit(
-                        at.min(other),
-                        at.max(other),
-                        matrix.values[k] * by * scale[row],
-                    );
-                }
-            }
-        };
-        let mut columns = vec![0; n + 1];
-        each(&mut |column, _, _| columns[column + 1] += 1);
-        for column in 0..n {
-            columns[column + 1] += columns[column];
-        }
-        let mut next = columns.clone();
-        let mut rows = vec![0; columns[n]];
-        let mut values = vec![0.0; columns[n]];
-        each(&mut |column, row, value| {
-            let at = next[column];
-            (rows[at], values[at]) = (row as u32, value);
-            next[column] += 1;
-        });
-        Self {
-            columns,
-            rows,
-            values,
-        }
-    }
-
-    fn column(&self, column: usize) -> impl Iterator<Item = (u32, f64)> {
-        let range = self.columns[column]..self.columns[column + 1];
-        let rows = self.rows[range.clone()].iter().copied();
-        rows.zip(self.values[range].iter().copied())
-    }
-}
-
-/// Bytes that an entry of the matrix takes here.
-pub(super) const BYTES_AN_ENTRY: usize = size_of::<u32>() + size_of::<f64>();
-
-/// Fills the values of the factor. `supernode` names the one that each row belongs to.
+/// Fills the values of the factor, for which there is room. `supernode` names the one that each row belongs to.
 ///
 /// # Errors
 /// [`FactorError::NotPositive`] with the row in the order of elimination, and [`FactorError::Cancelled`].
 pub(super) fn factorize(
     symbolic: &SymbolicSupernodalCholesky<usize>,
-    order: Option<PermRef<'_, usize>>,
-    matrix: &SymmetricMatrix,
-    scale: &[f64],
+    matrix: &Scaled,
     supernode: &[u32],
-    values: &mut [f64],
+    values: &mut Vec<f64>,
     watch: Watch,
 ) -> Result<(), FactorError> {
-    let entries = Entries::new(matrix, scale, order);
     let count = symbolic.n_supernodes();
     let starts = symbolic.col_ptr_for_val();
     let mut fronts = Fronts {
         symbolic,
         next: vec![0; count],
         waiting: vec![Vec::new(); count],
-        local: vec![0; matrix.dimension()],
+        local: vec![0; supernode.len()],
     };
     let mut meter = Meter::new(symbolic, watch);
     for s in 0..count {
-        let (done, rest) = values.split_at_mut(starts[s]);
-        let own = &mut rest[..starts[s + 1] - starts[s]];
+        // Not all at once: a large piece of new memory is slow to come.
+        values.resize(starts[s + 1], 0.0);
+        let (done, own) = values.split_at_mut(starts[s]);
         let begin = symbolic.supernode_begin()[s];
-        let height = fronts.assemble(s, &entries, own);
+        let height = fronts.assemble(s, matrix, own);
         fronts.gather(s, done, own);
         let width = own.len() / height;
         dense(own, height, width, &mut meter).map_err(|stop| match stop {
@@ -134,7 +76,7 @@ struct Fronts<'a> {
 
 impl Fronts<'_> {
     /// Puts the entries of the matrix into a front; gives its height.
-    fn assemble(&mut self, s: usize, entries: &Entries, own: &mut [f64]) -> usize {
+    fn assemble(&mut self, s: usize, matrix: &Scaled, own: &mut [f64]) -> usize {
         let node = self.symbolic.supernode(s);
         let (begin, end) = (node.start(), self.symbolic.supernode_end()[s]);
         let rows = (begin..end).chain(node.pattern().iter().copied());
@@ -143,7 +85,7 @@ impl Fronts<'_> {
         }
         let height = end - begin + node.pattern().len();
         for (column, into) in (begin..end).zip(own.chunks_exact_mut(height)) {
-            for (row, value) in entries.column(column) {
+            for (row, value) in matrix.column(column) {
                 into[self.local[row as usize] as usize] += value;
             }
         }

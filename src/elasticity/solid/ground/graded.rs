@@ -148,7 +148,7 @@ impl SolidGround {
     ) -> Result<Solved, ElasticError> {
         let fineness = self.fineness(size);
         let model = self.model(&fineness, watch)?;
-        Ok(Solved::of(fineness, model, touches, places))
+        Ok(Solved::of(fineness, model, touches, places, watch)?)
     }
 }
 

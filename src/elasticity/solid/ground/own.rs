@@ -79,7 +79,9 @@ impl Climb {
     }
 
     fn sizes(&self) -> Vec<f64> {
-        (self.changes.iter()).map(|c| c.displacement_percent).collect()
+        (self.changes.iter())
+            .map(|c| c.displacement_percent)
+            .collect()
     }
 }
 
@@ -145,7 +147,8 @@ impl SolidGround {
         let model = self
             .immersed
             .on_own(&self.whole, elements, &fineness, watch)?;
-        Ok(Solved::of(fineness, model, &climb.touches, &climb.places))
+        let (touches, places) = (&climb.touches, &climb.places);
+        Ok(Solved::of(fineness, model, touches, places, watch)?)
     }
 
     /// As [`Self::solve_own`]; nothing where memory does not hold it.
@@ -307,7 +310,7 @@ impl SolidGround {
                 let model = self
                     .immersed
                     .on_piece(&self.whole, &piece, &fineness, watch)?;
-                Ok(Solved::of(fineness, model, &[touch], &near))
+                Ok(Solved::of(fineness, model, &[touch], &near, watch)?)
             };
             match (solved(FIRST), solved(FIRST + 1)) {
                 (Ok(from), Ok(to)) => {

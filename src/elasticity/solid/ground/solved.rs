@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::budget::{Cancelled, Watch};
 use crate::elasticity::estimate::{Discretization, Sample};
 use crate::elasticity::grade::{CHECKED, subsample};
 use crate::elasticity::load::Touch;
@@ -35,7 +36,6 @@ pub(super) const SAFETY: f64 = 0.8;
 pub(super) struct Solved {
     pub(super) fineness: Fineness,
     pub(super) model: SolidModel,
-    pub(super) solutions: Vec<Vec<f64>>,
     pub(super) sample: Sample,
 }
 
@@ -45,15 +45,13 @@ impl Solved {
         model: SolidModel,
         touches: &[Touch],
         places: &[DVec3],
-    ) -> Self {
-        let loads: Vec<_> = touches.par_iter().map(|t| model.load(t)).collect();
-        let solutions = model.system().solve_loads(&loads);
-        Self {
-            sample: Sample::of(&model, touches, &solutions, places),
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
+        Ok(Self {
+            sample: Sample::read(&model, touches, places, watch)?,
             fineness,
             model,
-            solutions,
-        }
+        })
     }
 
     /// As the one that is taken, after so many models.
@@ -63,11 +61,11 @@ impl Solved {
         estimate: Discretization,
         models: u64,
     ) -> SolidGraded {
+        let checked = subsample(touches, CHECKED);
+        let loads: Vec<_> = checked.par_iter().map(|t| self.model.load(t)).collect();
+        let solutions = self.model.system().solve_loads(&loads);
         SolidGraded {
-            balance: (self.model).check_all(
-                &subsample(touches, CHECKED),
-                &subsample(&self.solutions, CHECKED),
-            ),
+            balance: self.model.check_all(&checked, &solutions),
             fineness: self.fineness,
             model: self.model,
             estimate,
