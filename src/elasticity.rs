@@ -5,6 +5,7 @@
 //! in blocks.
 
 pub mod bending;
+mod both;
 pub mod element;
 pub mod error;
 pub mod estimate;

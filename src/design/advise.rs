@@ -10,7 +10,6 @@ use super::layout::size_mm;
 use super::{DesignError, Ground, Inputs, SLOPE_TOUCHES, ground};
 use crate::budget::{Budget, Watch};
 use crate::elasticity::solid::ground::{Foreseen, SolidGround};
-use crate::elasticity::solid::simplex::Simplex;
 use crate::elasticity::solid::sizing::Shape;
 use crate::elasticity::{ElasticError, Touch, scope};
 use crate::mesh::TriMesh;
@@ -204,16 +203,17 @@ impl Asked {
 
     /// Of the tetrahedra of the part's file, read at so many sites.
     fn own(&self, foreseen: &Foreseen, sites: f64) -> Cost {
-        let solves = (self.touches + self.touches.min(SLOPE_TOUCHES)) as f64;
-        let nodes = Simplex::count(foreseen.order) as f64;
+        // Touches, and some of them once more and made otherwise in two ways; strains, moved gauges and gauges.
+        let loads = (self.touches + 3 * self.touches.min(SLOPE_TOUCHES)) as f64;
+        let outputs = 8.0 * sites;
         let built = ASSEMBLE * foreseen.assembled + FACTOR * foreseen.multiplications;
-        let read = READ * 9.0 * nodes * sites;
+        let solved = (SOLVE * loads).min(HALF * (loads + outputs)) * foreseen.entries;
         Cost {
             model: PartModel::Solid,
             order: Some(foreseen.order),
             element_mm: foreseen.edge * 1e3,
             unknowns: foreseen.unknowns,
-            seconds: SOLID.once + built + solves * (SOLVE * foreseen.entries + read),
+            seconds: SOLID.once + built + PRESS * loads + solved,
             memory_gb: foreseen.bytes / 1e9,
             error_percent: foreseen.estimate.displacement_percent,
             theory_percent: 0.0,
@@ -221,12 +221,14 @@ impl Asked {
     }
 }
 
-/// CPU time (s) of each entry of an element's matrix, each multiplication of a factorization, each entry of a
-/// factor that a touch is solved with, and each weight that a site is read with: as on a limb with tetrahedra.
+/// CPU time (s) of each entry of an element's matrix, each multiplication of a factorization, each entry of a factor that a
+/// touch is solved with or that it is divided out of a touch or an output, and of laying a touch on the elements: as on a limb with
+/// tetrahedra.
 const ASSEMBLE: f64 = 4e-8;
 const FACTOR: f64 = 5e-11;
-const SOLVE: f64 = 1.2e-10;
-const READ: f64 = 3e-9;
+const SOLVE: f64 = 6e-11;
+const HALF: f64 = 6e-12;
+const PRESS: f64 = 6e-4;
 
 /// Error of the displacement under a touch (%) with triangles as large as the tip's radius, which falls with the
 /// square of their size; area of such triangles' vertices over their squared edge. As on the bundled limb.
