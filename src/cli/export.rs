@@ -179,5 +179,9 @@ fn pressed(
         force: args.force,
         tip_radius: loaded.inputs.project.touch.tip_radius_mm * 1e-3,
     };
-    Ok(((**mesh).clone(), model.moved(&touch), touch))
+    Ok((
+        (**mesh).clone(),
+        model.moved(&[touch]).swap_remove(0),
+        touch,
+    ))
 }

@@ -214,7 +214,7 @@ impl Asked {
             element_mm: foreseen.edge * 1e3,
             unknowns: foreseen.unknowns,
             seconds: SOLID.once + built + PRESS * loads + solved,
-            memory_gb: foreseen.bytes / 1e9,
+            memory_gb: (foreseen.bytes + foreseen.before) / 1e9,
             error_percent: foreseen.estimate.displacement_percent,
             theory_percent: 0.0,
         }

@@ -165,14 +165,16 @@ impl<'a> Reaching<'a> {
         let all = runs.len() * self.rows.count();
         let done = AtomicUsize::new(0);
         for run in runs {
-            let reduced: Vec<Reduced> = (run.par_iter())
+            let reduced: Result<Vec<Reduced>, Cancelled> = (run.par_iter())
                 .map_init(Scratch::default, |scratch, block| {
+                    report(watch, stage, done.load(Ordering::Relaxed), all)?;
                     let mut reduced = Reduced::default();
                     let rows = (kept.rows, &block.rows[..]);
                     system.reduce(rows, &block.nodes, scratch, &mut reduced);
-                    reduced
+                    Ok(reduced)
                 })
                 .collect();
+            let reduced = reduced?;
             let streamed = self.blocks.par_iter().zip(&mut read);
             let begin = || {
                 (

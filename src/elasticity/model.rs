@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::load::{Push, Touch};
 use super::observe::{Face, Observer};
+use super::solver::BLOCK;
 use super::system::System;
 use crate::mesh::locate::SurfaceIndex;
 use crate::mesh::{SurfacePoint, TriMesh};
@@ -16,7 +17,7 @@ use crate::mesh::{SurfacePoint, TriMesh};
 pub struct LoadCheck {
     /// |sum of reactions + load| over the load.
     pub reaction_error: f64,
-    /// |½ u·f - strain energy| over the energy.
+    /// |½ u·f - strain energy| over the energy, of a solid that of the assembled stiffness.
     pub energy_error: f64,
 }
 
@@ -90,14 +91,21 @@ impl dyn Model + '_ {
         self.system().solve_dofs(&self.load(touch))
     }
 
-    /// How every vertex of the surface moves under a touch (m).
+    /// How every vertex of the surface moves under each touch (m).
     #[must_use]
-    pub fn moved(&self, touch: &Touch) -> Vec<DVec3> {
-        let solved = self.system().widened(&[self.press(touch)]);
-        let mut moved = self.translations(&solved, 1).swap_remove(0);
+    pub fn moved(&self, touches: &[Touch]) -> Vec<Vec<DVec3>> {
+        let mut moved = Vec::with_capacity(touches.len());
+        for block in touches.chunks(BLOCK) {
+            let loads: Vec<_> = block.iter().map(|t| self.load(t)).collect();
+            let solutions = self.system().solve_loads(&loads);
+            let solved = self.system().widened(&solutions);
+            moved.extend(self.translations(&solved, block.len()));
+        }
         if let Some(coarser) = self.coarser() {
-            for (fine, coarse) in moved.iter_mut().zip(coarser.model.moved(touch)) {
-                *fine += coarser.share * (*fine - coarse);
+            for (fine, coarse) in moved.iter_mut().zip(coarser.model.moved(touches)) {
+                for (fine, coarse) in fine.iter_mut().zip(coarse) {
+                    *fine += coarser.share * (*fine - coarse);
+                }
             }
         }
         moved

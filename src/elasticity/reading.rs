@@ -34,7 +34,7 @@ impl Observer {
         all
     }
 
-    /// Displacements (m) at each point for a single solution.
+    /// Displacements (m) at each point for a single solution, as its own elements have them: nothing is carried on.
     #[must_use]
     pub fn displacement_of(&self, model: &dyn Model, displacement: &[f64]) -> Vec<DVec3> {
         self.displacement(&model.system().widened(&[displacement]))

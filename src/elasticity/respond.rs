@@ -45,7 +45,7 @@ pub enum Reading<'a> {
 pub struct Responses {
     loads: usize,
     rows: usize,
-    /// Which side was cheaper and was solved for.
+    /// Which side was solved for, or both by halves: what took least.
     pub side: Side,
     /// Right-hand sides solved, halves too.
     pub solves: usize,

@@ -218,8 +218,10 @@ impl Model for SolidModel {
 
     fn check_all(&self, touches: &[Touch], solutions: &[Vec<f64>]) -> LoadCheck {
         let mut reactions = vec![DVec3::ZERO; solutions.len()];
-        for element in self.holding() {
-            for (sum, own) in reactions.iter_mut().zip(self.reactions(element, solutions)) {
+        let held = self.holding().into_par_iter();
+        let of_elements: Vec<_> = held.map(|e| self.reactions(e, solutions)).collect();
+        for own in of_elements {
+            for (sum, own) in reactions.iter_mut().zip(own) {
                 *sum += own;
             }
         }

@@ -36,13 +36,13 @@ pub fn fields(model: &dyn Model, touches: &[Touch]) -> Vec<Field> {
     }];
     let loads: Vec<_> = touches.iter().map(|t| model.load(t)).collect();
     let solutions = model.system().solve_loads(&loads);
-    let middle = model.observer(&vertices, Face::Middle);
     let strains = observer.strains_of(model, &solutions);
-    for (k, (u, strain)) in solutions.iter().zip(strains).enumerate() {
+    let moved = model.moved(touches);
+    for (k, (moved, strain)) in moved.into_iter().zip(strains).enumerate() {
         fields.push(Field {
             name: format!("displacement_mm_touch_{k}"),
             width: 3,
-            values: (middle.displacement_of(model, u).into_iter())
+            values: (moved.into_iter())
                 .flat_map(|u| (u * 1000.0).to_array())
                 .collect(),
         });

@@ -444,7 +444,7 @@ fn the_work_is_counted_and_nothing_is_done_twice() {
     )
     .unwrap();
     let total = design.work();
-    // The reference is the only other model, and on it the fewer of sites and test touches are solved for.
+    // The reference is the only other model, and on it what takes least is solved for.
     let truth = design.reference.work;
     assert_eq!((truth.assemblies, truth.factorizations), (1, 1));
     assert!(truth.solves <= 60, "{truth:?}");

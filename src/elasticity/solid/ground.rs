@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::SolidModel;
 use super::immersed::{Fineness, Immersed};
+use super::orders;
 use super::simplex::HIGHEST;
 use super::sizing::{FINER, Shape};
 use crate::budget::{Cancelled, Watch, report};
@@ -209,8 +210,10 @@ impl SolidGround {
         }
         // A part's own tetrahedra gain most by their order.
         let raised = fineness.order < HIGHEST;
+        let order = fineness.order + usize::from(raised);
         Fineness {
-            order: fineness.order + usize::from(raised),
+            order,
+            carried_on: orders::usually_left(order, orders::DISPLACEMENT),
             halvings: fineness.halvings + u32::from(!raised),
             ..*fineness
         }

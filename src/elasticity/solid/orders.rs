@@ -36,6 +36,13 @@ pub fn left(changes: &[f64], usual: f64) -> f64 {
     (smooth * rough).sqrt()
 }
 
+/// As [`left`] at an order of which nothing has been solved for.
+#[must_use]
+pub fn usually_left(order: usize, usual: f64) -> f64 {
+    let changes = (FIRST..order).map(|k| usual.powi((k - FIRST) as i32));
+    left(&changes.collect::<Vec<f64>>(), usual)
+}
+
 /// Errors one order further over those at `order`, where nothing but these is known.
 #[must_use]
 pub fn falls(order: usize, usual: f64) -> f64 {

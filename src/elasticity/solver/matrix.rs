@@ -46,7 +46,9 @@ impl SymmetricMatrix {
     /// Adds to entries of a column that stand side by side in the pattern, from the one in this row on.
     pub fn add_run(&mut self, row: usize, column: usize, values: impl Iterator<Item = f64>) {
         let range = self.columns[column]..self.columns[column + 1];
-        if let Ok(place) = self.rows[range.clone()].binary_search(&row) {
+        let found = self.rows[range.clone()].binary_search(&row);
+        debug_assert!(found.is_ok(), "({row}, {column}) is not in the pattern");
+        if let Ok(place) = found {
             let into = self.values[range.start + place..range.end].iter_mut();
             for (into, value) in into.zip(values) {
                 *into += value;

@@ -74,7 +74,7 @@ pub struct Raced {
 }
 
 /// Scores candidates again, the most promising first, until none that is left can be among the best:
-/// not even if its cheap score departs from the dear one half as much again as was seen so far.
+/// not even if its cheap score departs from the dear one half as much again as was seen so far; or until the most are scored.
 /// `worth` says how much a place with a score counts (more is better).
 ///
 /// # Errors

@@ -48,6 +48,8 @@ pub(super) struct Search<'a> {
     /// How each score related to the next in the last step.
     pub(super) relations: Vec<Relation>,
     pub(super) widest: f64,
+    /// Whether this step's sets are hardly told apart: races are cut off then.
+    pub(super) indistinct: bool,
     pub(super) exactly: usize,
     pub(super) converged: bool,
     pub(super) work: Work,
@@ -96,6 +98,7 @@ impl<'a> Search<'a> {
             kernel: vec![1.0; n * n],
             relations: Vec::new(),
             widest: 0.0,
+            indistinct: false,
             exactly: 0,
             converged: true,
             work: Work::default(),
@@ -113,6 +116,8 @@ impl<'a> Search<'a> {
         let last = LEVELS.len() - 1;
         let mut left: Vec<(usize, Vec<Scored>)> = Vec::new();
         let mut scored = self.scores(0, &open, field.chosen.len())?;
+        let promised = scored.iter().map(|s| s.error).fold(f64::INFINITY, f64::min);
+        self.indistinct = self.settings.is_indistinct(promised);
         let mut relations = Vec::new();
         for level in 1..=last {
             let (batch, audits) = BATCHES[level - 1];
@@ -142,7 +147,7 @@ impl<'a> Search<'a> {
             relations,
         };
         let step = field.chosen.len();
-        let winner = if self.settings.is_indistinct(before) {
+        let winner = if self.indistinct {
             winner
         } else {
             self.second_look(winner, &mut seen, &worth, step)?
@@ -197,7 +202,7 @@ impl<'a> Search<'a> {
     fn most(&self, level: usize) -> usize {
         /// Where sets are hardly told apart: nobody waits for a proof that there is no better one, and the gap says so.
         const MOST: [usize; LEVELS.len()] = [48, 24, 12, 6];
-        if self.settings.is_indistinct(self.base.error) {
+        if self.indistinct {
             MOST[level]
         } else {
             usize::MAX
@@ -235,7 +240,7 @@ impl<'a> Search<'a> {
         constraints.weighed(error, others.chain(std::iter::once(self.base.error)))
     }
 
-    /// Exact fits of the most promising until no other can be better by more than the tolerance.
+    /// Exact fits of the most promising until no other can be better by more than the tolerance, or the race is cut off.
     pub(super) fn final_race(
         &mut self,
         scored: &[Scored],

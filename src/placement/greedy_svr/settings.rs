@@ -35,7 +35,7 @@ impl GreedySvr {
     /// where criteria come near to that, how far they differ is chance. Data without noise get there.
     pub(super) fn is_indistinct(&self, error: f64) -> bool {
         /// In tubes.
-        const NEAR: f64 = 10.0;
+        const NEAR: f64 = 3.0;
         error < NEAR * self.hyper.epsilon
     }
 

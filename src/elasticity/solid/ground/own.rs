@@ -9,6 +9,7 @@ use crate::elasticity::error::ElasticError;
 use crate::elasticity::estimate::{self, Discretization};
 use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
+use crate::elasticity::model::Model as _;
 use crate::elasticity::solid::immersed::Fineness;
 use crate::elasticity::solid::orders::{self, FIRST};
 use crate::elasticity::solid::piece::Piece;
@@ -37,6 +38,8 @@ pub struct Foreseen {
     pub entries: f64,
     /// Memory of factor and matrix (bytes).
     pub bytes: f64,
+    /// The same of the order before, which displacements are carried on from.
+    pub before: f64,
     /// Entries of the elements' matrices and multiplications of the factorizations, of all orders on the way.
     pub assembled: f64,
     /// Multiplications of all factorizations on the way.
@@ -119,23 +122,30 @@ impl SolidGround {
         if order > HIGHEST || (order > FIRST && bytes > memory::allowed()) {
             return None;
         }
-        let fineness = Fineness {
-            order,
-            ..self.fineness(own.mean_edge())
-        };
+        let fineness = self.fineness_at(order);
         let elements = self.immersed.tetrahedra(&fineness)?;
         Some((fineness, elements))
     }
 
-    /// As [`Self::own_at`] where so many touches can be afforded at that order.
+    /// The part's own tetrahedra at an order.
+    fn fineness_at(&self, order: usize) -> Fineness {
+        let edge = self.immersed.own().map_or(0.0, VolumeMesh::mean_edge);
+        Fineness {
+            order,
+            ..self.fineness(edge)
+        }
+    }
+
+    /// As [`Self::own_at`] where so many touches can be afforded at that order, beside a model that takes so much memory (bytes).
     fn affordable(
         &self,
         order: usize,
         touches: usize,
         aim: &Elements,
+        beside: f64,
     ) -> Option<(Fineness, Tetrahedra)> {
         let own = self.own_at(order);
-        own.filter(|own| affords(Some(own), touches, aim))
+        own.filter(|own| affords(Some(own), touches, aim, beside))
     }
 
     fn solve_own(
@@ -180,7 +190,7 @@ impl SolidGround {
         };
         let given = self.solve_own(first, &climb, watch)?;
         let second = self.own_at(FIRST + 1);
-        let affordable = affords(second.as_ref(), touches.len(), aim);
+        let affordable = affords(second.as_ref(), touches.len(), aim, 0.0);
         let Some(mut last) = self.try_own(second, &climb, watch)? else {
             let estimate = self.by_pieces(&climb, watch)?;
             return Ok(given.graded(&climb.touches, estimate, 1));
@@ -190,19 +200,28 @@ impl SolidGround {
         if !affordable || estimate.excess(aim) <= SAFETY {
             return Ok(given.graded(&climb.touches, estimate, 2));
         }
-        let mut before = given;
+        let mut before = given.model;
         while climb.left(false).excess(aim) > SAFETY {
-            let next = self.affordable(last.fineness.order + 1, touches.len(), aim);
-            let Some(next) = self.try_own(next, &climb, watch)? else {
+            let order = last.fineness.order;
+            let beside = last.model.system().bytes();
+            let next = self.affordable(order + 1, touches.len(), aim, beside);
+            if next.is_none() {
+                break;
+            }
+            // Two models are there at a time.
+            drop(before);
+            let next = self.try_own(next, &climb, watch)?;
+            let Some(next) = next else {
+                before = self.model(&self.fineness_at(order - 1), watch)?;
                 break;
             };
             climb.step(&last, &next);
-            before = std::mem::replace(&mut last, next);
+            before = std::mem::replace(&mut last, next).model;
         }
         let models = 1 + climb.changes.len() as u64;
         let mut graded = last.graded(&climb.touches, climb.left(false), models);
         graded.fineness.carried_on = climb.carried_on();
-        graded.model = (graded.model).carried_on(before.model, graded.fineness.carried_on);
+        graded.model = (graded.model).carried_on(before, graded.fineness.carried_on);
         Ok(graded)
     }
 
@@ -236,7 +255,7 @@ impl SolidGround {
         foreseen.add(FIRST, &first.1);
         let given = self.solve_own(first, &climb, watch)?;
         let second = self.own_at(FIRST + 1);
-        let affordable = affords(second.as_ref(), count, aim);
+        let affordable = affords(second.as_ref(), count, aim, 0.0);
         let mut cubic = foreseen;
         if let Some((_, elements)) = &second {
             cubic.add(FIRST + 1, elements);
@@ -257,7 +276,7 @@ impl SolidGround {
         foreseen.estimate = climb.left(false);
         let mut last = Some(solved);
         while foreseen.estimate.excess(aim) > SAFETY
-            && let Some(next) = self.affordable(foreseen.order + 1, count, aim)
+            && let Some(next) = self.affordable(foreseen.order + 1, count, aim, foreseen.bytes)
         {
             let order = foreseen.order;
             foreseen.add(order + 1, &next.1);
@@ -336,6 +355,7 @@ impl Foreseen {
             unknowns: 0.0,
             entries: 0.0,
             bytes: 0.0,
+            before: 0.0,
             assembled: 0.0,
             multiplications: 0.0,
             estimate: estimate::unknown(0, 0),
@@ -349,19 +369,25 @@ impl Foreseen {
         let Some(plan) = elements.plan() else { return };
         self.unknowns = 3.0 * plan.order.len() as f64;
         self.entries = plan.entries;
+        self.before = self.bytes;
         self.bytes = plan.bytes();
         self.multiplications += plan.multiplications;
     }
 }
 
-/// Whether a factor fits into memory, and its solutions into the effort.
-fn affords(own: Option<&(Fineness, Tetrahedra)>, touches: usize, aim: &Elements) -> bool {
+/// Whether a factor fits into memory, of which so much is taken (bytes), and its solutions into the effort.
+fn affords(
+    own: Option<&(Fineness, Tetrahedra)>,
+    touches: usize,
+    aim: &Elements,
+    taken: f64,
+) -> bool {
     let plan = own.and_then(|(_, elements)| elements.plan());
     plan.is_some_and(|plan| {
         let effort = aim.effort as f64;
         plan.entries * touches as f64 <= ENTRIES * effort
             && plan.multiplications <= MULTIPLICATIONS * effort
-            && plan.bytes() <= memory::allowed()
+            && taken + plan.bytes() <= memory::allowed()
     })
 }
 
