@@ -2,7 +2,7 @@
 //!
 //! With K the stiffness, F the loads and B what is read, the answer is B K⁻¹ F. K is symmetric, so it may
 //! be had from a solution for every load or from one for every output (Maxwell–Betti reciprocity), or from both with
-//! only the lower triangle divided out ([`super::both`]).
+//! only the lower triangle divided out (`both.rs`).
 
 use rayon::prelude::*;
 
