@@ -11,8 +11,8 @@ pub const FIRST: usize = 2;
 pub const DISPLACEMENT: f64 = 0.25;
 /// Of strains at single places, which scatter: 0.2 to 0.5 and more.
 pub const STRAIN: f64 = 0.33;
-/// Where displacements are carried on by what is left of them, so much of that is still off: touches differ in it. Of a limb
-/// with thin walls 0.31 to 0.34 at order 3 and 0.2 to 0.3 at order 4, of a channel, a bracket and a cube 0.1 to 0.6.
+/// Where displacements are carried on by what is left of them, so much of that is still off: touches differ in it. Of the
+/// paper's limb 0.27 at order 3 and 0.2 at order 4, of a channel, a bracket and a cube 0.1 to 0.7.
 pub const OFF: f64 = 1.0 / 3.0;
 /// Ratios beyond these are chance.
 const LEAST: f64 = 0.1;

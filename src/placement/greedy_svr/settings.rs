@@ -21,7 +21,8 @@ pub struct GreedySvr {
     pub grouping: Grouping,
     /// Of each fit.
     pub effort: Effort,
-    /// A choice may be worse than the best by this share of the criterion.
+    /// A choice may be worse than the best by this share of the criterion; where that comes near to the tube by more, which the
+    /// gap of a step says.
     pub tolerance: f64,
     /// Landmarks of the screens, relative to what suits most data: fewer are faster, and more has to be
     /// fitted exactly.
