@@ -15,8 +15,10 @@ use crate::uncertainty::Gluing;
 
 /// How far a gauge is moved either way (m): about as far as a workshop is off.
 const STEP: f64 = 0.75e-3;
-/// A gauge is moved along itself and across itself, forth and back.
-const MOVES: usize = 4;
+/// A gauge is moved along itself and across itself.
+const MOVES: usize = 2;
+/// From the difference between gauges moved forth and back to the slope (1/m).
+const SLOPE: f64 = 0.5 / STEP;
 
 /// What the reading of every site changes by as its gauge is moved or turned, under some of the touches of a dataset
 /// at their force. In single precision: they make up variances.
@@ -30,8 +32,8 @@ pub struct GluingSlopes {
 }
 
 impl GluingSlopes {
-    /// Numbers in double precision that are held for a site and a touch while they are computed: moved readings,
-    /// and three slopes in single precision.
+    /// Numbers in double precision that are held for a site and a touch while they are computed: two slopes,
+    /// and three in single precision.
     pub const HELD: f64 = MOVES as f64 + 1.5;
 
     /// Solves for the touches in `columns` (at least one) once more, for gauges that are moved; `turned` are the
@@ -50,8 +52,14 @@ impl GluingSlopes {
         let pressed: Vec<Touch> = columns.iter().map(|&t| touches[t]).collect();
         let moved: Vec<Site> = sites.iter().flat_map(shifted).collect();
         let (observer, angles) = gauges_on(model, &moved);
-        let responses = respond(model, &pressed, &observer, Reading::Gauge(&angles), watch)?;
-        let slopes = Self::between(&responses, sites.len(), columns.to_vec(), turned);
+        let responses = respond(
+            model,
+            &pressed,
+            &observer,
+            Reading::GaugeDifference(&angles, SLOPE),
+            watch,
+        )?;
+        let slopes = Self::read(&responses, sites.len(), columns.to_vec(), turned);
         Ok((slopes, responses.solves))
     }
 
@@ -67,14 +75,14 @@ impl GluingSlopes {
     ) -> Result<(Self, usize), Cancelled> {
         let moved: Vec<Site> = sites.iter().flat_map(shifted).collect();
         let (observer, angles) = gauges_on(pressed.model(), &moved);
-        let responses = pressed.read(&observer, Reading::Gauge(&angles), watch)?;
+        let responses = pressed.read(&observer, Reading::GaugeDifference(&angles, SLOPE), watch)?;
         let columns = (0..pressed.touches()).collect();
-        let slopes = Self::between(&responses, sites.len(), columns, turned);
+        let slopes = Self::read(&responses, sites.len(), columns, turned);
         Ok((slopes, responses.solves))
     }
 
-    /// Central differences between what moved gauges read.
-    fn between(responses: &Responses, sites: usize, touches: Vec<usize>, turned: Vec<f32>) -> Self {
+    /// From the slopes along and across each gauge, as they were solved for.
+    fn read(responses: &Responses, sites: usize, touches: Vec<usize>, turned: Vec<f32>) -> Self {
         let count = touches.len();
         let mut along = vec![0.0_f32; sites * count];
         let mut across = vec![0.0_f32; sites * count];
@@ -82,13 +90,12 @@ impl GluingSlopes {
             .par_chunks_mut(count)
             .zip(across.par_chunks_mut(count));
         rows.enumerate().for_each_init(
-            || [vec![0.0; count], vec![0.0; count]],
-            |[forth, back], (site, (along, across))| {
+            || vec![0.0; count],
+            |row, (site, (along, across))| {
                 for (k, into) in [along, across].into_iter().enumerate() {
-                    responses.row_into(MOVES * site + 2 * k, forth);
-                    responses.row_into(MOVES * site + 2 * k + 1, back);
-                    for (slope, (f, b)) in into.iter_mut().zip(forth.iter().zip(back.iter())) {
-                        *slope = ((f - b) / (2.0 * STEP)) as f32;
+                    responses.row_into(MOVES * site + k, row);
+                    for (slope, &found) in into.iter_mut().zip(row.iter()) {
+                        *slope = found as f32;
                     }
                 }
             },
@@ -197,7 +204,7 @@ pub(super) fn turned(components: &[Vec<f64>], angle: f64, columns: &[usize]) -> 
 }
 
 /// A gauge moved along itself and across itself, forth and back.
-fn shifted(site: &Site) -> [Site; MOVES] {
+fn shifted(site: &Site) -> [Site; 2 * MOVES] {
     let across = site.normal.cross(site.direction);
     [site.direction, -site.direction, across, -across].map(|toward| Site {
         position: site.position + toward * STEP,

@@ -201,17 +201,19 @@ impl Asked {
         }
     }
 
-    /// Of the tetrahedra of the part's file, read at so many sites.
-    fn own(&self, foreseen: &Foreseen, sites: f64) -> Cost {
-        // Touches, and some of them once more and made otherwise in two ways; strains, moved gauges and gauges.
+    /// Of elements that were looked at, read at so many sites; of the part's own tetrahedra raised to an order.
+    fn looked_at(&self, foreseen: &Foreseen, order: Option<usize>, sites: f64) -> Cost {
+        // Touches, and some of them once more and made otherwise in two ways; strains, slopes of gauges and gauges.
         let loads = (self.touches + 3 * self.touches.min(SLOPE_TOUCHES)) as f64;
-        let outputs = 8.0 * sites;
-        let built = ASSEMBLE * foreseen.assembled + FACTOR * foreseen.multiplications;
+        let outputs = 6.0 * sites;
+        let built = CUT * foreseen.boxes
+            + ASSEMBLE * foreseen.assembled
+            + FACTOR * foreseen.multiplications;
         let solved = (SOLVE * loads).min(HALF * (loads + outputs)) * foreseen.entries;
         Cost {
             model: PartModel::Solid,
-            order: Some(foreseen.order),
-            element_mm: foreseen.edge * 1e3,
+            order,
+            element_mm: foreseen.size * 1e3,
             unknowns: foreseen.unknowns,
             seconds: SOLID.once + built + PRESS * loads + solved,
             memory_gb: (foreseen.bytes + foreseen.before) / 1e9,
@@ -221,9 +223,10 @@ impl Asked {
     }
 }
 
-/// CPU time (s) of each entry of an element's matrix, each multiplication of a factorization, each entry of a factor that a
-/// touch is solved with or that it is divided out of a touch or an output, and of laying a touch on the elements: as on a limb with
-/// tetrahedra.
+/// CPU time (s) of each box that a surface is found with, each entry of an element's matrix, each multiplication of a
+/// factorization, each entry of a factor that a touch is solved with or that it is divided out of a touch or an output, and
+/// of laying a touch on the elements: as on limbs with tetrahedra and in cells.
+const CUT: f64 = 6e-6;
 const ASSEMBLE: f64 = 4e-8;
 const FACTOR: f64 = 5e-11;
 const SOLVE: f64 = 6e-11;
@@ -259,7 +262,7 @@ const SHELL: Measured = Measured {
     entries: 8.0,
 };
 const SOLID: Measured = Measured {
-    once: 5.0,
+    once: 8.0,
     build: 1e-4,
     solve: 4e-8,
     entries: 9.0,
@@ -278,14 +281,13 @@ impl Measured {
     }
 }
 
-/// The tetrahedra that came with the part, where there are any: what they would cost, and why they could not be
-/// computed where that is so.
-fn of_own(
+/// What the elements of a closed part would cost, and why their error could not be computed where that is so.
+fn of_solid(
     asked: &Asked,
     inputs: &Inputs,
     solid: &SolidGround,
     watch: Watch,
-) -> Result<Option<(Cost, Option<String>)>, DesignError> {
+) -> Result<(Cost, Option<String>), DesignError> {
     /// Touches and places that the error is looked at with.
     const TOUCHES: usize = 24;
     const PLACES: usize = 120;
@@ -303,13 +305,16 @@ fn of_own(
     let places: Vec<DVec3> = on_inside.into_iter().map(|at| inside.point(at)).collect();
     let spacing = inputs.project.sites.spacing_mm * 1e-3;
     let sites = inside.area() / (spacing * spacing);
+    let own = solid.as_they_are();
+    let order = |foreseen: &Foreseen| own.map(|_| foreseen.order);
     let aim = &asked.budget.elements;
     match solid.foresee(&touches, &places, asked.touches, aim, watch) {
-        Ok(foreseen) => Ok(foreseen.map(|foreseen| (asked.own(&foreseen, sites), None))),
+        Ok(foreseen) => Ok((asked.looked_at(&foreseen, order(&foreseen), sites), None)),
         Err(stop @ ElasticError::Cancelled(_)) => Err(stop.into()),
         Err(why) => {
-            let cost = solid.as_they_are().map(|own| asked.own(&own, sites));
-            Ok(cost.map(|cost| (cost, Some(why.to_string()))))
+            let as_they_are = |own: &Foreseen| asked.looked_at(own, order(own), sites);
+            let cost = own.as_ref().map_or_else(|| asked.solid(), as_they_are);
+            Ok((cost, Some(why.to_string())))
         }
     }
 }
@@ -324,11 +329,11 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround, watch: Watch) -> Result<Advic
     let area: f64 = faces.iter().map(|&t| whole.facet_area(t)).sum();
     let radius = scope::radii(whole, &faces, solid.wall());
     let asked = Asked::new(inputs, area / 2.0, radius[0], solid.shape());
-    let (own, why) = of_own(&asked, inputs, solid, watch)?.unzip();
-    let costs = [asked.shell(), own.unwrap_or_else(|| asked.solid())];
+    let (cells, why) = of_solid(&asked, inputs, solid, watch)?;
+    let costs = [asked.shell(), cells];
     let [shell, cells] = &costs;
     // The user's own tetrahedra follow the walls, whatever those are.
-    let fits = if own.is_none() && cells.total() > MUCH * shell.total() {
+    let fits = if cells.order.is_none() && cells.total() > MUCH * shell.total() {
         PartModel::Shell
     } else {
         PartModel::Solid
@@ -355,8 +360,8 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround, watch: Watch) -> Result<Advic
             "As it is a solid fits: taken as a shell, both faces of each wall would be walls of their own.".into()
         },
     ];
-    if let Some(why) = why.flatten() {
-        words.push(format!("Its tetrahedra could not be computed yet: {why}."));
+    if let Some(why) = why {
+        words.push(format!("As a solid it could not be computed yet: {why}."));
     }
     Ok(Advice {
         closed: true,

@@ -37,6 +37,8 @@ pub enum Reading<'a> {
     GaugeAndDisplacement(&'a [f64]),
     /// Strain along one direction a point: row i.
     Gauge(&'a [f64]),
+    /// As [`Self::Gauge`] of points in pairs: row i is what gauge 2 i reads more than gauge 2 i + 1, times the number.
+    GaugeDifference(&'a [f64], f64),
     /// Rows 3 i … 3 i + 2 are x, y, z at point i.
     Displacement,
 }
@@ -103,7 +105,12 @@ impl Responses {
 
 impl Reading<'_> {
     fn displaces(&self) -> bool {
-        !matches!(self, Self::Strain | Self::Gauge(_))
+        match self {
+            Self::Strain | Self::Gauge(_) | Self::GaugeDifference(..) => false,
+            Self::StrainAndDisplacement | Self::GaugeAndDisplacement(_) | Self::Displacement => {
+                true
+            }
+        }
     }
 }
 
@@ -117,6 +124,15 @@ fn along_gauges(strain: &[f64], angles: &[f64]) -> Vec<f64> {
         );
     }
     along
+}
+
+/// Of gauges in pairs, what the first of each reads more than the second, so many times.
+fn differences(along: &[f64], times: f64) -> Vec<f64> {
+    let pairs = along.chunks_exact(2 * BLOCK);
+    let difference = |pair: &[f64]| -> [f64; BLOCK] {
+        std::array::from_fn(|k| times * (pair[k] - pair[BLOCK + k]))
+    };
+    pairs.flat_map(difference).collect()
 }
 
 /// Reads `observer`'s points under all touches, which may push in any direction ([`Push`]).
@@ -165,6 +181,10 @@ fn by(
             }
             Reading::Gauge(angles) | Reading::GaugeAndDisplacement(angles) => {
                 keep(&along_gauges(observer.strain_into(solved, buffer), angles));
+            }
+            Reading::GaugeDifference(angles, times) => {
+                let along = along_gauges(observer.strain_into(solved, buffer), angles);
+                keep(&differences(&along, times));
             }
             Reading::Displacement => {}
         }
@@ -398,11 +418,22 @@ fn touch_rows(model: &dyn Model, touches: &[impl Copy + Sync + Into<Push>]) -> R
 }
 
 pub(super) fn output_rows(observer: &Observer, reading: Reading) -> Rows {
+    let weighed = |(i, angle): (u32, f64), times: f64| {
+        let weights = observe::along(angle);
+        (0..3).map(move |k| (3 * i + k as u32, times * weights[k]))
+    };
     let gauge = |angles: &[f64]| {
         let mut along = Rows::default();
-        for (i, &angle) in (0u32..).zip(angles) {
-            let weights = observe::along(angle);
-            along.push((0..3).map(|k| (3 * i + k as u32, weights[k])));
+        for of in (0u32..).zip(angles.iter().copied()) {
+            along.push(weighed(of, 1.0));
+        }
+        along.times(&observer.strain_rows())
+    };
+    let difference = |angles: &[f64], times: f64| {
+        let mut along = Rows::default();
+        for (i, pair) in (0u32..).zip(angles.chunks_exact(2)) {
+            let more = weighed((2 * i, pair[0]), times);
+            along.push(more.chain(weighed((2 * i + 1, pair[1]), -times)));
         }
         along.times(&observer.strain_rows())
     };
@@ -418,6 +449,7 @@ pub(super) fn output_rows(observer: &Observer, reading: Reading) -> Rows {
         Reading::StrainAndDisplacement => both(observer.strain_rows()),
         Reading::Gauge(angles) => gauge(angles),
         Reading::GaugeAndDisplacement(angles) => both(gauge(angles)),
+        Reading::GaugeDifference(angles, times) => difference(angles, times),
         Reading::Displacement => observer.displacement_rows().clone(),
     }
 }

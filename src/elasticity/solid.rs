@@ -39,7 +39,7 @@ use super::load::{Push, Touch, pressure};
 use super::model::{Coarser, LoadCheck, Model};
 use super::observe::{Face, Observer, tangent_frame};
 use super::rows::Rows;
-use super::solver::{BLOCK, FactorError, SymmetricMatrix, bytes, check_bytes};
+use super::solver::{BLOCK, FactorError, Plan, SymmetricMatrix, bytes, check_bytes};
 use super::system::{HELD, System, number_unknowns};
 use crate::budget::{Cancelled, Watch, report};
 use crate::memory;
@@ -349,6 +349,11 @@ fn neighbours(elements: &dyn Elements) -> Vec<Vec<u32>> {
         list.shrink_to_fit();
     }
     coupled
+}
+
+/// What the factor of elements' stiffness will be.
+fn plan(elements: &dyn Elements) -> Result<Plan, FactorError> {
+    Plan::new(&neighbours(elements), elements.elimination(), 3)
 }
 
 /// The lower triangle's pattern: nodes that share an element are coupled.

@@ -328,7 +328,7 @@ pub fn check_bytes(bytes: f64) -> Result<(), FactorError> {
 /// What a factor will be, found on nodes that have several unknowns each: much quicker than on the unknowns, and as
 /// good an order.
 pub struct Plan {
-    /// Nodes in the order of elimination: by approximate minimum degree.
+    /// Nodes in the order of elimination: by approximate minimum degree where none was given.
     pub order: Vec<u32>,
     /// Entries of the factor.
     pub entries: f64,
@@ -339,11 +339,16 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Of nodes coupled with those in their lists (rising, themselves among them), with `each` unknowns.
+    /// Of nodes coupled with those in their lists (rising, themselves among them), with `each` unknowns, eliminated in
+    /// this order or the one that is found for them.
     ///
     /// # Errors
     /// [`FactorError::OutOfMemory`].
-    pub fn new(coupled: &[Vec<u32>], each: usize) -> Result<Self, FactorError> {
+    pub fn new(
+        coupled: &[Vec<u32>],
+        order: Option<Vec<u32>>,
+        each: usize,
+    ) -> Result<Self, FactorError> {
         let (mut columns, mut rows) = (vec![0], Vec::new());
         for (node, list) in coupled.iter().enumerate() {
             let below = list.iter().map(|&n| n as usize).filter(|&n| n >= node);
@@ -355,7 +360,8 @@ impl Plan {
             rows,
             values: Vec::new(),
         };
-        let symbolic = symbolic(&matrix, None, each)?;
+        let order = order.map(|nodes| nodes.into_iter().map(|n| n as usize).collect());
+        let symbolic = symbolic(&matrix, order, each)?;
         let order = symbolic.perm().map_or_else(
             || (0..coupled.len() as u32).collect(),
             |p| p.arrays().0.iter().map(|&i| i as u32).collect(),

@@ -224,7 +224,31 @@ fn estimates_of_solids_are_of_the_size_of_the_error() {
             );
             assert!(error < 1.5 * aim.displacement_percent, "{}", case.name);
             honest(case.name, error, said);
+            are_foreseen(&case, &ground, &aim, &graded);
         }
+    }
+}
+
+/// What cells come to is told from the first of them: how large they are, what they take and how far off they are.
+fn are_foreseen(case: &Case, ground: &SolidGround, aim: &Elements, graded: &SolidGraded) {
+    let (touches, places) = (&case.touches, &case.places);
+    let foreseen = ground.foresee(touches, places, touches.len(), aim, &unwatched);
+    let foreseen = foreseen.unwrap();
+    let system = graded.model.system();
+    let close = |percent: f64| percent.max(OWN);
+    let ratios = [
+        ("size", foreseen.size / graded.fineness.size),
+        ("unknowns", foreseen.unknowns / system.dimension() as f64),
+        ("memory", foreseen.bytes / system.bytes()),
+        (
+            "error",
+            close(foreseen.estimate.displacement_percent)
+                / close(graded.estimate.displacement_percent),
+        ),
+    ];
+    println!("foreseen: {ratios:.2?} of what they are");
+    for (what, ratio) in ratios {
+        assert!((0.5..2.0).contains(&ratio), "{}: {what} {ratio}", case.name);
     }
 }
 
@@ -310,7 +334,7 @@ fn given_tetrahedra_are_as_far_off_as_they_say() {
             order = graded.fineness.order;
             // What was foreseen of it: its factor and matrix from the pattern of its nodes alone.
             let foreseen = ground.foresee(touches, places, touches.len(), &aim, &unwatched);
-            let foreseen = foreseen.unwrap().unwrap();
+            let foreseen = foreseen.unwrap();
             let system = graded.model.system();
             assert_eq!(foreseen.order, order, "{}", case.name);
             let memory = foreseen.bytes / system.bytes();

@@ -229,6 +229,7 @@ fn loads_and_outputs_are_reciprocal() {
         Reading::StrainAndDisplacement,
         Reading::Gauge(&angles),
         Reading::GaugeAndDisplacement(&angles),
+        Reading::GaugeDifference(&angles, 3.0),
         Reading::Displacement,
     ] {
         // More touches than outputs, and fewer.

@@ -1,10 +1,11 @@
 //! A closed part ready to be computed as a solid: its faces told apart, and cells sized for its walls.
 
+mod foreseen;
 mod graded;
 mod own;
 mod solved;
 
-pub use self::own::Foreseen;
+pub use self::foreseen::Foreseen;
 pub use self::solved::SolidGraded;
 
 use std::collections::BTreeMap;

@@ -174,7 +174,20 @@ impl Immersed {
             let coarser = self.model(surface, &before, watch)?;
             return Ok(model.carried_on(coarser, fineness.carried_on));
         }
-        let cells = self.cells(fineness, watch)?;
+        self.on_cells(surface, self.cells(fineness, watch)?, fineness, watch)
+    }
+
+    /// The model on cells of a fineness that were cut.
+    ///
+    /// # Errors
+    /// [`ElasticError`] for what cannot be computed.
+    pub fn on_cells(
+        &self,
+        surface: &Arc<TriMesh>,
+        cells: FiniteCells,
+        fineness: &Fineness,
+        watch: Watch,
+    ) -> Result<SolidModel, ElasticError> {
         if cells.count() == 0 {
             return Err(ElasticError::NoMaterial {
                 size_mm: fineness.size * 1e3,

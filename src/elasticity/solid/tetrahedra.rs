@@ -108,7 +108,7 @@ impl Tetrahedra {
     /// What the factor of their stiffness will be; nothing where not even that fits into memory.
     #[must_use]
     pub fn plan(&self) -> Option<&Plan> {
-        let found = || Plan::new(&neighbours(self), 3).ok();
+        let found = || Plan::new(&neighbours(self), None, 3).ok();
         self.plan.get_or_init(found).as_ref()
     }
 
@@ -128,13 +128,6 @@ impl Tetrahedra {
             }
         }
         found
-    }
-
-    /// Entries of all elements' matrices: what assembling costs.
-    #[must_use]
-    pub fn entries(&self) -> f64 {
-        let each = 3.0 * self.simplex.lattice().len() as f64;
-        each * each * self.count() as f64
     }
 
     fn corners(&self, element: usize) -> [DVec3; 10] {

@@ -15,13 +15,12 @@ use crate::elasticity::solid::tip;
 
 /// Orders at which errors of displacements and of strains on the surface fall: of displacements between 2, where all
 /// is smooth, and 1.5 at edges that turn inward (`benches/solid.md`).
-const ORDER: f64 = 1.75;
-
-const STRAIN_ORDER: f64 = 1.5;
+pub(super) const ORDER: f64 = 1.75;
+pub(super) const STRAIN_ORDER: f64 = 1.5;
 
 /// Models on finer and finer grids: of all but the last only what was read.
 #[derive(Default)]
-struct Grids {
+pub(super) struct Grids {
     sizes: Vec<f64>,
     samples: Vec<Sample>,
     last: Option<Solved>,
@@ -51,7 +50,17 @@ impl Grids {
         }
     }
 
-    fn push(&mut self, mut solved: Solved) {
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.sizes.len()
+    }
+
+    /// Size of the last cells (m).
+    pub(super) fn size(&self) -> f64 {
+        self.sizes.last().copied().unwrap_or(f64::INFINITY)
+    }
+
+    pub(super) fn push(&mut self, mut solved: Solved) {
         self.sizes.push(solved.fineness.size);
         self.samples.push(std::mem::take(&mut solved.sample));
         self.last = Some(solved);
@@ -112,7 +121,12 @@ impl SolidGround {
     }
 
     /// What the last of several grids is off by; unknown where there is one only.
-    fn left(&self, grids: &Grids, touches: &[Touch], places: &[DVec3]) -> Discretization {
+    pub(super) fn left(
+        &self,
+        grids: &Grids,
+        touches: &[Touch],
+        places: &[DVec3],
+    ) -> Discretization {
         let Some(fine) = grids.samples.last().filter(|_| grids.sizes.len() > 1) else {
             return estimate::unknown(touches.len(), places.len());
         };

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::SolidGround;
+use super::foreseen::{Foreseen, is_quick};
 use super::solved::{SAFETY, SolidGraded, Solved};
 use crate::budget::{Elements, Watch};
 use crate::elasticity::error::ElasticError;
@@ -24,29 +25,6 @@ const ENTRIES: f64 = 70_000.0;
 const MULTIPLICATIONS: f64 = 25_000.0;
 /// Pieces that are judged where the whole, one order higher, does not fit into memory.
 const PIECES: usize = 6;
-
-/// What the part's own tetrahedra will be raised to, and what that takes.
-#[derive(Clone, Copy, Debug)]
-pub struct Foreseen {
-    /// Order of the shape functions.
-    pub order: usize,
-    /// Mean distance between their corners (m).
-    pub edge: f64,
-    /// Degrees of freedom at that order.
-    pub unknowns: f64,
-    /// Entries of the last factor, and memory that it and its matrix take (bytes).
-    pub entries: f64,
-    /// Memory of factor and matrix (bytes).
-    pub bytes: f64,
-    /// The same of the order before, which displacements are carried on from.
-    pub before: f64,
-    /// Entries of the elements' matrices and multiplications of the factorizations, of all orders on the way.
-    pub assembled: f64,
-    /// Multiplications of all factorizations on the way.
-    pub multiplications: f64,
-    /// What is left at that order.
-    pub estimate: Discretization,
-}
 
 /// The orders that were solved for a sample of the touches: what each changed.
 struct Climb {
@@ -230,39 +208,39 @@ impl SolidGround {
     pub fn as_they_are(&self) -> Option<Foreseen> {
         let (_, elements) = self.own_at(FIRST)?;
         let mut foreseen = Foreseen::new(self.immersed.own()?.mean_edge());
-        foreseen.add(FIRST, &elements);
+        foreseen.raise(FIRST, &elements);
         Some(foreseen)
     }
 
-    /// What `raise` would come to for `count` touches like these, from the first two orders, those that are
-    /// quick, and the pattern of the others; nothing for a part without tetrahedra.
+    /// What [`Self::raise`] would come to for `count` touches like these, from the first two orders, those that are
+    /// quick, and the pattern of the others.
     ///
     /// # Errors
     /// [`ElasticError`] for what cannot be computed.
-    pub fn foresee(
+    pub(super) fn foresee_raised(
         &self,
         touches: &[Touch],
         places: &[DVec3],
         count: usize,
         aim: &Elements,
         watch: Watch,
-    ) -> Result<Option<Foreseen>, ElasticError> {
+    ) -> Result<Foreseen, ElasticError> {
         let mut climb = Climb::new(touches, places);
         let Some(first) = self.own_at(FIRST) else {
-            return Ok(None);
+            unreachable!("only parts that have tetrahedra are raised");
         };
         let mut foreseen = Foreseen::new(self.immersed.own().map_or(0.0, VolumeMesh::mean_edge));
-        foreseen.add(FIRST, &first.1);
+        foreseen.raise(FIRST, &first.1);
         let given = self.solve_own(first, &climb, watch)?;
         let second = self.own_at(FIRST + 1);
         let affordable = affords(second.as_ref(), count, aim, 0.0);
         let mut cubic = foreseen;
         if let Some((_, elements)) = &second {
-            cubic.add(FIRST + 1, elements);
+            cubic.raise(FIRST + 1, elements);
         }
         let Some(solved) = self.try_own(second, &climb, watch)? else {
             foreseen.estimate = self.by_pieces(&climb, watch)?;
-            return Ok(Some(foreseen));
+            return Ok(foreseen);
         };
         climb.step(&given, &solved);
         foreseen.estimate = climb.left(true);
@@ -270,7 +248,7 @@ impl SolidGround {
             // The next order judges this one, and is built for that.
             foreseen.assembled = cubic.assembled;
             foreseen.multiplications = cubic.multiplications;
-            return Ok(Some(foreseen));
+            return Ok(foreseen);
         }
         foreseen = cubic;
         foreseen.estimate = climb.left(false);
@@ -279,9 +257,9 @@ impl SolidGround {
             && let Some(next) = self.affordable(foreseen.order + 1, count, aim, foreseen.bytes)
         {
             let order = foreseen.order;
-            foreseen.add(order + 1, &next.1);
+            foreseen.raise(order + 1, &next.1);
             last = match last {
-                Some(before) if is_quick(&next.1) => {
+                Some(before) if next.1.plan().is_some_and(|p| is_quick(p.multiplications)) => {
                     let solved = self.solve_own(next, &climb, watch)?;
                     climb.step(&before, &solved);
                     foreseen.estimate = climb.left(false);
@@ -296,7 +274,7 @@ impl SolidGround {
                 }
             };
         }
-        Ok(Some(foreseen))
+        Ok(foreseen)
     }
 
     /// What is left of the part's own tetrahedra as they are, judged by the next order on pieces around some touches:
@@ -347,34 +325,6 @@ impl SolidGround {
     }
 }
 
-impl Foreseen {
-    fn new(edge: f64) -> Self {
-        Self {
-            order: FIRST,
-            edge,
-            unknowns: 0.0,
-            entries: 0.0,
-            bytes: 0.0,
-            before: 0.0,
-            assembled: 0.0,
-            multiplications: 0.0,
-            estimate: estimate::unknown(0, 0),
-        }
-    }
-
-    /// The next order, which takes the place of the last.
-    fn add(&mut self, order: usize, elements: &Tetrahedra) {
-        self.order = order;
-        self.assembled += elements.entries();
-        let Some(plan) = elements.plan() else { return };
-        self.unknowns = 3.0 * plan.order.len() as f64;
-        self.entries = plan.entries;
-        self.before = self.bytes;
-        self.bytes = plan.bytes();
-        self.multiplications += plan.multiplications;
-    }
-}
-
 /// Whether a factor fits into memory, of which so much is taken (bytes), and its solutions into the effort.
 fn affords(
     own: Option<&(Fineness, Tetrahedra)>,
@@ -389,11 +339,4 @@ fn affords(
             && plan.multiplications <= MULTIPLICATIONS * effort
             && taken + plan.bytes() <= memory::allowed()
     })
-}
-
-/// Whether a factorization is a matter of seconds.
-fn is_quick(elements: &Tetrahedra) -> bool {
-    const QUICK: f64 = 2e10;
-    let plan = elements.plan();
-    plan.is_some_and(|plan| plan.multiplications < QUICK)
 }
