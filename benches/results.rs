@@ -12,7 +12,7 @@ use glam::DVec3;
 use hapdef::budget::{Quality, unwatched};
 use hapdef::dataset::{self, Signal};
 use hapdef::design::{self, Design, Inputs};
-use hapdef::elasticity::grade::Ground;
+use hapdef::elasticity::grade::ShellGround;
 use hapdef::elasticity::load::Touch;
 use hapdef::feasible::Filter;
 use hapdef::mesh::TriMesh;
@@ -96,7 +96,7 @@ fn limb(text: &mut String) {
     let touches = touches(part, &inputs, 1000);
     // The generator's own triangles, and those halved: what the reference was measured on.
     let supports = inputs.project.supports(&inputs.masks).expect("boxes");
-    let ground = Ground::new(part, inputs.project.section(), &supports, true);
+    let ground = ShellGround::new(part, inputs.project.section(), &supports, true);
     let given = ground.even(0);
     let coarse = solve(&ground, &given, &inputs, &touches);
     let finer = solve(&ground, &ground.halved(&given), &inputs, &touches);
@@ -187,7 +187,7 @@ fn touches(part: &TriMesh, inputs: &Inputs, count: usize) -> Vec<Touch> {
 
 /// Displacement along the normal under each touch (m), and strain at the feasible sites.
 fn solve(
-    ground: &Ground,
+    ground: &ShellGround,
     remeshed: &Remeshed,
     inputs: &Inputs,
     touches: &[Touch],

@@ -158,7 +158,7 @@ impl Quality {
         match self {
             Self::Draft => Budget {
                 quality: self,
-                elements: Elements {
+                elements: ElementBudget {
                     vertices: 2400,
                     most_vertices: 6000,
                     effort: 2_400_000,
@@ -185,7 +185,7 @@ impl Quality {
             },
             Self::Standard => Budget {
                 quality: self,
-                elements: Elements {
+                elements: ElementBudget {
                     vertices: 3000,
                     most_vertices: 24_000,
                     effort: 14_000_000,
@@ -212,7 +212,7 @@ impl Quality {
             },
             Self::Reference => Budget {
                 quality: self,
-                elements: Elements {
+                elements: ElementBudget {
                     vertices: 10_000,
                     most_vertices: 80_000,
                     effort: 60_000_000,
@@ -243,7 +243,7 @@ impl Quality {
 
 /// How fine an elastic model is to be and what it may cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Elements {
+pub struct ElementBudget {
     /// Vertices to begin with, and the most whatever the number of loads.
     pub vertices: usize,
     /// Most vertices, however few the loads are.
@@ -260,7 +260,7 @@ pub struct Elements {
     pub passes: usize,
 }
 
-impl Elements {
+impl ElementBudget {
     /// The most vertices for this many loads.
     #[must_use]
     pub fn most_for(&self, loads: usize) -> usize {
@@ -285,7 +285,7 @@ pub struct Budget {
     pub quality: Quality,
     /// Size of the elastic model. The reference model that accuracy is quoted against always has elements of half
     /// their size; of a solid two thirds.
-    pub elements: Elements,
+    pub elements: ElementBudget,
     /// Most touches the model is asked for.
     #[serde(serialize_with = "or_null")]
     pub touches: usize,

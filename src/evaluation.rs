@@ -15,7 +15,7 @@ use serde::Serialize;
 
 pub use self::judging::{EstimatorKind, Forces, Judging};
 pub use self::matched::{Matched, MatchedRow};
-pub use self::rows::{EVERYWHERE, EvaluationRow, Region};
+pub use self::rows::{EVERYWHERE, EvaluationRow, TouchRegion};
 
 use self::failures::{FailureRow, FailureTrial, MOST_FAILED, failures};
 use self::rows::Said;
@@ -41,7 +41,7 @@ pub struct Trial<'a> {
     /// Where the test touches were (mm).
     pub test_targets: &'a [[f64; 3]],
     /// Regions of the test touches that errors are quoted for.
-    pub regions: &'a [Region],
+    pub regions: &'a [TouchRegion],
     /// Standard deviation of the noise added to training and test strain, and the numbers of the streams it
     /// is drawn from, one a site: the same stream gives the same noise in every trial.
     pub noise: f64,
@@ -333,7 +333,7 @@ fn judge(
 impl Evaluation {
     /// The same errors, quoted for other regions of the same test touches.
     #[must_use]
-    pub fn in_regions(&self, regions: &[Region]) -> Self {
+    pub fn in_regions(&self, regions: &[TouchRegion]) -> Self {
         let whole = self.rows.iter().filter(|r| r.region == EVERYWHERE);
         let rows = whole.zip(self.errors.iter().zip(&self.built));
         let rows = rows.flat_map(|(row, (errors, built))| {
@@ -357,7 +357,11 @@ impl Evaluation {
 impl Evaluation {
     /// Of what was found by matching: rows and errors of every set are those at the force in the middle.
     #[must_use]
-    pub(crate) fn of_matched(judging: Judging, found: Vec<Matched>, regions: &[Region]) -> Self {
+    pub(crate) fn of_matched(
+        judging: Judging,
+        found: Vec<Matched>,
+        regions: &[TouchRegion],
+    ) -> Self {
         let middle = judging.middle_n();
         let of_set = || found.iter().filter(move |m| Some(m.force_n) == middle);
         Self {

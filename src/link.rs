@@ -31,7 +31,7 @@ pub use ports::{PortInfo, ports};
 pub use pressed::{BenchPress, bench_presses};
 pub use recorded::{check_length, record};
 pub use recording::{Recorder, old_note};
-pub use session::{Command, Connection, Listener, SessionEvent, State, Timing};
+pub use session::{Connection, Listener, ListenerCommand, SessionEvent, State, Timing};
 pub use table::{Table, write_table};
 pub use truths::Truths;
 

@@ -24,4 +24,4 @@ pub use pipeline::Pipeline;
 pub use presses::{Pressed, Presses};
 pub use receiver::{Doubt, Input, Receiver, Sample, Traffic};
 pub use tare::Rest;
-pub use update::{Estimator, GaugeModel, Guess, Settings, Update};
+pub use update::{GaugeModel, Guess, Settings, ShownEstimator, Update};

@@ -40,7 +40,7 @@ pub use key::{Key, Range, Span};
 pub use keys::KeyTable;
 pub use live::{GluedKeys, LiveKeys};
 pub use masks::Masks;
-pub use part::{Elements, MaterialKeys, Part, PartModel, SupportKeys, SupportKind, Unit};
+pub use part::{ElementKind, MaterialKeys, Part, PartModel, SupportKeys, SupportKind, Unit};
 pub use ranges::FARTHEST;
 pub use selection::{ChosenSite, CostKeys, GaussianProcessKeys, SelectionKeys};
 pub use tables::{Heading, all_keys};
@@ -116,7 +116,7 @@ impl Project {
                 fill_holes_mm: 0.0,
                 straighten_mm: part::defaults::straighten(),
                 halve_mm: 0.0,
-                elements: Elements::Graded,
+                elements: ElementKind::Graded,
                 model: PartModel::Shell,
                 thickness_mm: part::defaults::thickness(),
                 inside: None,

@@ -62,7 +62,7 @@ use paint::Look;
 use scene::Scene;
 
 pub use crate::session::Standing;
-pub use commands::Command;
+pub use commands::UiCommand;
 pub use display::last_words;
 pub use run::run;
 pub use view::{Field, Pane, Section, Stage, Tab, Tool, View, Way};
@@ -187,7 +187,7 @@ impl Studio {
 
     /// Whether a command can be given now.
     #[must_use]
-    pub fn enabled(&self, command: Command) -> bool {
+    pub fn enabled(&self, command: UiCommand) -> bool {
         commands::enabled(&self.session, &self.view, command)
     }
 
@@ -336,7 +336,7 @@ impl Studio {
     }
 
     /// Carries a command out.
-    pub fn execute(&mut self, ctx: &Context, command: Command) {
+    pub fn execute(&mut self, ctx: &Context, command: UiCommand) {
         self.asking(ctx, |ask, scene, panels, _| {
             execute::execute(command, ctx, ask, scene, panels);
         });

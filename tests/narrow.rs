@@ -1,7 +1,7 @@
 //! Little memory: what would not fit is made smaller before it is refused. A program of its own, for what may be
 //! taken holds for all of it.
 
-use hapdef::budget::{Budget, Elements, Quality, unwatched};
+use hapdef::budget::{Budget, ElementBudget, Quality, unwatched};
 use hapdef::design::DesignError;
 use hapdef::given::{self, GivenSite};
 use hapdef::{elasticity::Touch, memory};
@@ -23,7 +23,7 @@ fn few_touches_get_no_more_elements_than_memory_holds() {
     };
     // Finer and finer: nothing meets these.
     let budget = |most_vertices: usize| Budget {
-        elements: Elements {
+        elements: ElementBudget {
             vertices: 400,
             most_vertices,
             effort: usize::MAX,

@@ -1,6 +1,7 @@
 //! `hapdef calibrate`: how the gauges are really glued, from presses at known places.
 
 mod asked;
+mod part;
 mod summary;
 
 use std::path::{Path, PathBuf};
@@ -19,6 +20,7 @@ use super::{listen, out};
 use crate::design::{Sensing, check_reach};
 use crate::elasticity::Touch;
 use crate::inference::calibration::judged::{Outlook, misfits, outlook};
+use crate::inference::calibration::part::of_part;
 use crate::inference::{Calibration, Known, calibrate};
 use crate::io::points::{AskedPoint, read_points};
 use crate::io::project_file::{self, LoadedProject};
@@ -28,7 +30,8 @@ use crate::mesh::SurfacePoint;
 use crate::uncertainty::{Pressing, Uncertainty};
 
 use asked::Asked;
-use summary::{Row, Summary};
+use part::{Fitted, PartArg};
+use summary::{OfPart, Row, Summary};
 
 /// A calibration needs as many presses at least.
 const LEAST: usize = 4;
@@ -61,6 +64,10 @@ pub struct CalibrateArgs {
     /// Use presses that do not fit the others too.
     #[arg(long)]
     pub keep_all: bool,
+    /// Fit these properties of the part too, and write them into the project. A force that is not known well says nothing of
+    /// either; one that is says more of both the more is known of the other.
+    #[arg(long, value_delimiter = ',')]
+    pub fit: Vec<PartArg>,
     /// Rate of a serial port (baud); native USB does not care.
     #[arg(long, default_value_t = BAUD, value_parser = clap::value_parser!(u32).range(50..=20_000_000))]
     pub baud: u32,
@@ -99,16 +106,56 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         check_points(path, &points, &loaded)?;
     }
     let held = address.hold().map_err(anyhow::Error::msg)?;
+    part::check(&args.fit, &loaded.inputs.project)?;
     let sensing = sensing_for(&common, &loaded)?;
     let points = on_part(points, &sensing, args.force);
-    let off = off_with(&loaded, &sensing, args.machine);
+    let off = part::unsure(&args.fit, off_with(&loaded, &sensing, args.machine));
     let read = read((address, held), &loaded, &sensing, points)?;
-    let found = fit((&sensing, &loaded), read, &off, args)?;
+    let noise = read.noise.clone();
+    let rows = read.rows(&sensing.drawn.map.mesh);
+    check_count(&rows)?;
+    let part = Fitted::as_drawn(loaded, sensing);
+    let (part, found) = fit_all(args, &common, part, rows, (&noise, &off))?;
+    let Fitted {
+        loaded, sensing, ..
+    } = part;
     if let Some(path) = &args.table {
         summary::write_table(path, &found.rows)?;
     }
     save(&loaded, &target, &found.calibration)?;
     found.print(&sensing, &target, args.common.json)
+}
+
+/// The part as far as that is asked for, then its gauges; and once more where presses turn out not to fit.
+fn fit_all(
+    args: &CalibrateArgs,
+    common: &Common,
+    part: Fitted,
+    rows: Vec<Row>,
+    (noise, off): (&[f64], &Uncertainty),
+) -> anyhow::Result<(Fitted, Summary)> {
+    let used = |rows: &[Row]| rows.iter().filter(|r| r.used).count();
+    let before = used(&rows);
+    let mut part = part.fitted(&args.fit, common, &rows, noise, off)?;
+    let mut found = fit((&part.sensing, &part.loaded), rows, (noise, off), args)?;
+    if part.thickness.is_some() && used(&found.rows) < before {
+        part = part.fitted(&args.fit, common, &found.rows, noise, off)?;
+        let model = (&part.sensing, &part.loaded);
+        found = fit(model, found.rows, (noise, off), args)?;
+    }
+    found.of_part.thickness_mm = part.thickness;
+    part::take_stiffness(&args.fit, &mut part.loaded, &mut found);
+    Ok((part, found))
+}
+
+/// Refuses to calibrate with hardly any presses.
+fn check_count(rows: &[Row]) -> anyhow::Result<()> {
+    let read = rows.iter().filter(|r| r.used).count();
+    anyhow::ensure!(
+        read >= LEAST,
+        "a calibration takes {LEAST} presses that were read, and there are {read}: press for a second at each place, and let go between"
+    );
+    Ok(())
 }
 
 /// Which file the calibrated project goes to.
@@ -203,27 +250,16 @@ fn read(
 /// Fits the gauges to the presses that fit each other.
 fn fit(
     (sensing, loaded): (&Sensing, &LoadedProject),
-    read: Asked,
-    off: &Uncertainty,
+    mut rows: Vec<Row>,
+    (noise, off): (&[f64], &Uncertainty),
     args: &CalibrateArgs,
 ) -> anyhow::Result<Summary> {
-    let noise = read.noise.clone();
-    let mut rows = read.rows(&sensing.drawn.map.mesh);
-    let count = |rows: &[Row]| rows.iter().filter(|r| r.used).count();
-    let read = count(&rows);
-    anyhow::ensure!(
-        read >= LEAST,
-        "a calibration takes {LEAST} presses that were read, and there are {read}: press for a second at each place, and let go between"
-    );
     loop {
         let used: Vec<usize> = (0..rows.len()).filter(|&k| rows[k].used).collect();
         let known: Vec<Known> = (used.iter())
             .filter_map(|&k| rows[k].known.clone())
             .collect();
-        for (&k, misfit) in used
-            .iter()
-            .zip(misfits(&sensing.drawn, &known, &noise, off))
-        {
+        for (&k, misfit) in used.iter().zip(misfits(&sensing.drawn, &known, noise, off)) {
             rows[k].misfit = Some(misfit);
         }
         let worst = (used.iter().copied()).max_by(|&a, &b| {
@@ -237,13 +273,18 @@ fn fit(
                 "it does not fit the others: pressed elsewhere, or not as hard as it says".into(),
             ),
             _ => {
-                let calibration = calibrate(&sensing.drawn, &known, &noise, off);
-                let (found, uncertain) = ((&known[..], &calibration), (&noise[..], off));
+                let calibration = calibrate(&sensing.drawn, &known, noise, off);
+                let (found, uncertain) = ((&known[..], &calibration), (noise, off));
                 let outlook = next((sensing, loaded), found, uncertain, args.force)?;
+                let factor = of_part(&sensing.drawn, &known, noise, off).map(|part| part.factor);
                 return Ok(Summary {
                     rows,
                     calibration,
                     outlook,
+                    of_part: OfPart {
+                        factor,
+                        ..OfPart::default()
+                    },
                 });
             }
         }
@@ -270,6 +311,8 @@ fn save(loaded: &LoadedProject, target: &Path, found: &Calibration) -> anyhow::R
     let own = !loaded.bundled && loaded.path.is_file();
     let fresh = own.then(|| project_file::load(&loaded.path)).transpose()?;
     let mut project = fresh.map_or_else(|| loaded.inputs.project.clone(), |l| l.inputs.project);
+    project.part.thickness_mm = loaded.inputs.project.part.thickness_mm;
+    project.material.youngs_modulus_gpa = loaded.inputs.project.material.youngs_modulus_gpa;
     project
         .live
         .take(found, &loaded.inputs.project.selection.sites);

@@ -25,8 +25,10 @@ use crate::io::project_file::LoadedProject;
 use crate::io::run::Provenance;
 use crate::io::touch_file::{self, TouchFile};
 use crate::io::{handover, kept_model};
-use crate::link::{Address, BAUD, Command, Listener, Pace, Recorder, SessionEvent, State, Table};
-use crate::live::{Estimator, Pipeline, Sample, Update};
+use crate::link::{
+    Address, BAUD, Listener, ListenerCommand, Pace, Recorder, SessionEvent, State, Table,
+};
+use crate::live::{Pipeline, Sample, ShownEstimator, Update};
 use crate::plain;
 use crate::session::{train, training_touches};
 use crate::wire::Hello;
@@ -93,7 +95,7 @@ pub enum EstimatorArg {
     Normalized,
 }
 
-impl From<EstimatorArg> for Estimator {
+impl From<EstimatorArg> for ShownEstimator {
     fn from(value: EstimatorArg) -> Self {
         match value {
             EstimatorArg::Matching => Self::Matching,
@@ -224,7 +226,7 @@ pub(super) fn sensing_for(common: &Common, loaded: &LoadedProject) -> anyhow::Re
 }
 
 /// Takes orders from standard input.
-pub(super) fn obey_stdin(commands: Sender<Command>) {
+pub(super) fn obey_stdin(commands: Sender<ListenerCommand>) {
     from_stdin(commands, say);
 }
 
@@ -270,8 +272,8 @@ struct Output {
     log: Option<Log>,
     served: Option<(TcpListener, Vec<Client>)>,
     /// For whoever is served.
-    commands: Sender<Command>,
-    estimator: Estimator,
+    commands: Sender<ListenerCommand>,
+    estimator: ShownEstimator,
     learned: Option<TouchFile>,
     period_us: u64,
     last_us: Option<u64>,
@@ -282,7 +284,7 @@ struct Output {
 impl Output {
     fn new(
         args: &ListenArgs,
-        commands: Sender<Command>,
+        commands: Sender<ListenerCommand>,
         learned: Option<TouchFile>,
     ) -> anyhow::Result<Self> {
         Ok(Self {

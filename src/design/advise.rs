@@ -246,7 +246,7 @@ const MOST_THEORY: f64 = 5.0;
 const MUCH: f64 = 3.0;
 
 /// CPU time and memory of a model, as they were on limbs and shins.
-struct Measured {
+struct CostModel {
     /// Once (s); for each unknown of every factor (s); for each unknown and touch, less its growth (s).
     once: f64,
     build: f64,
@@ -255,20 +255,20 @@ struct Measured {
     entries: f64,
 }
 
-const SHELL: Measured = Measured {
+const SHELL: CostModel = CostModel {
     once: 0.2,
     build: 3e-5,
     solve: 1.8e-8,
     entries: 8.0,
 };
-const SOLID: Measured = Measured {
+const SOLID: CostModel = CostModel {
     once: 8.0,
     build: 1e-4,
     solve: 4e-8,
     entries: 9.0,
 };
 
-impl Measured {
+impl CostModel {
     fn seconds(&self, built: f64, unknowns: f64, touches: usize) -> f64 {
         /// Unknowns at which the times were taken: solves grow with the power 4/3.
         const AT: f64 = 5e4;

@@ -17,7 +17,7 @@ use crate::placement::{
     Constraints, PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet,
     margin, pca_qr,
 };
-use crate::project::Elements;
+use crate::project::ElementKind;
 use crate::regression::Grouping;
 use crate::regression::folds::evenly;
 use crate::regression::tune::Effort;
@@ -143,7 +143,7 @@ pub fn select_step_by_step(
 /// for the part's own triangles, which stay as they are.
 #[must_use]
 pub fn model_tolerance(inputs: &Inputs, simulated: &Simulated) -> f64 {
-    if inputs.project.part.elements == Elements::AsGiven {
+    if inputs.project.part.elements == ElementKind::AsGiven {
         return 0.0;
     }
     let percent = simulated.discretization.strain_percent;

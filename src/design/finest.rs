@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::judge::{ByMatching, judge, measured_by};
 use super::layout::{lay_out_sites, touches_on};
 use super::{Design, DesignError, Inputs, Meshed, Reference, Simulated, ground};
-use crate::budget::{Budget, Elements, Watch};
+use crate::budget::{Budget, ElementBudget, Watch};
 use crate::elasticity::{Model, Touch};
 use crate::evaluation::{Candidate, EvaluationRow, Judging};
 
@@ -16,7 +16,7 @@ const JUDGE_SEED: u64 = 0x41d6e;
 /// Touches that its elements are graded for.
 const GRADED_FOR: usize = 200;
 /// Finer than the finest that a project can ask for by a quality.
-const FINEST: Elements = Elements {
+const FINEST: ElementBudget = ElementBudget {
     vertices: 12_000,
     most_vertices: 36_000,
     effort: usize::MAX,

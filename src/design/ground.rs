@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::layout::{check_shape, size_mm};
 use super::{DesignError, Inputs, LAYOUT, Meshed};
-use crate::budget::{Cancelled, Elements, Watch};
+use crate::budget::{Cancelled, ElementBudget, Watch};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::grade::{self, Graded};
 use crate::elasticity::linearity::Linearity;
@@ -20,13 +20,13 @@ use crate::mesh::walls::Side;
 use crate::mesh::winding::Winding;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain;
-use crate::project::{Elements as ElementKind, PartModel, Project};
+use crate::project::{ElementKind, PartModel, Project};
 
 /// A part with its supports, ready to have elements laid on it or cells around it.
 #[derive(Clone)]
 pub enum Ground {
     /// A mid-surface, to be meshed with facets.
-    Shell(Arc<grade::Ground>),
+    Shell(Arc<grade::ShellGround>),
     /// A closed surface, to be immersed in cells.
     Solid(Arc<SolidGround>),
 }
@@ -69,7 +69,7 @@ pub fn ground(inputs: &Inputs, watch: Watch) -> Result<Ground, DesignError> {
         });
     }
     let as_given = project.part.elements == ElementKind::AsGiven;
-    let shell = grade::Ground::new(&inputs.part, project.section(), &supports, as_given);
+    let shell = grade::ShellGround::new(&inputs.part, project.section(), &supports, as_given);
     Ok(Ground::Shell(Arc::new(shell)))
 }
 
@@ -316,7 +316,7 @@ impl Ground {
         &self,
         touches: &[Touch],
         places: &[DVec3],
-        aim: &Elements,
+        aim: &ElementBudget,
         watch: Watch,
     ) -> Result<Built, DesignError> {
         /// Vertices of a model that says anything at all.
@@ -345,7 +345,7 @@ impl Ground {
         &self,
         touches: &[Touch],
         places: &[DVec3],
-        aim: &Elements,
+        aim: &ElementBudget,
         watch: Watch,
     ) -> Result<Built, DesignError> {
         match self {
@@ -406,7 +406,7 @@ impl Ground {
 }
 
 /// The part, or where too much of it lies in facets that distances cannot be measured on, even ones on its surface.
-fn even_enough(ground: &grade::Ground) -> Arc<TriMesh> {
+fn even_enough(ground: &grade::ShellGround) -> Arc<TriMesh> {
     /// Share of the area that may lie in such facets.
     const SHARE: f64 = 0.02;
     let part = ground.part();

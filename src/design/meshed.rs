@@ -14,7 +14,7 @@ use crate::mesh::remesh::Remeshed;
 #[derive(Clone)]
 pub enum Meshed {
     /// Facets of a shell.
-    Shell(Arc<grade::Ground>, Remeshed),
+    Shell(Arc<grade::ShellGround>, Remeshed),
     /// Cells or tetrahedra of a solid.
     Solid(Arc<SolidGround>, Fineness),
 }

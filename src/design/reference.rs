@@ -5,7 +5,7 @@ use super::{Inputs, NOISE_SEED};
 use crate::budget::Work;
 use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::load::Touch;
-use crate::evaluation::{self, EstimatorKind, Region};
+use crate::evaluation::{self, EstimatorKind, TouchRegion};
 use crate::project::{Project, boxes};
 use crate::uncertainty::Uncertainty;
 
@@ -15,7 +15,7 @@ pub struct Reference {
     /// The held-out touches.
     pub touches: Vec<Touch>,
     /// Regions that errors are quoted for.
-    pub regions: Vec<Region>,
+    pub regions: Vec<TouchRegion>,
     /// Element size of the reference model (mm).
     pub element_mm: f64,
     /// What it took.
@@ -45,7 +45,7 @@ pub(super) fn grid(project: &Project) -> Option<[f64; 2]> {
     matching.then_some([keys.grid_length_mm * 1e-3, keys.grid_width_mm * 1e-3])
 }
 
-pub(super) fn regions(project: &Project, touches: &[Touch]) -> Vec<Region> {
+pub(super) fn regions(project: &Project, touches: &[Touch]) -> Vec<TouchRegion> {
     project
         .evaluation
         .regions
@@ -53,7 +53,7 @@ pub(super) fn regions(project: &Project, touches: &[Touch]) -> Vec<Region> {
         .map(|region| {
             let place = boxes::oriented(&region.box_mm, region.box_axis);
             let inside = |t: &Touch| boxes::contains(&place, t.position);
-            Region {
+            TouchRegion {
                 name: region.name.clone(),
                 contains: touches.iter().map(inside).collect(),
             }

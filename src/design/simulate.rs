@@ -16,12 +16,12 @@ use crate::budget::{Achieved, Budget, Cancelled, Quality, StopReason, Watch, Wor
 use crate::dataset::{self, Dataset, Surveyed};
 use crate::elasticity::estimate::Discretization;
 use crate::elasticity::linearity::Linearity;
-use crate::elasticity::support::Region;
+use crate::elasticity::support::HeldRegion;
 use crate::elasticity::{DofSet, Model, Support, Touch};
 use crate::feasible::Surroundings;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain::digits;
-use crate::project::{Elements as ElementKind, PartModel, Project};
+use crate::project::{ElementKind, PartModel, Project};
 use crate::regression::folds::evenly;
 
 /// The elastic stage: the mesh that was computed on, the sites on it and the dataset.
@@ -154,7 +154,7 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
         solves,
         ..
     } = built;
-    let known = Elements {
+    let known = JudgedElements {
         meshed,
         estimate,
         linearity,
@@ -226,7 +226,7 @@ pub fn simulate_again(
         project.gauge.signal,
     )?;
     let places: Vec<DVec3> = sites.iter().map(|&at| layout.point(at)).collect();
-    let known = Elements {
+    let known = JudgedElements {
         meshed: last.meshed.clone(),
         estimate: last.discretization,
         linearity: last.linearity,
@@ -241,7 +241,7 @@ pub fn simulate_again(
 }
 
 /// Elements with what is known of them.
-struct Elements {
+struct JudgedElements {
     meshed: Meshed,
     estimate: Discretization,
     linearity: Option<Linearity>,
@@ -256,14 +256,14 @@ struct Elements {
 fn read(
     inputs: &Inputs,
     budget: &Budget,
-    known: Elements,
+    known: JudgedElements,
     model: &dyn Model,
     touches: Vec<Touch>,
     places: &[DVec3],
     before: Work,
     watch: Watch,
 ) -> Result<Simulated, DesignError> {
-    let Elements {
+    let JudgedElements {
         meshed,
         estimate,
         linearity,
@@ -372,8 +372,8 @@ pub fn on_what_is_held(inputs: &Inputs, touches: &[Touch]) -> Result<Vec<usize>,
     let is_held = |&k: &usize| {
         let touch = &touches[k];
         held.iter().any(|support| match &support.region {
-            Region::Box(held) => held.contains(touch.position, 0.0),
-            Region::Vertices(mask) => {
+            HeldRegion::Box(held) => held.contains(touch.position, 0.0),
+            HeldRegion::Vertices(mask) => {
                 let at = index.nearest(touch.position).0;
                 inputs.part.mostly_in(mask, at)
             }

@@ -11,7 +11,7 @@ use super::Model;
 use super::load::Touch;
 use super::observe::{Face, turn};
 use super::respond::{Reading, gives_way, respond};
-use crate::budget::{Cancelled, Elements, Watch};
+use crate::budget::{Cancelled, ElementBudget, Watch};
 use crate::statistics::median;
 
 /// Change from 2h to h over the error at h. Displacements and smoothed strains converge with h² where all
@@ -90,14 +90,14 @@ impl Discretization {
     /// The larger of the estimated errors over what was asked for; displacements alone decide where no place is
     /// far enough from a touch.
     #[must_use]
-    pub fn excess(&self, aim: &Elements) -> f64 {
+    pub fn excess(&self, aim: &ElementBudget) -> f64 {
         let displacement = self.displacement_percent / aim.displacement_percent;
         displacement.max(self.strain_percent / aim.strain_percent)
     }
 
     /// Whether the estimated errors are within what was asked for.
     #[must_use]
-    pub fn meets(&self, aim: &Elements) -> bool {
+    pub fn meets(&self, aim: &ElementBudget) -> bool {
         let strain = self.strain_percent.is_nan() || self.strain_percent <= aim.strain_percent;
         self.displacement_percent <= aim.displacement_percent && strain
     }

@@ -12,7 +12,7 @@ use super::recover::facet_errors;
 use super::shell::check_held;
 use super::support::{DofSet, HeldPart, Support, geometry};
 use super::{ElasticError, Model as _, Section, ShellModel, scope};
-use crate::budget::{Elements, Watch, report};
+use crate::budget::{ElementBudget, Watch, report};
 use crate::mesh::TriMesh;
 use crate::mesh::canonical::Canonical;
 use crate::mesh::locate::SurfaceIndex;
@@ -21,7 +21,7 @@ use crate::mesh::surface::Surface;
 
 /// A part ready to have elements laid on it. They are laid on its canonical form, and then carried to where the part
 /// lies.
-pub struct Ground {
+pub struct ShellGround {
     /// The part that elements are laid on.
     part: Arc<TriMesh>,
     held: HeldPart,
@@ -73,7 +73,7 @@ const LEAST_IN_THICKNESS: f64 = 0.3;
 /// The error is an estimate: stop at this share of the tolerance.
 const SAFETY: f64 = 0.6;
 
-impl Ground {
+impl ShellGround {
     /// Cuts the part along its supports and finds its feature lines. With `as_given` the part's own
     /// triangles will be the elements.
     #[must_use]
@@ -219,7 +219,7 @@ impl Ground {
         &self,
         touches: &[Touch],
         places: &[DVec3],
-        aim: &Elements,
+        aim: &ElementBudget,
         watch: Watch,
     ) -> Result<Graded, ElasticError> {
         let as_given = self.own.is_none();
@@ -315,7 +315,7 @@ struct Solved {
 
 impl Solved {
     fn new(
-        ground: &Ground,
+        ground: &ShellGround,
         remeshed: Remeshed,
         touches: &[Touch],
         watch: Watch,
@@ -331,7 +331,7 @@ impl Solved {
 
     fn graded(
         self,
-        ground: &Ground,
+        ground: &ShellGround,
         touches: &[Touch],
         estimate: Discretization,
         models: u64,

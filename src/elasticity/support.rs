@@ -42,7 +42,7 @@ impl DofSet {
 
 /// Where a support holds.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Region {
+pub enum HeldRegion {
     /// Every point of the part inside a box.
     Box(OrientedBox),
     /// Every point between vertices of the part that are set (one value a vertex): a painted mask or a
@@ -54,7 +54,7 @@ pub enum Region {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Support {
     /// Where.
-    pub region: Region,
+    pub region: HeldRegion,
     /// What.
     pub held: DofSet,
 }
@@ -64,8 +64,8 @@ impl Support {
     #[must_use]
     pub fn in_order(&self, part: &Canonical) -> Self {
         let region = match &self.region {
-            Region::Box(held) => Region::Box(*held),
-            Region::Vertices(mask) => Region::Vertices(Arc::new(part.in_order(mask))),
+            HeldRegion::Box(held) => HeldRegion::Box(*held),
+            HeldRegion::Vertices(mask) => HeldRegion::Vertices(Arc::new(part.in_order(mask))),
         };
         Self {
             region,
@@ -77,8 +77,8 @@ impl Support {
     #[must_use]
     pub fn canonical(&self, part: &Canonical) -> Self {
         let region = match &self.region {
-            Region::Box(held) => Region::Box(part.frame.snapped_box(held)),
-            Region::Vertices(mask) => Region::Vertices(Arc::new(part.in_order(mask))),
+            HeldRegion::Box(held) => HeldRegion::Box(part.frame.snapped_box(held)),
+            HeldRegion::Vertices(mask) => HeldRegion::Vertices(Arc::new(part.in_order(mask))),
         };
         Self {
             region,
@@ -93,8 +93,8 @@ impl Support {
 pub fn geometry(part: &Arc<TriMesh>, supports: &[Support]) -> (Arc<TriMesh>, Vec<Support>) {
     let given = |support: &Support| {
         let region = match &support.region {
-            Region::Box(held) => Region::Box(*held),
-            Region::Vertices(mask) => Region::Vertices(Arc::new(part.given_mask(mask)?)),
+            HeldRegion::Box(held) => HeldRegion::Box(*held),
+            HeldRegion::Vertices(mask) => HeldRegion::Vertices(Arc::new(part.given_mask(mask)?)),
         };
         Some(Support {
             region,
@@ -132,8 +132,8 @@ impl HeldPart {
         let boxes: Vec<OrientedBox> = supports
             .iter()
             .filter_map(|s| match s.region {
-                Region::Box(held) => Some(held),
-                Region::Vertices(_) => None,
+                HeldRegion::Box(held) => Some(held),
+                HeldRegion::Vertices(_) => None,
             })
             .collect();
         let (mesh, parents) = cut_by_boxes(part, &boxes);
@@ -271,7 +271,7 @@ fn members(mesh: &TriMesh, supports: &[Support]) -> Vec<Members> {
         .map(|&p| in_boxes(p, supports, slack))
         .collect();
     for (k, support) in supports.iter().enumerate().take(MOST) {
-        if let Region::Vertices(mask) = &support.region {
+        if let HeldRegion::Vertices(mask) = &support.region {
             for (m, _) in members.iter_mut().zip(mask.iter()).filter(|(_, set)| **set) {
                 *m |= 1 << k;
             }
@@ -284,7 +284,7 @@ fn members(mesh: &TriMesh, supports: &[Support]) -> Vec<Members> {
 fn in_boxes(p: DVec3, supports: &[Support], slack: f64) -> Members {
     let boxes = supports.iter().enumerate().take(MOST);
     boxes.fold(0, |members, (k, s)| match s.region {
-        Region::Box(held) if held.contains(p, slack) => members | 1 << k,
+        HeldRegion::Box(held) if held.contains(p, slack) => members | 1 << k,
         _ => members,
     })
 }
@@ -327,7 +327,7 @@ mod tests {
     #[test]
     fn a_box_holds_exactly_what_it_covers() {
         let support = Support {
-            region: Region::Box(OrientedBox::of_file(
+            region: HeldRegion::Box(OrientedBox::of_file(
                 DVec3::splat(-1.0),
                 DVec3::new(1.3, 2.0, 1.0),
             )),
@@ -365,7 +365,7 @@ mod tests {
         ];
         let part = Arc::new(TriMesh::new(&p, &[[0, 1, 2], [0, 2, 3]], 0).unwrap().0);
         let clamp = |from: f64, to: f64| Support {
-            region: Region::Box(OrientedBox::of_file(
+            region: HeldRegion::Box(OrientedBox::of_file(
                 DVec3::new(from, -1.0, -1.0),
                 DVec3::new(to, 2.0, 1.0),
             )),
@@ -401,7 +401,7 @@ mod tests {
         let mut mask = vec![false; 10];
         mask[9] = true;
         let support = |mask| Support {
-            region: Region::Vertices(Arc::new(mask)),
+            region: HeldRegion::Vertices(Arc::new(mask)),
             held: DofSet::DISPLACEMENTS,
         };
         let spot = HeldPart::new(&strip(), &[support(mask.clone())]);

@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::judging::EstimatorKind;
-use super::rows::{Region, Said, quoted, row};
+use super::rows::{Said, TouchRegion, quoted, row};
 use crate::statistics::mean;
 
 /// What was found of one set under touches of one force: errors touch by touch (mm).
@@ -68,12 +68,12 @@ impl Matched {
     }
 
     /// A row for all touches, and one for each region that has any.
-    pub(super) fn rows(&self, regions: &[Region]) -> Vec<MatchedRow> {
+    pub(super) fn rows(&self, regions: &[TouchRegion]) -> Vec<MatchedRow> {
         let regions = quoted(regions, self.errors.len());
         regions.iter().map(|region| self.row(region)).collect()
     }
 
-    fn row(&self, region: &Region) -> MatchedRow {
+    fn row(&self, region: &TouchRegion) -> MatchedRow {
         let all = row(&self.said(), region, [&self.errors, &self.built]);
         let blind = region.within(&self.blind);
         let errors = region.within(&self.errors).into_iter().zip(&blind);
@@ -114,8 +114,8 @@ mod tests {
         }
     }
 
-    fn half() -> Region {
-        Region {
+    fn half() -> TouchRegion {
+        TouchRegion {
             name: "half".into(),
             contains: vec![true, true, false, false],
         }

@@ -7,14 +7,14 @@ use crate::statistics::{mean, quantile};
 
 /// A named part of the touches.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Region {
+pub struct TouchRegion {
     /// For people.
     pub name: String,
     /// One value a test touch.
     pub contains: Vec<bool>,
 }
 
-impl Region {
+impl TouchRegion {
     /// Of one value a test touch, those inside.
     pub(super) fn within<T: Copy>(&self, values: &[T]) -> Vec<T> {
         (values.iter().zip(&self.contains))
@@ -62,15 +62,15 @@ pub(super) struct Said<'a> {
 
 impl Said<'_> {
     /// A row for all touches, and one for each region that has any.
-    pub(super) fn rows(&self, regions: &[Region], errors: [&[f64]; 2]) -> Vec<EvaluationRow> {
+    pub(super) fn rows(&self, regions: &[TouchRegion], errors: [&[f64]; 2]) -> Vec<EvaluationRow> {
         let regions = quoted(regions, errors[0].len());
         regions.iter().map(|r| row(self, r, errors)).collect()
     }
 }
 
 /// What errors of so many touches are quoted for: all of them, and each region that has any.
-pub(super) fn quoted(regions: &[Region], touches: usize) -> Vec<Region> {
-    let everywhere = Region {
+pub(super) fn quoted(regions: &[TouchRegion], touches: usize) -> Vec<TouchRegion> {
+    let everywhere = TouchRegion {
         name: EVERYWHERE.into(),
         contains: vec![true; touches],
     };
@@ -81,7 +81,7 @@ pub(super) fn quoted(regions: &[Region], touches: usize) -> Vec<Region> {
         .collect()
 }
 
-pub(super) fn row(set: &Said, region: &Region, [errors, built]: [&[f64]; 2]) -> EvaluationRow {
+pub(super) fn row(set: &Said, region: &TouchRegion, [errors, built]: [&[f64]; 2]) -> EvaluationRow {
     let (mut inside, built) = (region.within(errors), region.within(built));
     inside.sort_by(f64::total_cmp);
     let share = |q: f64| quantile(&inside, q).unwrap_or(f64::NAN);

@@ -28,11 +28,12 @@
 //! matrix: never more than before, so that presses that say nothing leave everything as it was.
 
 pub mod judged;
+pub mod part;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
 
-use super::drawn::{AsDrawn, Doubt, covariance, doubt, upper_triangle};
+use super::drawn::{AsDrawn, AsGlued, Doubt, covariance, doubt, upper_triangle};
 use super::map::{ResponseMap, Slope};
 use super::matching::Errors;
 use crate::mesh::SurfacePoint;
@@ -53,8 +54,8 @@ pub struct Known {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
-    /// For each channel its gain, millimetres along and across, and degrees.
-    pub glued: Vec<[f64; 4]>,
+    /// How the gauge of each channel is glued.
+    pub glued: Vec<AsGlued>,
     /// What is not known of these.
     pub doubts: Vec<Doubt>,
     /// Standard deviation of each gain.
@@ -119,7 +120,7 @@ pub fn calibrate(
 
 /// What was fitted, with the share of the readings that the model leaves.
 struct Fitted {
-    glued: Vec<[f64; 4]>,
+    glued: Vec<AsGlued>,
     relative: f64,
     /// Nothing where numbers overflow.
     fit: Option<Fit>,
@@ -128,7 +129,7 @@ struct Fitted {
 /// By the noise of each press (strain, a channel each).
 fn fitted(drawn: &AsDrawn, known: &[&Known], noise: &[f64], off: &Uncertainty) -> Fitted {
     let mut fitted = Fitted {
-        glued: vec![[1.0, 0.0, 0.0, 0.0]; noise.len()],
+        glued: vec![AsGlued::DRAWN; noise.len()],
         relative: off.elements.max(LEAST),
         fit: None,
     };
@@ -167,7 +168,7 @@ struct Press {
 }
 
 impl Press {
-    fn new(drawn: &AsDrawn, known: &Known, glued: &[[f64; 4]], off: &Uncertainty) -> Self {
+    fn new(drawn: &AsDrawn, known: &Known, glued: &[AsGlued], off: &Uncertainty) -> Self {
         let basis = drawn.basis(known.at);
         let pairs = known.reading.iter().zip(&basis);
         let or_expected = |(x, b): (&f64, &Vector4<f64>)| {
@@ -324,11 +325,11 @@ impl Least<'_> {
 }
 
 impl Fit {
-    /// For each channel its gain, millimetres along and across, and degrees, with the factor that all share.
-    fn glued(&self) -> Vec<[f64; 4]> {
+    /// How each gauge is glued, with the factor that all share.
+    fn glued(&self) -> Vec<AsGlued> {
         let common = 1.0 + self.found[self.found.len() - 1];
         let gauges = self.found.as_slice().chunks_exact(PER_GAUGE);
-        let glued = |g: &[f64]| [1.0 + g[0], g[1], g[2], g[3]].map(|v| common * v);
+        let glued = |g: &[f64]| AsGlued::from([1.0 + g[0], g[1], g[2], g[3]]).times(common);
         gauges.map(glued).collect()
     }
 
@@ -359,6 +360,17 @@ fn zero_of(excess: impl Fn(f64) -> f64) -> f64 {
         }
     }
     high
+}
+
+impl Calibration {
+    /// The same gauges on a part that is so many times as soft as the one they were compared with.
+    #[must_use]
+    pub fn on_softer(mut self, factor: f64) -> Self {
+        for glued in &mut self.glued {
+            *glued = glued.times(factor.recip());
+        }
+        self
+    }
 }
 
 impl AsDrawn {

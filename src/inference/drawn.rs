@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix4, Vector4};
+use serde::{Deserialize, Serialize};
 
 use super::deviation::{Deviations, Nuisances};
 use super::map::{ResponseMap, Slope};
@@ -19,6 +20,54 @@ pub struct AsDrawn {
     pub tip: Option<Arc<ResponseMap>>,
     /// A newton along x, y and z, whichever way the surface lies; absent where touches press straight in.
     pub axes: Option<Arc<[ResponseMap; 3]>>,
+}
+
+/// How a gauge is glued, beside how it was drawn: it reads the gain times what it would as drawn, and so many times what a
+/// step along it, one across it (normal × direction) and a turn change of that. In files the four numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "[f64; 4]", into = "[f64; 4]")]
+pub struct AsGlued {
+    /// A factor.
+    pub gain: f64,
+    /// mm.
+    pub along_mm: f64,
+    /// mm.
+    pub across_mm: f64,
+    /// From the direction towards the other side of the gauge.
+    pub turned_degrees: f64,
+}
+
+impl AsGlued {
+    /// Exactly as it was drawn.
+    pub const DRAWN: Self = Self {
+        gain: 1.0,
+        along_mm: 0.0,
+        across_mm: 0.0,
+        turned_degrees: 0.0,
+    };
+
+    /// The same gauge where all of the part gives way so many times as much.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Self {
+        <[f64; 4]>::from(self).map(|value| factor * value).into()
+    }
+}
+
+impl From<[f64; 4]> for AsGlued {
+    fn from([gain, along_mm, across_mm, turned_degrees]: [f64; 4]) -> Self {
+        Self {
+            gain,
+            along_mm,
+            across_mm,
+            turned_degrees,
+        }
+    }
+}
+
+impl From<AsGlued> for [f64; 4] {
+    fn from(of: AsGlued) -> Self {
+        [of.gain, of.along_mm, of.across_mm, of.turned_degrees]
+    }
 }
 
 /// What is not known of one gauge, as far as a covariance of its gain, millimetres along and across, and degrees says
@@ -68,10 +117,11 @@ pub(super) fn upper_triangle(covariance: &Matrix4<f64>) -> Doubt {
 }
 
 impl AsDrawn {
-    /// For gauges with these gains, moved (mm) and turned (degrees) like that.
+    /// For gauges that are glued like that, a channel each.
     #[must_use]
-    pub fn glued(&self, glued: &[[f64; 4]]) -> ResponseMap {
-        self.map.combined(&self.changes, glued)
+    pub fn glued(&self, glued: &[AsGlued]) -> ResponseMap {
+        let factors: Vec<[f64; 4]> = glued.iter().map(|&of| of.into()).collect();
+        self.map.combined(&self.changes, &factors)
     }
 
     /// How far off readings per newton are by gluing and the way touches are made, everywhere, while nothing is known of
@@ -117,10 +167,11 @@ impl AsDrawn {
     }
 
     /// Readings and slopes at one place for gauges that are glued like that.
-    pub(super) fn slope(&self, at: SurfacePoint, glued: &[[f64; 4]]) -> Slope {
+    pub(super) fn slope(&self, at: SurfacePoint, glued: &[AsGlued]) -> Slope {
         let mut slope = self.map.slope(at);
         let changes = self.changes.each_ref().map(|m| m.slope(at));
-        for (c, factors) in glued.iter().enumerate() {
+        for (c, &of) in glued.iter().enumerate() {
+            let factors: [f64; 4] = of.into();
             slope.reading[c] *= factors[0];
             slope.change[c] *= factors[0];
             for (change, factor) in changes.iter().zip(&factors[1..]) {
@@ -183,12 +234,12 @@ mod tests {
         for k in 0..4 * DIRECTIONS {
             let (s, c) = (TAU * f64::from(k / 4) / f64::from(DIRECTIONS)).sin_cos();
             let [turn, gain] = [k % 2, k / 2 % 2].map(|bit| 2.0 * f64::from(bit) - 1.0);
-            let off = [
-                1.0 + gluing.gain * gain,
-                gluing.place * 1e3 * c,
-                gluing.place * 1e3 * s,
-                gluing.angle.to_degrees() * turn,
-            ];
+            let off = AsGlued {
+                gain: 1.0 + gluing.gain * gain,
+                along_mm: gluing.place * 1e3 * c,
+                across_mm: gluing.place * 1e3 * s,
+                turned_degrees: gluing.angle.to_degrees() * turn,
+            };
             let built = drawn.glued(&[off, off]).at(at);
             for ((square, built), drawn) in squares.iter_mut().zip(built).zip(drawn.map.at(at)) {
                 *square += (built - drawn).powi(2) / f64::from(4 * DIRECTIONS);

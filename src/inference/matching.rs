@@ -31,7 +31,7 @@ use glam::DVec3;
 
 use super::deviation::About;
 use super::map::{LANES, ResponseMap};
-use super::region::Region;
+use super::region::CredibleRegion;
 use crate::mesh::SurfacePoint;
 
 pub use self::errors::Errors;
@@ -55,7 +55,7 @@ pub struct Contact {
     /// Standard deviation of the force (N).
     pub force_deviation: f64,
     /// Where it may be.
-    pub region: Region,
+    pub region: CredibleRegion,
     /// Twice the gain in log-likelihood over no touch at all.
     pub strength: f64,
     /// Whether it is one narrow place, and not the mean of several or of a wide stretch.
@@ -163,7 +163,7 @@ impl Matching {
         measured: &Observation,
         at: SurfacePoint,
         load: Load,
-        region: Region,
+        region: CredibleRegion,
         cost: f64,
         narrow: bool,
     ) -> Contact {

@@ -11,14 +11,14 @@ pub(super) const DEVIATIONS: f64 = 2.145_966_026_289_347;
 
 /// An ellipse in the tangent plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Region {
+pub struct CredibleRegion {
     /// Half-axes (m), the longer first.
     pub axes: [DVec3; 2],
     /// Radius of a disk that holds as much (m).
     pub radius: f64,
 }
 
-impl Region {
+impl CredibleRegion {
     /// Of a normal distribution with this covariance (m²) in the plane of two directions.
     #[must_use]
     pub fn of_normal(covariance: DMat2, plane: [DVec3; 2]) -> Self {

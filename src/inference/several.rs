@@ -19,7 +19,7 @@ use super::matching::weighed::Observation;
 use super::matching::{Contact, Load, Matching};
 use crate::inference::deviation::About;
 use crate::inference::map::ResponseMap;
-use crate::inference::region::Region;
+use crate::inference::region::CredibleRegion;
 
 /// Before anything is read. A pull is none of them: it is held against them by itself.
 const ONE: f64 = 0.88;
@@ -405,7 +405,7 @@ impl Matching {
         let weight = |joint: &Joint| (joint.log_evidence - all).exp();
         let flat = flat_of(best, k);
         let region = if weight(best) >= CLEAR {
-            Region::of_normal(flat, best.planes[k])
+            CredibleRegion::of_normal(flat, best.planes[k])
         } else {
             let of_answer = |joint: &Joint| {
                 let away = |i: &usize| self.map.mesh.point(joint.spots[*i].at).distance(place);
@@ -421,7 +421,7 @@ impl Matching {
                 )
             };
             let places: Vec<(DVec3, f64)> = answers.iter().flat_map(of_answer).collect();
-            Region::of_places(&places, place, self.map.mesh.normal(spot.at))
+            CredibleRegion::of_places(&places, place, self.map.mesh.normal(spot.at))
         };
         let of_force = best.first(k) + spot.places();
         let load = Load {

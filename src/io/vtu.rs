@@ -9,7 +9,7 @@ use crate::elasticity::{Model, Touch};
 use crate::mesh::TriMesh;
 
 /// One named field, by rows.
-pub struct Field {
+pub struct NamedField {
     pub name: String,
     /// Numbers a row.
     pub width: usize,
@@ -22,10 +22,10 @@ pub const TOUCHES: usize = 32;
 /// What a model says of touches at its vertices: displacement, and strain on the inside face as the two
 /// principal values.
 #[must_use]
-pub fn fields(model: &dyn Model, touches: &[Touch]) -> Vec<Field> {
+pub fn fields(model: &dyn Model, touches: &[Touch]) -> Vec<NamedField> {
     let vertices = model.mesh().vertex_points();
     let observer = model.observer(&vertices, Face::Inside);
-    let mut fields = vec![Field {
+    let mut fields = vec![NamedField {
         name: "held".into(),
         width: 1,
         values: model
@@ -39,14 +39,14 @@ pub fn fields(model: &dyn Model, touches: &[Touch]) -> Vec<Field> {
     let strains = observer.strains_of(model, &solutions);
     let moved = model.moved(touches);
     for (k, (moved, strain)) in moved.into_iter().zip(strains).enumerate() {
-        fields.push(Field {
+        fields.push(NamedField {
             name: format!("displacement_mm_touch_{k}"),
             width: 3,
             values: (moved.into_iter())
                 .flat_map(|u| (u * 1000.0).to_array())
                 .collect(),
         });
-        fields.push(Field {
+        fields.push(NamedField {
             name: format!("inside_principal_strain_touch_{k}"),
             width: 2,
             values: strain
@@ -65,11 +65,11 @@ pub fn fields(model: &dyn Model, touches: &[Touch]) -> Vec<Field> {
 ///
 /// # Errors
 /// [`FileError`] naming the file.
-pub fn write(path: &Path, mesh: &TriMesh, fields: &[Field]) -> Result<(), FileError> {
+pub fn write(path: &Path, mesh: &TriMesh, fields: &[NamedField]) -> Result<(), FileError> {
     atomic::write(path, to_text(mesh, fields).as_bytes())
 }
 
-fn to_text(mesh: &TriMesh, fields: &[Field]) -> String {
+fn to_text(mesh: &TriMesh, fields: &[NamedField]) -> String {
     let (points, cells) = (mesh.positions().len(), mesh.triangles().len());
     let mut t = String::from(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\">\n<UnstructuredGrid>\n",

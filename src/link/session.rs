@@ -19,7 +19,7 @@ use crate::plain;
 use crate::wire::{Hello, Message};
 
 pub use connection::Connection;
-pub use listener::{Command, Listener, SessionEvent, State};
+pub use listener::{Listener, ListenerCommand, SessionEvent, State};
 pub use timing::Timing;
 
 /// Asked again so often while nothing is understood; silence that is told.
@@ -38,7 +38,7 @@ impl Listener {
     pub fn run(
         mut self,
         stop: &AtomicBool,
-        inbox: &Inbox<Command>,
+        inbox: &Inbox<ListenerCommand>,
         mut tell: impl FnMut(SessionEvent),
     ) -> Result<(), String> {
         let mut port = match self.held.take().and_then(Held::port) {
@@ -92,7 +92,7 @@ impl Listener {
         &mut self,
         port: &mut dyn Port,
         stop: &AtomicBool,
-        inbox: &Inbox<Command>,
+        inbox: &Inbox<ListenerCommand>,
         tell: &mut impl FnMut(SessionEvent),
     ) {
         self.receiver.reset();

@@ -16,7 +16,7 @@ const ENOUGH_HZ: f64 = 1000.0;
 const NOISE_S: f64 = 8.0;
 
 /// The rest and all that is known of it.
-pub(super) struct Ground {
+pub(super) struct KnownRest {
     /// Of every channel, when it was taken; absent before the first tare.
     pub rest: Option<Rest>,
     hum: Hum,
@@ -43,7 +43,7 @@ pub(super) enum Under<'a> {
     Unsure,
 }
 
-impl Ground {
+impl KnownRest {
     /// Before a tare, with this noise of each channel (strain).
     pub fn new(noise: Vec<f64>) -> Self {
         Self {

@@ -8,7 +8,7 @@ use super::blind::Blind;
 use super::checking::Checking;
 use super::counting::Counting;
 use super::feeling::{Feeling, Turn};
-use super::ground::{Ground, Under};
+use super::ground::{KnownRest, Under};
 use super::health::Health;
 use super::hum::Hum;
 use super::news::News;
@@ -42,7 +42,7 @@ pub struct Pipeline {
     /// What was learned from presses alone: by all channels.
     learned: Option<Arc<TouchEstimator>>,
     taring: Option<Taring>,
-    ground: Ground,
+    ground: KnownRest,
     /// What the project knows all to have drifted by together (strain).
     known_drift: f64,
     checking: Checking,
@@ -76,7 +76,7 @@ impl Pipeline {
             known_drift,
             counting: Counting::new(&matching),
             matching,
-            ground: Ground::new(noise),
+            ground: KnownRest::new(noise),
             settings,
             trained: [None, None],
             trained_for: Vec::new(),

@@ -113,7 +113,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::inference::{Contact, Region, Touches};
+    use crate::inference::{Contact, CredibleRegion, Touches};
 
     fn update(k: u64, strain: f64) -> Update {
         let contact = Contact {
@@ -123,7 +123,7 @@ mod tests {
             drag: DVec3::ZERO,
             drag_deviation: 0.0,
             force_deviation: 0.1,
-            region: Region {
+            region: CredibleRegion {
                 axes: [DVec3::X, DVec3::Y],
                 radius: 1e-3,
             },

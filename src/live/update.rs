@@ -9,7 +9,7 @@ use crate::uncertainty::{UNESTIMATED, Uncertainty};
 
 /// Which estimator is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Estimator {
+pub enum ShownEstimator {
     /// Model matching.
     #[default]
     Matching,
@@ -21,7 +21,7 @@ pub enum Estimator {
     Learned,
 }
 
-impl Estimator {
+impl ShownEstimator {
     /// All, the default first.
     pub const ALL: [Self; 4] = [Self::Matching, Self::Normalized, Self::Raw, Self::Learned];
 
@@ -118,15 +118,15 @@ impl Update {
 
     /// Where and how hard, by one of the estimators.
     #[must_use]
-    pub fn by(&self, estimator: Estimator) -> Option<Guess> {
+    pub fn by(&self, estimator: ShownEstimator) -> Option<Guess> {
         match estimator {
-            Estimator::Matching => self.contact.map(|c| Guess {
+            ShownEstimator::Matching => self.contact.map(|c| Guess {
                 position: c.position,
                 force: c.force,
             }),
-            Estimator::Normalized => self.guesses[0],
-            Estimator::Raw => self.guesses[1],
-            Estimator::Learned => self.guesses[2],
+            ShownEstimator::Normalized => self.guesses[0],
+            ShownEstimator::Raw => self.guesses[1],
+            ShownEstimator::Learned => self.guesses[2],
         }
     }
 }

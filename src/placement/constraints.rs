@@ -149,7 +149,7 @@ pub fn reached(sets: &[SensorSet], constraints: &Constraints) -> bool {
         && sets.len() >= constraints.required.len()
 }
 
-/// A note on a choice that ended short of what was wanted, with what [`Field::closed`] says.
+/// A note on a choice that ended short of what was wanted, with what [`PartialSet::closed`] says.
 #[must_use]
 pub fn shortage(why: &str, reached: usize, wanted: usize) -> String {
     format!(
@@ -171,7 +171,7 @@ pub fn unreached(sets: &[SensorSet], constraints: &Constraints) -> Option<String
 
 /// Which places may still be chosen, as the choice grows: none whose signal never changes.
 #[derive(Clone)]
-pub struct Field<'a> {
+pub struct PartialSet<'a> {
     pool: &'a Pool<'a>,
     constraints: &'a Constraints,
     /// In the order they were chosen.
@@ -186,7 +186,7 @@ pub struct Field<'a> {
     first: Option<usize>,
 }
 
-impl<'a> Field<'a> {
+impl<'a> PartialSet<'a> {
     /// Nothing chosen yet.
     ///
     /// # Errors

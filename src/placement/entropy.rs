@@ -1,9 +1,9 @@
 //! Sites of largest uncertainty (A. Krause, A. Singh, C. Guestrin, JMLR 9, 2008; the paper's Algorithm
 //! 3): a partial Cholesky factor of the covariance, pivoted by what is still uncertain.
 
-use super::constraints::Field;
+use super::constraints::PartialSet;
 use super::exchange::{self, Criterion};
-use super::information::{Conditional, Geometry, Measured, finish, grow, with_each};
+use super::information::{Conditional, Geometry, Observed, finish, grow, with_each};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Cancelled, report};
 
@@ -74,7 +74,7 @@ struct Entropies<'a> {
     entropy: f64,
 }
 
-impl Measured for Entropies<'_> {
+impl Observed for Entropies<'_> {
     fn nats(&self) -> f64 {
         self.entropy
     }
@@ -112,16 +112,20 @@ impl Criterion for Sought<'_> {
         Ok(-self.measured(set).entropy)
     }
 
-    fn screened(&mut self, others: &Field, _: usize) -> Result<Vec<(usize, f64)>, PlacementError> {
+    fn screened(
+        &mut self,
+        others: &PartialSet,
+        _: usize,
+    ) -> Result<Vec<(usize, f64)>, PlacementError> {
         self.report(others.chosen.len())?;
         Ok(with_each(&self.measured(&others.chosen), others))
     }
 
     fn grow<'f>(
         &mut self,
-        field: Field<'f>,
+        field: PartialSet<'f>,
         found: &dyn Fn(&SensorSet),
-    ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
+    ) -> Result<(PartialSet<'f>, Vec<SensorSet>), PlacementError> {
         grow(
             self.measured(&[]),
             field,

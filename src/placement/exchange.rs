@@ -2,7 +2,7 @@
 //! a time while that helps (V. V. Fedorov, Theory of Optimal Experiments, 1972, ch. 3). What a greedy choice has taken
 //! it never gives back, and what was best alone need not be among the best together.
 
-use super::constraints::{Constraints, Field, reached};
+use super::constraints::{Constraints, PartialSet, reached};
 use super::{PlacementError, Pool, Request, SensorSet};
 use crate::plain;
 
@@ -36,7 +36,7 @@ pub(super) trait Criterion {
     /// As [`Self::of`].
     fn screened(
         &mut self,
-        others: &Field,
+        others: &PartialSet,
         number: usize,
     ) -> Result<Vec<(usize, f64)>, PlacementError>;
 
@@ -44,7 +44,11 @@ pub(super) trait Criterion {
     ///
     /// # Errors
     /// As [`Self::of`].
-    fn best_for(&mut self, others: &Field, number: usize) -> Result<Option<usize>, PlacementError> {
+    fn best_for(
+        &mut self,
+        others: &PartialSet,
+        number: usize,
+    ) -> Result<Option<usize>, PlacementError> {
         let screened = self.screened(others, number)?;
         let best = screened.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
         Ok(best.map(|(place, _)| place))
@@ -57,7 +61,7 @@ pub(super) trait Criterion {
     /// As [`Self::of`].
     fn better_for(
         &mut self,
-        others: &Field,
+        others: &PartialSet,
         (set, number): (&[usize], usize),
         value: f64,
     ) -> Result<Option<(usize, f64)>, PlacementError> {
@@ -77,15 +81,15 @@ pub(super) trait Criterion {
     /// As [`Self::of`].
     fn grow<'f>(
         &mut self,
-        field: Field<'f>,
+        field: PartialSet<'f>,
         found: &dyn Fn(&SensorSet),
-    ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError>;
+    ) -> Result<(PartialSet<'f>, Vec<SensorSet>), PlacementError>;
 }
 
 /// What was chosen.
 pub(super) struct Chosen<'f> {
     /// As the set grew.
-    pub field: Field<'f>,
+    pub field: PartialSet<'f>,
     pub sets: Vec<SensorSet>,
     /// The last set, after exchanges (places in the pool).
     pub places: Vec<usize>,
@@ -101,7 +105,7 @@ pub(super) fn search<'f, C: Criterion>(
     criterion: &mut C,
     pool: &Pool,
     request: &Request,
-    empty: &Field<'f>,
+    empty: &PartialSet<'f>,
     rounds: usize,
 ) -> Result<Chosen<'f>, PlacementError> {
     let starts = request.constraints.thorough.starts;
@@ -160,7 +164,7 @@ pub(super) fn rounds_asked(constraints: &Constraints) -> usize {
 
 /// A set that grew from one first gauge, and what exchanges made of it.
 struct Run<'f> {
-    field: Field<'f>,
+    field: PartialSet<'f>,
     sets: Vec<SensorSet>,
     /// Its criterion as it grew.
     grown: f64,
@@ -171,7 +175,7 @@ struct Run<'f> {
 impl<'f> Run<'f> {
     fn new<C: Criterion>(
         criterion: &mut C,
-        empty: &Field<'f>,
+        empty: &PartialSet<'f>,
         margin: Option<usize>,
         rounds: usize,
         found: &dyn Fn(&SensorSet),
@@ -256,7 +260,7 @@ pub(super) fn gains(before: f64, after: f64) -> bool {
 /// its criterion, which never gets worse. Gauges that must be there, which come first, stay.
 fn exchange<C: Criterion>(
     criterion: &mut C,
-    empty: &Field,
+    empty: &PartialSet,
     chosen: &[usize],
     grown: f64,
     rounds: usize,
@@ -294,7 +298,7 @@ fn other_starts<C: Criterion>(
     criterion: &mut C,
     pool: &Pool,
     run: &Run,
-    empty: &Field,
+    empty: &PartialSet,
     count: usize,
 ) -> Result<Vec<usize>, PlacementError> {
     let kept = empty.required();
@@ -376,7 +380,7 @@ mod tests {
 
         fn screened(
             &mut self,
-            others: &Field,
+            others: &PartialSet,
             number: usize,
         ) -> Result<Vec<(usize, f64)>, PlacementError> {
             let with = |place: usize| {
@@ -389,9 +393,9 @@ mod tests {
 
         fn grow<'f>(
             &mut self,
-            mut field: Field<'f>,
+            mut field: PartialSet<'f>,
             found: &dyn Fn(&SensorSet),
-        ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
+        ) -> Result<(PartialSet<'f>, Vec<SensorSet>), PlacementError> {
             let mut sets = Vec::new();
             while !field.full() {
                 let number = field.chosen.len();
@@ -434,7 +438,7 @@ mod tests {
             watch: &unwatched,
             found: &|_| {},
         };
-        let empty = Field::new(&pool, constraints).unwrap();
+        let empty = PartialSet::new(&pool, constraints).unwrap();
         let chosen = search(&mut Cover, &pool, &request, &empty, rounds).unwrap();
         let last = chosen.sets.last().unwrap();
         assert_eq!(last.sites.len(), chosen.places.len());

@@ -29,7 +29,7 @@ pub use super::exchange::ROUNDS;
 
 use self::bank::Bank;
 use self::expectation::{Expectation, Scenes, scan};
-use super::constraints::{Field, shortage, unreached};
+use super::constraints::{PartialSet, shortage, unreached};
 use super::exchange::{self, Chosen};
 use super::margin;
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind};
@@ -55,7 +55,7 @@ impl Selector for ExpectedError<'_> {
     }
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
-        let empty = Field::new(pool, request.constraints)?;
+        let empty = PartialSet::new(pool, request.constraints)?;
         let scenes = Scenes::new(&self.known, self.detail, pool, request.watch)?;
         let mut expectation = Expectation::new(&scenes, pool, request, self.known.seed);
         let mut chosen = exchange::search(&mut expectation, pool, request, &empty, self.rounds)?;
@@ -70,7 +70,7 @@ impl Selector for ExpectedError<'_> {
 fn certify_last(
     expectation: &Expectation,
     request: &Request,
-    empty: &Field,
+    empty: &PartialSet,
     chosen: &mut Chosen,
 ) -> Result<(), Cancelled> {
     let Some(last) = chosen.sets.last_mut() else {

@@ -21,7 +21,7 @@ pub use self::search::TIE;
 pub use self::settings::{GreedySvr, TOLERANCE};
 
 use self::search::Search;
-use super::constraints::{Field, reached, shortage, unreached};
+use super::constraints::{PartialSet, reached, shortage, unreached};
 use super::exchange::{self, Chosen};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind};
 use crate::budget::{Achieved, StopReason};
@@ -44,7 +44,7 @@ impl Selector for GreedySvr {
             });
         }
         let folds = self.split(pool.targets)?;
-        let empty = Field::new(pool, constraints)?;
+        let empty = PartialSet::new(pool, constraints)?;
         let mut search = Search::new(self, pool, request, &folds);
         let rounds = exchange::rounds_asked(constraints);
         let chosen = exchange::search(&mut search, pool, request, &empty, rounds)?;

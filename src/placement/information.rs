@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::constraints::{Field, shortage};
+use super::constraints::{PartialSet, shortage};
 use super::exchange::Chosen;
 use super::margin::Best;
 use super::{PlacementError, Pool, Request, Selection, SelectorKind, SensorSet, margin};
@@ -69,7 +69,7 @@ impl Geometry {
         pool: &'a Pool<'a>,
         request: &'a Request<'a>,
         name: &'static str,
-    ) -> Result<Field<'a>, PlacementError> {
+    ) -> Result<PartialSet<'a>, PlacementError> {
         if request.constraints.failure > 0.0 {
             return Err(PlacementError::Refused {
                 selector: name,
@@ -81,12 +81,12 @@ impl Geometry {
                 what: "the geometry does not know all sites",
             });
         }
-        Field::new(pool, request.constraints)
+        PartialSet::new(pool, request.constraints)
     }
 }
 
 /// Measurements at some places, as a criterion in nats sees them.
-pub(super) trait Measured {
+pub(super) trait Observed {
     /// Of all of them.
     fn nats(&self) -> f64;
 
@@ -105,7 +105,7 @@ pub(super) trait Measured {
 }
 
 /// The criterion (nats, negative) with each open place of a field beside what was measured.
-pub(super) fn with_each(measured: &impl Measured, others: &Field) -> Vec<(usize, f64)> {
+pub(super) fn with_each(measured: &impl Observed, others: &PartialSet) -> Vec<(usize, f64)> {
     let open = others.open().into_iter();
     open.filter(|&place| measured.is_uncertain(place))
         .map(|place| (place, -(measured.nats() + measured.adds(place))))
@@ -115,11 +115,11 @@ pub(super) fn with_each(measured: &impl Measured, others: &Field) -> Vec<(usize,
 /// Adds to a field, one after the other, the open place that is worth the most, the first of equal ones, as long as there
 /// is an uncertain one or one that must be there.
 pub(super) fn grow<'f>(
-    mut measured: impl Measured,
-    mut field: Field<'f>,
+    mut measured: impl Observed,
+    mut field: PartialSet<'f>,
     report: impl Fn(usize) -> Result<(), Cancelled>,
     found: &dyn Fn(&SensorSet),
-) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
+) -> Result<(PartialSet<'f>, Vec<SensorSet>), PlacementError> {
     let mut sets = Vec::new();
     while !field.full() {
         report(field.chosen.len())?;

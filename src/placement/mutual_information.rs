@@ -8,9 +8,9 @@
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::{Mat, Par, Side};
 
-use super::constraints::Field;
+use super::constraints::PartialSet;
 use super::exchange::{self, Criterion};
-use super::information::{Conditional, Geometry, Measured, finish, grow, with_each};
+use super::information::{Conditional, Geometry, Observed, finish, grow, with_each};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet};
 use crate::budget::{Cancelled, Watch, report};
 
@@ -66,7 +66,7 @@ struct Informed<'a> {
     information: f64,
 }
 
-impl Measured for Informed<'_> {
+impl Observed for Informed<'_> {
     fn nats(&self) -> f64 {
         self.information
     }
@@ -119,15 +119,19 @@ impl Criterion for Sought<'_> {
         Ok(-self.measured(set)?.information)
     }
 
-    fn screened(&mut self, others: &Field, _: usize) -> Result<Vec<(usize, f64)>, PlacementError> {
+    fn screened(
+        &mut self,
+        others: &PartialSet,
+        _: usize,
+    ) -> Result<Vec<(usize, f64)>, PlacementError> {
         Ok(with_each(&self.measured(&others.chosen)?, others))
     }
 
     fn grow<'f>(
         &mut self,
-        field: Field<'f>,
+        field: PartialSet<'f>,
         found: &dyn Fn(&SensorSet),
-    ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
+    ) -> Result<(PartialSet<'f>, Vec<SensorSet>), PlacementError> {
         let nothing = self.measured(&[])?;
         grow(nothing, field, |chosen| self.report(chosen), found)
     }

@@ -1,6 +1,6 @@
 //! PCA with pivoted QR as a selector: exact, deterministic, without a seed.
 
-use super::constraints::{self, Constraints, Field};
+use super::constraints::{self, Constraints, PartialSet};
 use super::{PlacementError, Pool, Request, Selection, Selector, SelectorKind, SensorSet, margin};
 use crate::budget::{Achieved, StopReason, Work, report};
 use crate::pca::Pca;
@@ -18,7 +18,7 @@ impl Selector for PcaQr {
     }
 
     fn select(&self, pool: &Pool, request: &Request) -> Result<Selection, PlacementError> {
-        Field::new(pool, request.constraints)?;
+        PartialSet::new(pool, request.constraints)?;
         let pca = Pca::new(pool.x, request.constraints.sensors, request.watch)?;
         from_components(&pca, pool, request)
     }
@@ -40,7 +40,7 @@ pub fn from_components(
             why: "its criterion is the span of the patterns, in which a lost gauge has no price; use expected error or greedy SVR to expect failures",
         });
     }
-    let whole = Field::new(pool, constraints)?;
+    let whole = PartialSet::new(pool, constraints)?;
     let mut sets: Vec<SensorSet> = Vec::new();
     let mut no_room = None;
     for k in counts(constraints.sensors, constraints.target_mm.is_some()) {
@@ -107,7 +107,7 @@ pub fn from_components(
 /// How the choice ended, and what has to be known of it.
 fn achieved(
     pca: &Pca,
-    whole: &Field,
+    whole: &PartialSet,
     constraints: &Constraints,
     sets: &[SensorSet],
     no_room: Option<String>,
@@ -152,7 +152,7 @@ fn counts(most: usize, on_the_way: bool) -> Vec<usize> {
 
 /// `count` sites by pivoting in as many components; fewer where not so many can be had.
 /// With how far the least certain pick was ahead of the next.
-fn choose<'a>(pca: &Pca, whole: &Field<'a>, count: usize) -> (Field<'a>, Option<f64>) {
+fn choose<'a>(pca: &Pca, whole: &PartialSet<'a>, count: usize) -> (PartialSet<'a>, Option<f64>) {
     let mut field = whole.clone();
     let mut pivoting = pca.pivoting(count);
     let mut least: Option<f64> = None;

@@ -7,7 +7,7 @@ use super::keys::keys;
 use super::ranges::{FRICTION, PLACES};
 use super::selection::ChosenSite;
 use super::value::BadValue;
-use crate::inference::{Calibration, Chain, Doubt};
+use crate::inference::{AsGlued, Calibration, Chain, Doubt};
 use crate::live::Settings;
 use crate::wire::MOST_CHANNELS;
 
@@ -103,8 +103,13 @@ fn numbers(site: &ChosenSite) -> [f64; 6] {
 impl LiveKeys {
     /// Takes over what known touches have shown of the gauges at these sites.
     pub fn take(&mut self, calibration: &Calibration, sites: &[ChosenSite]) {
-        let keys = |((glued, doubt), site): ((&[f64; 4], &Doubt), &ChosenSite)| {
-            let [gain, along_mm, across_mm, turned_degrees] = *glued;
+        let keys = |((glued, doubt), site): ((&AsGlued, &Doubt), &ChosenSite)| {
+            let AsGlued {
+                gain,
+                along_mm,
+                across_mm,
+                turned_degrees,
+            } = *glued;
             GluedKeys {
                 gain,
                 along_mm,
@@ -136,11 +141,15 @@ impl LiveKeys {
         self.model_error = Self::default().model_error;
     }
 
-    /// For each gauge its gain, millimetres along and across, and degrees; nothing without a calibration of the gauges at
-    /// these very sites.
+    /// How each gauge is glued; nothing without a calibration of the gauges at these very sites.
     #[must_use]
-    pub fn glued(&self, sites: &[ChosenSite]) -> Option<Vec<[f64; 4]>> {
-        let values = |g: &GluedKeys| [g.gain, g.along_mm, g.across_mm, g.turned_degrees];
+    pub fn glued(&self, sites: &[ChosenSite]) -> Option<Vec<AsGlued>> {
+        let values = |g: &GluedKeys| AsGlued {
+            gain: g.gain,
+            along_mm: g.along_mm,
+            across_mm: g.across_mm,
+            turned_degrees: g.turned_degrees,
+        };
         (self.is_of(sites)).then(|| self.glued.iter().map(values).collect())
     }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{BadValue, Project, SupportKeys, SupportKind};
-use crate::elasticity::support::Region;
+use crate::elasticity::support::HeldRegion;
 use crate::elasticity::{DofSet, Support};
 use crate::mesh::unroll::Axis;
 use crate::plain::quote;
@@ -89,13 +89,13 @@ fn names(masks: &Masks) -> String {
     format!("{}{more}", listed.join(", "))
 }
 
-fn region(support: &SupportKeys, masks: &Masks) -> Result<Region, BadValue> {
+fn region(support: &SupportKeys, masks: &Masks) -> Result<HeldRegion, BadValue> {
     match (support.oriented_box(), &support.vertices) {
-        (Some(held), None) => Ok(Region::Box(held)),
+        (Some(held), None) => Ok(HeldRegion::Box(held)),
         (None, Some(name)) => {
             let mask = Project::mask("support.vertices", Some(name), masks)?;
             let mask = mask.map(Arc::clone).unwrap_or_default();
-            Ok(Region::Vertices(mask))
+            Ok(HeldRegion::Vertices(mask))
         }
         (both, _) => Err(BadValue {
             key: "support".into(),

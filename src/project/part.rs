@@ -13,7 +13,7 @@ use crate::mesh::oriented_box::OrientedBox;
 use crate::mesh::repair::Repair;
 use crate::mesh::unroll::Axis;
 
-any!(Unit, Elements, PartModel, SupportKind, Axis);
+any!(Unit, ElementKind, PartModel, SupportKind, Axis);
 
 /// Unit of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -89,7 +89,7 @@ keys! {
         halve_mm: f64, "mm", ROOM,
             "edges longer than this are halved, so that there are vertices to paint on and to show fields at; 0 does so where triangles are large beside the part, 1000000 never";
         #[serde(default)]
-        elements: Elements, "", Range::Words(&["graded", "as-given"]),
+        elements: ElementKind, "", Range::Words(&["graded", "as-given"]),
             "\"graded\": computed on a mesh of its own, finer where the strain changes; \"as-given\": on the file's triangles";
         #[serde(default)]
         model: PartModel, "", Range::Words(&["shell", "solid"]),
@@ -118,9 +118,9 @@ impl Part {
             fill_holes: self.fill_holes_mm * MM,
             straighten: self.straighten_mm * MM,
             halve: match self.elements {
-                Elements::Graded => self.halve_mm * MM,
+                ElementKind::Graded => self.halve_mm * MM,
                 // Those of the file are the elements.
-                Elements::AsGiven => f64::INFINITY,
+                ElementKind::AsGiven => f64::INFINITY,
             },
         }
     }
@@ -129,7 +129,7 @@ impl Part {
 /// What the elastic model is computed on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Elements {
+pub enum ElementKind {
     /// A mesh of its own on the part's surface, finer where the strain changes.
     #[default]
     Graded,

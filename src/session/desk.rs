@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::state::bench::BenchDesk;
 use crate::link::BAUD;
-use crate::live::Estimator;
+use crate::live::ShownEstimator;
 
 /// Settings of whoever works here, none of them a project's.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Desk {
     /// Of serial ports.
     pub baud: u32,
     /// What of live touch is shown, and whether the others are shown beside it.
-    pub estimator: Estimator,
+    pub estimator: ShownEstimator,
     pub compare: bool,
     /// That known touches are pressed with (N).
     pub known_force_n: f64,
@@ -33,7 +33,7 @@ impl Default for Desk {
             trades: None,
             pace: 1.0,
             baud: BAUD,
-            estimator: Estimator::default(),
+            estimator: ShownEstimator::default(),
             compare: false,
             known_force_n: 10.0,
             bench: BenchDesk::default(),

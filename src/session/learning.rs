@@ -13,7 +13,7 @@ use crate::io::kept_model;
 use crate::io::touch_file::{self, Origin};
 use crate::job::{Reporter, Stop};
 use crate::learning::{Asked, ByModel, Lessons};
-use crate::live::Estimator;
+use crate::live::ShownEstimator;
 use crate::test_bed::{Collected, Wanted};
 use crate::uncertainty::Pressing;
 
@@ -91,7 +91,7 @@ impl Session {
     /// Goes by the project's model again.
     pub fn close_estimator(&mut self) {
         self.live.learnt = None;
-        self.show_estimator(Estimator::Matching);
+        self.show_estimator(ShownEstimator::Matching);
         self.live.applied = None;
     }
 
@@ -108,9 +108,9 @@ impl Session {
         // The connection takes it at its next look.
         self.live.applied = None;
         self.show_estimator(if matching {
-            Estimator::Matching
+            ShownEstimator::Matching
         } else {
-            Estimator::Learned
+            ShownEstimator::Learned
         });
     }
 }

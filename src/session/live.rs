@@ -28,9 +28,10 @@ use crate::document::SensingInputs;
 use crate::io::kept_model;
 use crate::job::{Reporter, Stop};
 use crate::link::{
-    Address, BAUD, Command, Connection, Doorway, ENDING, Listener, Pace, Truths, host, write_table,
+    Address, BAUD, Connection, Doorway, ENDING, Listener, ListenerCommand, Pace, Truths, host,
+    write_table,
 };
-use crate::live::{Estimator, Pipeline};
+use crate::live::{Pipeline, ShownEstimator};
 use feed::Shared;
 
 /// What may happen to a simulated board.
@@ -239,7 +240,7 @@ impl Session {
     }
 
     /// Shows another estimator.
-    pub fn show_estimator(&mut self, estimator: Estimator) {
+    pub fn show_estimator(&mut self, estimator: ShownEstimator) {
         self.desk.estimator = estimator;
         if let Ok(mut feed) = self.live.feed.lock() {
             feed.estimator = estimator;
@@ -248,7 +249,7 @@ impl Session {
 
     /// Takes what is read now for rest.
     pub fn tare(&mut self) {
-        self.live.send(Command::Tare);
+        self.live.send(ListenerCommand::Tare);
     }
 
     /// Replays a recording into a table beside it.
@@ -273,12 +274,12 @@ impl Session {
     /// Begins to record raw counts.
     pub fn record(&mut self, path: &Path) {
         self.live.recorded = Some(path.to_owned());
-        self.live.send(Command::Record(path.to_owned()));
+        self.live.send(ListenerCommand::Record(path.to_owned()));
     }
 
     /// Ends the recording.
     pub fn stop_recording(&mut self) {
-        self.live.send(Command::StopRecording);
+        self.live.send(ListenerCommand::StopRecording);
         if let Ok(mut feed) = self.live.feed.lock() {
             feed.recording = None;
         }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::commands::Command;
+use super::commands::UiCommand;
 use super::nudge::next_site;
 use super::view::{Picture, View, Way};
 use crate::document::{Brush, Layer};
@@ -34,7 +34,7 @@ pub enum Action {
 
 /// What concerns the window alone.
 pub enum WindowAction {
-    Command(Command),
+    Command(UiCommand),
     /// Come near to some points (m).
     Look(Vec<glam::DVec3>),
     /// Opens a file, or asks where something would be lost or is not known.

@@ -3,7 +3,7 @@
 use egui::{Button, Ui};
 
 use super::action::{Action, WindowAction};
-use super::commands::{Command, enabled, is_on, why_not};
+use super::commands::{UiCommand, enabled, is_on, why_not};
 use super::view::View;
 use crate::project::Project;
 use crate::session::{Desk, Session};
@@ -37,7 +37,7 @@ impl<'a> Ask<'a> {
     }
 
     /// Gives a command.
-    pub fn command(&mut self, command: Command) {
+    pub fn command(&mut self, command: UiCommand) {
         self.act(WindowAction::Command(command));
     }
 
@@ -79,12 +79,12 @@ impl<'a> Ask<'a> {
 
     /// Whether a command can be given now.
     #[must_use]
-    pub fn enabled(&self, command: Command) -> bool {
+    pub fn enabled(&self, command: UiCommand) -> bool {
         enabled(self.session, self.view, command)
     }
 
     /// A button or menu entry for a command.
-    pub fn button(&mut self, ui: &mut Ui, command: Command) {
+    pub fn button(&mut self, ui: &mut Ui, command: UiCommand) {
         let on = is_on(self.session, self.view, command);
         let mut button = Button::new(command.name()).selected(on);
         if let Some(shortcut) = command.shortcut() {
@@ -101,7 +101,7 @@ impl<'a> Ask<'a> {
     }
 
     /// A small button for a command, pressed in while it is on.
-    pub fn toggle(&mut self, ui: &mut Ui, command: Command) {
+    pub fn toggle(&mut self, ui: &mut Ui, command: UiCommand) {
         let on = is_on(self.session, self.view, command);
         let button = ui.add_enabled(
             self.enabled(command),

@@ -10,7 +10,7 @@ use crate::session::{Session, Task};
 
 /// Everything that can be commanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Command {
+pub enum UiCommand {
     Open,
     Example(Example),
     Save,
@@ -65,7 +65,7 @@ pub enum Command {
     Stage(Stage),
 }
 
-impl Command {
+impl UiCommand {
     /// As menus and accessibility name it.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -389,68 +389,74 @@ impl Command {
 
 /// Whether a command can be given now.
 #[must_use]
-pub fn enabled(session: &Session, view: &View, command: Command) -> bool {
+pub fn enabled(session: &Session, view: &View, command: UiCommand) -> bool {
     match command {
-        Command::Undo => session.document.can_undo(),
-        Command::Redo => session.document.can_redo(),
-        Command::GrowPaint | Command::ShrinkPaint => session.document.layer(view.layer).is_some(),
-        Command::Cancel => session.busy(),
-        Command::Tare | Command::Record | Command::Disconnect => session.live.is_connected(),
-        Command::PlanPresses | Command::PressPlan => session.bench.is_free(),
-        Command::LearnPresses => {
+        UiCommand::Undo => session.document.can_undo(),
+        UiCommand::Redo => session.document.can_redo(),
+        UiCommand::GrowPaint | UiCommand::ShrinkPaint => {
+            session.document.layer(view.layer).is_some()
+        }
+        UiCommand::Cancel => session.busy(),
+        UiCommand::Tare | UiCommand::Record | UiCommand::Disconnect => session.live.is_connected(),
+        UiCommand::PlanPresses | UiCommand::PressPlan => session.bench.is_free(),
+        UiCommand::LearnPresses => {
             session.bench.is_free()
                 && session.bench.look(|p| p.made_and_failed()[0] > 0) == Some(true)
         }
-        Command::PausePresses | Command::StopPresses | Command::HaltMachine => {
+        UiCommand::PausePresses | UiCommand::StopPresses | UiCommand::HaltMachine => {
             session.bench.goes_on()
         }
-        Command::Export => session.results.design.is_some(),
-        Command::MeasureTrade => !session.jobs.runs(Task::Trade),
-        Command::Keep => !session.document.state.project.selection.sites.is_empty(),
-        Command::Paint(layer) if layer.is_face() => session.document.is_solid(),
-        Command::Pin | Command::RemoveGauges | Command::FramePicked | Command::Nudge(_) => {
+        UiCommand::Export => session.results.design.is_some(),
+        UiCommand::MeasureTrade => !session.jobs.runs(Task::Trade),
+        UiCommand::Keep => !session.document.state.project.selection.sites.is_empty(),
+        UiCommand::Paint(layer) if layer.is_face() => session.document.is_solid(),
+        UiCommand::Pin | UiCommand::RemoveGauges | UiCommand::FramePicked | UiCommand::Nudge(_) => {
             !view.picked.is_empty()
         }
-        Command::AddHelpful | Command::FindSpare => no_help(session, command).is_none(),
+        UiCommand::AddHelpful | UiCommand::FindSpare => no_help(session, command).is_none(),
         _ => true,
     }
 }
 
 /// Why one of the commands that look for a gauge cannot be given now.
-fn no_help(session: &Session, command: Command) -> Option<&'static str> {
+fn no_help(session: &Session, command: UiCommand) -> Option<&'static str> {
     match command {
-        Command::AddHelpful => session.no_helpful(),
-        Command::FindSpare => session.no_spare(),
+        UiCommand::AddHelpful => session.no_helpful(),
+        UiCommand::FindSpare => session.no_spare(),
         _ => None,
     }
 }
 
 /// What is said of a command that cannot be given.
 #[must_use]
-pub fn why_not(session: &Session, command: Command) -> &'static str {
+pub fn why_not(session: &Session, command: UiCommand) -> &'static str {
     no_help(session, command).unwrap_or(command.tooltip())
 }
 
 /// Whether a command that turns something on or off has it on.
 #[must_use]
-pub fn is_on(session: &Session, view: &View, command: Command) -> bool {
+pub fn is_on(session: &Session, view: &View, command: UiCommand) -> bool {
     match command {
-        Command::Follow => session.desk.follow,
-        Command::SeeThrough => view.see_through,
-        Command::Section => view.section.is_some(),
-        Command::Unrolled => view.unrolled_shown,
-        Command::Jig => view.jig_shown,
-        Command::PausePresses => session.bench.paused && session.bench.goes_on(),
-        Command::Tool(tool) => view.tool == tool,
+        UiCommand::Follow => session.desk.follow,
+        UiCommand::SeeThrough => view.see_through,
+        UiCommand::Section => view.section.is_some(),
+        UiCommand::Unrolled => view.unrolled_shown,
+        UiCommand::Jig => view.jig_shown,
+        UiCommand::PausePresses => session.bench.paused && session.bench.goes_on(),
+        UiCommand::Tool(tool) => view.tool == tool,
         _ => false,
     }
 }
 
 /// Whether a command works on what the file holds, which must be the part that the project asks for.
 #[must_use]
-pub fn needs_part(command: Command) -> bool {
+pub fn needs_part(command: UiCommand) -> bool {
     matches!(
         command,
-        Command::Simulate | Command::Select | Command::Export | Command::Save | Command::SaveAs
+        UiCommand::Simulate
+            | UiCommand::Select
+            | UiCommand::Export
+            | UiCommand::Save
+            | UiCommand::SaveAs
     )
 }

@@ -7,7 +7,7 @@ use egui::Context;
 
 use super::action::{Action, FileAction, WindowAction};
 use super::ask::Ask;
-use super::commands::Command;
+use super::commands::UiCommand;
 use super::view::Picture;
 use crate::document::Document;
 use crate::io::examples::Example;
@@ -266,7 +266,7 @@ impl Dialogs {
             ui.horizontal(|ui| {
                 if ui.button("Save and keep open").clicked() {
                     self.quit = false;
-                    ask.command(Command::Save);
+                    ask.command(UiCommand::Save);
                 }
                 if ui.button("Close without saving").clicked() {
                     ask.act(WindowAction::Close);

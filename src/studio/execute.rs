@@ -6,7 +6,7 @@ use super::action::{
     Action, BenchAction, BoardAction, Change, Compute, FileAction, History, LayerChange,
 };
 use super::ask::Ask;
-use super::commands::{Command, needs_part};
+use super::commands::{UiCommand, needs_part};
 use super::dialogs::Dialog;
 use super::layout::Panels;
 use super::palette::Palette;
@@ -21,7 +21,7 @@ const ZOOM_STEP: f32 = 0.1;
 
 /// Carries a command out, where it can be given now.
 pub fn execute(
-    command: Command,
+    command: UiCommand,
     ctx: &Context,
     ask: &mut Ask<'_>,
     scene: &Scene,
@@ -36,20 +36,20 @@ pub fn execute(
         ));
     }
     match command {
-        Command::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
-        Command::Open
-        | Command::Example(_)
-        | Command::Save
-        | Command::SaveAs
-        | Command::Export
-        | Command::SavePicture
-        | Command::Palette => open_panel(command, ask, panels),
-        Command::DarkLight => ctx.set_theme(match ctx.theme() {
+        UiCommand::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
+        UiCommand::Open
+        | UiCommand::Example(_)
+        | UiCommand::Save
+        | UiCommand::SaveAs
+        | UiCommand::Export
+        | UiCommand::SavePicture
+        | UiCommand::Palette => open_panel(command, ask, panels),
+        UiCommand::DarkLight => ctx.set_theme(match ctx.theme() {
             Theme::Dark => Theme::Light,
             Theme::Light => Theme::Dark,
         }),
-        Command::LargerText => zoom(ctx, ZOOM_STEP),
-        Command::SmallerText => zoom(ctx, -ZOOM_STEP),
+        UiCommand::LargerText => zoom(ctx, ZOOM_STEP),
+        UiCommand::SmallerText => zoom(ctx, -ZOOM_STEP),
         command => {
             look_at(command, ask, scene);
             if let Some(action) = asked_of_session(command, ask, panels) {
@@ -64,103 +64,103 @@ fn zoom(ctx: &Context, by: f32) {
 }
 
 /// Commands that ask for more.
-fn open_panel(command: Command, ask: &mut Ask<'_>, panels: &mut Panels) {
+fn open_panel(command: UiCommand, ask: &mut Ask<'_>, panels: &mut Panels) {
     let document = &ask.session.document;
     let dialogs = &mut panels.dialogs;
     match (command, document.path.clone()) {
-        (Command::Open, _) => dialogs.path = Some(Dialog::open(document)),
-        (Command::Save, Some(path)) => ask.act(FileAction::SaveTo(path)),
-        (Command::Save | Command::SaveAs, _) => dialogs.path = Some(Dialog::save_as(document)),
-        (Command::Export, _) => dialogs.path = Some(Dialog::export(document)),
-        (Command::SavePicture, _) => dialogs.path = Some(Dialog::picture(document)),
-        (Command::Example(example), _) if document.is_dirty() => {
+        (UiCommand::Open, _) => dialogs.path = Some(Dialog::open(document)),
+        (UiCommand::Save, Some(path)) => ask.act(FileAction::SaveTo(path)),
+        (UiCommand::Save | UiCommand::SaveAs, _) => dialogs.path = Some(Dialog::save_as(document)),
+        (UiCommand::Export, _) => dialogs.path = Some(Dialog::export(document)),
+        (UiCommand::SavePicture, _) => dialogs.path = Some(Dialog::picture(document)),
+        (UiCommand::Example(example), _) if document.is_dirty() => {
             dialogs.example = Some(example);
         }
-        (Command::Example(example), _) => ask.act(FileAction::Example(example)),
+        (UiCommand::Example(example), _) => ask.act(FileAction::Example(example)),
         _ => panels.palette = Some(Palette::default()),
     }
 }
 
 /// What a command changes of how the session is looked at.
-fn look_at(command: Command, ask: &mut Ask<'_>, scene: &Scene) {
+fn look_at(command: UiCommand, ask: &mut Ask<'_>, scene: &Scene) {
     let (session, view) = (ask.session, &mut *ask.view);
     match command {
-        Command::WiderBrush => view.brush *= BRUSH_STEP,
-        Command::NarrowerBrush => view.brush /= BRUSH_STEP,
-        Command::Frame => view.frame(&session.document),
-        Command::FramePicked => {
+        UiCommand::WiderBrush => view.brush *= BRUSH_STEP,
+        UiCommand::NarrowerBrush => view.brush /= BRUSH_STEP,
+        UiCommand::Frame => view.frame(&session.document),
+        UiCommand::FramePicked => {
             let all = session.gauge_places();
             let picked = view.picked.iter();
             let picked: Vec<_> = picked.filter_map(|&n| all.get(n).copied()).collect();
             scene.frame_points(view, &picked, &session.document);
         }
-        Command::SeeThrough => view.see_through = !view.see_through,
-        Command::Section => scene.toggle_section(view),
-        Command::Unrolled => {
+        UiCommand::SeeThrough => view.see_through = !view.see_through,
+        UiCommand::Section => scene.toggle_section(view),
+        UiCommand::Unrolled => {
             view.unrolled_shown = !view.unrolled_shown;
             // What was begun in a view that goes ends with it.
             view.gesture = Gesture::None;
         }
-        Command::Jig => view.jig_shown = !view.jig_shown,
-        Command::Look(preset) => view.camera.look_from(preset),
-        Command::Tool(tool) => view.take(tool),
-        Command::Paint(layer) => {
+        UiCommand::Jig => view.jig_shown = !view.jig_shown,
+        UiCommand::Look(preset) => view.camera.look_from(preset),
+        UiCommand::Tool(tool) => view.take(tool),
+        UiCommand::Paint(layer) => {
             view.layer = layer;
             view.take(Tool::Paint);
         }
-        Command::Stage(stage) => view.stage = stage,
-        Command::Advise => view.stage = Stage::Part,
-        Command::SimulatedBoard => view.stage = Stage::Live,
-        Command::PlanPresses | Command::PressPlan | Command::LearnPresses => {
+        UiCommand::Stage(stage) => view.stage = stage,
+        UiCommand::Advise => view.stage = Stage::Part,
+        UiCommand::SimulatedBoard => view.stage = Stage::Live,
+        UiCommand::PlanPresses | UiCommand::PressPlan | UiCommand::LearnPresses => {
             view.stage = Stage::Bench;
         }
-        Command::MeasureTrade => view.tab = Tab::Trade,
+        UiCommand::MeasureTrade => view.tab = Tab::Trade,
         _ => {}
     }
 }
 
 /// What a command asks of the session.
-fn asked_of_session(command: Command, ask: &mut Ask<'_>, panels: &Panels) -> Option<Action> {
+fn asked_of_session(command: UiCommand, ask: &mut Ask<'_>, panels: &Panels) -> Option<Action> {
     let view = &mut *ask.view;
     let paint = |change: LayerChange| Change::Layer(view.layer, change);
     let by = view.brush / 4.0;
     Some(match command {
-        Command::Undo => History::Undo.into(),
-        Command::Redo => History::Redo.into(),
-        Command::Unrolled => History::Settle.into(),
-        Command::ClearPaint => paint(LayerChange::Clear).into(),
-        Command::FillPaint => paint(LayerChange::Fill).into(),
-        Command::InvertPaint => paint(LayerChange::Invert).into(),
-        Command::GrowPaint => paint(LayerChange::Grow(by)).into(),
-        Command::ShrinkPaint => paint(LayerChange::Shrink(by)).into(),
-        Command::Pin => Change::PinGauges(view.picked.clone()).into(),
-        Command::RemoveGauges => Change::RemoveGauges(std::mem::take(&mut view.picked)).into(),
-        Command::Nudge(way) => {
+        UiCommand::Undo => History::Undo.into(),
+        UiCommand::Redo => History::Redo.into(),
+        UiCommand::Unrolled => History::Settle.into(),
+        UiCommand::ClearPaint => paint(LayerChange::Clear).into(),
+        UiCommand::FillPaint => paint(LayerChange::Fill).into(),
+        UiCommand::InvertPaint => paint(LayerChange::Invert).into(),
+        UiCommand::GrowPaint => paint(LayerChange::Grow(by)).into(),
+        UiCommand::ShrinkPaint => paint(LayerChange::Shrink(by)).into(),
+        UiCommand::Pin => Change::PinGauges(view.picked.clone()).into(),
+        UiCommand::RemoveGauges => Change::RemoveGauges(std::mem::take(&mut view.picked)).into(),
+        UiCommand::Nudge(way) => {
             let seen = Box::new(view.clone());
             Change::NudgeGauges(view.picked.clone(), way, seen).into()
         }
-        Command::Keep => Change::Keep.into(),
-        Command::Simulate => Compute::Simulate.into(),
-        Command::Select => Compute::Select.into(),
-        Command::AddHelpful => Compute::AddHelpful.into(),
-        Command::FindSpare => Compute::FindSpare.into(),
-        Command::Advise => Compute::MeasureWalls.into(),
-        Command::MeasureTrade => Compute::MeasureTrade(panels.dial.count).into(),
-        Command::Cancel => Compute::Cancel.into(),
-        Command::SimulatedBoard => BoardAction::Simulated.into(),
-        Command::Tare => BoardAction::Tare.into(),
-        Command::Record => BoardAction::ToggleRecording(panels.live.record_to.clone()).into(),
-        Command::Disconnect => BoardAction::Disconnect.into(),
-        Command::PlanPresses => BenchAction::Plan.into(),
-        Command::PressPlan => BenchAction::Press.into(),
-        Command::LearnPresses => BenchAction::Learn.into(),
-        Command::PausePresses if ask.session.bench.paused => {
+        UiCommand::Keep => Change::Keep.into(),
+        UiCommand::Simulate => Compute::Simulate.into(),
+        UiCommand::Select => Compute::Select.into(),
+        UiCommand::AddHelpful => Compute::AddHelpful.into(),
+        UiCommand::FindSpare => Compute::FindSpare.into(),
+        UiCommand::Advise => Compute::MeasureWalls.into(),
+        UiCommand::MeasureTrade => Compute::MeasureTrade(panels.dial.count).into(),
+        UiCommand::Cancel => Compute::Cancel.into(),
+        UiCommand::SimulatedBoard => BoardAction::Simulated.into(),
+        UiCommand::Tare => BoardAction::Tare.into(),
+        UiCommand::Record => BoardAction::ToggleRecording(panels.live.record_to.clone()).into(),
+        UiCommand::Disconnect => BoardAction::Disconnect.into(),
+        UiCommand::PlanPresses => BenchAction::Plan.into(),
+        UiCommand::PressPlan => BenchAction::Press.into(),
+        UiCommand::LearnPresses => BenchAction::Learn.into(),
+        UiCommand::PausePresses if ask.session.bench.paused => {
             BenchAction::Order(BenchOrder::Resume).into()
         }
-        Command::PausePresses => BenchAction::Order(BenchOrder::Pause).into(),
-        Command::StopPresses => BenchAction::Order(BenchOrder::Stop).into(),
-        Command::HaltMachine => BenchAction::Order(BenchOrder::Kill).into(),
-        Command::Follow => {
+        UiCommand::PausePresses => BenchAction::Order(BenchOrder::Pause).into(),
+        UiCommand::StopPresses => BenchAction::Order(BenchOrder::Stop).into(),
+        UiCommand::HaltMachine => BenchAction::Order(BenchOrder::Kill).into(),
+        UiCommand::Follow => {
             let mut desk = ask.session.desk.clone();
             desk.follow = !desk.follow;
             Action::Desk(Box::new(desk))

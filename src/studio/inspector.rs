@@ -11,7 +11,7 @@ mod supports;
 use egui::Ui;
 
 use super::ask::Ask;
-use super::commands::Command;
+use super::commands::UiCommand;
 use super::view::Stage;
 use evaluation::evaluation_form;
 use feasible::feasible_form;
@@ -38,7 +38,7 @@ pub fn settings(ask: &mut Ask<'_>, ui: &mut Ui) {
         Stage::Candidates => candidates_form(ask, ui),
         Stage::Selection => selection_form(ask, ui),
         Stage::Evaluation => evaluation_form(ask, ui),
-        Stage::Report => ask.button(ui, Command::Export),
+        Stage::Report => ask.button(ui, UiCommand::Export),
         // They have panels of their own.
         Stage::Bench | Stage::Live => {}
     }

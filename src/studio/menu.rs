@@ -3,7 +3,7 @@
 use egui::Ui;
 
 use super::ask::Ask;
-use super::commands::Command;
+use super::commands::UiCommand;
 use super::recent::Recent;
 use super::view::{Tool, Way};
 use crate::document::Layer;
@@ -12,114 +12,114 @@ use crate::render::camera::Preset;
 
 fn run_menu(ask: &mut Ask<'_>, ui: &mut Ui) {
     for command in [
-        Command::Simulate,
-        Command::Select,
-        Command::Keep,
-        Command::Cancel,
+        UiCommand::Simulate,
+        UiCommand::Select,
+        UiCommand::Keep,
+        UiCommand::Cancel,
     ] {
         ask.button(ui, command);
     }
     ui.separator();
     for command in [
-        Command::PlanPresses,
-        Command::PressPlan,
-        Command::LearnPresses,
-        Command::SimulatedBoard,
-        Command::Tare,
-        Command::Record,
-        Command::Disconnect,
+        UiCommand::PlanPresses,
+        UiCommand::PressPlan,
+        UiCommand::LearnPresses,
+        UiCommand::SimulatedBoard,
+        UiCommand::Tare,
+        UiCommand::Record,
+        UiCommand::Disconnect,
     ] {
         ask.button(ui, command);
     }
     ui.separator();
-    ask.button(ui, Command::Follow);
+    ask.button(ui, UiCommand::Follow);
 }
 
 fn gauges_menu(ask: &mut Ask<'_>, ui: &mut Ui) {
     for command in [
-        Command::Pin,
-        Command::RemoveGauges,
-        Command::AddHelpful,
-        Command::FindSpare,
+        UiCommand::Pin,
+        UiCommand::RemoveGauges,
+        UiCommand::AddHelpful,
+        UiCommand::FindSpare,
     ] {
         ask.button(ui, command);
     }
     ui.separator();
     for way in Way::ALL {
-        ask.button(ui, Command::Nudge(way));
+        ask.button(ui, UiCommand::Nudge(way));
     }
 }
 
 fn file_menu(ask: &mut Ask<'_>, recent: &Recent, ui: &mut Ui) {
-    ask.button(ui, Command::Open);
+    ask.button(ui, UiCommand::Open);
     recent.menu(ui, ask);
     ui.menu_button("Examples", |ui| {
         for example in Example::ALL {
-            ask.button(ui, Command::Example(example));
+            ask.button(ui, UiCommand::Example(example));
         }
     });
     ui.separator();
-    for command in [Command::Save, Command::SaveAs] {
+    for command in [UiCommand::Save, UiCommand::SaveAs] {
         ask.button(ui, command);
     }
     ui.separator();
-    ask.button(ui, Command::Export);
-    ask.button(ui, Command::SavePicture);
+    ask.button(ui, UiCommand::Export);
+    ask.button(ui, UiCommand::SavePicture);
     ui.separator();
-    ask.button(ui, Command::Quit);
+    ask.button(ui, UiCommand::Quit);
 }
 
 fn edit_menu(ask: &mut Ask<'_>, ui: &mut Ui) {
-    for command in [Command::Undo, Command::Redo] {
+    for command in [UiCommand::Undo, UiCommand::Redo] {
         ask.button(ui, command);
     }
     ui.separator();
     for tool in Tool::ALL {
-        ask.button(ui, Command::Tool(tool));
+        ask.button(ui, UiCommand::Tool(tool));
     }
     ui.separator();
     ui.menu_button("Painted layer", |ui| {
         for layer in Layer::ALL {
-            ask.button(ui, Command::Paint(layer));
+            ask.button(ui, UiCommand::Paint(layer));
         }
         ui.separator();
         for command in [
-            Command::FillPaint,
-            Command::InvertPaint,
-            Command::GrowPaint,
-            Command::ShrinkPaint,
-            Command::ClearPaint,
+            UiCommand::FillPaint,
+            UiCommand::InvertPaint,
+            UiCommand::GrowPaint,
+            UiCommand::ShrinkPaint,
+            UiCommand::ClearPaint,
         ] {
             ask.button(ui, command);
         }
     });
     ui.menu_button("Gauges", |ui| gauges_menu(ask, ui));
     ui.separator();
-    ask.button(ui, Command::Palette);
+    ask.button(ui, UiCommand::Palette);
 }
 
 fn view_menu(ask: &mut Ask<'_>, ui: &mut Ui) {
-    for command in [Command::Frame, Command::FramePicked] {
+    for command in [UiCommand::Frame, UiCommand::FramePicked] {
         ask.button(ui, command);
     }
     ui.separator();
     for command in [
-        Command::SeeThrough,
-        Command::Section,
-        Command::Unrolled,
-        Command::Jig,
+        UiCommand::SeeThrough,
+        UiCommand::Section,
+        UiCommand::Unrolled,
+        UiCommand::Jig,
     ] {
         ask.button(ui, command);
     }
     ui.separator();
     for preset in Preset::ALL {
-        ask.button(ui, Command::Look(preset));
+        ask.button(ui, UiCommand::Look(preset));
     }
     ui.separator();
     for command in [
-        Command::DarkLight,
-        Command::LargerText,
-        Command::SmallerText,
+        UiCommand::DarkLight,
+        UiCommand::LargerText,
+        UiCommand::SmallerText,
     ] {
         ask.button(ui, command);
     }

@@ -3,7 +3,7 @@
 use egui::{Align2, Context, Id, Key, Modal, RichText, ScrollArea, TextEdit, Ui};
 
 use super::ask::Ask;
-use super::commands::{Command, why_not};
+use super::commands::{UiCommand, why_not};
 
 /// The open palette.
 #[derive(Default)]
@@ -24,16 +24,16 @@ fn matches(query: &str, name: &str) -> bool {
 }
 
 /// Commands that a query finds: those that begin with it first, of those the shortest.
-fn found(query: &str) -> Vec<Command> {
+fn found(query: &str) -> Vec<UiCommand> {
     let wanted = query.trim().to_lowercase();
-    let rank = |c: &Command| {
+    let rank = |c: &UiCommand| {
         let name = c.name().to_lowercase();
         let length = if wanted.is_empty() { 0 } else { name.len() };
         (!name.starts_with(&wanted), length)
     };
-    let mut all: Vec<Command> = Command::all()
+    let mut all: Vec<UiCommand> = UiCommand::all()
         .into_iter()
-        .filter(|c| *c != Command::Palette && matches(query, c.name()))
+        .filter(|c| *c != UiCommand::Palette && matches(query, c.name()))
         .collect();
     all.sort_by_key(rank);
     all
@@ -53,7 +53,7 @@ pub fn show(palette: &mut Palette, ctx: &Context, ask: &mut Ask<'_>) -> bool {
     !modal.should_close()
 }
 
-fn rows(ask: &Ask<'_>, ui: &mut Ui, palette: &mut Palette) -> Option<Command> {
+fn rows(ask: &Ask<'_>, ui: &mut Ui, palette: &mut Palette) -> Option<UiCommand> {
     let input = ui.add(
         TextEdit::singleline(&mut palette.query)
             .hint_text("A command")
@@ -96,7 +96,7 @@ fn rows(ask: &Ask<'_>, ui: &mut Ui, palette: &mut Palette) -> Option<Command> {
 }
 
 /// One command with its key and what it does; whether it was clicked.
-fn row(ask: &Ask<'_>, ui: &mut Ui, command: Command, marked: bool, moved: bool) -> bool {
+fn row(ask: &Ask<'_>, ui: &mut Ui, command: UiCommand, marked: bool, moved: bool) -> bool {
     let mut button = egui::Button::selectable(marked, command.name())
         .min_size(egui::vec2(ui.available_width(), 0.0));
     if let Some(shortcut) = command.shortcut() {
@@ -121,9 +121,9 @@ mod tests {
     fn a_few_letters_find_a_command() {
         assert!(matches("slg", "Select gauges") && matches("SEL G", "Select gauges"));
         assert!(!matches("gs", "Select"));
-        assert_eq!(found("save")[0], Command::Save);
-        assert_eq!(found("inv")[0], Command::InvertPaint);
-        assert_eq!(found("").len(), Command::all().len() - 1);
+        assert_eq!(found("save")[0], UiCommand::Save);
+        assert_eq!(found("inv")[0], UiCommand::InvertPaint);
+        assert_eq!(found("").len(), UiCommand::all().len() - 1);
         assert!(found("xyzzy").is_empty());
     }
 }

@@ -6,7 +6,7 @@ use egui_plot::{Corner, HLine, Legend, Line, LineStyle, Plot, PlotPoints, PlotUi
 use super::action::Change;
 use super::ask::Ask;
 use super::by_force::{force_table, has_forces};
-use super::commands::Command;
+use super::commands::UiCommand;
 use super::paint::empty;
 use super::theme::{kept_colour, still};
 use super::view::{Tab, Tool};
@@ -413,7 +413,7 @@ pub fn gauge_table(ask: &mut Ask<'_>, ui: &mut Ui) {
         Some((k, Row::Add)) => ask.view.picked.push(k),
         Some((k, Row::Frame)) => {
             ask.view.picked = vec![k];
-            ask.command(Command::FramePicked);
+            ask.command(UiCommand::FramePicked);
         }
         Some((k, Row::Pin)) => {
             ask.view.picked = vec![k];

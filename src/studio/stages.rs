@@ -3,7 +3,7 @@
 use egui::{RichText, Ui};
 
 use super::ask::Ask;
-use super::commands::Command;
+use super::commands::UiCommand;
 use super::theme;
 use super::view::Stage;
 use super::words::live_in_words;
@@ -45,8 +45,8 @@ pub fn stages(ask: &mut Ask<'_>, ui: &mut Ui) {
             }
             ui.add_space(8.0);
             ask.edit_desk(|desk| {
-                ui.checkbox(&mut desk.follow, Command::Follow.name())
-                    .on_hover_text(Command::Follow.tooltip());
+                ui.checkbox(&mut desk.follow, UiCommand::Follow.name())
+                    .on_hover_text(UiCommand::Follow.tooltip());
             });
         });
 }
@@ -318,11 +318,11 @@ fn notes_of(session: &Session, ui: &mut Ui, stage: Stage) {
 }
 
 /// What to press at a stage.
-fn next_commands(stage: Stage) -> &'static [Command] {
+fn next_commands(stage: Stage) -> &'static [UiCommand] {
     match stage {
-        Stage::Simulation => &[Command::Simulate],
-        Stage::Selection => &[Command::Select, Command::Keep],
-        Stage::Report => &[Command::Export],
+        Stage::Simulation => &[UiCommand::Simulate],
+        Stage::Selection => &[UiCommand::Select, UiCommand::Keep],
+        Stage::Report => &[UiCommand::Export],
         _ => &[],
     }
 }

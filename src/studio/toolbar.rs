@@ -5,7 +5,7 @@ mod expected;
 use egui::{DragValue, Ui};
 
 use super::ask::Ask;
-use super::commands::Command;
+use super::commands::UiCommand;
 use super::scene::Scene;
 use super::view::{Field, Section, Tool};
 use crate::document::Layer;
@@ -42,25 +42,25 @@ pub fn toolbar(ask: &mut Ask<'_>, scene: &Scene, ui: &mut Ui) {
             ui.spacing_mut().item_spacing.y = 4.0;
             ui.horizontal_wrapped(|ui| {
                 for tool in Tool::ALL {
-                    ask.toggle(ui, Command::Tool(tool));
+                    ask.toggle(ui, UiCommand::Tool(tool));
                 }
                 ui.separator();
                 field_controls(ask, scene, ui);
             });
             ui.horizontal_wrapped(|ui| {
                 for command in [
-                    Command::SeeThrough,
-                    Command::Section,
-                    Command::Unrolled,
-                    Command::Jig,
+                    UiCommand::SeeThrough,
+                    UiCommand::Section,
+                    UiCommand::Unrolled,
+                    UiCommand::Jig,
                 ] {
                     ask.toggle(ui, command);
                 }
                 ui.separator();
                 for preset in Preset::ALL {
-                    ask.toggle(ui, Command::Look(preset));
+                    ask.toggle(ui, UiCommand::Look(preset));
                 }
-                ask.toggle(ui, Command::Frame);
+                ask.toggle(ui, UiCommand::Frame);
             });
         });
 }
@@ -108,12 +108,12 @@ fn gauge_controls(ask: &mut Ask<'_>, ui: &mut Ui) {
     let all = ask.project().selection.sites.len();
     ui.label(format!("{all} gauges, {} picked", ask.view.picked.len()));
     ui.horizontal(|ui| {
-        ask.toggle(ui, Command::Pin);
-        ask.toggle(ui, Command::RemoveGauges);
+        ask.toggle(ui, UiCommand::Pin);
+        ask.toggle(ui, UiCommand::RemoveGauges);
     });
     ui.horizontal(|ui| {
-        ask.toggle(ui, Command::AddHelpful);
-        ask.toggle(ui, Command::FindSpare);
+        ask.toggle(ui, UiCommand::AddHelpful);
+        ask.toggle(ui, UiCommand::FindSpare);
     });
 }
 
@@ -153,11 +153,11 @@ fn paint_controls(ask: &mut Ask<'_>, ui: &mut Ui) {
     }
     ui.horizontal_wrapped(|ui| {
         for command in [
-            Command::FillPaint,
-            Command::InvertPaint,
-            Command::GrowPaint,
-            Command::ShrinkPaint,
-            Command::ClearPaint,
+            UiCommand::FillPaint,
+            UiCommand::InvertPaint,
+            UiCommand::GrowPaint,
+            UiCommand::ShrinkPaint,
+            UiCommand::ClearPaint,
         ] {
             ask.toggle(ui, command);
         }

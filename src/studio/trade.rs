@@ -5,7 +5,7 @@ use egui_plot::{GridMark, Line, Plot, PlotPoint, PlotPoints, PlotTransform, Poin
 
 use super::action::Change;
 use super::ask::Ask;
-use super::commands::Command;
+use super::commands::UiCommand;
 use super::paint::empty;
 use super::theme;
 use crate::session::{Promise, Task};
@@ -158,7 +158,7 @@ fn trade_side(ask: &mut Ask<'_>, dial: &mut Dial, ui: &mut Ui, drawn: &[Drawn]) 
         let button = ui.add_enabled(!running, egui::Button::new("Measure the trade"));
         let button = button.on_hover_text("Runs this project at many settings on this machine, in the background; ended on the way, it keeps what it has");
         if button.clicked() {
-            ask.command(Command::MeasureTrade);
+            ask.command(UiCommand::MeasureTrade);
         }
         let name = ui.label("settings");
         ui.add(DragValue::new(&mut dial.count).range(8..=400))

@@ -2,7 +2,7 @@
 
 use super::{Knob, Point, Setting, front, knobs};
 use crate::budget::Quality;
-use crate::project::{Elements, PartModel, Project};
+use crate::project::{ElementKind, PartModel, Project};
 
 /// Repeats of the centre with other seeds: what an error moves by when nothing is turned.
 const REPEATS: u64 = 3;
@@ -119,7 +119,7 @@ impl<'a> Sweep<'a> {
             return true;
         };
         let there = |count: usize, usual: usize| count < 2 * project.touch.count || count <= usual;
-        let own = project.part.elements == Elements::AsGiven;
+        let own = project.part.elements == ElementKind::AsGiven;
         let counted = project.candidates.count.is_some();
         (project.part.model == PartModel::Shell || !spent.as_solid)
             && there(spent.touches, usual.touches)

@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::DVec3;
-use hapdef::budget::{Elements, unwatched};
+use hapdef::budget::{ElementBudget, unwatched};
 use hapdef::elasticity::estimate::under_load;
-use hapdef::elasticity::grade::{Graded, Ground};
+use hapdef::elasticity::grade::{Graded, ShellGround};
 use hapdef::elasticity::observe::Face;
-use hapdef::elasticity::support::Region;
+use hapdef::elasticity::support::HeldRegion;
 use hapdef::elasticity::{DofSet, Model as _, Section, ShellModel, Support, Touch};
 use hapdef::mesh::{SurfacePoint, TriMesh};
 
@@ -104,7 +104,7 @@ impl Disc {
         let edge = self.clear * (1.0 - 1e-9);
         let mask = self.part.positions().iter().map(|p| p.length() > edge);
         Support {
-            region: Region::Vertices(Arc::new(mask.collect())),
+            region: HeldRegion::Vertices(Arc::new(mask.collect())),
             held: DofSet::ALL,
         }
     }
@@ -166,8 +166,8 @@ impl Disc {
             .collect()
     }
 
-    pub fn graded(&self, aim: &Elements, as_given: bool) -> Graded {
-        let ground = Ground::new(&self.part, self.section, &[self.support()], as_given);
+    pub fn graded(&self, aim: &ElementBudget, as_given: bool) -> Graded {
+        let ground = ShellGround::new(&self.part, self.section, &[self.support()], as_given);
         ground
             .grade(&[self.touch], &Self::places(), aim, &unwatched)
             .unwrap()
@@ -182,8 +182,8 @@ impl Disc {
     }
 }
 
-pub fn aim(vertices: usize, passes: usize) -> Elements {
-    Elements {
+pub fn aim(vertices: usize, passes: usize) -> ElementBudget {
+    ElementBudget {
         vertices,
         most_vertices: vertices,
         effort: usize::MAX,

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
-use hapdef::budget::{Elements, unwatched};
+use hapdef::budget::{ElementBudget, unwatched};
 use hapdef::elasticity::estimate::Discretization;
 use hapdef::elasticity::grade;
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::solid::SolidModel;
 use hapdef::elasticity::solid::ground::SolidGround;
 use hapdef::elasticity::solid::immersed::{Fineness, Immersed};
-use hapdef::elasticity::support::Region;
+use hapdef::elasticity::support::HeldRegion;
 use hapdef::elasticity::{DofSet, Material, Model as _, Support, Touch};
 use hapdef::given::GivenSite;
 use hapdef::io::points::{read_sites, read_touches};
@@ -73,7 +73,7 @@ pub fn tube(inner: f64, outer: f64, length: f64, n: u32) -> Arc<TriMesh> {
 /// All displacements held in a box.
 pub fn clamp(lower: DVec3, upper: DVec3) -> Support {
     Support {
-        region: Region::Box(OrientedBox::of_file(lower, upper)),
+        region: HeldRegion::Box(OrientedBox::of_file(lower, upper)),
         held: DofSet::ALL,
     }
 }
@@ -290,7 +290,7 @@ fn slotted_shell(wall: f64, vertices: usize) -> Readings {
     inputs.project.part.thickness_mm = wall * 1e3;
     let (touches, sites) = slotted_places();
     let supports = inputs.project.supports(&inputs.masks).unwrap();
-    let ground = grade::Ground::new(&inputs.part, inputs.project.section(), &supports, false);
+    let ground = grade::ShellGround::new(&inputs.part, inputs.project.section(), &supports, false);
     let m = ground.model(&ground.even(vertices), &unwatched).unwrap();
     let loads: Vec<_> = touches.iter().map(|t| m.load(t)).collect();
     let at: Vec<_> = sites
@@ -348,7 +348,7 @@ pub fn slotted(cells_mm: f64, order: usize) -> Found {
 }
 
 /// The same as a design at a quality computes it, with what that says of its own error.
-pub fn slotted_graded(aim: &Elements) -> (Found, Discretization) {
+pub fn slotted_graded(aim: &ElementBudget) -> (Found, Discretization) {
     let wall = 3e-3;
     let inputs = super::slotted::inputs();
     let (touches, sites) = slotted_places();

@@ -8,7 +8,7 @@ use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::design::{self, Inputs, Simulated};
 use hapdef::mesh::TriMesh;
 use hapdef::placement::{Selection, SelectorKind, greedy_svr, margin};
-use hapdef::project::Elements;
+use hapdef::project::ElementKind;
 
 const CHANGE: f64 = 1e-6;
 
@@ -137,7 +137,7 @@ fn cases(base: &Inputs) -> Vec<(&'static str, Inputs)> {
 #[test]
 fn a_millionth_changes_no_pick_that_leads() {
     let mut base = limb();
-    base.project.part.elements = Elements::AsGiven;
+    base.project.part.elements = ElementKind::AsGiven;
     let (simulated, selections) = selected(&base);
     assert_eq!(design::model_tolerance(&base, &simulated), 0.0);
     for (what, inputs) in cases(&base) {

@@ -6,7 +6,7 @@ use crate::bench;
 use bench::hexes::{Bricks, ends};
 use bench::solids::clamp;
 use glam::DVec3;
-use hapdef::budget::{Elements, Quality, unwatched};
+use hapdef::budget::{ElementBudget, Quality, unwatched};
 use hapdef::elasticity::estimate::{self, Sample};
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::respond::{self, Reading, gives_way, respond_from};
@@ -230,7 +230,7 @@ fn estimates_of_solids_are_of_the_size_of_the_error() {
 }
 
 /// What cells come to is told from the first of them: how large they are, what they take and how far off they are.
-fn are_foreseen(case: &Case, ground: &SolidGround, aim: &Elements, graded: &SolidGraded) {
+fn are_foreseen(case: &Case, ground: &SolidGround, aim: &ElementBudget, graded: &SolidGraded) {
     let (touches, places) = (&case.touches, &case.places);
     let foreseen = ground.foresee(touches, places, touches.len(), aim, &unwatched);
     let foreseen = foreseen.unwrap();
@@ -296,8 +296,8 @@ fn own(case: &Case, side_mm: f64) -> SolidGround {
 }
 
 /// As good a displacement as asked for (%).
-fn asking(percent: f64) -> Elements {
-    Elements {
+fn asking(percent: f64) -> ElementBudget {
+    ElementBudget {
         displacement_percent: percent,
         strain_percent: f64::INFINITY,
         ..Quality::Draft.budget().elements

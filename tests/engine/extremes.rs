@@ -19,7 +19,7 @@ use hapdef::io::artifacts::{self, Provenance};
 use hapdef::io::report;
 use hapdef::mesh::TriMesh;
 use hapdef::placement::SelectorKind;
-use hapdef::project::{Elements, Lattice, Masks, Project, SupportKeys, SupportKind};
+use hapdef::project::{ElementKind, Lattice, Masks, Project, SupportKeys, SupportKind};
 
 fn budget() -> Budget {
     Budget {
@@ -190,7 +190,7 @@ fn the_same_limb_at_a_micrometre_and_at_a_metre() {
     // triangles, for remeshing takes other turns where two choices are equal.
     let limb = || {
         let mut inputs = limb();
-        inputs.project.part.elements = Elements::AsGiven;
+        inputs.project.part.elements = ElementKind::AsGiven;
         inputs
     };
     let base = sound("limb", &limb());

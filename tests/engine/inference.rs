@@ -10,7 +10,7 @@ use hapdef::design::{self, Inputs, Sensing, Workshop};
 use hapdef::elasticity::Touch;
 use hapdef::inference::calibration::noise_of_mean;
 use hapdef::inference::{
-    Errors, Features, Known, Lessons, Matching, Trained, calibrate, cramer_rao,
+    AsGlued, Errors, Features, Known, Lessons, Matching, Trained, calibrate, cramer_rao,
 };
 use hapdef::live::{Health, Input, Pipeline, Receiver, Update};
 use hapdef::regression::Hyper;
@@ -151,10 +151,10 @@ fn the_trained_ones_learn() {
 fn known_touches_show_how_gauges_are_glued() {
     let lab = lab();
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let glued: Vec<[f64; 4]> = (0..lab.sensing.gauges.len())
+    let glued: Vec<AsGlued> = (0..lab.sensing.gauges.len())
         .map(|_| {
             let mut draw = |s: f64| s * (2.0 * rng.random::<f64>() - 1.0);
-            [1.0 + draw(0.05), draw(1.0), draw(1.0), draw(4.0)]
+            [1.0 + draw(0.05), draw(1.0), draw(1.0), draw(4.0)].into()
         })
         .collect();
     let real = lab.sensing.drawn.glued(&glued);

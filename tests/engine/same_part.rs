@@ -7,9 +7,9 @@ use std::sync::Arc;
 use glam::DVec3;
 use hapdef::budget::{Budget, Limits, Quality, unwatched};
 use hapdef::design::{self, Inputs};
-use hapdef::elasticity::grade::Ground;
+use hapdef::elasticity::grade::ShellGround;
 use hapdef::elasticity::solid::ground::SolidGround;
-use hapdef::elasticity::support::Region;
+use hapdef::elasticity::support::HeldRegion;
 use hapdef::elasticity::{DofSet, ElasticError, Material, Section, Support, Touch};
 use hapdef::given::{self, GivenSite};
 use hapdef::io::mesh_file::read_mesh;
@@ -247,7 +247,7 @@ fn the_same_part_is_touched_at_the_same_places() {
 fn lower_hoop(positions: &[DVec3]) -> Support {
     let mask = positions.iter().map(|p| p.z < 8.001e-3).collect();
     Support {
-        region: Region::Vertices(Arc::new(mask)),
+        region: HeldRegion::Vertices(Arc::new(mask)),
         held: DofSet::ALL,
     }
 }
@@ -258,7 +258,7 @@ fn a_mask_holds_the_same_places_in_any_order() {
         let (positions, triangles) = reordered(&tube().0, seed);
         let (part, _) = TriMesh::new(&positions, &triangles, 0).unwrap();
         let support = lower_hoop(part.positions());
-        let ground = Ground::new(&Arc::new(part), SECTION, &[support], false);
+        let ground = ShellGround::new(&Arc::new(part), SECTION, &[support], false);
         assert!(ground.check_held().is_ok());
         let remeshed = ground.even(500);
         for remeshed in [ground.halved(&remeshed), remeshed] {
@@ -292,7 +292,7 @@ fn a_solid_answers_the_same_in_any_order() {
         let is_foot = |p: &DVec3| p.z - off.z < 1e-9;
         let mask = part.positions().iter().map(is_foot).collect();
         let foot = Support {
-            region: Region::Vertices(Arc::new(mask)),
+            region: HeldRegion::Vertices(Arc::new(mask)),
             held: DofSet::ALL,
         };
         let told = |_: DVec3| None;
@@ -327,10 +327,10 @@ fn what_is_not_held_is_told_where_the_part_lies() {
     let (part, _) = TriMesh::new(&positions, tube.triangles(), 0).unwrap();
     let part = Arc::new(part);
     let beside = Support {
-        region: Region::Box(OrientedBox::of_file(DVec3::ZERO, DVec3::ONE)),
+        region: HeldRegion::Box(OrientedBox::of_file(DVec3::ZERO, DVec3::ONE)),
         held: DofSet::ALL,
     };
-    let ground = Ground::new(&part, SECTION, &[beside], false);
+    let ground = ShellGround::new(&part, SECTION, &[beside], false);
     let Err(ElasticError::NothingHeld { lower, upper }) = ground.check_held() else {
         panic!("nothing holds it");
     };

@@ -11,7 +11,7 @@ use glam::{DQuat, DVec3};
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::solid::SolidModel;
 use hapdef::elasticity::solid::immersed::Fineness;
-use hapdef::elasticity::support::Region;
+use hapdef::elasticity::support::HeldRegion;
 use hapdef::elasticity::{DofSet, Material, Model as _, Support, Touch};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::oriented_box::OrientedBox;
@@ -155,7 +155,7 @@ fn mirror(axis: usize) -> Support {
     upper[axis] = 1e-9;
     lower[axis] = -1e-9;
     Support {
-        region: Region::Box(OrientedBox::of_file(lower, upper)),
+        region: HeldRegion::Box(OrientedBox::of_file(lower, upper)),
         held: DofSet::symmetry(axis),
     }
 }
@@ -280,7 +280,7 @@ fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
             let part = part(turn);
             let stance = Stance::about(turn(DVec3::Z));
             let region = |lower, upper| {
-                Region::Box(OrientedBox {
+                HeldRegion::Box(OrientedBox {
                     stance,
                     lower,
                     upper,
@@ -293,7 +293,7 @@ fn a_box_that_is_turned_with_the_part_holds_it_as_one_by_the_grid_does() {
             let foot = held(region(DVec3::NEG_ONE, DVec3::new(1.0, 1.0, top)));
             // Another box lies along the file's axes within what the foot holds: cells stand as that one does.
             let middle = turn(DVec3::new(at.y, at.y, 0.0));
-            let another = held(Region::Box(OrientedBox::of_file(
+            let another = held(HeldRegion::Box(OrientedBox::of_file(
                 middle - 1e-3,
                 middle + 1e-3,
             )));
@@ -373,7 +373,7 @@ fn an_edge_and_a_corner_hold_a_solid_too() {
         .map(|p| at_head(p) && p.y > 0.5 * side)
         .collect();
     let held = |mask: &[bool]| Support {
-        region: Region::Vertices(std::sync::Arc::new(mask.to_vec())),
+        region: HeldRegion::Vertices(std::sync::Arc::new(mask.to_vec())),
         held: DofSet::DISPLACEMENTS,
     };
     let touch = Touch {

@@ -308,7 +308,7 @@ fn what_bounds_the_elements_is_what_is_to_be_changed() {
         "{limited}"
     );
     let as_given = said(Quality::Draft, &|p| {
-        p.part.elements = hapdef::project::Elements::AsGiven;
+        p.part.elements = hapdef::project::ElementKind::AsGiven;
     });
     assert!(
         as_given.contains("part.elements = \"graded\""),

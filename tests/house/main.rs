@@ -4,5 +4,6 @@
 mod arrows;
 mod figures;
 mod layers;
+mod names;
 mod repeats;
 mod source;

@@ -42,7 +42,11 @@ fn script(path: &Path, places: &[DVec3], force: f64) {
 }
 
 fn record(script: &Path, recording: &Path, seed: &str) {
-    hapdef(&[
+    record_with(script, recording, seed, &[]);
+}
+
+fn record_with(script: &Path, recording: &Path, seed: &str, more: &[&str]) {
+    let mut arguments = vec![
         "board",
         "--simulate",
         "--quality",
@@ -57,8 +61,9 @@ fn record(script: &Path, recording: &Path, seed: &str) {
         script.to_str().unwrap(),
         "--record",
         recording.to_str().unwrap(),
-    ])
-    .unwrap();
+    ];
+    arguments.extend(more);
+    hapdef(&arguments).unwrap();
 }
 
 /// Mean distance (mm) of what is found in a recording from where it was pressed.
@@ -155,4 +160,63 @@ fn presses_by_hand_show_how_gauges_are_glued() {
         why.contains("takes 4 presses") && !at("few.hapdef.toml").exists(),
         "{why}"
     );
+}
+
+/// A limb that was printed thicker, or of softer nylon, than its project says.
+#[test]
+fn presses_say_how_stiff_and_how_thick_the_part_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    hapdef(&["limb", "--out", folder.path().to_str().unwrap()]).unwrap();
+    let drawn = std::fs::read_to_string(at("limb.hapdef.toml")).unwrap();
+    script(&at("known.csv"), &places(16, 0.0), 10.0);
+    let fitted = |name: &str, made: &str, fit: &str| -> Value {
+        assert_ne!(made, drawn);
+        let printed = at(&format!("{name}.hapdef.toml"));
+        std::fs::write(&printed, made).unwrap();
+        let recording = at(&format!("{name}.hapdrec"));
+        record_with(
+            &at("known.csv"),
+            &recording,
+            "4",
+            &[printed.to_str().unwrap()],
+        );
+        let project = at("limb.hapdef.toml");
+        let said = hapdef(&[
+            "calibrate",
+            "--recording",
+            recording.to_str().unwrap(),
+            "--presses",
+            at("known.csv").to_str().unwrap(),
+            "--project",
+            project.to_str().unwrap(),
+            "--quality",
+            "draft",
+            "--machine",
+            "--fit",
+            fit,
+            "--json",
+            "--out",
+            at("fitted.hapdef.toml").to_str().unwrap(),
+        ]);
+        println!("{name}: {said:?}");
+        serde_json::from_str(&said.unwrap()).unwrap()
+    };
+    let within = |found: &Value, right: f64, share: f64| {
+        let value = found["value"].as_f64().unwrap();
+        assert!((value / right - 1.0).abs() < share, "{value} for {right}");
+        assert!(found["deviation"].as_f64().unwrap() < share * right);
+    };
+    let thick = drawn.replace("thickness_mm = 1.5 ", "thickness_mm = 1.7 ");
+    let found = fitted("thick", &thick, "thickness");
+    within(&found["thickness_mm"], 1.7, 0.05);
+    let saved = std::fs::read_to_string(at("fitted.hapdef.toml")).unwrap();
+    assert!(saved.contains("youngs_modulus_gpa = 1.7 ") && !saved.contains("thickness_mm = 1.5 "));
+
+    let soft = drawn.replace("youngs_modulus_gpa = 1.7 ", "youngs_modulus_gpa = 1.2 ");
+    let found = fitted("soft", &soft, "stiffness");
+    within(&found["youngs_modulus_gpa"], 1.2, 0.05);
+    assert!(found["thickness_mm"].is_null());
+    let saved = std::fs::read_to_string(at("fitted.hapdef.toml")).unwrap();
+    assert!(saved.contains("thickness_mm = 1.5 ") && !saved.contains("youngs_modulus_gpa = 1.7 "));
 }

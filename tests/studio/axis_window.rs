@@ -8,7 +8,7 @@ use glam::DVec3;
 use hapdef::mesh::stance::Direction;
 use hapdef::mesh::unroll::Axis;
 use hapdef::project::PartAxis;
-use hapdef::studio::Command;
+use hapdef::studio::UiCommand;
 use window::Window;
 
 #[test]
@@ -31,7 +31,7 @@ fn views_follow_the_axis_of_the_part() {
     // Where lengths are off the unrolled view is hatched: about a wrong axis everywhere.
     w.session_mut().document.state.project.part.axis = PartAxis::Auto;
     let ctx = w.harness.ctx.clone();
-    w.harness.state_mut().execute(&ctx, Command::Unrolled);
+    w.harness.state_mut().execute(&ctx, UiCommand::Unrolled);
     w.harness.run_ok();
     let kept = w.picture();
     w.session_mut().document.state.project.part.axis = PartAxis::Coordinate(Axis::X);
@@ -45,7 +45,7 @@ fn views_follow_the_axis_of_the_part() {
 fn sections_mirrors_and_new_boxes_follow_the_axis_of_the_part() {
     let mut w = Window::open();
     let ctx = w.harness.ctx.clone();
-    w.harness.state_mut().execute(&ctx, Command::Section);
+    w.harness.state_mut().execute(&ctx, UiCommand::Section);
     w.harness.state_mut().view.mirror = Some(Direction::Right);
     w.stage("Supports");
     let oblique = DVec3::new(0.5, 0.8, 0.6);
@@ -89,7 +89,7 @@ fn an_example_goes_by_its_own_name() {
     for example in Example::ALL {
         // The first of them is open.
         if example != Example::Tube {
-            let open = Command::Example(example);
+            let open = UiCommand::Example(example);
             w.harness.state_mut().execute(&ctx, open);
         }
         w.wait("the example", 60, |s| {

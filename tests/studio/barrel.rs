@@ -180,11 +180,11 @@ fn both_examples_open_and_their_meshes_go_where_they_are_saved() {
 #[cfg(feature = "studio")]
 #[test]
 fn the_window_opens_the_barrel_as_an_example() {
-    use hapdef::studio::Command;
+    use hapdef::studio::UiCommand;
 
     let mut w = window::Window::open();
     let ctx = w.harness.ctx.clone();
-    let barrel = Command::Example(Example::Barrel);
+    let barrel = UiCommand::Example(Example::Barrel);
     w.harness.state_mut().execute(&ctx, barrel);
     w.wait("the barrel", 60, |s| {
         s.session.document.mesh_path == Path::new("barrel.glb")

@@ -14,7 +14,7 @@ use hapdef::budget::Quality;
 use hapdef::document::{Brush, Layer};
 use hapdef::placement::{LostBy, SelectorKind};
 use hapdef::project::SelectionKeys;
-use hapdef::studio::{Command, Field, Studio};
+use hapdef::studio::{Field, Studio, UiCommand};
 use image::RgbaImage;
 use window::Window;
 
@@ -605,7 +605,7 @@ fn the_jig_is_drawn_in_the_limb_while_it_is_asked_for() {
 #[test]
 fn one_key_adds_the_gauge_that_helps_most() {
     let w = Window::open();
-    assert!(!w.harness.state().enabled(Command::AddHelpful));
+    assert!(!w.harness.state().enabled(UiCommand::AddHelpful));
     drop(w);
     let mut w = simulated();
     w.press("Gauges");
@@ -624,7 +624,7 @@ fn one_key_adds_the_gauge_that_helps_most() {
 #[test]
 fn one_key_finds_the_gauge_that_helps_least() {
     let w = Window::open();
-    assert!(!w.harness.state().enabled(Command::FindSpare));
+    assert!(!w.harness.state().enabled(UiCommand::FindSpare));
     drop(w);
     let mut w = simulated();
     let sites = gauges(&w);

@@ -46,11 +46,21 @@ impl Row {
     }
 }
 
+/// What was found of the part, each with its standard deviation; nothing of what was not asked for.
+#[derive(Default)]
+pub struct OfPart {
+    /// Readings over those of the model, common to all gauges.
+    pub factor: Option<[f64; 2]>,
+    pub youngs_modulus_gpa: Option<[f64; 2]>,
+    pub thickness_mm: Option<[f64; 2]>,
+}
+
 /// What was found.
 pub struct Summary {
     pub rows: Vec<Row>,
     pub calibration: Calibration,
     pub outlook: Outlook,
+    pub of_part: OfPart,
 }
 
 impl Summary {
@@ -80,6 +90,8 @@ impl Summary {
                 "unknown_percent": percent,
                 "worth_more": worth,
                 "next_mm": next,
+                "youngs_modulus_gpa": self.of_part.youngs_modulus_gpa.map(with_deviation),
+                "thickness_mm": self.of_part.thickness_mm.map(with_deviation),
             });
             return out::line(&summary.to_string());
         }
@@ -102,8 +114,20 @@ impl Summary {
                 p.x, p.y, p.z
             ))?;
         }
+        for (what, found, unit) in [
+            ("Young's modulus", self.of_part.youngs_modulus_gpa, "GPa"),
+            ("the wall's thickness", self.of_part.thickness_mm, "mm"),
+        ] {
+            if let Some([value, deviation]) = found {
+                out::line(&format!("{what}: {value:.3} ± {deviation:.3} {unit}"))?;
+            }
+        }
         out::line(&format!("saved in {}", target.display()))
     }
+}
+
+fn with_deviation([value, deviation]: [f64; 2]) -> Value {
+    json!({"value": rounded(value), "deviation": rounded(deviation)})
 }
 
 fn rounded(value: f64) -> f64 {

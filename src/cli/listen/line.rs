@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::dataset::SignalMatrix;
 use crate::inference::{Contact, Kind};
 use crate::learning::TouchEstimator;
-use crate::live::{Estimator, Guess, Update};
+use crate::live::{Guess, ShownEstimator, Update};
 
 /// Where nothing touches.
 const NOTHING: &str = "\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":null,\"fx_n\":null,\"fy_n\":null,\"fz_n\":null,\"uncertainty_mm\":null";
@@ -13,13 +13,13 @@ const NOTHING: &str = "\"x_mm\":null,\"y_mm\":null,\"z_mm\":null,\"force_n\":nul
 /// Of the touch by one of the estimators. Nulls where nothing touches. `uncertainty_mm` is the radius within which a touch lies with a probability of 90 %;
 /// `force_n` presses straight in, and `fx_n`, `fy_n` and `fz_n` are all of the force. Of several touches, the hardest stands
 /// first and by itself; `count` is null where it is not clear what touches.
-pub(super) fn of(update: &Update, estimator: Estimator) -> String {
+pub(super) fn of(update: &Update, estimator: ShownEstimator) -> String {
     let mut line = format!("{{\"t_us\":{},", update.time_us);
     let guess = update
         .by(estimator)
-        .filter(|_| estimator != Estimator::Matching);
+        .filter(|_| estimator != ShownEstimator::Matching);
     match (&update.contact, guess) {
-        (Some(contact), _) if estimator == Estimator::Matching => touch(&mut line, contact),
+        (Some(contact), _) if estimator == ShownEstimator::Matching => touch(&mut line, contact),
         (_, Some(guess)) => guessed(&mut line, &guess),
         _ => line.push_str(NOTHING),
     }

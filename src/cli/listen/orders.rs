@@ -6,7 +6,7 @@ use std::sync::mpsc::Sender;
 
 use serde::Deserialize;
 
-use crate::link::Command;
+use crate::link::ListenerCommand;
 use crate::plain;
 
 /// The longest line that may be an order.
@@ -23,12 +23,12 @@ struct Json {
 ///
 /// # Errors
 /// Why it is no order, with what is one.
-pub fn order(line: &str) -> Result<Option<Command>, String> {
+pub fn order(line: &str) -> Result<Option<ListenerCommand>, String> {
     let line = line.trim();
     let json = serde_json::from_str::<Json>(line).ok();
     match json.as_ref().map_or(line, |json| json.command.as_str()) {
         "" => Ok(None),
-        "t" | "tare" => Ok(Some(Command::Tare)),
+        "t" | "tare" => Ok(Some(ListenerCommand::Tare)),
         _ => Err(format!(
             "{} is no order: write “tare” to take the rest again",
             plain::quote(line)
@@ -101,7 +101,7 @@ impl Client {
 }
 
 /// Takes orders from standard input as long as there is one.
-pub fn from_stdin(commands: Sender<Command>, say: fn(&str)) {
+pub fn from_stdin(commands: Sender<ListenerCommand>, say: fn(&str)) {
     let listen = move || {
         let mut lines = Lines::default();
         let mut buffer = [0; 1024];
@@ -159,7 +159,10 @@ mod tests {
     #[test]
     fn orders_are_few_and_the_rest_is_refused_with_what_is_one() {
         for text in ["t", " tare ", r#"{"command":"tare"}"#] {
-            assert!(matches!(order(text), Ok(Some(Command::Tare))), "{text}");
+            assert!(
+                matches!(order(text), Ok(Some(ListenerCommand::Tare))),
+                "{text}"
+            );
         }
         assert!(matches!(order("  "), Ok(None)));
         for text in [

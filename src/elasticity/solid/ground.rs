@@ -1,5 +1,6 @@
 //! A closed part ready to be computed as a solid: its faces told apart, and cells sized for its walls.
 
+mod foresee;
 mod foreseen;
 mod graded;
 mod own;

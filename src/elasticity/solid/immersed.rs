@@ -14,7 +14,7 @@ use super::{Elements, SolidModel};
 use crate::bounds::Bounds;
 use crate::budget::Watch;
 use crate::elasticity::error::ElasticError;
-use crate::elasticity::support::{HeldPart, Region};
+use crate::elasticity::support::{HeldPart, HeldRegion};
 use crate::elasticity::{DofSet, Material, Support};
 use crate::mesh::TriMesh;
 use crate::mesh::cut::ON_PLANE;
@@ -147,8 +147,8 @@ impl Immersed {
     fn stance(&self) -> Stance {
         let boxes = || {
             (self.supports.iter()).filter_map(|support| match &support.region {
-                Region::Box(held) => Some(held),
-                Region::Vertices(_) => None,
+                HeldRegion::Box(held) => Some(held),
+                HeldRegion::Vertices(_) => None,
             })
         };
         let upright = boxes().any(|held| held.along_axes().is_some());
@@ -334,7 +334,7 @@ impl Immersed {
                 continue;
             }
             self.spring(&mut grip, cells, number, held, size);
-            if let (Region::Box(region), DofSet::DISPLACEMENTS) = (&support.region, held) {
+            if let (HeldRegion::Box(region), DofSet::DISPLACEMENTS) = (&support.region, held) {
                 self.spring_across(&mut grip, cells, region, size);
             }
         }
@@ -364,8 +364,8 @@ const PIECES_OF_CELL: f64 = 4.0;
 /// the surface in it, and where its faces go through the part, by springs: cells that it goes through would hold a staircase.
 fn along_planes(support: &Support, stance: Stance) -> Option<(DVec3, DVec3)> {
     match &support.region {
-        Region::Box(held) => held.along(stance),
-        Region::Vertices(_) => None,
+        HeldRegion::Box(held) => held.along(stance),
+        HeldRegion::Vertices(_) => None,
     }
 }
 
@@ -376,7 +376,7 @@ fn hold_box(
     support: &Support,
     fineness: &Fineness,
 ) -> bool {
-    let Region::Box(held) = support.region else {
+    let HeldRegion::Box(held) = support.region else {
         return false;
     };
     let slack = 1e-9 * fineness.size;

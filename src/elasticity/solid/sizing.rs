@@ -1,6 +1,6 @@
 //! How large the cells of a solid may be, and how small a budget lets them become.
 
-use crate::budget::Elements;
+use crate::budget::ElementBudget;
 
 /// Each next cells over the last.
 pub const FINER: f64 = 1.0 / 1.5;
@@ -76,7 +76,7 @@ impl Shape {
 
     /// Size of the smallest cells (m) that a budget allows for so many touches.
     #[must_use]
-    pub fn least(&self, aim: &Elements, touches: usize) -> f64 {
+    pub fn least(&self, aim: &ElementBudget, touches: usize) -> f64 {
         let allowed = UNKNOWNS_A_VERTEX * aim.most_for(touches) as f64;
         self.size_for(allowed.min(MOST_UNKNOWNS))
     }

@@ -51,15 +51,13 @@ fn somewhere(rng: &mut ChaCha8Rng) -> SurfacePoint {
 }
 
 /// Gauges as a workshop glues them.
-fn built(gluing: &Gluing, rng: &mut ChaCha8Rng) -> Vec<[f64; 4]> {
+fn built(gluing: &Gluing, rng: &mut ChaCha8Rng) -> Vec<AsGlued> {
     let place = gluing.place * 1e3 / 2.0_f64.sqrt();
-    let gauge = |_| {
-        [
-            1.0 + gluing.gain * normal(rng),
-            place * normal(rng),
-            place * normal(rng),
-            gluing.angle.to_degrees() * normal(rng),
-        ]
+    let gauge = |_| AsGlued {
+        gain: 1.0 + gluing.gain * normal(rng),
+        along_mm: place * normal(rng),
+        across_mm: place * normal(rng),
+        turned_degrees: gluing.angle.to_degrees() * normal(rng),
     };
     (0..CHANNELS).map(gauge).collect()
 }
@@ -88,7 +86,7 @@ fn what_is_integrated_out_is_what_would_be_solved_for() {
     let known: Vec<Known> = (0..3)
         .map(|_| press(&real, &off.pressing, &mut rng))
         .collect();
-    let glued = [[1.0, 0.0, 0.0, 0.0]; CHANNELS];
+    let glued = [AsGlued::DRAWN; CHANNELS];
     let presses: Vec<Press> = (known.iter())
         .map(|k| Press::new(&drawn, k, &glued, &off))
         .collect();
@@ -131,7 +129,7 @@ fn what_is_integrated_out_is_what_would_be_solved_for() {
 fn no_presses_leave_everything_as_it_was() {
     let (drawn, off) = (drawn(), off());
     let found = calibrate(&drawn, &[], &NOISE, &off);
-    assert_eq!(found.glued, [[1.0, 0.0, 0.0, 0.0]; CHANNELS]);
+    assert_eq!(found.glued, [AsGlued::DRAWN; CHANNELS]);
     assert!((found.relative - off.elements).abs() < 1e-6);
     let before = drawn.deviations(&off).all;
     let after = drawn.deviations_of(&found.doubts, &off).all;
@@ -193,14 +191,17 @@ fn a_machine_finds_a_part_that_is_softer() {
         ..off()
     };
     let mut rng = ChaCha8Rng::seed_from_u64(7);
-    let softer = [[1.1, 0.0, 0.0, 0.0]; CHANNELS];
+    let softer = [AsGlued {
+        gain: 1.1,
+        ..AsGlued::DRAWN
+    }; CHANNELS];
     let real = drawn.glued(&softer);
     let known: Vec<Known> = (0..12)
         .map(|_| press(&real, &off.pressing, &mut rng))
         .collect();
     let found = calibrate(&drawn, &known, &NOISE, &off);
     // Part of what the part is softer by may be told as gauges that lie elsewhere: what counts is what is read.
-    let gain = found.glued.iter().map(|g| g[0]).sum::<f64>() / CHANNELS as f64;
+    let gain = found.glued.iter().map(|g| g.gain).sum::<f64>() / CHANNELS as f64;
     assert!((gain - 1.1).abs() < 0.03, "{:?}", found.glued);
     let fitted = drawn.calibrated(&found);
     let apart = |map: &ResponseMap, at| -> f64 {
@@ -261,6 +262,37 @@ fn what_all_gauges_feel_of_a_tip_is_not_taken_for_gluing() {
     assert!(apart[0] < 0.8 * apart[1], "{apart:?}");
 }
 
+/// The factor that all gauges share is found as well as it says; and gauges that no workshop glues so are less likely than those that were
+/// pressed.
+#[test]
+fn presses_speak_for_the_part_that_was_pressed() {
+    let drawn = drawn();
+    let off = Uncertainty {
+        stiffness: 0.5,
+        pressing: Pressing::EXACT,
+        ..off()
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let built: Vec<AsGlued> = (built(&off.gluing, &mut rng).into_iter())
+        .map(|of| of.times(1.3))
+        .collect();
+    let real = drawn.glued(&built);
+    let known: Vec<Known> = (0..12)
+        .map(|_| press(&real, &off.pressing, &mut rng))
+        .collect();
+    let right = part::of_part(&drawn, &known, &NOISE, &off).unwrap();
+    let [factor, deviation] = right.factor;
+    assert!(
+        deviation < 0.1 && (factor - 1.3).abs() < 3.0 * deviation,
+        "{right:?}"
+    );
+    let channels: Vec<Vec<(usize, f64)>> = (0..CHANNELS)
+        .map(|c| vec![(c, if c % 2 == 0 { 1.5 } else { 0.7 })])
+        .collect();
+    let wrong = part::of_part(&drawn.mixed(&channels), &known, &NOISE, &off).unwrap();
+    assert!(right.evidence > wrong.evidence + 3.0, "{right:?} {wrong:?}");
+}
+
 /// A gauge that was dead while somebody pressed stays as it was drawn, with all doubt, and takes nothing from the others.
 #[test]
 fn a_channel_that_was_not_read_learns_nothing() {
@@ -276,14 +308,15 @@ fn a_channel_that_was_not_read_learns_nothing() {
     }
     let found = calibrate(&drawn, &known, &NOISE, &off);
     assert_eq!(found.touches, 12);
-    let [gain, along, across, turned] = found.glued[1];
-    assert!((gain - 1.0).abs() < 0.02 && along.hypot(across).hypot(turned) < 0.02);
+    let of = found.glued[1];
+    let moved = (of.along_mm).hypot(of.across_mm).hypot(of.turned_degrees);
+    assert!((of.gain - 1.0).abs() < 0.02 && moved < 0.02);
     let prior = doubt(&off.gluing);
     assert!((found.doubts[1][0] / prior[0] - 1.0).abs() < 0.05);
     for c in (0..CHANNELS).filter(|c| *c != 1) {
         let doubt = found.doubts[c][0].sqrt();
         assert!(
-            (found.glued[c][0] - all.glued[c][0]).abs() < 2.0 * doubt,
+            (found.glued[c].gain - all.glued[c].gain).abs() < 2.0 * doubt,
             "{c}"
         );
         assert!(found.doubts[c][0] < 1.5 * all.doubts[c][0], "{c}");

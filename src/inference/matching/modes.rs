@@ -5,11 +5,11 @@ use std::borrow::Cow;
 use glam::{DMat2, DVec3};
 use nalgebra::Matrix3;
 
-use super::weighed::{Measured, Observation, Weighed};
+use super::weighed::{Matched, Observation, Weighed};
 use super::{Contact, Load, Matching};
 use crate::inference::deviation::{About, Nuisance, Nuisances};
 use crate::inference::map::Slope;
-use crate::inference::region::{DEVIATIONS, Region};
+use crate::inference::region::{CredibleRegion, DEVIATIONS};
 use crate::mesh::SurfacePoint;
 
 const STEPS: usize = 8;
@@ -174,7 +174,7 @@ impl Matching {
 
     /// Gauss–Newton on place and force, with Levenberg's damping.
     fn descend(&self, observed: &Observation, terms: &Terms, start: SurfacePoint) -> Mode {
-        let measured = Measured::of(&terms.weighed, &terms.reading);
+        let measured = Matched::of(&terms.weighed, &terms.reading);
         let map = &self.map;
         let mut at = start;
         let mut slope = self.slope(&terms.about, at);
@@ -225,7 +225,7 @@ impl Matching {
 
     fn mode(
         &self,
-        measured: &Measured,
+        measured: &Matched,
         at: SurfacePoint,
         slope: &Slope,
         force: f64,
@@ -260,7 +260,7 @@ impl Matching {
 
     /// A mode alone, with its normal distribution.
     pub(super) fn contact_at(&self, measured: &Observation, mode: &Mode, narrow: bool) -> Contact {
-        let region = Region::of_normal(mode.covariance, mode.plane);
+        let region = CredibleRegion::of_normal(mode.covariance, mode.plane);
         let load = Load {
             force: mode.force,
             variance: mode.force_variance,
@@ -297,7 +297,8 @@ impl Matching {
         };
         let stand_in = |m: &Mode| stand_ins(m.position, m.covariance, m.plane, weight(m));
         let places: Vec<(DVec3, f64)> = modes.iter().flat_map(stand_in).collect();
-        let region = Region::of_places(&places, self.map.mesh.point(at), self.map.mesh.normal(at));
+        let region =
+            CredibleRegion::of_places(&places, self.map.mesh.point(at), self.map.mesh.normal(at));
         self.contact(measured, at, load, region, best.cost, false)
     }
 }
@@ -310,7 +311,7 @@ pub(in crate::inference) fn stand_ins(
     plane: [DVec3; 2],
     weight: f64,
 ) -> impl Iterator<Item = (DVec3, f64)> {
-    let region = Region::of_normal(covariance, plane);
+    let region = CredibleRegion::of_normal(covariance, plane);
     let scale = std::f64::consts::SQRT_2 / DEVIATIONS;
     region.axes.into_iter().flat_map(move |axis| {
         [1.0, -1.0].map(|sign| (centre + axis * (sign * scale), weight / 4.0))

@@ -7,7 +7,7 @@ use super::modes::{Mode, TURNS};
 use super::weighed::Observation;
 use super::{Contact, Load, Matching};
 use crate::inference::map::LANES;
-use crate::inference::region::Region;
+use crate::inference::region::CredibleRegion;
 
 /// Log-likelihoods so far below the best count for nothing.
 const NOTHING: f64 = 14.0;
@@ -97,7 +97,7 @@ impl Matching {
         let at = map.mesh.index().nearest(centre / total).0;
         let force = force / total;
         let variance = (squares / total - force * force).max(0.0);
-        let region = Region::of_places(&places, map.mesh.point(at), map.mesh.normal(at));
+        let region = CredibleRegion::of_places(&places, map.mesh.point(at), map.mesh.normal(at));
         let load = Load {
             force,
             variance,

@@ -20,7 +20,7 @@ use super::soup::Soup;
 use super::words::at;
 use crate::elasticity::DofSet;
 use crate::plain::quote;
-use command::{Command, Lines, Statement, statements};
+use command::{DeckCommand, Lines, Statement, statements};
 use elements::{Element, Routine};
 use glam::DVec3;
 use reader::Reader;
@@ -76,7 +76,7 @@ impl Reader {
         }
     }
 
-    fn carry_out(&mut self, command: &Command, lines: &mut Lines) -> Result<(), String> {
+    fn carry_out(&mut self, command: &DeckCommand, lines: &mut Lines) -> Result<(), String> {
         let key = command.key();
         self.in_unread = false;
         if self.is_skipped(command)? {
@@ -127,7 +127,7 @@ impl Reader {
     }
 
     /// Whether a command stands between *IF and *ENDIF, or in a loop: these are not followed.
-    fn is_skipped(&mut self, command: &Command) -> Result<bool, String> {
+    fn is_skipped(&mut self, command: &DeckCommand) -> Result<bool, String> {
         let last = command.label(command.fields() - 1);
         match command.key() {
             "*IF" if last.starts_with("THEN") => self.depth += 1,
@@ -157,19 +157,19 @@ impl Reader {
         Ok(true)
     }
 
-    fn not_read(&mut self, command: &Command) {
+    fn not_read(&mut self, command: &DeckCommand) {
         self.in_unread = true;
         if !SILENT.contains(&command.key()) {
             self.unread.add(&command.title(), command.line);
         }
     }
 
-    fn attribute(&self, command: &Command) -> Result<u64, String> {
+    fn attribute(&self, command: &DeckCommand) -> Result<u64, String> {
         Ok(self.known.whole(command, 0)?.unwrap_or(1))
     }
 
     /// N,NODE,X,Y,Z,THXY,THYZ,THZX.
-    fn node(&mut self, command: &Command) -> Result<(), String> {
+    fn node(&mut self, command: &DeckCommand) -> Result<(), String> {
         let line = command.line;
         if command.label(0).starts_with("R5") {
             // The end of a block of nodes.
@@ -194,7 +194,7 @@ impl Reader {
     }
 
     /// NROTAT: nodes get directions of their own.
-    fn turn_node(&mut self, command: &Command) -> Result<(), String> {
+    fn turn_node(&mut self, command: &DeckCommand) -> Result<(), String> {
         if let Some(first) = self.known.whole(command, 0).ok().flatten() {
             let last = self.known.whole(command, 1)?.unwrap_or(first);
             let turned = self.node_list().between(first, last, 1);
@@ -206,7 +206,7 @@ impl Reader {
     }
 
     /// ET,ITYPE,Ename,KOP1,…
-    fn element_type(&mut self, command: &Command) -> Result<(), String> {
+    fn element_type(&mut self, command: &DeckCommand) -> Result<(), String> {
         let number = self.attribute(command)?;
         let word = command.field(1);
         let value = self.known.value(word).map(|x| format!("{x}"));
@@ -221,7 +221,7 @@ impl Reader {
     }
 
     /// KEYOPT,ITYPE,KNUM,VALUE: one of all that are there changes what is computed here.
-    fn key_option(&mut self, command: &Command) -> Result<(), String> {
+    fn key_option(&mut self, command: &DeckCommand) -> Result<(), String> {
         let number = self.attribute(command)?;
         if self.known.whole(command, 1)? == Some(1) {
             self.note_membrane(number, self.known.number(command, 2)?, command.line);
@@ -239,7 +239,7 @@ impl Reader {
     }
 
     /// E,I,J,… and EN,IEL,I,J,…: nodes from field `first` on.
-    fn element(&mut self, command: &Command, first: usize) -> Result<(), String> {
+    fn element(&mut self, command: &DeckCommand, first: usize) -> Result<(), String> {
         let next = self.last_element.saturating_add(1);
         let number = if first > 0 {
             self.known.whole(command, 0)?
@@ -258,7 +258,7 @@ impl Reader {
     }
 
     /// EMORE,Q,R,…: more nodes of the last element.
-    fn more_nodes(&mut self, command: &Command) -> Result<(), String> {
+    fn more_nodes(&mut self, command: &DeckCommand) -> Result<(), String> {
         let more = self.node_fields(command, 0)?;
         let last = self.elements.last_mut().ok_or_else(|| {
             at(
@@ -271,7 +271,7 @@ impl Reader {
     }
 
     /// The nodes of a command, those after the last left out.
-    fn node_fields(&self, command: &Command, first: usize) -> Result<Vec<u64>, String> {
+    fn node_fields(&self, command: &DeckCommand, first: usize) -> Result<Vec<u64>, String> {
         let fields = first..command.fields();
         let nodes = fields.map(|k| Ok(self.known.whole(command, k)?.unwrap_or(0)));
         let mut nodes: Vec<u64> = nodes.collect::<Result<_, String>>()?;
@@ -282,14 +282,14 @@ impl Reader {
     }
 
     /// SECTYPE,SECID,Type: what follows is of that section.
-    fn begin_section(&mut self, command: &Command) -> Result<(), String> {
+    fn begin_section(&mut self, command: &DeckCommand) -> Result<(), String> {
         self.section = self.attribute(command)?;
         self.thickness.remove(&self.section);
         Ok(())
     }
 
     /// SECDATA,TK,…: a layer.
-    fn layer(&mut self, command: &Command) -> Result<(), String> {
+    fn layer(&mut self, command: &DeckCommand) -> Result<(), String> {
         let thickness = self.known.number(command, 0)?.unwrap_or(0.0);
         *self.thickness.entry(self.section).or_default() += thickness;
         Ok(())
@@ -326,7 +326,7 @@ impl Reader {
     }
 
     /// What Mechanical says in a comment: “Data in consistent MKS units”.
-    fn comment(&mut self, command: &Command) -> Result<(), String> {
+    fn comment(&mut self, command: &DeckCommand) -> Result<(), String> {
         let words: Vec<&str> = command.text.split_whitespace().collect();
         let says = words.windows(3).find(|three| {
             three[0].eq_ignore_ascii_case("consistent") && three[2].starts_with("units")
@@ -334,7 +334,7 @@ impl Reader {
         says.map_or(Ok(()), |three| self.units(three[1], command.line))
     }
 
-    fn system(&mut self, command: &Command) -> Result<(), String> {
+    fn system(&mut self, command: &DeckCommand) -> Result<(), String> {
         let global = self.known.whole(command, 0)?.unwrap_or(0) == 0;
         self.elsewhere = (!global).then_some(command.line);
         Ok(())
@@ -352,7 +352,7 @@ impl Reader {
         }
     }
 
-    fn select_nodes(&mut self, command: &Command) -> Result<(), String> {
+    fn select_nodes(&mut self, command: &DeckCommand) -> Result<(), String> {
         let count = self.nodes.len();
         let label = command.label(0);
         match label.as_str() {
@@ -373,7 +373,7 @@ impl Reader {
     }
 
     /// CMSEL,Type,Name.
-    fn select_component(&mut self, command: &Command) {
+    fn select_component(&mut self, command: &DeckCommand) {
         let (label, name) = (command.label(0), command.field(1));
         if self.element_sets.known(name, command.line).is_ok() {
             // Which elements are selected says nothing of nodes.
@@ -388,7 +388,7 @@ impl Reader {
     }
 
     /// CM,Cname,Entity: the nodes that are selected.
-    fn component(&mut self, command: &Command) {
+    fn component(&mut self, command: &DeckCommand) {
         let places = self.selection.places(self.nodes.len());
         let (Ok(places), "NODE") = (places, command.label(1).as_str()) else {
             return self.not_read(command);
@@ -405,7 +405,7 @@ impl Reader {
     }
 
     /// CMGRP,Aname,Cnam1,…: components as one.
-    fn component_group(&mut self, command: &Command) {
+    fn component_group(&mut self, command: &DeckCommand) {
         let fields = 1..command.fields();
         let names = fields
             .map(|k| command.field(k))
@@ -421,7 +421,7 @@ impl Reader {
     }
 
     /// D,NODE,Lab,VALUE,VALUE2,NEND,NINC,Lab2,…,Lab6.
-    fn hold(&mut self, command: &Command) -> Result<(), String> {
+    fn hold(&mut self, command: &DeckCommand) -> Result<(), String> {
         let labels: Vec<String> = [1, 6, 7, 8, 9, 10].map(|k| command.label(k)).into();
         let dofs = labels.iter().fold(0, |all, label| all | dof(label).0);
         // A table, or what is no plain number, moves what it holds.
@@ -449,7 +449,7 @@ impl Reader {
     }
 
     /// The nodes that a D speaks of; nothing where that could not be followed.
-    fn held_places(&mut self, command: &Command) -> Result<Option<Vec<u32>>, String> {
+    fn held_places(&mut self, command: &DeckCommand) -> Result<Option<Vec<u32>>, String> {
         let word = command.field(0);
         if word.eq_ignore_ascii_case("ALL") {
             return Ok(self.selection.places(self.nodes.len()).ok());
@@ -469,7 +469,7 @@ impl Reader {
 }
 
 /// Why a command that changes the mesh is refused.
-fn changing(command: &Command) -> String {
+fn changing(command: &DeckCommand) -> String {
     at(
         command.line,
         &format!(

@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
-use super::{Command, Listener, SessionEvent};
+use super::{Listener, ListenerCommand, SessionEvent};
 
 /// A listener on a thread of its own; it ends when this is dropped.
 pub struct Connection {
-    commands: Sender<Command>,
+    commands: Sender<ListenerCommand>,
     stop: Arc<AtomicBool>,
 }
 
@@ -32,7 +32,7 @@ impl Connection {
         Ok(Self { commands, stop })
     }
 
-    pub fn send(&self, command: Command) {
+    pub fn send(&self, command: ListenerCommand) {
         // A listener that has ended hears nothing any more, and has said so.
         let _ = self.commands.send(command);
     }

@@ -53,7 +53,7 @@ pub enum SessionEvent<'a> {
 }
 
 /// What can be asked of a connection.
-pub enum Command {
+pub enum ListenerCommand {
     Tare,
     /// Samples a second.
     Rate(u16),

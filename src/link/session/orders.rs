@@ -1,6 +1,6 @@
 //! What a listener is asked to do while it listens.
 
-use super::listener::{Command, Listener, SessionEvent};
+use super::listener::{Listener, ListenerCommand, SessionEvent};
 use crate::link::{Port, Recorder};
 use crate::wire::Message;
 
@@ -17,32 +17,32 @@ impl Listener {
 
     pub(super) fn obey(
         &mut self,
-        command: Command,
+        command: ListenerCommand,
         port: &mut dyn Port,
         tell: &mut impl FnMut(SessionEvent),
     ) {
         match command {
-            Command::Tare => {
+            ListenerCommand::Tare => {
                 self.pipeline.tare();
                 self.record(|r| r.own("tare"));
                 tell(SessionEvent::Message("the rest is taken again"));
             }
-            Command::Rate(hertz) => {
+            ListenerCommand::Rate(hertz) => {
                 self.rate = Some(hertz);
                 self.say(port, &Message::Rate(hertz));
             }
-            Command::Record(path) => match Recorder::create(&path) {
+            ListenerCommand::Record(path) => match Recorder::create(&path) {
                 Ok(recorder) => {
                     self.recorder = Some(recorder);
                     self.begin_recording();
                 }
                 Err(why) => tell(SessionEvent::Unrecorded(&why)),
             },
-            Command::StopRecording => {
+            ListenerCommand::StopRecording => {
                 self.flush_recording(tell);
                 self.recorder = None;
             }
-            Command::Do(work) => {
+            ListenerCommand::Do(work) => {
                 work(&mut self.pipeline);
                 // The gauges may be on other channels now.
                 self.compared = None;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver as Inbox;
 use std::time::{Duration, Instant};
 
-use super::listener::{Command, Listener, SessionEvent};
+use super::listener::{Listener, ListenerCommand, SessionEvent};
 use crate::link::{Address, Got, Port, PortInfo, ports};
 use crate::live::{Input, Receiver};
 use crate::wire::Message;
@@ -20,7 +20,7 @@ impl Listener {
     pub(super) fn find_again(
         &mut self,
         stop: &AtomicBool,
-        inbox: &Inbox<Command>,
+        inbox: &Inbox<ListenerCommand>,
         tell: &mut impl FnMut(SessionEvent),
     ) -> Option<Box<dyn Port>> {
         while !stop.load(Ordering::Relaxed) {

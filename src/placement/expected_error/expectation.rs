@@ -7,7 +7,7 @@ use super::bank::{Bank, Rows};
 use super::losses::Losses;
 use super::scene::{Detail, Knowledge, Scene};
 use crate::budget::{Cancelled, Watch, report};
-use crate::placement::constraints::{Constraints, Field, LostBy, reached};
+use crate::placement::constraints::{Constraints, LostBy, PartialSet, reached};
 use crate::placement::exchange::{Criterion, gains};
 use crate::placement::margin::Best;
 use crate::placement::{PlacementError, Pool, Request, SensorSet};
@@ -186,7 +186,7 @@ impl<'a> Expectation<'a> {
     fn promising_for(
         &mut self,
         banks: &Banks,
-        (others, number): (&Field, usize),
+        (others, number): (&PartialSet, usize),
         here: usize,
     ) -> Result<Vec<usize>, Cancelled> {
         let open = others.open();
@@ -305,7 +305,7 @@ impl Criterion for Expectation<'_> {
 
     fn screened(
         &mut self,
-        others: &Field,
+        others: &PartialSet,
         number: usize,
     ) -> Result<Vec<(usize, f64)>, PlacementError> {
         let bank = Bank::seated(&self.scenes.coarse, seats(&others.chosen, number));
@@ -315,7 +315,7 @@ impl Criterion for Expectation<'_> {
     /// Compared with what is there in the same look: to rounding, the way a set was added up counts.
     fn better_for(
         &mut self,
-        others: &Field,
+        others: &PartialSet,
         (set, number): (&[usize], usize),
         _: f64,
     ) -> Result<Option<(usize, f64)>, PlacementError> {
@@ -334,9 +334,9 @@ impl Criterion for Expectation<'_> {
 
     fn grow<'f>(
         &mut self,
-        mut field: Field<'f>,
+        mut field: PartialSet<'f>,
         found: &dyn Fn(&SensorSet),
-    ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
+    ) -> Result<(PartialSet<'f>, Vec<SensorSet>), PlacementError> {
         let mut banks = Banks::new(self.scenes);
         let mut sets: Vec<SensorSet> = Vec::new();
         let mut before = self.error(&[])?;

@@ -8,7 +8,7 @@ use super::screen::{Base, LEVELS, Sieve, Stop};
 use super::settings::GreedySvr;
 use crate::budget::{Cancelled, Progress, Work, report};
 use crate::dataset::SignalMatrix;
-use crate::placement::constraints::Field;
+use crate::placement::constraints::PartialSet;
 use crate::placement::{PlacementError, Pool, Request};
 use crate::regression::features::Standardizer;
 use crate::regression::folds::Folds;
@@ -106,7 +106,10 @@ impl<'a> Search<'a> {
     }
 
     /// The best place to add, taken; none when nothing may be added any more.
-    pub(super) fn best_addition(&mut self, field: &Field) -> Result<Option<Step>, PlacementError> {
+    pub(super) fn best_addition(
+        &mut self,
+        field: &PartialSet,
+    ) -> Result<Option<Step>, PlacementError> {
         let open = field.open();
         if open.is_empty() {
             return Ok(None);

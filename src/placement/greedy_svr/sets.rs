@@ -4,7 +4,7 @@ use super::exact::Judged;
 use super::screen::Base;
 use super::search::Search;
 use crate::budget::Cancelled;
-use crate::placement::constraints::{Field, reached};
+use crate::placement::constraints::{PartialSet, reached};
 use crate::placement::exchange::Criterion;
 use crate::placement::{PlacementError, SensorSet};
 use crate::regression::kernel;
@@ -24,22 +24,26 @@ impl Criterion for Search<'_> {
         Ok(self.request.constraints.weighed(whole, lost.into_iter()))
     }
 
-    fn screened(&mut self, others: &Field, _: usize) -> Result<Vec<(usize, f64)>, PlacementError> {
+    fn screened(
+        &mut self,
+        others: &PartialSet,
+        _: usize,
+    ) -> Result<Vec<(usize, f64)>, PlacementError> {
         self.stand_on(&others.chosen)?;
         let scored = self.scores(0, &others.open(), others.chosen.len())?;
         Ok(scored.into_iter().map(|s| (s.place, s.error)).collect())
     }
 
-    fn best_for(&mut self, others: &Field, _: usize) -> Result<Option<usize>, PlacementError> {
+    fn best_for(&mut self, others: &PartialSet, _: usize) -> Result<Option<usize>, PlacementError> {
         self.stand_on(&others.chosen)?;
         Ok(self.best_addition(others)?.map(|step| step.place))
     }
 
     fn grow<'f>(
         &mut self,
-        mut field: Field<'f>,
+        mut field: PartialSet<'f>,
         found: &dyn Fn(&SensorSet),
-    ) -> Result<(Field<'f>, Vec<SensorSet>), PlacementError> {
+    ) -> Result<(PartialSet<'f>, Vec<SensorSet>), PlacementError> {
         self.stand_on(&[])?;
         let mut sets: Vec<SensorSet> = Vec::new();
         while !field.full() && !reached(&sets, self.request.constraints) {

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::gathering::Gathering;
 use crate::link::{SessionEvent, State};
-use crate::live::{Estimator, Health, Traffic, Update};
+use crate::live::{Health, ShownEstimator, Traffic, Update};
 use crate::wire::Hello;
 
 /// How long a trail lasts, and strips reach back (s).
@@ -53,7 +53,7 @@ pub struct Feed {
     pub traffic: Traffic,
     /// Half and 99 % of the samples were computed within so many microseconds.
     pub delays: Option<[f32; 2]>,
-    pub trail: VecDeque<(f64, Estimator, DVec3)>,
+    pub trail: VecDeque<(f64, ShownEstimator, DVec3)>,
     pub strips: VecDeque<Strip>,
     pub recording: Option<Recording>,
     /// Where a simulated board is really touched (m, N).
@@ -64,7 +64,7 @@ pub struct Feed {
     /// How it ended.
     pub ended: Option<Result<(), String>>,
     /// Whose trail is drawn.
-    pub estimator: Estimator,
+    pub estimator: ShownEstimator,
     /// Known touches that are being read.
     pub gathering: Gathering,
     open: Option<Strip>,

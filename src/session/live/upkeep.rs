@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::design::Sensing;
 use crate::job::Reporter;
-use crate::link::Command;
-use crate::live::Estimator;
+use crate::link::ListenerCommand;
+use crate::live::ShownEstimator;
 use crate::session::jobs::{Task, stop};
 use crate::session::live::training::{train, training_touches};
 use crate::session::slot::{Slot, current};
@@ -35,8 +35,8 @@ impl Session {
         }
         self.doubt_learned();
         // What was learned on other gauges, or closed, shows nothing.
-        if self.desk.estimator == Estimator::Learned && !self.learns_alone() {
-            self.show_estimator(Estimator::Matching);
+        if self.desk.estimator == ShownEstimator::Learned && !self.learns_alone() {
+            self.show_estimator(ShownEstimator::Matching);
         }
         self.apply_settings();
         self.keep_trained();
@@ -67,15 +67,16 @@ impl Session {
         self.live.applied = Some(live.clone());
         let (model, settings) = self.gauge_model(&sensing);
         let learned = self.learned_alone();
-        self.live.send(Command::Do(Box::new(move |pipeline| {
-            pipeline.set_model(model, settings);
-            pipeline.set_learned(learned);
-        })));
+        self.live
+            .send(ListenerCommand::Do(Box::new(move |pipeline| {
+                pipeline.set_model(model, settings);
+                pipeline.set_learned(learned);
+            })));
     }
 
     /// The trained estimators are trained when they are wanted, and again when gauges fail or recover.
     fn keep_trained(&mut self) {
-        let trained = [Estimator::Normalized, Estimator::Raw];
+        let trained = [ShownEstimator::Normalized, ShownEstimator::Raw];
         if !self.desk.compare && !trained.contains(&self.desk.estimator) {
             return;
         }
@@ -109,8 +110,9 @@ impl Session {
                 inputs,
                 value: (used.clone(), trained.clone()),
             });
-            s.live
-                .send(Command::Do(Box::new(move |p| p.set_trained(trained, used))));
+            s.live.send(ListenerCommand::Do(Box::new(move |p| {
+                p.set_trained(trained, used)
+            })));
         });
     }
 }

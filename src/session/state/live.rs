@@ -8,7 +8,7 @@ use glam::DVec3;
 use crate::design::Sensing;
 use crate::document::SensingInputs;
 use crate::inference::Known;
-use crate::link::{Address, Command, Connection, Hosted, State};
+use crate::link::{Address, Connection, Hosted, ListenerCommand, State};
 use crate::live::Update;
 use crate::project::LiveKeys;
 use crate::session::live::feed::{Feed, Shared};
@@ -115,7 +115,7 @@ impl Live {
             .unwrap_or_default()
     }
 
-    pub(in crate::session) fn send(&self, command: Command) {
+    pub(in crate::session) fn send(&self, command: ListenerCommand) {
         if let Some(connection) = &self.connection {
             connection.send(command);
         }

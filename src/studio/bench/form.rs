@@ -3,7 +3,7 @@
 use egui::{Color32, DragValue, RichText, TextEdit, Ui};
 
 use super::super::ask::Ask;
-use super::super::commands::Command;
+use super::super::commands::UiCommand;
 use super::super::form::{counted, quantity, rows};
 use super::super::learned::estimator_shown;
 use super::super::theme;
@@ -30,12 +30,12 @@ pub fn bench_form(ask: &mut Ask<'_>, ui: &mut Ui) {
     ui.weak(format!("Into {}", folder.display()));
     ui.add_space(6.0);
     ui.horizontal_wrapped(|ui| {
-        ask.button(ui, Command::PlanPresses);
-        ask.button(ui, Command::PressPlan);
+        ask.button(ui, UiCommand::PlanPresses);
+        ask.button(ui, UiCommand::PressPlan);
     });
     ui.horizontal_wrapped(|ui| {
-        ask.button(ui, Command::PausePresses);
-        ask.button(ui, Command::StopPresses);
+        ask.button(ui, UiCommand::PausePresses);
+        ask.button(ui, UiCommand::StopPresses);
     });
     halt_button(ask, ui);
     ui.add_space(6.0);
@@ -46,7 +46,7 @@ pub fn bench_form(ask: &mut Ask<'_>, ui: &mut Ui) {
         ui.colored_label(theme::STALE, text);
     }
     ui.add_space(6.0);
-    ask.button(ui, Command::LearnPresses);
+    ask.button(ui, UiCommand::LearnPresses);
     if let Some(learnt) = ask.session.learnt() {
         estimator_shown(ui, learnt);
     }
@@ -54,7 +54,7 @@ pub fn bench_form(ask: &mut Ask<'_>, ui: &mut Ui) {
 
 /// The emergency stop, which must be found without looking for it.
 fn halt_button(ask: &mut Ask<'_>, ui: &mut Ui) {
-    let command = Command::HaltMachine;
+    let command = UiCommand::HaltMachine;
     let enabled = ask.enabled(command);
     let mut text = RichText::new(command.name()).strong();
     if enabled {

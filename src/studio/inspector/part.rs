@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::super::action::FileAction;
 use super::super::ask::Ask;
-use super::super::commands::Command;
+use super::super::commands::UiCommand;
 use super::super::form::{choice, counted, number, rows};
 use crate::io::examples::Example;
 use crate::mesh::unroll::Axis;
@@ -33,7 +33,7 @@ pub fn part_form(ask: &mut Ask<'_>, ui: &mut Ui) {
     if pressed {
         ask.act(FileAction::TakeInAgain);
     }
-    ask.button(ui, Command::Advise);
+    ask.button(ui, UiCommand::Advise);
     advice_lines(ask, ui);
 }
 

@@ -4,14 +4,14 @@ use egui::{ComboBox, DragValue, RichText, TextEdit, Ui};
 
 use super::super::action::{BoardAction, FileAction};
 use super::super::ask::Ask;
-use super::super::commands::Command;
+use super::super::commands::UiCommand;
 use super::super::form::{choice, number, percentage, quantity, rows};
 use super::super::learned::estimator_shown;
 use super::super::theme;
 use super::super::words::live_in_words;
 use crate::board::Illness;
 use crate::link::{PortInfo, ports};
-use crate::live::Estimator;
+use crate::live::ShownEstimator;
 use crate::project::{CalibrationKeys, LiveKeys};
 use crate::session::{Awaited, Desk, LEAST_KNOWN, Mishap, WANTED_KNOWN};
 
@@ -74,8 +74,8 @@ fn board_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
     if connect {
         ask.act(BoardAction::Connect(form.port.clone()));
     }
-    ask.button(ui, Command::SimulatedBoard);
-    ask.button(ui, Command::Disconnect);
+    ask.button(ui, UiCommand::SimulatedBoard);
+    ask.button(ui, UiCommand::Disconnect);
     state_lines(ask, ui);
 }
 
@@ -133,7 +133,7 @@ fn state_lines(ask: &Ask<'_>, ui: &mut Ui) {
 fn connected_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
     ui.add_space(4.0);
     ui.horizontal(|ui| {
-        ask.button(ui, Command::Tare);
+        ask.button(ui, UiCommand::Tare);
         if ask.session.live.simulated_board().is_some() {
             faults(ask, ui);
         }
@@ -177,16 +177,16 @@ fn estimator_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
 
 fn estimators(ui: &mut Ui, desk: &mut Desk, learned: bool) {
     let all = if learned {
-        &Estimator::ALL[..]
+        &ShownEstimator::ALL[..]
     } else {
-        &Estimator::ALL[..3]
+        &ShownEstimator::ALL[..3]
     };
     choice(
         ui,
         "Estimator",
         &mut desk.estimator,
         all,
-        Estimator::label,
+        ShownEstimator::label,
         "Model matching needs no training and says how sure it is; the others learn from the model first",
     );
     ui.label("");
@@ -227,7 +227,7 @@ fn recording_form(ask: &mut Ask<'_>, form: &mut LiveForm, ui: &mut Ui) {
     });
     ui.horizontal(|ui| {
         let name = if recording.is_some() { "Stop recording" } else { "Record" };
-        if ui.button(name).on_hover_text(Command::Record.tooltip()).clicked() {
+        if ui.button(name).on_hover_text(UiCommand::Record.tooltip()).clicked() {
             ask.act(BoardAction::ToggleRecording(form.record_to.clone()));
         }
         let last = ask.session.live.recorded.clone().filter(|_| recording.is_none());

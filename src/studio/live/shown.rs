@@ -11,7 +11,7 @@ use super::super::theme;
 use super::super::view::{Pane, Stage};
 use super::super::words::live_in_words;
 use crate::inference::{Contact, Kind, Touches};
-use crate::live::{Estimator, Health};
+use crate::live::{Health, ShownEstimator};
 use crate::session::{Feed, STRIPS_S, Strip};
 
 /// Of the estimators, apart for colour-blind eyes too.
@@ -22,8 +22,8 @@ const COLOURS: [Color32; 4] = [
     Color32::from_rgb(204, 121, 167),
 ];
 
-fn colour(estimator: Estimator) -> Color32 {
-    COLOURS[Estimator::ALL
+fn colour(estimator: ShownEstimator) -> Color32 {
+    COLOURS[ShownEstimator::ALL
         .iter()
         .position(|e| *e == estimator)
         .unwrap_or(0)]
@@ -47,7 +47,7 @@ fn paint_heard(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
     {
         painter.circle_stroke(at, 9.0, Stroke::new(1.5, Color32::WHITE));
     }
-    for estimator in Estimator::ALL {
+    for estimator in ShownEstimator::ALL {
         let shown = estimator == look.session.desk.estimator;
         let Some(guess) = update
             .by(estimator)
@@ -63,7 +63,7 @@ fn paint_heard(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
             painter.circle(at, 4.0, colour, Stroke::new(1.0, Color32::BLACK));
             continue;
         }
-        if estimator == Estimator::Matching
+        if estimator == ShownEstimator::Matching
             && let Some(touches) = &update.touches
         {
             paint_touches(look, painter, pane, touches, colour);
@@ -122,7 +122,7 @@ fn paint_press(
     const FULL: f64 = 30.0;
     const LENGTH: f64 = 0.22;
     let (on, _) = look.scene.index.nearest(place);
-    let contact = contact.filter(|_| look.session.desk.estimator == Estimator::Matching);
+    let contact = contact.filter(|_| look.session.desk.estimator == ShownEstimator::Matching);
     // Against the whole force, where it is known.
     let whole = contact.and_then(|c| (-c.on_part()).try_normalize());
     let from = whole.unwrap_or_else(|| look.session.document.part.normal(on));
@@ -296,9 +296,9 @@ fn how_many(touches: &Touches) -> Option<String> {
 /// What every estimator says, and how far off that is where the truth is known.
 fn compared(ui: &mut Ui, feed: &Feed) {
     ui.horizontal_wrapped(|ui| {
-        for estimator in Estimator::ALL {
+        for estimator in ShownEstimator::ALL {
             let guess = feed.update.as_ref().and_then(|u| u.by(estimator));
-            if estimator == Estimator::Learned && guess.is_none() {
+            if estimator == ShownEstimator::Learned && guess.is_none() {
                 continue;
             }
             let (dot, _) = ui.allocate_exact_size(vec2(9.0, 9.0), egui::Sense::hover());

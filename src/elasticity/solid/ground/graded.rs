@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::SolidGround;
 use super::solved::{SAFETY, SolidGraded, Solved};
-use crate::budget::{Elements, Watch};
+use crate::budget::{ElementBudget, Watch};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::estimate::{self, Discretization, Sample};
 use crate::elasticity::grade::{PLACES, sample, subsample};
@@ -77,7 +77,7 @@ impl SolidGround {
         &self,
         touches: &[Touch],
         places: &[DVec3],
-        aim: &Elements,
+        aim: &ElementBudget,
         watch: Watch,
     ) -> Result<SolidGraded, ElasticError> {
         if self.immersed.own().is_some() {
@@ -170,7 +170,7 @@ impl SolidGround {
     /// Sizes of the cells (m), one after the other, that [`Self::grade`] would come to for a part and a tip (m), were
     /// the error as on other parts.
     #[must_use]
-    pub fn foreseen(shape: &Shape, tip: f64, aim: &Elements, touches: usize) -> Vec<f64> {
+    pub fn foreseen(shape: &Shape, tip: f64, aim: &ElementBudget, touches: usize) -> Vec<f64> {
         let least = shape.least(aim, touches);
         let mut sizes = vec![shape.first(tip, f64::INFINITY, least)];
         while let Some(&size) = sizes.last()
@@ -191,7 +191,7 @@ mod tests {
 
     use super::*;
     use crate::budget::unwatched;
-    use crate::elasticity::support::Region;
+    use crate::elasticity::support::HeldRegion;
     use crate::elasticity::{DofSet, Material, Support};
     use crate::mesh::TriMesh;
     use crate::mesh::oriented_box::OrientedBox;
@@ -211,7 +211,7 @@ mod tests {
         let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
         let part = TriMesh::from_checked(positions, quads.into_iter().flat_map(halves).collect());
         let foot = Support {
-            region: Region::Box(OrientedBox::of_file(
+            region: HeldRegion::Box(OrientedBox::of_file(
                 DVec3::NEG_ONE,
                 DVec3::new(1.0, 1.0, 1e-6),
             )),

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::SolidGround;
 use super::foreseen::{Foreseen, is_quick};
 use super::solved::{SAFETY, SolidGraded, Solved};
-use crate::budget::{Elements, Watch};
+use crate::budget::{ElementBudget, Watch};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::estimate::{self, Discretization};
 use crate::elasticity::grade::{PLACES, sample, subsample};
@@ -119,7 +119,7 @@ impl SolidGround {
         &self,
         order: usize,
         touches: usize,
-        aim: &Elements,
+        aim: &ElementBudget,
         beside: f64,
     ) -> Option<(Fineness, Tetrahedra)> {
         let own = self.own_at(order);
@@ -159,7 +159,7 @@ impl SolidGround {
         &self,
         touches: &[Touch],
         places: &[DVec3],
-        aim: &Elements,
+        aim: &ElementBudget,
         watch: Watch,
     ) -> Result<SolidGraded, ElasticError> {
         let mut climb = Climb::new(touches, places);
@@ -222,7 +222,7 @@ impl SolidGround {
         touches: &[Touch],
         places: &[DVec3],
         count: usize,
-        aim: &Elements,
+        aim: &ElementBudget,
         watch: Watch,
     ) -> Result<Foreseen, ElasticError> {
         let mut climb = Climb::new(touches, places);
@@ -329,7 +329,7 @@ impl SolidGround {
 fn affords(
     own: Option<&(Fineness, Tetrahedra)>,
     touches: usize,
-    aim: &Elements,
+    aim: &ElementBudget,
     taken: f64,
 ) -> bool {
     let plan = own.and_then(|(_, elements)| elements.plan());

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::command::{Command, Lines};
+use super::command::{DeckCommand, Lines};
 use super::elements::{Element, Routine};
 use super::format::Format;
 use super::reader::Reader;
@@ -24,7 +24,12 @@ struct Tally {
 
 impl Tally {
     /// Refuses a block that was cut; `announced` is how many things it says that it has.
-    fn check(&self, command: &Command, what: &str, announced: Option<u64>) -> Result<(), String> {
+    fn check(
+        &self,
+        command: &DeckCommand,
+        what: &str,
+        announced: Option<u64>,
+    ) -> Result<(), String> {
         match announced {
             Some(count) if self.read < count => Err(at(
                 command.line,
@@ -48,7 +53,7 @@ impl Tally {
 }
 
 /// The format that follows a command.
-fn format_of(command: &Command, lines: &mut Lines) -> Result<Format, String> {
+fn format_of(command: &DeckCommand, lines: &mut Lines) -> Result<Format, String> {
     let (line, text) = lines.next().ok_or_else(|| {
         let what = format!("the file was cut after {}", command.title());
         at(command.line, &what)
@@ -71,7 +76,7 @@ impl Reader {
     /// NBLOCK,NUMFIELD,Solkey,NDMAX,NDSEL: number, …, three coordinates, and angles.
     pub(super) fn node_block(
         &mut self,
-        command: &Command,
+        command: &DeckCommand,
         lines: &mut Lines,
     ) -> Result<(), String> {
         let format = format_of(command, lines)?;
@@ -109,7 +114,7 @@ impl Reader {
     }
 
     /// Says where far larger numbers are announced than there are: the file may have been cut.
-    fn note_numbers(&mut self, command: &Command) -> Result<(), String> {
+    fn note_numbers(&mut self, command: &DeckCommand) -> Result<(), String> {
         let announced = self.known.whole(command, 2)?.unwrap_or(0);
         if announced / 2 > self.last_node {
             self.soup.notes.push(format!(
@@ -123,7 +128,7 @@ impl Reader {
     /// EBLOCK,NUMFIELD,Solkey,NDMAX,NDSEL: elements with all that belongs to them (SOLID), or those of the active type.
     pub(super) fn element_block(
         &mut self,
-        command: &Command,
+        command: &DeckCommand,
         lines: &mut Lines,
     ) -> Result<(), String> {
         let format = format_of(command, lines)?;
@@ -190,7 +195,7 @@ impl Reader {
     /// CMBLOCK,Cname,Entity,NUMITEMS: numbers of nodes or elements; a negative one ends a range.
     pub(super) fn component_block(
         &mut self,
-        command: &Command,
+        command: &DeckCommand,
         lines: &mut Lines,
     ) -> Result<(), String> {
         let count = self.known.whole(command, 2)?.unwrap_or(0);
@@ -238,7 +243,11 @@ impl Reader {
     }
 
     /// SECBLOCK,N: thickness, and more, of each layer.
-    pub(super) fn layers(&mut self, command: &Command, lines: &mut Lines) -> Result<(), String> {
+    pub(super) fn layers(
+        &mut self,
+        command: &DeckCommand,
+        lines: &mut Lines,
+    ) -> Result<(), String> {
         let count = self.known.whole(command, 0)?.unwrap_or(0);
         for _ in 0..count {
             let Some((line, text)) = lines.next_of_block() else {

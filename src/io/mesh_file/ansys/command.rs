@@ -8,7 +8,7 @@ use crate::plain::quote;
 
 /// What a line, or a part of it between `$`, says.
 pub enum Statement<'t> {
-    Command(Command<'t>),
+    Command(DeckCommand<'t>),
     /// A parameter and what it is set to.
     Set(String, &'t str),
     /// Numbers of a block whose command was not read.
@@ -16,7 +16,7 @@ pub enum Statement<'t> {
 }
 
 /// A command with its fields.
-pub struct Command<'t> {
+pub struct DeckCommand<'t> {
     /// In capitals.
     pub name: String,
     pub line: usize,
@@ -24,7 +24,7 @@ pub struct Command<'t> {
     pub text: &'t str,
 }
 
-impl<'t> Command<'t> {
+impl<'t> DeckCommand<'t> {
     /// Its name, to stand in a message: bytes behind the letters that tell it from others may be anything.
     #[must_use]
     pub fn title(&self) -> String {
@@ -107,7 +107,7 @@ fn command(text: &str, line: usize) -> Option<Statement<'_>> {
     let ends = |c: char| c == ',' || c.is_whitespace();
     let end = text.find(ends).unwrap_or(text.len());
     let rest = text[end..].trim_start();
-    let command = Command {
+    let command = DeckCommand {
         name: text[..end].to_uppercase(),
         line,
         text: rest.strip_prefix(',').unwrap_or(rest),
@@ -171,7 +171,7 @@ impl Parameters {
     ///
     /// # Errors
     /// A message naming the line of what is neither a number nor a known parameter.
-    pub fn number(&self, command: &Command, k: usize) -> Result<Option<f64>, String> {
+    pub fn number(&self, command: &DeckCommand, k: usize) -> Result<Option<f64>, String> {
         let word = command.field(k);
         if word.is_empty() {
             return Ok(None);
@@ -187,7 +187,7 @@ impl Parameters {
     ///
     /// # Errors
     /// Also for one that is not whole.
-    pub fn whole(&self, command: &Command, k: usize) -> Result<Option<u64>, String> {
+    pub fn whole(&self, command: &DeckCommand, k: usize) -> Result<Option<u64>, String> {
         /// All below are whole in a double.
         const MOST: f64 = 9e15;
         match self.number(command, k)? {
@@ -205,7 +205,7 @@ impl Parameters {
 mod tests {
     use super::*;
 
-    fn one(line: &str) -> Command<'_> {
+    fn one(line: &str) -> DeckCommand<'_> {
         match statements(line, 3).pop() {
             Some(Statement::Command(command)) => command,
             _ => panic!("{line}"),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::command::{Command, Parameters};
+use super::command::{DeckCommand, Parameters};
 use crate::io::mesh_file::unread::Unread;
 
 /// Ansys' own Poisson's ratio, where a material has none.
@@ -30,7 +30,7 @@ fn is_elastic(label: &str) -> bool {
 }
 
 /// Where the fields of a command begin: written by CDWRITE, it has a release and a count first.
-fn start(command: &Command) -> usize {
+fn start(command: &DeckCommand) -> usize {
     if command.label(0).starts_with('R') && command.field(0).contains('.') {
         2
     } else {
@@ -45,7 +45,7 @@ impl Materials {
     /// A message naming the line.
     pub fn constant(
         &mut self,
-        command: &Command,
+        command: &DeckCommand,
         known: &Parameters,
         unread: &mut Unread,
     ) -> Result<(), String> {
@@ -68,7 +68,11 @@ impl Materials {
     ///
     /// # Errors
     /// A message naming the line.
-    pub fn temperatures(&mut self, command: &Command, known: &Parameters) -> Result<(), String> {
+    pub fn temperatures(
+        &mut self,
+        command: &DeckCommand,
+        known: &Parameters,
+    ) -> Result<(), String> {
         let first = start(command);
         if command.fields() == 1 && command.field(0).is_empty() {
             self.temperatures.clear();
@@ -90,7 +94,7 @@ impl Materials {
     /// A message naming the line.
     pub fn data(
         &mut self,
-        command: &Command,
+        command: &DeckCommand,
         known: &Parameters,
         unread: &mut Unread,
     ) -> Result<(), String> {
@@ -117,7 +121,7 @@ impl Materials {
     ///
     /// # Errors
     /// A message naming the line.
-    pub fn reference(&mut self, command: &Command, known: &Parameters) -> Result<(), String> {
+    pub fn reference(&mut self, command: &DeckCommand, known: &Parameters) -> Result<(), String> {
         self.reference = known.number(command, 0)?.unwrap_or(0.0);
         Ok(())
     }
@@ -184,7 +188,7 @@ fn slots(first: u64) -> std::ops::Range<usize> {
 }
 
 /// The numbers from field `k` on.
-fn following(command: &Command, known: &Parameters, k: usize) -> Result<Vec<f64>, String> {
+fn following(command: &DeckCommand, known: &Parameters, k: usize) -> Result<Vec<f64>, String> {
     let mut values = Vec::new();
     for k in k..command.fields() {
         values.extend(known.number(command, k)?);

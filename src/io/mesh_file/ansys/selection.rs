@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use glam::DVec3;
 
-use super::command::{Command, Parameters};
+use super::command::{DeckCommand, Parameters};
 use crate::io::mesh_file::sets::Numbered;
 
 /// What is selected.
@@ -67,7 +67,7 @@ impl Nodes<'_> {
     /// A message naming the line of a word that is no number.
     pub fn named(
         &self,
-        command: &Command,
+        command: &DeckCommand,
         known: &Parameters,
     ) -> Result<Option<BTreeSet<u32>>, String> {
         let item = command.label(1);
