@@ -117,39 +117,45 @@ fn known(rows: &[Row], sensing: &Sensing) -> Vec<Known> {
     known.collect()
 }
 
-/// Where a concave function is largest, and the standard deviation that its curvature there stands for: a parabola through
-/// three places, laid anew around its top until that stays.
+/// Where a function with one top is largest, and the standard deviation that its curvature there stands for. Away from the
+/// top evidence falls ever more slowly, for the model is then trusted less and less: slopes do not lead there, but the best
+/// of five places does, which are laid anew around it, nearer to each other. Elements are laid anew for every thickness, which
+/// makes evidence tremble: places that lie too near each other would say nothing.
 fn likeliest(evidence: impl Fn(f64) -> anyhow::Result<f64>) -> anyhow::Result<(f64, f64)> {
-    /// Logarithms of the thickness: the first step, how far the top may lie, and how near two tops are one.
-    const STEP: f64 = 0.15;
+    /// Between places at first and at last, and the farthest that the top may lie (logarithms of the thickness).
+    const FIRST: f64 = 0.12;
+    const LAST: f64 = 0.03;
     const FARTHEST: f64 = 1.0;
-    const NEAR: f64 = 0.003;
-    const TURNS: usize = 8;
-    let (mut middle, mut step) = (0.0_f64, STEP);
-    for _ in 0..TURNS {
-        let [below, at, above] = [
-            evidence(middle - step)?,
-            evidence(middle)?,
-            evidence(middle + step)?,
-        ];
-        let curvature = (below - 2.0 * at + above) / (step * step);
-        let slope = (above - below) / (2.0 * step);
-        let top = if curvature < 0.0 {
-            (-slope / curvature).clamp(-2.0 * step, 2.0 * step)
-        } else {
-            2.0 * step * slope.signum()
-        };
-        middle = (middle + top).clamp(-FARTHEST, FARTHEST);
-        if top.abs() < NEAR && curvature < 0.0 {
-            return Ok((middle, (-curvature).recip().sqrt()));
+    let (mut middle, mut step) = (0.0_f64, FIRST);
+    while middle.abs() < FARTHEST {
+        let places = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| middle + k * step);
+        let mut found = [0.0; 5];
+        for (&at, value) in places.iter().zip(&mut found) {
+            *value = evidence(at)?;
         }
-        if top.abs() < step {
-            step = (step / 2.0).max(NEAR);
+        let best = (0..5).max_by(|&a, &b| found[a].total_cmp(&found[b]));
+        let best = best.filter(|&k| found[k].is_finite());
+        let best = best.context("numbers overflow where the wall's thickness is looked for")?;
+        middle = places[best];
+        if best == 0 || best == 4 {
+            continue;
         }
+        if step <= LAST {
+            let (off, deviation) = top_of([found[best - 1], found[best], found[best + 1]]);
+            return Ok((middle + step * off, step * deviation));
+        }
+        step /= 2.0;
     }
     None.context(
         "the presses do not say how thick the wall is: press at more places, with a force that is known, or leave --fit thickness out",
     )
+}
+
+/// Where the parabola through three values at even steps, the middle one the largest, has its top, and the standard
+/// deviation of a density with that logarithm; both in steps.
+fn top_of([before, at, after]: [f64; 3]) -> (f64, f64) {
+    let bend = (2.0 * at - before - after).max(f64::MIN_POSITIVE);
+    ((after - before) / (2.0 * bend), bend.recip().sqrt())
 }
 
 /// Takes the factor that all gauges share for the material's.
@@ -164,4 +170,25 @@ pub fn take_stiffness(fit: &[PartArg], loaded: &mut LoadedProject, found: &mut S
     *modulus /= factor;
     found.of_part.youngs_modulus_gpa = Some([*modulus, *modulus * deviation / factor]);
     found.calibration = found.calibration.clone().on_softer(factor);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_top_is_found_wherever_it_lies_and_however_the_values_tremble() {
+        for top in [-0.7, 0.02, 0.17, 0.4] {
+            let tremble = |x: f64| 0.02 * (1e4 * x).sin();
+            // As it falls where the model is trusted less and less.
+            let value = |x: f64| Ok(-80.0 * (1.0 + ((x - top) / 0.1).powi(2)).ln() + tremble(x));
+            let (found, said) = likeliest(value).unwrap();
+            assert!((found - top).abs() < 3e-3, "{found} for {top}");
+            assert!(
+                (said / (0.1 / 160.0_f64.sqrt()) - 1.0).abs() < 0.2,
+                "{said}"
+            );
+        }
+        assert!(likeliest(|x| Ok(x * x)).is_err() && likeliest(|_| Ok(f64::NAN)).is_err());
+    }
 }
