@@ -19,9 +19,9 @@ use crate::uncertainty::Uncertainty;
 /// What may be fitted of a part.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PartArg {
-    /// Young's modulus (material.youngs_modulus_gpa), from forces that are known.
+    /// Young's modulus of the material, from forces that are known.
     Stiffness,
-    /// The thickness of a shell's wall (part.thickness_mm).
+    /// The thickness of a shell's wall.
     Thickness,
 }
 

@@ -111,7 +111,7 @@ impl Session {
                 value: (used.clone(), trained.clone()),
             });
             s.live.send(ListenerCommand::Do(Box::new(move |p| {
-                p.set_trained(trained, used)
+                p.set_trained(trained, used);
             })));
         });
     }
