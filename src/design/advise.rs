@@ -305,14 +305,14 @@ fn of_solid(
     let places: Vec<DVec3> = on_inside.into_iter().map(|at| inside.point(at)).collect();
     let spacing = inputs.project.sites.spacing_mm * 1e-3;
     let sites = inside.area() / (spacing * spacing);
-    let own = solid.as_they_are();
-    let order = |foreseen: &Foreseen| own.map(|_| foreseen.order);
+    let order = |foreseen: &Foreseen| solid.has_tetrahedra().then_some(foreseen.order);
     let aim = &asked.budget.elements;
     match solid.foresee(&touches, &places, asked.touches, aim, watch) {
         Ok(foreseen) => Ok((asked.looked_at(&foreseen, order(&foreseen), sites), None)),
         Err(stop @ ElasticError::Cancelled(_)) => Err(stop.into()),
         Err(why) => {
             let as_they_are = |own: &Foreseen| asked.looked_at(own, order(own), sites);
+            let own = solid.as_they_are();
             let cost = own.as_ref().map_or_else(|| asked.solid(), as_they_are);
             Ok((cost, Some(why.to_string())))
         }

@@ -150,6 +150,12 @@ impl SolidGround {
         })
     }
 
+    /// Whether the part came with tetrahedra, which are computed on in place of cells.
+    #[must_use]
+    pub fn has_tetrahedra(&self) -> bool {
+        self.immersed.own().is_some()
+    }
+
     /// Whether points of the inside lie on the back of a wall that touches come to.
     #[must_use]
     pub fn behind(&self, points: &[SurfacePoint]) -> Vec<bool> {

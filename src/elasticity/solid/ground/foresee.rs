@@ -51,7 +51,9 @@ impl Look<'_> {
         };
         let shape = self.ground.shape();
         let more = shape.unknowns(size) / shape.unknowns(self.foreseen.size);
-        Some(last.beyond(before, last.unknowns * more))
+        let told = last.beyond(before, last.unknowns * more);
+        // Of a model that does not fit into memory nothing is known.
+        told.unknowns.is_finite().then_some(told)
     }
 
     fn solve(&mut self, size: f64, watch: Watch) -> Result<Taken, ElasticError> {
