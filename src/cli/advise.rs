@@ -3,8 +3,7 @@
 use clap::Args;
 
 use super::common::Common;
-use super::out;
-use crate::budget::unwatched;
+use super::{out, progress::Bar};
 use crate::design;
 
 #[derive(Args, Debug, Clone)]
@@ -19,9 +18,12 @@ pub struct AdviseArgs {
 /// What the user must change.
 pub fn run(args: &AdviseArgs) -> anyhow::Result<()> {
     let loaded = args.common.load()?;
+    let bar = Bar::default();
+    let watch = |p| bar.show(p);
     let advice = args
         .common
-        .in_pool(|| Ok(design::advise(&loaded.inputs, &unwatched)?))?;
+        .in_pool(|| Ok(design::advise(&loaded.inputs, &watch)?))?;
+    bar.finish();
     if args.common.json {
         return out::line(&serde_json::to_string(&advice)?);
     }

@@ -30,8 +30,8 @@ use crate::mesh::SurfacePoint;
 use crate::uncertainty::{Pressing, Uncertainty};
 
 use asked::Asked;
-use part::{Fitted, PartArg};
-use summary::{OfPart, Row, Summary};
+use part::{FittedPart, PartArg};
+use summary::{FoundOfPart, Row, Summary};
 
 /// A calibration needs as many presses at least.
 const LEAST: usize = 4;
@@ -113,16 +113,20 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let read = read((address, held), &loaded, &sensing, points)?;
     let noise = read.noise.clone();
     let rows = read.rows(&sensing.drawn.map.mesh);
+    if let Some(path) = &args.table {
+        // Whoever pressed by hand keeps that, whatever comes of it.
+        summary::write_table(path, &rows)?;
+    }
     check_count(&rows)?;
-    let part = Fitted::as_drawn(loaded, sensing);
+    let part = FittedPart::as_drawn(loaded, sensing);
     let (part, found) = fit_all(args, &common, part, rows, (&noise, &off))?;
-    let Fitted {
+    let FittedPart {
         loaded, sensing, ..
     } = part;
     if let Some(path) = &args.table {
         summary::write_table(path, &found.rows)?;
     }
-    save(&loaded, &target, &found.calibration)?;
+    save(&loaded, &target, &found)?;
     found.print(&sensing, &target, args.common.json)
 }
 
@@ -130,10 +134,10 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
 fn fit_all(
     args: &CalibrateArgs,
     common: &Common,
-    part: Fitted,
+    part: FittedPart,
     rows: Vec<Row>,
     (noise, off): (&[f64], &Uncertainty),
-) -> anyhow::Result<(Fitted, Summary)> {
+) -> anyhow::Result<(FittedPart, Summary)> {
     let used = |rows: &[Row]| rows.iter().filter(|r| r.used).count();
     let before = used(&rows);
     let mut part = part.fitted(&args.fit, common, &rows, noise, off)?;
@@ -144,7 +148,7 @@ fn fit_all(
         found = fit(model, found.rows, (noise, off), args)?;
     }
     found.of_part.thickness_mm = part.thickness;
-    part::take_stiffness(&args.fit, &mut part.loaded, &mut found);
+    part::take_stiffness(&args.fit, &part.loaded.inputs.project, &mut found)?;
     Ok((part, found))
 }
 
@@ -281,9 +285,9 @@ fn fit(
                     rows,
                     calibration,
                     outlook,
-                    of_part: OfPart {
+                    of_part: FoundOfPart {
                         factor,
-                        ..OfPart::default()
+                        ..FoundOfPart::default()
                     },
                 });
             }
@@ -307,15 +311,19 @@ fn next(
 }
 
 /// Writes the project with what was found, and nothing else changed.
-fn save(loaded: &LoadedProject, target: &Path, found: &Calibration) -> anyhow::Result<()> {
+fn save(loaded: &LoadedProject, target: &Path, found: &Summary) -> anyhow::Result<()> {
     let own = !loaded.bundled && loaded.path.is_file();
     let fresh = own.then(|| project_file::load(&loaded.path)).transpose()?;
     let mut project = fresh.map_or_else(|| loaded.inputs.project.clone(), |l| l.inputs.project);
-    project.part.thickness_mm = loaded.inputs.project.part.thickness_mm;
-    project.material.youngs_modulus_gpa = loaded.inputs.project.material.youngs_modulus_gpa;
+    if let Some([thickness, _]) = found.of_part.thickness_mm {
+        project.part.thickness_mm = thickness;
+    }
+    if let Some([modulus, _]) = found.of_part.youngs_modulus_gpa {
+        project.material.youngs_modulus_gpa = modulus;
+    }
     project
         .live
-        .take(found, &loaded.inputs.project.selection.sites);
+        .take(&found.calibration, &loaded.inputs.project.selection.sites);
     let folder = target.parent().unwrap_or(Path::new("."));
     let mesh = if loaded.bundled {
         crate::io::examples::write_bundled_mesh(folder, &loaded.mesh_path)?

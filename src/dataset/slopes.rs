@@ -33,8 +33,8 @@ pub struct GluingSlopes {
 
 impl GluingSlopes {
     /// Numbers in double precision that are held for a site and a touch while they, or those of touches that drag along after
-    /// them, are computed: two that are solved for, and five in single precision.
-    pub const HELD: f64 = MOVES as f64 + 2.5;
+    /// them, are computed: two that are solved for, and six in single precision.
+    pub const HELD: f64 = MOVES as f64 + 3.0;
 
     /// Solves for the touches in `columns` (at least one) once more, for gauges that are moved; `turned` are the
     /// slopes by the angle, sites × these touches. Also how many right-hand sides that took.

@@ -58,8 +58,8 @@ pub struct Cost {
     pub seconds: f64,
     /// Memory of the largest stage (GB).
     pub memory_gb: f64,
-    /// Error of the displacement under a touch (%) that finer elements would take away; no number where it could not
-    /// be computed.
+    /// Error of the displacement under a touch (%) that finer elements would take away: as on other parts where that of
+    /// cells could not be computed, no number where that of a part's own tetrahedra could not.
     pub error_percent: f64,
     /// And what no elements take away (%): what the theory leaves out.
     pub theory_percent: f64,
@@ -115,10 +115,22 @@ pub struct Faces {
 /// # Errors
 /// [`DesignError`] for values out of range, and when the watch asks for a stop.
 pub fn advise(inputs: &Inputs, watch: Watch) -> Result<Advice, DesignError> {
+    advise_on(inputs, true, watch)
+}
+
+/// As [`advise`] with nothing solved: what a solid in cells would cost is told from other parts.
+///
+/// # Errors
+/// As [`advise`].
+pub fn advise_by_walls(inputs: &Inputs, watch: Watch) -> Result<Advice, DesignError> {
+    advise_on(inputs, false, watch)
+}
+
+fn advise_on(inputs: &Inputs, solves: bool, watch: Watch) -> Result<Advice, DesignError> {
     let mut as_solid = inputs.clone();
     as_solid.project.part.model = PartModel::Solid;
     match solid_ground(&as_solid, watch) {
-        Ok(solid) => of_closed(inputs, &solid, watch),
+        Ok(solid) => of_closed(inputs, &solid, solves, watch),
         // What is closed and yet encloses nothing is neither.
         Err(DesignError::Elastic(ElasticError::Open { rims, .. })) if rims > 0 => {
             Ok(of_open(inputs, rims, watch))
@@ -176,6 +188,15 @@ impl Asked {
             error_percent: OF_TIP * (size / self.tip).powi(2),
             theory_percent: OF_THEORY * self.wall / self.radius,
         }
+    }
+
+    /// Of a closed part of which nothing was solved: its own tetrahedra as they are, or cells as on other parts.
+    fn unsolved(&self, inputs: &Inputs, solid: &SolidGround) -> Cost {
+        let own = solid.as_they_are();
+        own.map_or_else(
+            || self.solid(),
+            |own| self.looked_at(&own, Some(own.order), sites(inputs, solid)),
+        )
     }
 
     /// Vertices of even triangles of a size (m).
@@ -303,23 +324,28 @@ fn of_solid(
     let touches: Vec<Touch> = on_outside.into_iter().map(touch).collect();
     let on_inside = sample::random(inside, PLACES, 2, |_| true);
     let places: Vec<DVec3> = on_inside.into_iter().map(|at| inside.point(at)).collect();
-    let spacing = inputs.project.sites.spacing_mm * 1e-3;
-    let sites = inside.area() / (spacing * spacing);
+    let sites = sites(inputs, solid);
     let order = |foreseen: &Foreseen| solid.has_tetrahedra().then_some(foreseen.order);
     let aim = &asked.budget.elements;
     match solid.foresee(&touches, &places, asked.touches, aim, watch) {
         Ok(foreseen) => Ok((asked.looked_at(&foreseen, order(&foreseen), sites), None)),
         Err(stop @ ElasticError::Cancelled(_)) => Err(stop.into()),
-        Err(why) => {
-            let as_they_are = |own: &Foreseen| asked.looked_at(own, order(own), sites);
-            let own = solid.as_they_are();
-            let cost = own.as_ref().map_or_else(|| asked.solid(), as_they_are);
-            Ok((cost, Some(why.to_string())))
-        }
+        Err(why) => Ok((asked.unsolved(inputs, solid), Some(why.to_string()))),
     }
 }
 
-fn of_closed(inputs: &Inputs, solid: &SolidGround, watch: Watch) -> Result<Advice, DesignError> {
+/// About how many sites lie on the inside.
+fn sites(inputs: &Inputs, solid: &SolidGround) -> f64 {
+    let spacing = inputs.project.sites.spacing_mm * 1e-3;
+    solid.inside.area() / (spacing * spacing)
+}
+
+fn of_closed(
+    inputs: &Inputs,
+    solid: &SolidGround,
+    solves: bool,
+    watch: Watch,
+) -> Result<Advice, DesignError> {
     let whole = &solid.whole;
     let wall_mm = [0.1, 0.5, 0.9].map(|s| 1e3 * solid.walls.thinner_than(whole, s));
     let is_face = |t: u32| solid.walls.sides[t as usize] != Side::Rim;
@@ -329,7 +355,11 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround, watch: Watch) -> Result<Advic
     let area: f64 = faces.iter().map(|&t| whole.facet_area(t)).sum();
     let radius = scope::radii(whole, &faces, solid.wall());
     let asked = Asked::new(inputs, area / 2.0, radius[0], solid.shape());
-    let (cells, why) = of_solid(&asked, inputs, solid, watch)?;
+    let (cells, why) = if solves {
+        of_solid(&asked, inputs, solid, watch)?
+    } else {
+        (asked.unsolved(inputs, solid), None)
+    };
     let costs = [asked.shell(), cells];
     let [shell, cells] = &costs;
     // The user's own tetrahedra follow the walls, whatever those are.
@@ -361,7 +391,13 @@ fn of_closed(inputs: &Inputs, solid: &SolidGround, watch: Watch) -> Result<Advic
         },
     ];
     if let Some(why) = why {
-        words.push(format!("As a solid it could not be computed yet: {why}."));
+        let told = match cells.order {
+            Some(_) => "",
+            None => "; its figures are those of other parts",
+        };
+        words.push(format!(
+            "As a solid it could not be computed yet{told}: {why}."
+        ));
     }
     Ok(Advice {
         closed: true,

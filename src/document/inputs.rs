@@ -142,7 +142,9 @@ pub struct TradeInputs {
 /// What is known of the part's walls depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WallInputs {
-    thickness_mm: f64,
+    /// What a model would cost, and how far off it would be, hangs on all of it.
+    model: ModelInputs,
+    spacing_mm: f64,
     tip_radius_mm: f64,
     reach_mm: f64,
     quality: Quality,
@@ -346,7 +348,8 @@ impl Document {
     pub fn wall_inputs(&self) -> WallInputs {
         let p = &self.state.project;
         WallInputs {
-            thickness_mm: p.part.thickness_mm,
+            model: self.model_inputs(),
+            spacing_mm: p.sites.spacing_mm,
             tip_radius_mm: p.touch.tip_radius_mm,
             reach_mm: p.touch.reach_mm,
             quality: p.budget.quality,

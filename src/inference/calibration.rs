@@ -97,8 +97,7 @@ pub fn calibrate(
     off: &Uncertainty,
 ) -> Calibration {
     let noise = &noise_of_mean(noise);
-    let read = |k: &&Known| k.reading.iter().filter(|x| x.is_finite()).count() >= FEWEST;
-    let known: Vec<&Known> = known.iter().filter(read).collect();
+    let known = sound(known);
     let Fitted {
         glued,
         relative,
@@ -116,6 +115,12 @@ pub fn calibrate(
         relative,
         touches: known.len(),
     }
+}
+
+/// The touches that enough channels have read.
+fn sound(known: &[Known]) -> Vec<&Known> {
+    let read = |k: &&Known| k.reading.iter().filter(|x| x.is_finite()).count() >= FEWEST;
+    known.iter().filter(read).collect()
 }
 
 /// What was fitted, with the share of the readings that the model leaves.

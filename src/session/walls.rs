@@ -6,7 +6,8 @@ use super::attention::{Attention, Colours};
 use super::jobs::{Task, stop};
 use super::slot::{Slot, current, take_in};
 use super::state::Session;
-use crate::design::{self, Advice};
+use crate::budget::Watch;
+use crate::design::{self, Advice, DesignError, Inputs};
 use crate::job::Reporter;
 
 impl Session {
@@ -21,12 +22,17 @@ impl Session {
         let looked_at = attention.colours == Some(Colours::Walls) && !attention.hand;
         let inputs = self.document.wall_inputs();
         if looked_at && self.advice().is_none() && self.jobs.is_new(Task::Advise, &inputs) {
-            self.measure_walls();
+            // Whoever paints waits for the colours, and not for models.
+            self.start_advice(design::advise_by_walls);
         }
     }
 
-    /// Measures the walls in the background, unless that is under way.
+    /// Measures the walls in the background, and what models would cost by solving the first ones, unless that is under way.
     pub fn measure_walls(&mut self) {
+        self.start_advice(design::advise);
+    }
+
+    fn start_advice(&mut self, advise: fn(&Inputs, Watch) -> Result<Advice, DesignError>) {
         let inputs = self.document.wall_inputs();
         if self.jobs.runs_on(Task::Advise, &inputs) {
             return;
@@ -34,7 +40,7 @@ impl Session {
         let snapshot = self.document.inputs();
         let work = move |r: &Reporter| {
             let watch = |progress| r.report(progress);
-            let advice = design::advise(&snapshot, &watch).map_err(|e| stop(&e))?;
+            let advice = advise(&snapshot, &watch).map_err(|e| stop(&e))?;
             Ok(Arc::new(advice))
         };
         self.jobs

@@ -7,12 +7,13 @@ use syn::Item;
 use crate::source::Source;
 
 /// Words that each had two meanings and more.
-const WORDS: [&str; 7] = [
+const WORDS: [&str; 8] = [
     "Command",
     "Elements",
     "Estimator",
     "Field",
     "Ground",
+    "Matched",
     "Measured",
     "Region",
 ];

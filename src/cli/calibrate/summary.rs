@@ -11,6 +11,7 @@ use crate::inference::calibration::judged::Outlook;
 use crate::inference::{Calibration, Known};
 use crate::io::atomic;
 use crate::io::table::Writing;
+use crate::plain::digits;
 
 /// One press.
 pub struct Row {
@@ -48,7 +49,7 @@ impl Row {
 
 /// What was found of the part, each with its standard deviation; nothing of what was not asked for.
 #[derive(Default)]
-pub struct OfPart {
+pub struct FoundOfPart {
     /// Readings over those of the model, common to all gauges.
     pub factor: Option<[f64; 2]>,
     pub youngs_modulus_gpa: Option<[f64; 2]>,
@@ -60,7 +61,7 @@ pub struct Summary {
     pub rows: Vec<Row>,
     pub calibration: Calibration,
     pub outlook: Outlook,
-    pub of_part: OfPart,
+    pub of_part: FoundOfPart,
 }
 
 impl Summary {
@@ -119,7 +120,8 @@ impl Summary {
             ("the wall's thickness", self.of_part.thickness_mm, "mm"),
         ] {
             if let Some([value, deviation]) = found {
-                out::line(&format!("{what}: {value:.3} ± {deviation:.3} {unit}"))?;
+                let (value, deviation) = (digits(value), digits(deviation));
+                out::line(&format!("{what}: {value} ± {deviation} {unit}"))?;
             }
         }
         out::line(&format!("saved in {}", target.display()))
@@ -127,7 +129,7 @@ impl Summary {
 }
 
 fn with_deviation([value, deviation]: [f64; 2]) -> Value {
-    json!({"value": rounded(value), "deviation": rounded(deviation)})
+    json!({"value": value, "deviation": deviation})
 }
 
 fn rounded(value: f64) -> f64 {

@@ -12,7 +12,7 @@
 
 use nalgebra::{Cholesky, Dyn};
 
-use super::{BEFORE, Errors, Fitted, Known, LEAST, Least, Press, fitted, noise_of_mean};
+use super::{BEFORE, Errors, Fitted, Known, LEAST, Least, Press, fitted, noise_of_mean, sound};
 use crate::inference::drawn::AsDrawn;
 use crate::uncertainty::Uncertainty;
 
@@ -35,7 +35,7 @@ pub fn of_part(
     off: &Uncertainty,
 ) -> Option<OfPart> {
     let noise = &noise_of_mean(noise);
-    let known: Vec<&Known> = known.iter().collect();
+    let known = sound(known);
     let Fitted {
         glued,
         relative,

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use glam::{DMat2, DVec3};
 use nalgebra::Matrix3;
 
-use super::weighed::{Matched, Observation, Weighed};
+use super::weighed::{Observation, Weighed, WeighedReading};
 use super::{Contact, Load, Matching};
 use crate::inference::deviation::{About, Nuisance, Nuisances};
 use crate::inference::map::Slope;
@@ -174,7 +174,7 @@ impl Matching {
 
     /// Gauss–Newton on place and force, with Levenberg's damping.
     fn descend(&self, observed: &Observation, terms: &Terms, start: SurfacePoint) -> Mode {
-        let measured = Matched::of(&terms.weighed, &terms.reading);
+        let measured = WeighedReading::of(&terms.weighed, &terms.reading);
         let map = &self.map;
         let mut at = start;
         let mut slope = self.slope(&terms.about, at);
@@ -225,7 +225,7 @@ impl Matching {
 
     fn mode(
         &self,
-        measured: &Matched,
+        measured: &WeighedReading,
         at: SurfacePoint,
         slope: &Slope,
         force: f64,

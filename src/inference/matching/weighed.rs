@@ -107,7 +107,7 @@ fn whitening(inner: &Matrix4<f64>) -> (Matrix4<f64>, f64) {
 }
 
 /// A reading with its weights, ready to be compared.
-pub(in crate::inference) struct Matched<'a> {
+pub(in crate::inference) struct WeighedReading<'a> {
     x: &'a [f64],
     w: &'a [f64],
     shared: &'a Shared,
@@ -117,7 +117,7 @@ pub(in crate::inference) struct Matched<'a> {
     pub squares: f64,
 }
 
-impl<'a> Matched<'a> {
+impl<'a> WeighedReading<'a> {
     /// A reading by these weights.
     pub fn of(weighed: &'a Weighed, x: &'a [f64]) -> Self {
         Self::new(x, &weighed.w, &weighed.shared)
@@ -222,7 +222,7 @@ impl<'a> Observation<'a> {
         let drift = errors.drift * errors.drift;
         let shared = Shared::of(drift, &[], 0.0, &w);
         Self {
-            squares: Matched::new(&x, &w, &shared).squares,
+            squares: WeighedReading::new(&x, &w, &shared).squares,
             shared,
             x,
             w,
@@ -301,8 +301,8 @@ impl<'a> Observation<'a> {
     }
 
     /// The reading under these weights, as it is compared with templates.
-    pub fn measured<'b>(&'b self, weighed: &'b Weighed) -> Matched<'b> {
-        Matched::of(weighed, &self.x)
+    pub fn measured<'b>(&'b self, weighed: &'b Weighed) -> WeighedReading<'b> {
+        WeighedReading::of(weighed, &self.x)
     }
 
     /// The force that fits best where all channels are off alike: where each has variances of its own, one begins

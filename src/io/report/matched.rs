@@ -60,7 +60,7 @@ pub(super) fn errors(page: &mut String, design: &Design) {
         reference.off.gluing.in_words(),
         reference.off.pressing.in_words()
     );
-    page.push_str("<details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Force (N)</th><th>TouchRegion</th><th>Touches</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Calibrated (mm)</th><th>Blind</th><th>Mean without blind (mm)</th></tr>");
+    page.push_str("<details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Force (N)</th><th>Region</th><th>Touches</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Calibrated (mm)</th><th>Blind</th><th>Mean without blind (mm)</th></tr>");
     for r in &design.evaluation.matched {
         let _ = write!(
             page,

@@ -27,7 +27,7 @@ pub(super) fn comparison(page: &mut String, design: &Design) {
         .filter(|size| rows.iter().any(|r| r.sensors == *size))
         .chain([design.chosen().len()])
         .collect();
-    page.push_str("<h2>The paper's comparison</h2><p>Four selectors, each set read by a support vector regression that was trained for it. Mean, median and 95 % of the error (mm) on unseen touches.</p><table><tr><th>Selector</th><th>TouchRegion</th>");
+    page.push_str("<h2>The paper's comparison</h2><p>Four selectors, each set read by a support vector regression that was trained for it. Mean, median and 95 % of the error (mm) on unseen touches.</p><table><tr><th>Selector</th><th>Region</th>");
     for size in &sizes {
         let _ = write!(page, "<th>{size} gauges</th>");
     }
@@ -64,7 +64,7 @@ fn errors_of(design: &Design, kind: SelectorKind, size: usize, region: &str) -> 
 pub(super) fn errors(page: &mut String, design: &Design) {
     let _ = write!(
         page,
-        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, {}. “As built”: every gauge {}, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>TouchRegion</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
+        "<p>Trained on {} touches of the model ({:.2} mm elements); judged on {} touches that no selection or training has seen, {}. “As built”: every gauge {}, read with the regression trained for the ideal one.</p><details><summary>Every figure</summary><table><tr><th>Selector</th><th>Gauges</th><th>Region</th><th>Mean (mm)</th><th>Median (mm)</th><th>95 % (mm)</th><th>As built (mm)</th><th>Touches</th><th>C (mm)</th><th>ε (mm)</th><th>γ</th></tr>",
         design.simulated.dataset.touches.len(),
         design.simulated.element_mm,
         design.reference.touches.len(),

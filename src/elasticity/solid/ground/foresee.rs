@@ -13,6 +13,7 @@ use crate::elasticity::load::Touch;
 use crate::elasticity::solid::immersed::Fineness;
 use crate::elasticity::solid::plan;
 use crate::elasticity::solid::sizing::{self, LEAST_GRIDS};
+use crate::memory;
 
 /// Cells of one size after the other.
 struct Look<'a> {
@@ -52,13 +53,21 @@ impl Look<'_> {
         let shape = self.ground.shape();
         let more = shape.unknowns(size) / shape.unknowns(self.foreseen.size);
         let told = last.beyond(before, last.unknowns * more);
-        // Of a model that does not fit into memory nothing is known.
-        told.unknowns.is_finite().then_some(told)
+        // Of a pattern that does not fit into memory nothing is known.
+        told.entries.is_finite().then_some(told)
+    }
+
+    /// Whether cells of a size (m) fit into memory, as far as that is told.
+    fn fits(&self, size: f64) -> bool {
+        let told = self.told(size);
+        told.is_none_or(|told| told.bytes <= memory::allowed())
     }
 
     fn solve(&mut self, size: f64, watch: Watch) -> Result<Taken, ElasticError> {
         /// The surface is found less closely: that takes most of the time, and what it leaves is the same on all grids.
         const LOOSELY: f64 = 2.0;
+        // The factor before goes first: memory is asked for one of them.
+        self.grids.forget_last();
         let ground = self.ground;
         let closely = ground.fineness(size);
         let fineness = Fineness {
@@ -106,9 +115,9 @@ impl SolidGround {
         loop {
             look.go_on(size, watch)?;
             let is_known = look.taken.len() >= LEAST_GRIDS as usize;
-            let is_enough = is_known && look.foreseen.estimate.excess(aim) <= SAFETY;
+            let goes_on = !is_known || look.foreseen.estimate.excess(aim) > SAFETY;
             match sizing::next(size, least) {
-                Some(next) if !is_enough => size = next,
+                Some(next) if goes_on && (!is_known || look.fits(next)) => size = next,
                 _ => return Ok(look.foreseen),
             }
         }

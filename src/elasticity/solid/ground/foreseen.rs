@@ -68,8 +68,8 @@ impl Foreseen {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Taken {
     pub unknowns: f64,
-    entries: f64,
-    bytes: f64,
+    pub entries: f64,
+    pub bytes: f64,
     assembled: f64,
     pub multiplications: f64,
 }

@@ -50,6 +50,11 @@ impl Grids {
         }
     }
 
+    /// Lets the last model go: what was read of it stays.
+    pub(super) fn forget_last(&mut self) {
+        self.last = None;
+    }
+
     /// How many there are.
     pub(super) fn len(&self) -> usize {
         self.sizes.len()
