@@ -118,7 +118,8 @@ pub fn advise(inputs: &Inputs, watch: Watch) -> Result<Advice, DesignError> {
     advise_on(inputs, true, watch)
 }
 
-/// As [`advise`] with nothing solved: what a solid in cells would cost is told from other parts.
+/// As [`advise`] with nothing solved: faces and thickness. What a solid in cells would cost, and with it what fits, is as on
+/// other parts, and stands in no words.
 ///
 /// # Errors
 /// As [`advise`].
@@ -390,6 +391,11 @@ fn of_closed(
             "As it is a solid fits: taken as a shell, both faces of each wall would be walls of their own.".into()
         },
     ];
+    if !solves {
+        // Told from other parts, they may say the opposite of what solving says.
+        words.truncate(1);
+        words.push("What a shell and a solid would cost, and which of them fits, has not been looked at for the part as it is: ask again (Shell or solid?, F4).".into());
+    }
     if let Some(why) = why {
         let told = match cells.order {
             Some(_) => "",

@@ -97,9 +97,9 @@ impl FittedPart {
                 .and_then(|sensing| of_part(&sensing.drawn, &known(rows, &sensing), noise, off));
             found.map_or(f64::NEG_INFINITY, |f| f.evidence)
         };
-        let (log, deviation) = likeliest(evidence).context(UNSAID)?;
-        let sensing = of(log)?;
+        let found = likeliest(evidence).map(|top| of(top.0).map(|sensing| (top, sensing)));
         bar.finish();
+        let ((log, deviation), sensing) = found.context(UNSAID)??;
         let thickness = drawn * log.exp();
         self.loaded.inputs.project.part.thickness_mm = thickness;
         Ok(Self {
