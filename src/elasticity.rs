@@ -25,6 +25,7 @@ pub mod sensitivity;
 pub mod shell;
 pub mod solid;
 mod solver;
+mod spare;
 pub mod support;
 pub mod system;
 

@@ -1,11 +1,14 @@
-//! What outputs read of loads, with the lower triangle of the stiffness divided out of both ([`super::solver::Reduced`]).
+//! What outputs read of loads, with one side solved above a cut of the elimination tree and the other divided out below it
+//! ([`super::solver::Reduced`]).
 
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
 use super::rows::Rows;
-use super::solver::{BLOCK, Reduced, Scratch, common};
+use super::solver::{BLOCK, Cut, Reduced, Scratch, common};
+use super::spare::Spare;
 use super::system::{Needed, System};
 use crate::budget::{Cancelled, Watch, report};
 use crate::memory;
@@ -25,12 +28,13 @@ struct Reach {
 /// What was read, block by block: the rows of one side that it holds, and values.
 pub(super) type Blocks = Vec<(Vec<u32>, Vec<f64>)>;
 
-/// Multiplications that three ways take: to solve for one side, for the other, and to divide out of both.
+/// Multiplications that four ways take: to solve for one side or for the other, all the way or above the cut.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Costs {
     pub one: f64,
     pub other: f64,
-    pub both: f64,
+    pub one_above: f64,
+    pub other_above: f64,
 }
 
 /// Rows that are kept while those of the other side pass by take this share of the memory that is allowed.
@@ -88,34 +92,74 @@ impl<'a> Reaching<'a> {
         EACH * entries as f64 * to.blocks.len() as f64
     }
 
-    /// What the three ways take to read this side of another, which reads what is solved for this one cheaply.
+    /// What the four ways take to read this side of another, which reads what is solved for this one cheaply.
     pub fn costs(&self, other: &Self, system: &System) -> Costs {
+        let cut = system.cut();
         let [up, up_other] = [self, other].map(|side| side.entries(system));
-        let down = |side: &Self, read: &Self| {
-            side.blocks.len() as f64 * system.entries(&read.needed(system))
+        let down = |side: &Self, needed: &Needed| side.blocks.len() as f64 * system.entries(needed);
+        let all = |side: &Self, read: &Self| down(side, &read.needed(system));
+        let above = |side: &Self, up: f64, read: &Self| {
+            let solved = up + down(side, &read.needed(system).above(&cut));
+            let (divided, kept) = read.below(&cut, system);
+            let runs = (kept / room()).ceil().max(1.0);
+            BLOCK as f64 * (runs * solved + divided) + side.products(read, &cut, system)
         };
-        let (own, each) = self.sample();
-        let mut shared = 0.0;
-        for block in own {
-            let (others, each_other) = other.sample();
-            for beside in others {
-                common(&block.nodes, &beside.nodes, |at, _| {
-                    shared += each * each_other * system.extent(block.nodes[at]).0 as f64;
+        let block = BLOCK as f64;
+        Costs {
+            one: block * (up + all(self, other)),
+            other: block * (up_other + all(other, self) + self.applied(other)),
+            one_above: above(self, up, other),
+            other_above: above(other, up_other, self),
+        }
+    }
+
+    /// Entries of the factor that all blocks meet below a cut, and rows that they have there and leave above it.
+    fn below(&self, cut: &Cut, system: &System) -> (f64, f64) {
+        let (blocks, each) = self.sample();
+        let (mut entries, mut rows) = (0.0, 0.0);
+        for block in blocks {
+            let reached = self.reached(block, cut, system);
+            let extents = reached.0.iter().map(|&node| system.extent(node));
+            let (columns, of_factor) = extents.fold((0, 0.0), |sum, e| (sum.0 + e.0, sum.1 + e.1));
+            entries += each * of_factor;
+            rows += each * (columns + reached.1.len()) as f64;
+        }
+        (entries, rows)
+    }
+
+    /// Multiplications of what this side, solved above a cut, and another one, divided below it, are multiplied with each other.
+    fn products(&self, divided: &Self, cut: &Cut, system: &System) -> f64 {
+        let (others, each_other) = divided.sample();
+        let mut rows = 0.0;
+        for other in others {
+            let (nodes, above) = divided.reached(other, cut, system);
+            let (own, each) = self.sample();
+            for block in own {
+                rows += each * each_other * above.len() as f64;
+                common(&nodes, &block.nodes, |at, _| {
+                    rows += each * each_other * system.extent(nodes[at]).0 as f64;
                 });
             }
         }
-        let block = BLOCK as f64;
-        Costs {
-            one: block * (up + down(self, other)),
-            other: block * (up_other + down(other, self) + self.applied(other)),
-            both: block * (up + up_other + block * shared),
-        }
+        (BLOCK * BLOCK) as f64 * rows
+    }
+
+    /// The supernodes that a block reaches below a cut, and the rows above on which it leaves something.
+    fn reached(&self, block: &Reach, cut: &Cut, system: &System) -> (Vec<u32>, Vec<u32>) {
+        let below = block.nodes.iter().copied();
+        let below: Vec<u32> = below.filter(|&node| !cut.is_above(node)).collect();
+        let rows = block.rows.iter();
+        let places = rows.flat_map(|&row| self.rows.row(row as usize).iter().map(|e| e.0));
+        let above = system.rows_above(&below, places, cut);
+        (below, above)
     }
 
     /// What each row, as a load, does by what it moves: fᵀ K⁻¹ f = |L⁻¹ f|².
     pub fn works(&self, system: &System) -> Vec<f64> {
+        let cut = system.cut_at_the_root();
         let of_block = |(scratch, own): &mut (Scratch, Reduced), block: &Reach| {
-            system.reduce((self.rows, &block.rows), &block.nodes, scratch, own);
+            let reached = (&block.nodes[..], &[][..]);
+            system.reduce((self.rows, &block.rows), reached, &cut, scratch, own);
             own.squares()
         };
         let blocks = self.blocks.par_iter();
@@ -130,16 +174,16 @@ impl<'a> Reaching<'a> {
     }
 
     /// Runs of blocks that fit into the memory for what is kept.
-    fn runs(&self, system: &System) -> Vec<&[Reach]> {
-        let room = KEPT * memory::allowed() / (BLOCK * size_of::<f64>()) as f64;
+    fn runs(&self, cut: &Cut, system: &System) -> Vec<&[Reach]> {
         let rows = |block: &Reach| -> f64 {
-            let nodes = block.nodes.iter();
-            nodes.map(|&node| system.extent(node).0 as f64).sum()
+            let (nodes, above) = self.reached(block, cut, system);
+            let below = nodes.iter().map(|&node| system.extent(node).0);
+            (below.sum::<usize>() + above.len()) as f64
         };
+        let sizes: Vec<f64> = self.blocks.par_iter().map(rows).collect();
         let (mut runs, mut from, mut taken) = (Vec::new(), 0, 0.0);
-        for (at, block) in self.blocks.iter().enumerate() {
-            let more = rows(block);
-            if taken + more > room && at > from {
+        for (at, more) in sizes.into_iter().enumerate() {
+            if taken + more > room() && at > from {
                 runs.push(&self.blocks[from..at]);
                 (from, taken) = (at, 0.0);
             }
@@ -149,7 +193,8 @@ impl<'a> Reaching<'a> {
         runs
     }
 
-    /// For every block of this side which rows it holds and, by rows of `width` values each, what `kept` gives with it:
+    /// This side, solved above the cut, and another that is divided below it and `kept`. For every block of this side which
+    /// rows it holds and, by rows of `width` values each, what `kept` gives with it:
     /// `place` says where the value of a column of the block (of so many) and a row of `kept` stands.
     pub fn read(
         &self,
@@ -159,48 +204,69 @@ impl<'a> Reaching<'a> {
         watch: Watch,
         place: impl Fn(usize, usize, usize) -> usize + Sync,
     ) -> Result<Blocks, Cancelled> {
-        let empty = |block: &Reach| vec![0.0; block.rows.len() * kept.rows.count()];
-        let mut read: Vec<Vec<f64>> = self.blocks.iter().map(empty).collect();
-        let runs = kept.runs(system);
+        let cut = system.cut();
+        let needed = kept.needed(system).above(&cut);
+        let empty = |block: &Reach| Mutex::new(vec![0.0; block.rows.len() * kept.rows.count()]);
+        let read: Vec<Mutex<Vec<f64>>> = self.blocks.iter().map(empty).collect();
+        let runs = kept.runs(&cut, system);
         let all = runs.len() * self.rows.count();
         let done = AtomicUsize::new(0);
+        let spare = Spare::default();
         for run in runs {
-            let reduced: Result<Vec<Reduced>, Cancelled> = (run.par_iter())
-                .map_init(Scratch::default, |scratch, block| {
-                    report(watch, stage, done.load(Ordering::Relaxed), all)?;
-                    let mut reduced = Reduced::default();
-                    let rows = (kept.rows, &block.rows[..]);
-                    system.reduce(rows, &block.nodes, scratch, &mut reduced);
-                    Ok(reduced)
-                })
-                .collect();
-            let reduced = reduced?;
-            let streamed = self.blocks.par_iter().zip(&mut read);
-            let begin = || {
-                (
-                    Scratch::default(),
-                    Reduced::default(),
-                    vec![0.0; BLOCK * BLOCK],
-                )
-            };
-            streamed.try_for_each_init(begin, |(scratch, own, tile), (block, values)| {
+            let divided = kept.divided(run, &cut, system, &|| {
+                report(watch, stage, done.load(Ordering::Relaxed), all)
+            })?;
+            let begin = || (system.block(), Vec::new(), vec![0.0; BLOCK * BLOCK]);
+            let of_block = |(block, values): (&Reach, &Mutex<Vec<f64>>)| {
                 report(watch, stage, done.load(Ordering::Relaxed), all)?;
-                let rows = (self.rows, &block.rows[..]);
-                system.reduce(rows, &block.nodes, scratch, own);
+                let mut values = values.lock().unwrap_or_else(PoisonError::into_inner);
                 let width = block.rows.len();
-                for (other, reach) in reduced.iter().zip(run) {
-                    own.times(other, tile);
-                    for (column, tile) in tile.chunks_exact(BLOCK).take(width).enumerate() {
-                        for (&row, &value) in reach.rows.iter().zip(tile) {
-                            values[place(column, width, row as usize)] = value;
+                spare.with(begin, |(solved, gathered, tile)| {
+                    let rows = (self.rows, &block.rows[..]);
+                    system.solve_block(rows, |node| needed.is_needed(node), solved);
+                    for (other, reach) in divided.iter().zip(run) {
+                        system.read(other, (&solved.rows, &block.nodes), gathered, tile);
+                        for (column, tile) in tile.chunks_exact(BLOCK).take(width).enumerate() {
+                            for (&row, &value) in reach.rows.iter().zip(tile) {
+                                values[place(column, width, row as usize)] = value;
+                            }
                         }
                     }
-                }
+                });
                 done.fetch_add(width, Ordering::Relaxed);
                 Ok(())
-            })?;
+            };
+            (self.blocks.par_iter().zip(&read)).try_for_each(of_block)?;
         }
-        let numbers = self.blocks.iter().map(|block| block.rows.clone());
-        Ok(numbers.zip(read).collect())
+        let blocks = self.blocks.iter().zip(read).map(|(block, values)| {
+            let values = values.into_inner().unwrap_or_else(PoisonError::into_inner);
+            (block.rows.clone(), values)
+        });
+        Ok(blocks.collect())
     }
+
+    /// Some blocks of this side with the lower triangle divided out below a cut.
+    fn divided(
+        &self,
+        run: &[Reach],
+        cut: &Cut,
+        system: &System,
+        go_on: &(dyn Fn() -> Result<(), Cancelled> + Sync),
+    ) -> Result<Vec<Reduced>, Cancelled> {
+        let divide = |scratch: &mut Scratch, block: &Reach| {
+            go_on()?;
+            let mut reduced = Reduced::default();
+            let (nodes, above) = self.reached(block, cut, system);
+            let rows = (self.rows, &block.rows[..]);
+            system.reduce(rows, (&nodes, &above), cut, scratch, &mut reduced);
+            Ok(reduced)
+        };
+        let blocks = run.par_iter().map_init(Scratch::default, divide);
+        blocks.collect()
+    }
+}
+
+/// Rows of [`BLOCK`] values that may be kept while those of the other side pass by.
+fn room() -> f64 {
+    KEPT * memory::allowed() / (BLOCK * size_of::<f64>()) as f64
 }

@@ -1,8 +1,8 @@
 //! What given outputs read under given loads, in the way that takes least.
 //!
 //! With K the stiffness, F the loads and B what is read, the answer is B K⁻¹ F. K is symmetric, so it may
-//! be had from a solution for every load or from one for every output (Maxwell–Betti reciprocity), or from both with
-//! only the lower triangle divided out (`both.rs`).
+//! be had from a solution for every load or from one for every output (Maxwell–Betti reciprocity), or from one of them solved
+//! above a cut of the elimination tree and the other divided out below it (`both.rs`).
 
 use rayon::prelude::*;
 
@@ -22,8 +22,10 @@ pub enum Side {
     Loads,
     /// One solve an output, by reciprocity.
     Outputs,
-    /// Half a solve each.
-    Both,
+    /// One solve a load above a cut of the elimination tree; the lower triangle is divided out of the outputs below it.
+    LoadsAbove,
+    /// As [`Self::LoadsAbove`] with loads and outputs changed about.
+    OutputsAbove,
 }
 
 /// What is read at the points of an observer.
@@ -47,9 +49,9 @@ pub enum Reading<'a> {
 pub struct Responses {
     loads: usize,
     rows: usize,
-    /// Which side was solved for, or both by halves: what took least.
+    /// Which side was solved for, all the way or above the cut: what took least.
     pub side: Side,
-    /// Right-hand sides solved, halves too.
+    /// Right-hand sides solved, those of one side only below the cut too.
     pub solves: usize,
     /// Which loads (outputs) a block holds and, by rows, outputs × its loads (its outputs × all loads).
     blocks: Blocks,
@@ -231,23 +233,24 @@ fn between(
     let (reached_loads, reached_outputs) = (of(loads), of(outputs));
     let side = side.unwrap_or_else(|| {
         let costs = reached_loads.costs(&reached_outputs, system);
-        if costs.both < costs.one.min(costs.other) {
-            Side::Both
-        } else if costs.other < costs.one {
-            Side::Outputs
-        } else {
-            Side::Loads
-        }
+        let ways = [
+            (Side::Loads, costs.one),
+            (Side::Outputs, costs.other),
+            (Side::LoadsAbove, costs.one_above),
+            (Side::OutputsAbove, costs.other_above),
+        ];
+        let least = ways.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        least.map_or(Side::Loads, |way| way.0)
     });
     match side {
         Side::Loads => by_loads(system, loads, (&reached_outputs, read), watch),
         Side::Outputs => by_outputs(system, &reached_loads, outputs, watch),
-        Side::Both if outputs.count() <= loads.count() => {
+        Side::LoadsAbove => {
             let place = |load, width, output| output * width + load;
             let blocks = reached_loads.read(&reached_outputs, system, TOUCHES, watch, place)?;
             Ok(of_loads(side, loads, outputs, blocks))
         }
-        Side::Both => {
+        Side::OutputsAbove => {
             let place = |output, _, load| output * loads.count() + load;
             let blocks = reached_outputs.read(&reached_loads, system, SITES, watch, place)?;
             Ok(of_outputs(side, loads, outputs, blocks))
@@ -334,7 +337,7 @@ fn solves(side: Side, loads: &Rows, outputs: &Rows) -> usize {
     match side {
         Side::Loads => loads.count(),
         Side::Outputs => outputs.count(),
-        Side::Both => loads.count() + outputs.count(),
+        Side::LoadsAbove | Side::OutputsAbove => loads.count() + outputs.count(),
     }
 }
 

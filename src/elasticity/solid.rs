@@ -6,7 +6,7 @@
 
 pub mod cells;
 pub mod cut;
-pub mod dissect;
+pub mod dissection;
 mod elements;
 pub mod grid;
 pub mod grip;
@@ -81,10 +81,8 @@ impl SolidModel {
         assemble(&*elements, &material, &unknowns, &mut stiffness, watch)?;
         grip.stiffen(&unknowns, &mut stiffness);
         report(watch, "Factoring", 0, 1)?;
-        let order = elements
-            .elimination()
-            .map(|nodes| in_unknowns(&nodes, &unknowns));
-        let factored = System::new(unknowns.clone(), stiffness, order, watch);
+        let order = in_unknowns(&elements.elimination(), &unknowns);
+        let factored = System::new(unknowns.clone(), stiffness, Some(order), watch);
         let system = factored.map_err(|e| explain(&*elements, &unknowns, e))?;
         let mut model = Self {
             mesh: Arc::clone(mesh),
@@ -353,7 +351,7 @@ fn neighbours(elements: &dyn Elements) -> Vec<Vec<u32>> {
 
 /// What the factor of elements' stiffness will be.
 fn plan(elements: &dyn Elements) -> Result<Plan, FactorError> {
-    Plan::new(&neighbours(elements), elements.elimination(), 3)
+    Plan::new(&neighbours(elements), &elements.elimination(), 3)
 }
 
 /// The lower triangle's pattern: nodes that share an element are coupled.

@@ -1,5 +1,6 @@
 //! The sparse stiffness matrix: its pattern, its scaled factor, and solves in blocks.
 
+mod cut;
 mod matrix;
 mod numeric;
 mod reduced;
@@ -24,6 +25,7 @@ use faer::{Accum, MatMut, MatRef, Par, Side};
 use crate::budget::Watch;
 use crate::memory;
 
+pub use self::cut::Cut;
 pub use self::matrix::{FactorError, Scaled, SymmetricMatrix, bytes, bytes_with};
 pub use self::reduced::{BLOCK, Reduced, Scratch, common};
 
@@ -48,17 +50,9 @@ pub struct Factor {
 pub struct Block {
     /// Row-major, dimension × [`BLOCK`].
     pub rows: Vec<f64>,
-    /// Supernodes with anything on their right-hand sides.
-    active: Vec<bool>,
+    /// Supernodes with anything in their rows.
+    filled: Vec<bool>,
     below: Vec<f64>,
-}
-
-impl Block {
-    /// Empties it for the next right-hand sides.
-    pub fn clear(&mut self) {
-        self.rows.fill(0.0);
-        self.active.fill(false);
-    }
 }
 
 impl Factor {
@@ -143,8 +137,19 @@ impl Factor {
         let l = self.supernodes().symbolic();
         Block {
             rows: vec![0.0; self.dimension() * BLOCK],
-            active: vec![false; l.n_supernodes()],
+            filled: vec![false; l.n_supernodes()],
             below: vec![0.0; self.tallest * BLOCK],
+        }
+    }
+
+    /// Empties a block for the next right-hand sides.
+    pub fn clear(&self, block: &mut Block) {
+        let symbolic = nodes(&self.symbolic);
+        let (begins, ends) = (symbolic.supernode_begin(), symbolic.supernode_end());
+        for (node, filled) in block.filled.iter_mut().enumerate() {
+            if std::mem::take(filled) {
+                block.rows[begins[node] * BLOCK..ends[node] * BLOCK].fill(0.0);
+            }
         }
     }
 
@@ -152,13 +157,13 @@ impl Factor {
     pub fn load(&self, block: &mut Block, row: usize, column: usize, value: f64) {
         let at = self.order[row] as usize;
         block.rows[at * BLOCK + column] += value * self.scale[row];
-        block.active[self.supernode[at] as usize] = true;
+        block.filled[self.supernode[at] as usize] = true;
     }
 
     /// As [`Self::load`] for a row in the order of elimination and a value that is scaled already.
     pub fn load_place(&self, block: &mut Block, at: u32, column: usize, value: f64) {
         block.rows[at as usize * BLOCK + column] += value;
-        block.active[self.supernode[at as usize] as usize] = true;
+        block.filled[self.supernode[at as usize] as usize] = true;
     }
 
     /// Solves in place. Forward, only the supernodes that a load reaches do any work: loads that lie
@@ -173,31 +178,38 @@ impl Factor {
         let l = self.supernodes();
         let count = l.symbolic().n_supernodes();
         for s in 0..count {
-            if block.active[s] {
+            if block.filled[s] {
                 self.forward(l, s, block);
             }
         }
         for s in (0..count).rev().filter(|&s| is_needed(s)) {
             backward(l, s, block);
+            block.filled[s] = true;
         }
     }
 
-    /// Divides the lower triangle out of right-hand sides, at most [`BLOCK`], with `values` (row in the order of elimination,
-    /// column, value); `nodes` are the supernodes that they reach ([`Self::reach`]).
+    /// Divides the lower triangle out of right-hand sides, at most [`BLOCK`], below a cut, with `values` (row in the order of
+    /// elimination, column, value); `nodes` are the supernodes below that they reach ([`Self::reach`]), `above` the rows above
+    /// ([`Self::rows_above`]).
     pub fn reduce(
         &self,
-        nodes: &[u32],
+        (nodes, above): (&[u32], &[u32]),
+        cut: &Cut,
         values: impl Iterator<Item = (u32, usize, f64)>,
         scratch: &mut Scratch,
         into: &mut Reduced,
     ) {
         let l = self.supernodes();
         let begins = l.symbolic().supernode_begin();
-        into.lay_out(nodes, |node| self.extent(node).0);
-        scratch.lay_out(l.symbolic().n_supernodes(), into);
+        into.lay_out(nodes, above, |node| self.extent(node).0);
+        scratch.lay_out((l.symbolic().n_supernodes(), self.dimension()), into);
         let place = |row: usize| {
-            let node = self.supernode[row] as usize;
-            (scratch.starts[node] as usize + row - begins[node]) * BLOCK
+            let node = self.supernode[row];
+            if cut.is_above(node) {
+                scratch.places[row] as usize * BLOCK
+            } else {
+                (scratch.starts[node as usize] as usize + row - begins[node as usize]) * BLOCK
+            }
         };
         for (row, column, value) in values {
             into.rows[place(row as usize) + column] += value;
@@ -215,10 +227,54 @@ impl Factor {
         }
     }
 
+    /// What right-hand sides that were reduced below a cut read of a block that is solved above it and divided below, where it
+    /// reaches `nodes` ([`Reduced::read`]).
+    pub fn read(
+        &self,
+        reduced: &Reduced,
+        (solved, nodes): (&[f64], &[u32]),
+        gathered: &mut Vec<f64>,
+        into: &mut [f64],
+    ) {
+        let begins = self.supernodes().symbolic().supernode_begin();
+        let begin = |node: u32| begins[node as usize];
+        reduced.read((solved, nodes), begin, gathered, into);
+    }
+
+    /// Where the elimination tree is cut to solve for some right-hand sides above and reduce others below.
+    pub fn cut(&self) -> Cut {
+        let nodes = 0..self.supernodes_count() as u32;
+        Cut::new(nodes.map(|node| (self.extent(node).0, self.above(node))))
+    }
+
+    /// The rows above a cut, rising, on which right-hand sides leave something that have something in `rows` and reach `nodes`
+    /// below it.
+    pub fn rows_above(
+        &self,
+        nodes: &[u32],
+        rows: impl Iterator<Item = u32>,
+        cut: &Cut,
+    ) -> Vec<u32> {
+        // What a supernode leaves on rows above the next one is a part of what that one does.
+        let last = |node: &&u32| self.above(**node).is_some_and(|next| cut.is_above(next));
+        let pattern = |&node: &u32| self.supernodes().supernode(node as usize).pattern();
+        let left = nodes.iter().filter(last).flat_map(pattern);
+        let own = rows.filter(|&row| cut.is_above(self.supernode[row as usize]));
+        let mut above: Vec<u32> = left.map(|&row| row as u32).chain(own).collect();
+        above.sort_unstable();
+        above.dedup();
+        above
+    }
+
+    /// The supernode above another one in the elimination tree.
+    fn above(&self, node: u32) -> Option<u32> {
+        let first = self.supernodes().supernode(node as usize).pattern().first();
+        first.map(|&row| self.supernode[row])
+    }
+
     /// The supernodes, rising, that right-hand sides with something in these rows (in the order of elimination) reach.
     pub fn reach(&self, rows: impl Iterator<Item = u32>) -> Vec<u32> {
-        let l = self.supernodes().symbolic();
-        let mut is_reached = vec![false; l.n_supernodes()];
+        let mut is_reached = vec![false; self.supernodes_count()];
         let mut reached = Vec::new();
         for row in rows {
             let mut at = Some(self.supernode[row as usize]);
@@ -226,8 +282,7 @@ impl Factor {
                 && !std::mem::replace(&mut is_reached[s as usize], true)
             {
                 reached.push(s);
-                let first = l.supernode(s as usize).pattern().first();
-                at = first.map(|&row| self.supernode[row]);
+                at = self.above(s);
             }
         }
         reached.sort_unstable();
@@ -264,7 +319,7 @@ impl Factor {
             }
         }
         if let Some(&first) = node.pattern().first() {
-            block.active[self.supernode[first] as usize] = true;
+            block.filled[self.supernode[first] as usize] = true;
         }
     }
 }
@@ -328,8 +383,8 @@ pub fn check_bytes(bytes: f64) -> Result<(), FactorError> {
 /// What a factor will be, found on nodes that have several unknowns each: much quicker than on the unknowns, and as
 /// good an order.
 pub struct Plan {
-    /// Nodes in the order of elimination: by approximate minimum degree where none was given.
-    pub order: Vec<u32>,
+    /// How many unknowns the nodes have.
+    pub unknowns: f64,
     /// Entries of the factor.
     pub entries: f64,
     /// Entries of the lower triangle of the matrix.
@@ -340,15 +395,11 @@ pub struct Plan {
 
 impl Plan {
     /// Of nodes coupled with those in their lists (rising, themselves among them), with `each` unknowns, eliminated in
-    /// this order or the one that is found for them.
+    /// this order.
     ///
     /// # Errors
     /// [`FactorError::OutOfMemory`].
-    pub fn new(
-        coupled: &[Vec<u32>],
-        order: Option<Vec<u32>>,
-        each: usize,
-    ) -> Result<Self, FactorError> {
+    pub fn new(coupled: &[Vec<u32>], order: &[u32], each: usize) -> Result<Self, FactorError> {
         let (mut columns, mut rows) = (vec![0], Vec::new());
         for (node, list) in coupled.iter().enumerate() {
             let below = list.iter().map(|&n| n as usize).filter(|&n| n >= node);
@@ -360,15 +411,11 @@ impl Plan {
             rows,
             values: Vec::new(),
         };
-        let order = order.map(|nodes| nodes.into_iter().map(|n| n as usize).collect());
-        let symbolic = symbolic(&matrix, order, each)?;
-        let order = symbolic.perm().map_or_else(
-            || (0..coupled.len() as u32).collect(),
-            |p| p.arrays().0.iter().map(|&i| i as u32).collect(),
-        );
+        let order = order.iter().map(|&node| node as usize).collect();
+        let symbolic = symbolic(&matrix, Some(order), each)?;
         let each = each as f64;
         Ok(Self {
-            order,
+            unknowns: each * coupled.len() as f64,
             entries: each.powi(2) * symbolic.len_val() as f64,
             of_matrix: each.powi(2) * matrix.rows.len() as f64,
             multiplications: each.powi(3) * numeric::multiplications(nodes(&symbolic)),

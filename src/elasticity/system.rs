@@ -1,11 +1,14 @@
 //! A factored stiffness, ready for any number of loads, whatever its elements are.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use rayon::prelude::*;
 
 use super::rows::Rows;
 use super::solver::{
-    BLOCK, Block, Factor, FactorError, Reduced, Scaled, Scratch, SymmetricMatrix, bytes_with,
+    BLOCK, Block, Cut, Factor, FactorError, Reduced, Scaled, Scratch, SymmetricMatrix, bytes_with,
 };
+use super::spare::Spare;
 use crate::budget::{Cancelled, Watch, Work, report};
 use crate::tally::{self, Done};
 
@@ -20,6 +23,21 @@ pub struct System {
 
 /// Which supernodes of solved blocks are read, and all above them.
 pub(super) struct Needed(Vec<bool>);
+
+impl Needed {
+    /// Whether a supernode is.
+    pub fn is_needed(&self, node: usize) -> bool {
+        self.0[node]
+    }
+
+    /// Without what lies below a cut.
+    pub fn above(mut self, cut: &Cut) -> Self {
+        for (node, needed) in (0u32..).zip(&mut self.0) {
+            *needed &= cut.is_above(node);
+        }
+        self
+    }
+}
 
 pub(super) const HELD: u32 = u32::MAX;
 
@@ -112,7 +130,7 @@ impl System {
         let mut solutions = Vec::with_capacity(loads.len());
         let mut block = self.factor.block();
         for chunk in loads.chunks(BLOCK) {
-            block.clear();
+            self.factor.clear(&mut block);
             for (column, load) in chunk.iter().enumerate() {
                 self.load(&mut block, column, load);
             }
@@ -182,36 +200,28 @@ impl System {
         watch: Watch,
         consume: impl Fn(&mut Vec<f64>, &[u32], &[f64]) -> T + Sync,
     ) -> Result<Vec<T>, Cancelled> {
-        let done = std::sync::atomic::AtomicUsize::new(0);
-        loads
-            .in_blocks()
-            .par_iter()
-            .map_init(
-                || (self.factor.block(), Vec::new()),
-                |(block, buffer), chunk| {
-                    let so_far = done.load(std::sync::atomic::Ordering::Relaxed);
-                    report(watch, stage, so_far, loads.count())?;
-                    block.clear();
-                    for (column, &row) in chunk.iter().enumerate() {
-                        for &(place, value) in loads.row(row as usize) {
-                            self.factor.load_place(block, place, column, value);
-                        }
-                    }
-                    tally::count(Done::Solve, chunk.len());
-                    let is_needed = |s: usize| needed.is_none_or(|needed| needed.0[s]);
-                    self.factor.solve_for(is_needed, block);
-                    done.fetch_add(chunk.len(), std::sync::atomic::Ordering::Relaxed);
-                    Ok(consume(buffer, chunk, &block.rows))
-                },
-            )
-            .collect()
+        let done = AtomicUsize::new(0);
+        let spare = Spare::default();
+        let of_chunk = |chunk: &Vec<u32>| {
+            report(watch, stage, done.load(Ordering::Relaxed), loads.count())?;
+            let begin = || (self.factor.block(), Vec::new());
+            spare.with(begin, |(block, buffer)| {
+                let is_needed = |s: usize| needed.is_none_or(|needed| needed.is_needed(s));
+                self.solve_block((loads, chunk), is_needed, block);
+                done.fetch_add(chunk.len(), Ordering::Relaxed);
+                Ok(consume(buffer, chunk, &block.rows))
+            })
+        };
+        loads.in_blocks().par_iter().map(of_chunk).collect()
     }
 
-    /// The lower triangle divided out of some rows of `loads`, one column each, which reach these supernodes.
+    /// The lower triangle divided out of some rows of `loads`, one column each, below a cut: of the supernodes that they reach
+    /// there, with the rows above on which they leave something ([`Factor::reduce`]).
     pub(super) fn reduce(
         &self,
         (loads, rows): (&Rows, &[u32]),
-        nodes: &[u32],
+        reached: (&[u32], &[u32]),
+        cut: &Cut,
         scratch: &mut Scratch,
         into: &mut Reduced,
     ) {
@@ -220,7 +230,61 @@ impl System {
             row.map(move |&(place, value)| (place, column, value))
         });
         tally::count(Done::Solve, rows.len());
-        self.factor.reduce(nodes, values, scratch, into);
+        self.factor.reduce(reached, cut, values, scratch, into);
+    }
+
+    /// An empty block.
+    pub(super) fn block(&self) -> Block {
+        self.factor.block()
+    }
+
+    /// Fills a block with some rows of `loads`, one column each, and solves for what is needed; of what is not, it holds the rows
+    /// with the lower triangle divided out.
+    pub(super) fn solve_block(
+        &self,
+        (loads, rows): (&Rows, &[u32]),
+        is_needed: impl Fn(usize) -> bool,
+        block: &mut Block,
+    ) {
+        self.factor.clear(block);
+        for (column, &row) in rows.iter().enumerate() {
+            for &(place, value) in loads.row(row as usize) {
+                self.factor.load_place(block, place, column, value);
+            }
+        }
+        tally::count(Done::Solve, rows.len());
+        self.factor.solve_for(is_needed, block);
+    }
+
+    /// What is read of a block that is solved above a cut ([`Factor::read`]).
+    pub(super) fn read(
+        &self,
+        reduced: &Reduced,
+        solved: (&[f64], &[u32]),
+        gathered: &mut Vec<f64>,
+        into: &mut [f64],
+    ) {
+        self.factor.read(reduced, solved, gathered, into);
+    }
+
+    /// Where the elimination tree is cut ([`Factor::cut`]).
+    pub(super) fn cut(&self) -> Cut {
+        self.factor.cut()
+    }
+
+    /// With nothing above.
+    pub(super) fn cut_at_the_root(&self) -> Cut {
+        Cut::at_the_root(self.factor.supernodes_count())
+    }
+
+    /// The rows above a cut on which something is left ([`Factor::rows_above`]).
+    pub(super) fn rows_above(
+        &self,
+        nodes: &[u32],
+        rows: impl Iterator<Item = u32>,
+        cut: &Cut,
+    ) -> Vec<u32> {
+        self.factor.rows_above(nodes, rows, cut)
     }
 
     /// The supernodes that right-hand sides in these rows of solved blocks reach, rising.

@@ -394,7 +394,8 @@ fn carries_on(case: &Case, graded: &SolidGraded, error: f64) {
     for side in [
         respond::Side::Loads,
         respond::Side::Outputs,
-        respond::Side::Both,
+        respond::Side::LoadsAbove,
+        respond::Side::OutputsAbove,
     ] {
         let read = respond_from(
             side,

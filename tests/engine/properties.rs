@@ -201,8 +201,10 @@ fn blocks_give_the_bytes_of_single_touches() {
     for (side, t) in [
         (Side::Loads, 2),
         (Side::Loads, 69),
-        (Side::Both, 2),
-        (Side::Both, 69),
+        (Side::LoadsAbove, 2),
+        (Side::LoadsAbove, 69),
+        (Side::OutputsAbove, 2),
+        (Side::OutputsAbove, 69),
     ] {
         let all = read(side, &touches);
         let single = read(side, &touches[t..=t]);
@@ -216,7 +218,7 @@ fn blocks_give_the_bytes_of_single_touches() {
     }
 }
 
-/// Maxwell and Betti: solving for the loads, for the outputs or half for both gives the same, and what takes least is done.
+/// Maxwell and Betti: solving for the loads or for the outputs, all the way or above a cut, gives the same, and what takes least is done.
 #[test]
 fn loads_and_outputs_are_reciprocal() {
     let inputs = bundled();
@@ -234,12 +236,18 @@ fn loads_and_outputs_are_reciprocal() {
     ] {
         // More touches than outputs, and fewer.
         for touches in [&touches[..], &touches[..20]] {
-            let [a, b, c] = [Side::Loads, Side::Outputs, Side::Both].map(|side| {
+            let ways = [
+                Side::Loads,
+                Side::Outputs,
+                Side::LoadsAbove,
+                Side::OutputsAbove,
+            ];
+            let [a, b, c, d] = ways.map(|side| {
                 let r = respond_from(side, &m, touches, &observer, reading, &unwatched).unwrap();
                 assert_eq!(r.side, side);
                 table(&r, touches.len())
             });
-            for other in [b, c] {
+            for other in [b, c, d] {
                 assert_eq!(a.len(), other.len());
                 for (x, y) in a.chunks(touches.len()).zip(other.chunks(touches.len())) {
                     let apart: Vec<f64> = x.iter().zip(y).map(|(x, y)| x - y).collect();

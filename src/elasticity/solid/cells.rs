@@ -33,8 +33,7 @@ pub struct FiniteCells {
     number: FxHashMap<Place, u32>,
     /// Nodes of each cell, as many as it has shape functions.
     nodes: Vec<u32>,
-    /// Lattice places of the nodes, and where they lie (m).
-    lattice: Vec<[u32; 3]>,
+    /// Where the nodes lie (m).
     positions: Vec<DVec3>,
     /// Gradients of the shape functions along the cell's coordinates at its Gauss points: rows 3 a + i.
     gradients: Mat<f64>,
@@ -96,7 +95,6 @@ impl FiniteCells {
             places,
             moments,
             nodes,
-            lattice,
             positions,
         })
     }
@@ -244,13 +242,6 @@ impl Elements for FiniteCells {
             nodes: self.nodes_of(number as usize).to_vec(),
             values: shapes.map(|(n, g)| (n, gradient(g))).collect(),
         }
-    }
-
-    fn elimination(&self) -> Option<Vec<u32>> {
-        Some(super::dissect::dissect(
-            &self.lattice,
-            self.shapes.order() as u32,
-        ))
     }
 }
 

@@ -3,6 +3,7 @@
 use faer::Mat;
 use glam::DVec3;
 
+use super::dissection::Dissection;
 use crate::elasticity::Material;
 
 /// What a displacement at a point is made of.
@@ -46,8 +47,18 @@ pub trait Elements: Send + Sync {
     /// The shape functions at a point of the surface (m) with this outward normal.
     fn shape(&self, point: DVec3, outward: DVec3) -> Shape;
 
-    /// Nodes in a good order of elimination, where there is one.
-    fn elimination(&self) -> Option<Vec<u32>>;
+    /// The points in the middle of all elements (m).
+    fn centres(&self) -> Vec<DVec3> {
+        (0..self.count())
+            .map(|element| self.centre(element))
+            .collect()
+    }
+
+    /// Nodes in a good order of elimination.
+    fn elimination(&self) -> Vec<u32> {
+        let (nodes, nodes_of) = (self.nodes().len(), |element| self.nodes_of(element));
+        Dissection::of(nodes, nodes_of, self.centres()).order(nodes, nodes_of)
+    }
 
     /// Entries of all elements' matrices: what assembling costs.
     fn entries(&self) -> f64 {

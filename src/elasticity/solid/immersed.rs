@@ -1,11 +1,12 @@
 //! A closed part ready to be immersed in grids of any size.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
 use super::cells::FiniteCells;
 use super::cut::Cutting;
+use super::dissection::Dissection;
 use super::grid::Grid;
 use super::grip::Grip;
 use super::piece::Piece;
@@ -32,6 +33,8 @@ pub struct Immersed {
     part: Arc<TriMesh>,
     supports: Vec<Support>,
     surface: SignedDistance,
+    /// Of the part's own tetrahedra, as they are.
+    dissection: Arc<OnceLock<Dissection>>,
 }
 
 /// How fine a grid is.
@@ -95,6 +98,7 @@ impl Immersed {
             part: Arc::clone(part),
             supports: supports.to_vec(),
             surface: SignedDistance::new(part),
+            dissection: Arc::default(),
         }
     }
 
@@ -201,6 +205,10 @@ impl Immersed {
     #[must_use]
     pub fn tetrahedra(&self, fineness: &Fineness) -> Option<Tetrahedra> {
         let mut mesh = Arc::clone(self.part.volume()?);
+        if fineness.halvings == 0 {
+            let elements = Tetrahedra::dissected(&mesh, fineness.order, &self.dissection);
+            return Some(elements);
+        }
         for _ in 0..fineness.halvings {
             mesh = Arc::new(mesh.refined());
         }

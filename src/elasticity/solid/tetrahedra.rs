@@ -12,6 +12,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use glam::DVec3;
 
+use super::dissection::{Dissection, Net};
 use super::isotropic::isotropic;
 use super::simplex::Simplex;
 use super::{Elements, Shape, neighbours};
@@ -34,6 +35,8 @@ pub struct Tetrahedra {
     places: Vec<FacePlace>,
     /// Asked for by every load.
     grain: f64,
+    /// Of the mesh, for all orders.
+    dissection: Arc<OnceLock<Dissection>>,
     plan: OnceLock<Option<Plan>>,
 }
 
@@ -80,10 +83,44 @@ fn numbered(mesh: &VolumeMesh, simplex: &Simplex) -> (Vec<DVec3>, Vec<u32>) {
     (nodes, numbers)
 }
 
+/// What tetrahedra have in common: corners, edges and faces, with as many nodes as they have at order 4.
+fn nets(mesh: &VolumeMesh) -> Vec<Net> {
+    let mut known: HashMap<[u32; 4], usize> = HashMap::new();
+    let mut nets: Vec<Net> = Vec::new();
+    for (element, tet) in (0u32..).zip(&mesh.tetrahedra) {
+        for taken in 1..15_u32 {
+            let has = |corner: usize| taken >> corner & 1 == 1;
+            let mut corners: [u32; 4] =
+                std::array::from_fn(|c| if has(c) { tet[c] } else { u32::MAX });
+            corners.sort_unstable();
+            let at = *known.entry(corners).or_insert_with(|| {
+                nets.push(Net {
+                    elements: Vec::new(),
+                    nodes: if taken.is_power_of_two() { 1 } else { 3 },
+                });
+                nets.len() - 1
+            });
+            nets[at].elements.push(element);
+        }
+    }
+    nets.retain(|net| net.elements.len() > 1);
+    nets
+}
+
 impl Tetrahedra {
     /// Of an order between 1 and [`super::simplex::HIGHEST`].
     #[must_use]
     pub fn new(mesh: &Arc<VolumeMesh>, order: usize) -> Self {
+        Self::dissected(mesh, order, &Arc::default())
+    }
+
+    /// As [`Self::new`]; the order of elimination goes by a dissection that is found when it is first asked for, for all orders.
+    #[must_use]
+    pub fn dissected(
+        mesh: &Arc<VolumeMesh>,
+        order: usize,
+        dissection: &Arc<OnceLock<Dissection>>,
+    ) -> Self {
         let (triangles, places) = mesh.surface_places();
         let simplex = Simplex::new(order);
         let (nodes, numbers) = numbered(mesh, &simplex);
@@ -101,6 +138,7 @@ impl Tetrahedra {
             numbers,
             simplex,
             places,
+            dissection: Arc::clone(dissection),
             plan: OnceLock::new(),
         }
     }
@@ -108,8 +146,16 @@ impl Tetrahedra {
     /// What the factor of their stiffness will be; nothing where not even that fits into memory.
     #[must_use]
     pub fn plan(&self) -> Option<&Plan> {
-        let found = || Plan::new(&neighbours(self), None, 3).ok();
+        let found = || Plan::new(&neighbours(self), &self.dissect(), 3).ok();
         self.plan.get_or_init(found).as_ref()
+    }
+
+    /// The nodes in the order of elimination.
+    fn dissect(&self) -> Vec<u32> {
+        let dissection = self
+            .dissection
+            .get_or_init(|| Dissection::new(nets(&self.mesh), self.centres()));
+        dissection.order(self.nodes.len(), |element| self.nodes_of(element))
     }
 
     /// Nodes on faces that are named by their corners in rising order.
@@ -215,8 +261,8 @@ impl Elements for Tetrahedra {
         }
     }
 
-    fn elimination(&self) -> Option<Vec<u32>> {
-        self.plan().map(|plan| plan.order.clone())
+    fn elimination(&self) -> Vec<u32> {
+        self.dissect()
     }
 }
 

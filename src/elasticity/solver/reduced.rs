@@ -1,8 +1,10 @@
-//! Right-hand sides that the lower triangle is divided out of, as far as the elimination tree carries them.
+//! Right-hand sides that the lower triangle is divided out of below a cut of the elimination tree.
 //!
-//! With K = L Lᵀ, what outputs B read of loads F is B K⁻¹ F = (L⁻¹ Bᵀ)ᵀ (L⁻¹ F). A load and an output at single places reach only
-//! the supernodes above theirs, and have only the last of these in common: two short ways up the tree and a product take
-//! much less than a way up and a way down through all of it.
+//! What outputs B read of loads F is B K⁻¹ F with K = L Lᵀ. With the rows in two parts, those below a cut of the tree (1) and
+//! those above (2), y = L⁻¹ F and u = K⁻¹ F, it is zᵀ y₁ + rᵀ u₂: z = L₁₁⁻¹ B₁ᵀ is what is divided out of the outputs below, and
+//! r = B₂ᵀ - L₂₁ z what that leaves above, on few rows, because an output at a single place reaches one branch
+//! only. So a load takes a way up the tree and one down again as far as the cut, where the long rows end, and an output
+//! a short way up to it.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
@@ -10,12 +12,17 @@ use faer::{Accum, MatMut, MatRef, Par};
 /// Right-hand sides solved together. Fixed, so that a load gives the same bytes in any company.
 pub const BLOCK: usize = 64;
 
+/// Rows above the cut are multiplied by those of the same so many: which others there are must not change how sums are taken.
+const TOGETHER: u32 = 128;
+
 /// One block of them.
 #[derive(Default)]
 pub struct Reduced {
-    /// The supernodes that are reached, rising, and the row here at which the rows of each begin.
+    /// The supernodes below the cut that are reached, rising, and the row here at which the rows of each begin.
     nodes: Vec<u32>,
     pub(super) starts: Vec<usize>,
+    /// The rows above on which anything is left, rising, in the order of elimination. They stand after the others.
+    above: Vec<u32>,
     /// Row-major, rows × [`BLOCK`].
     pub(super) rows: Vec<f64>,
 }
@@ -23,25 +30,33 @@ pub struct Reduced {
 /// What a thread keeps between blocks.
 #[derive(Default)]
 pub struct Scratch {
-    /// By supernode, the row at which its rows begin in a block that reaches it.
+    /// By supernode below the cut, the row at which its rows begin in a block that reaches it.
     pub(super) starts: Vec<u32>,
+    /// By row above, where it stands in a block that leaves something there.
+    pub(super) places: Vec<u32>,
     pub(super) below: Vec<f64>,
 }
 
 impl Scratch {
-    pub(super) fn lay_out(&mut self, count: usize, block: &Reduced) {
-        self.starts.resize(count, 0);
+    pub(super) fn lay_out(&mut self, (nodes, rows): (usize, usize), block: &Reduced) {
+        self.starts.resize(nodes, 0);
+        self.places.resize(rows, 0);
         for (&node, &start) in block.nodes.iter().zip(&block.starts) {
             self.starts[node as usize] = start as u32;
+        }
+        for (&row, place) in block.above.iter().zip(block.below() as u32..) {
+            self.places[row as usize] = place;
         }
     }
 }
 
 impl Reduced {
-    /// Makes room for supernodes with so many rows each, all zero.
-    pub(super) fn lay_out(&mut self, nodes: &[u32], rows: impl Fn(u32) -> usize) {
+    /// Makes room for supernodes with so many rows each, and for rows above, all zero.
+    pub(super) fn lay_out(&mut self, nodes: &[u32], above: &[u32], rows: impl Fn(u32) -> usize) {
         self.nodes.clear();
         self.nodes.extend_from_slice(nodes);
+        self.above.clear();
+        self.above.extend_from_slice(above);
         self.starts.clear();
         self.starts.push(0);
         let mut count = 0;
@@ -50,7 +65,12 @@ impl Reduced {
             self.starts.push(count);
         }
         self.rows.clear();
-        self.rows.resize(count * BLOCK, 0.0);
+        self.rows.resize((count + above.len()) * BLOCK, 0.0);
+    }
+
+    /// How many rows are of supernodes below.
+    fn below(&self) -> usize {
+        self.starts.last().copied().unwrap_or(0)
     }
 
     /// The square of each column.
@@ -64,27 +84,44 @@ impl Reduced {
         sums
     }
 
-    /// `into` (by rows, one for each column of this block) = the products of its columns with those of another. What is added up
-    /// for a pair of columns, and in which order, does not depend on the others of their blocks: a supernode that only those
-    /// reach adds zero.
-    pub fn times(&self, other: &Self, into: &mut [f64]) {
+    /// `into` (by rows, one for each column of a solved block) = what the columns of this one read there. The block is solved above
+    /// the cut; below, the lower triangle is divided out of it, where it reaches `nodes`. `begin` is the first row of a
+    /// supernode in it, `gathered` a buffer. What is added up for a pair of columns, and in which order, does not depend on
+    /// the others of their blocks: a row that only those reach adds zero.
+    pub(super) fn read(
+        &self,
+        (solved, nodes): (&[f64], &[u32]),
+        begin: impl Fn(u32) -> usize,
+        gathered: &mut Vec<f64>,
+        into: &mut [f64],
+    ) {
         into.fill(0.0);
-        let mut product = MatMut::from_row_major_slice_mut(into, BLOCK, BLOCK);
-        common(&self.nodes, &other.nodes, |own, others| {
-            let [left, right] = [(self, own), (other, others)].map(|(block, at)| {
-                let rows = &block.rows[block.starts[at] * BLOCK..block.starts[at + 1] * BLOCK];
-                MatRef::from_row_major_slice(rows, rows.len() / BLOCK, BLOCK)
-            });
-            matmul(
-                product.as_mut(),
-                Accum::Add,
-                left.transpose(),
-                right,
-                1.0,
-                Par::Seq,
-            );
+        common(&self.nodes, nodes, |at, _| {
+            let own = &self.rows[self.starts[at] * BLOCK..self.starts[at + 1] * BLOCK];
+            let solved = &solved[begin(self.nodes[at]) * BLOCK..][..own.len()];
+            add_product(solved, own, into);
         });
+        let (mut own, together) = (&self.rows[self.below() * BLOCK..], |a: &u32, b: &u32| {
+            a / TOGETHER == b / TOGETHER
+        });
+        for rows in self.above.chunk_by(together) {
+            gathered.clear();
+            for &row in rows {
+                gathered.extend_from_slice(&solved[row as usize * BLOCK..][..BLOCK]);
+            }
+            let (these, others) = own.split_at(gathered.len());
+            add_product(gathered, these, into);
+            own = others;
+        }
     }
+}
+
+/// Adds leftᵀ right, of rows of [`BLOCK`] values each, to [`BLOCK`] × [`BLOCK`] values by rows.
+fn add_product(left: &[f64], right: &[f64], into: &mut [f64]) {
+    let [left, right] =
+        [left, right].map(|rows| MatRef::from_row_major_slice(rows, rows.len() / BLOCK, BLOCK));
+    let into = MatMut::from_row_major_slice_mut(into, BLOCK, BLOCK);
+    matmul(into, Accum::Add, left.transpose(), right, 1.0, Par::Seq);
 }
 
 /// Calls `each` with the places of what two rising lists have in common.

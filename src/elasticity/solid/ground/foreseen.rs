@@ -79,7 +79,7 @@ impl Taken {
     pub fn by(elements: &dyn Elements, plan: Option<&Plan>) -> Self {
         let assembled = elements.entries();
         plan.map_or_else(Self::default, |plan| Self {
-            unknowns: 3.0 * plan.order.len() as f64,
+            unknowns: plan.unknowns,
             entries: plan.entries,
             bytes: plan.bytes(),
             assembled,
