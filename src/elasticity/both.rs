@@ -16,11 +16,11 @@ use crate::memory;
 /// Rows over solved blocks, in blocks of neighbours, with what of the factor they reach.
 pub(super) struct Reaching<'a> {
     rows: &'a Rows,
-    blocks: Vec<Reach>,
+    blocks: Vec<Reached>,
 }
 
 /// A block of rows, by their numbers, and the supernodes that they reach, rising.
-struct Reach {
+struct Reached {
     rows: Vec<u32>,
     nodes: Vec<u32>,
 }
@@ -47,7 +47,7 @@ impl<'a> Reaching<'a> {
     pub fn new(system: &System, rows: &'a Rows) -> Self {
         let blocks = rows.in_blocks().into_par_iter().map(|numbers| {
             let places = (numbers.iter()).flat_map(|&row| rows.row(row as usize).iter());
-            Reach {
+            Reached {
                 nodes: system.reach(places.map(|entry| entry.0)),
                 rows: numbers,
             }
@@ -75,7 +75,7 @@ impl<'a> Reaching<'a> {
     }
 
     /// Evenly chosen blocks, and how many each stands for.
-    fn sample(&self) -> (impl Iterator<Item = &Reach>, f64) {
+    fn sample(&self) -> (impl Iterator<Item = &Reached>, f64) {
         let step = self.blocks.len().div_ceil(SAMPLE).max(1);
         let taken = self.blocks.len().div_ceil(step).max(1);
         let each = self.blocks.len() as f64 / taken as f64;
@@ -145,7 +145,7 @@ impl<'a> Reaching<'a> {
     }
 
     /// The supernodes that a block reaches below a cut, and the rows above on which it leaves something.
-    fn reached(&self, block: &Reach, cut: &Cut, system: &System) -> (Vec<u32>, Vec<u32>) {
+    fn reached(&self, block: &Reached, cut: &Cut, system: &System) -> (Vec<u32>, Vec<u32>) {
         let below = block.nodes.iter().copied();
         let below: Vec<u32> = below.filter(|&node| !cut.is_above(node)).collect();
         let rows = block.rows.iter();
@@ -157,7 +157,7 @@ impl<'a> Reaching<'a> {
     /// What each row, as a load, does by what it moves: fᵀ K⁻¹ f = |L⁻¹ f|².
     pub fn works(&self, system: &System) -> Vec<f64> {
         let cut = system.cut_at_the_root();
-        let of_block = |(scratch, own): &mut (Scratch, Reduced), block: &Reach| {
+        let of_block = |(scratch, own): &mut (Scratch, Reduced), block: &Reached| {
             let reached = (&block.nodes[..], &[][..]);
             system.reduce((self.rows, &block.rows), reached, &cut, scratch, own);
             own.squares()
@@ -174,8 +174,8 @@ impl<'a> Reaching<'a> {
     }
 
     /// Runs of blocks that fit into the memory for what is kept.
-    fn runs(&self, cut: &Cut, system: &System) -> Vec<&[Reach]> {
-        let rows = |block: &Reach| -> f64 {
+    fn runs(&self, cut: &Cut, system: &System) -> Vec<&[Reached]> {
+        let rows = |block: &Reached| -> f64 {
             let (nodes, above) = self.reached(block, cut, system);
             let below = nodes.iter().map(|&node| system.extent(node).0);
             (below.sum::<usize>() + above.len()) as f64
@@ -206,7 +206,7 @@ impl<'a> Reaching<'a> {
     ) -> Result<Blocks, Cancelled> {
         let cut = system.cut();
         let needed = kept.needed(system).above(&cut);
-        let empty = |block: &Reach| Mutex::new(vec![0.0; block.rows.len() * kept.rows.count()]);
+        let empty = |block: &Reached| Mutex::new(vec![0.0; block.rows.len() * kept.rows.count()]);
         let read: Vec<Mutex<Vec<f64>>> = self.blocks.iter().map(empty).collect();
         let runs = kept.runs(&cut, system);
         let all = runs.len() * self.rows.count();
@@ -217,7 +217,7 @@ impl<'a> Reaching<'a> {
                 report(watch, stage, done.load(Ordering::Relaxed), all)
             })?;
             let begin = || (system.block(), Vec::new(), vec![0.0; BLOCK * BLOCK]);
-            let of_block = |(block, values): (&Reach, &Mutex<Vec<f64>>)| {
+            let of_block = |(block, values): (&Reached, &Mutex<Vec<f64>>)| {
                 report(watch, stage, done.load(Ordering::Relaxed), all)?;
                 let mut values = values.lock().unwrap_or_else(PoisonError::into_inner);
                 let width = block.rows.len();
@@ -248,12 +248,12 @@ impl<'a> Reaching<'a> {
     /// Some blocks of this side with the lower triangle divided out below a cut.
     fn divided(
         &self,
-        run: &[Reach],
+        run: &[Reached],
         cut: &Cut,
         system: &System,
         go_on: &(dyn Fn() -> Result<(), Cancelled> + Sync),
     ) -> Result<Vec<Reduced>, Cancelled> {
-        let divide = |scratch: &mut Scratch, block: &Reach| {
+        let divide = |scratch: &mut Scratch, block: &Reached| {
             go_on()?;
             let mut reduced = Reduced::default();
             let (nodes, above) = self.reached(block, cut, system);

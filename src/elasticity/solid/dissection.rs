@@ -1,18 +1,20 @@
 //! An order of elimination for the nodes of any elements: nested dissection (A. George 1973).
 //!
-//! The elements are parted into two halves with few nodes between them ([`Piece::halves`]), each half likewise, down to single
+//! The elements are parted into two halves with few nodes between them ([`halves`]), each half likewise, down to single
 //! elements. A node that elements of both halves have is eliminated after all nodes that only one half has. Where elements
 //! part does not depend on how many nodes they have, so that one dissection serves all orders of shape functions.
 
 mod bisect;
+mod hypergraph;
 
 use std::collections::HashMap;
 
 use glam::DVec3;
 
-use self::bisect::Piece;
+use self::bisect::halves;
+use self::hypergraph::Hypergraph;
 
-pub use self::bisect::Net;
+pub use self::hypergraph::Net;
 
 /// Pieces of more elements are parted side by side.
 const BOTH: usize = 500;
@@ -42,7 +44,7 @@ impl Dissection {
                 wholes: Vec::new(),
             };
         }
-        let branch = part(&Piece::new(nets, centres));
+        let branch = part(&Hypergraph::new(nets, centres));
         for (element, piece) in branch.leaves {
             leaves[element as usize] = piece;
         }
@@ -105,16 +107,16 @@ impl Dissection {
     }
 }
 
-fn part(piece: &Piece) -> Branch {
+fn part(piece: &Hypergraph) -> Branch {
     if let [element] = piece.elements() {
         return Branch {
             leaves: vec![(*element, 0)],
             wholes: vec![0],
         };
     }
-    let sides = piece.halves();
+    let sides = halves(piece);
     let half = |side| part(&piece.half(&sides, side));
-    let (mut one, other) = if piece.elements().len() > BOTH {
+    let (mut one, other) = if piece.count() > BOTH {
         rayon::join(|| half(false), || half(true))
     } else {
         (half(false), half(true))

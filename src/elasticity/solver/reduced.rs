@@ -3,8 +3,8 @@
 //! What outputs B read of loads F is B K⁻¹ F with K = L Lᵀ. With the rows in two parts, those below a cut of the tree (1) and
 //! those above (2), y = L⁻¹ F and u = K⁻¹ F, it is zᵀ y₁ + rᵀ u₂: z = L₁₁⁻¹ B₁ᵀ is what is divided out of the outputs below, and
 //! r = B₂ᵀ - L₂₁ z what that leaves above, on few rows, because an output at a single place reaches one branch
-//! only. So a load takes a way up the tree and one down again as far as the cut, where the long rows end, and an output
-//! a short way up to it.
+//! only. So a load takes a way up the tree and one down again as far as the cut, not into the many branches below it, and an
+//! output a short way up to the cut, not through the large supernodes above.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
