@@ -269,10 +269,13 @@ fn askew(touches: &[Touch], rows: &Sifted, part: &TriMesh, notes: &mut Vec<Strin
         .filter(|(t, _)| part.normal(index.nearest(t.position).0).dot(t.normal) < ASKEW)
         .map(|(_, &row)| row)
         .collect();
-    if let Some(first) = turned.first() {
-        notes.push(format!(
-            "The normals of {} touches (the first is touch {first}) are more than 45° from the surface's: they were pressed as given.",
+    let pressed = match turned[..] {
+        [] => return,
+        [only] => format!("The normal of touch {only} is more than 45° from the surface's: it was"),
+        [first, ..] => format!(
+            "The normals of {} touches (the first is touch {first}) are more than 45° from the surface's: they were",
             turned.len()
-        ));
-    }
+        ),
+    };
+    notes.push(format!("{pressed} pressed as given."));
 }
