@@ -341,6 +341,11 @@ pub(super) fn check_memory(
     check_numbers(most, sites, touches, SaidBy::Project)
 }
 
+/// Memory of the strains and signals that a simulation holds at its largest (GB).
+pub(super) fn simulation_gb(sites: usize, touches: usize, signal: Signal) -> f64 {
+    gigabytes(simulation_numbers(sites, touches, signal))
+}
+
 /// Numbers in double precision that a simulation holds at its largest.
 fn simulation_numbers(sites: usize, touches: usize, signal: Signal) -> f64 {
     // The signal itself beside what it is read from: the components of the strain, and of the displacement.
@@ -370,8 +375,8 @@ pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
     let places = (share * inputs.part.area() / (spacing * spacing)).round();
     let sites = (places * inputs.project.gauge.directions as f64) as usize;
     let touches = inputs.project.touch.count.min(budget.touches);
-    let numbers = simulation_numbers(sites, touches, inputs.project.gauge.signal);
-    (sites, touches, gigabytes(numbers))
+    let gb = simulation_gb(sites, touches, inputs.project.gauge.signal);
+    (sites, touches, gb)
 }
 
 /// Refuses a result of `each` numbers for every site and touch of two tables that cannot be held, before it is

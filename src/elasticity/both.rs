@@ -100,9 +100,8 @@ impl<'a> Reaching<'a> {
         let all = |side: &Self, read: &Self| down(side, &read.needed(system));
         let above = |side: &Self, up: f64, read: &Self| {
             let solved = up + down(side, &read.needed(system).above(&cut));
-            let (divided, kept) = read.below(&cut, system);
-            let runs = (kept / room()).ceil().max(1.0);
-            BLOCK as f64 * (runs * solved + divided) + side.products(read, &cut, system)
+            let divided = read.below(&cut, system);
+            BLOCK as f64 * (solved + divided) + side.products(read, &cut, system)
         };
         let block = BLOCK as f64;
         Costs {
@@ -113,18 +112,11 @@ impl<'a> Reaching<'a> {
         }
     }
 
-    /// Entries of the factor that all blocks meet below a cut, and rows that they have there and leave above it.
-    fn below(&self, cut: &Cut, system: &System) -> (f64, f64) {
-        let (blocks, each) = self.sample();
-        let (mut entries, mut rows) = (0.0, 0.0);
-        for block in blocks {
-            let reached = self.reached(block, cut, system);
-            let extents = reached.0.iter().map(|&node| system.extent(node));
-            let (columns, of_factor) = extents.fold((0, 0.0), |sum, e| (sum.0 + e.0, sum.1 + e.1));
-            entries += each * of_factor;
-            rows += each * (columns + reached.1.len()) as f64;
-        }
-        (entries, rows)
+    /// Entries of the factor that all blocks meet below a cut.
+    fn below(&self, cut: &Cut, system: &System) -> f64 {
+        let nodes = self.blocks.iter().flat_map(|block| &block.nodes);
+        let below = nodes.filter(|&&node| !cut.is_above(node));
+        below.map(|&node| system.extent(node).1).sum()
     }
 
     /// Multiplications of what this side, solved above a cut, and another one, divided below it, are multiplied with each other.
@@ -181,9 +173,10 @@ impl<'a> Reaching<'a> {
             (below.sum::<usize>() + above.len()) as f64
         };
         let sizes: Vec<f64> = self.blocks.par_iter().map(rows).collect();
+        let room = KEPT * memory::allowed() / (BLOCK * size_of::<f64>()) as f64;
         let (mut runs, mut from, mut taken) = (Vec::new(), 0, 0.0);
         for (at, more) in sizes.into_iter().enumerate() {
-            if taken + more > room() && at > from {
+            if taken + more > room && at > from {
                 runs.push(&self.blocks[from..at]);
                 (from, taken) = (at, 0.0);
             }
@@ -236,7 +229,9 @@ impl<'a> Reaching<'a> {
                 done.fetch_add(width, Ordering::Relaxed);
                 Ok(())
             };
-            (self.blocks.par_iter().zip(&read)).try_for_each(of_block)?;
+            let in_turn = system.in_turn(self.blocks.len());
+            let blocks = self.blocks.par_iter().zip(&read).with_min_len(in_turn);
+            blocks.try_for_each(of_block)?;
         }
         let blocks = self.blocks.iter().zip(read).map(|(block, values)| {
             let values = values.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -264,9 +259,4 @@ impl<'a> Reaching<'a> {
         let blocks = run.par_iter().map_init(Scratch::default, divide);
         blocks.collect()
     }
-}
-
-/// Rows of [`BLOCK`] values that may be kept while those of the other side pass by.
-fn room() -> f64 {
-    KEPT * memory::allowed() / (BLOCK * size_of::<f64>()) as f64
 }

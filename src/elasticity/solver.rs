@@ -132,7 +132,7 @@ impl Factor {
         self.scale.len()
     }
 
-    /// An empty block; each thread has its own.
+    /// An empty block.
     pub fn block(&self) -> Block {
         let l = self.supernodes().symbolic();
         Block {

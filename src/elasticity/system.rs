@@ -10,6 +10,7 @@ use super::solver::{
 };
 use super::spare::Spare;
 use crate::budget::{Cancelled, Watch, Work, report};
+use crate::memory;
 use crate::tally::{self, Done};
 
 /// Assembled once, factored once.
@@ -189,7 +190,7 @@ impl System {
     }
 
     /// Solves for every row of `loads` (its entries by solver row, as [`Self::place`] gives them) and
-    /// hands each block to `consume`: a buffer of the thread's own, which rows the block holds, column by
+    /// hands each block to `consume`: a buffer that may hold anything, which rows the block holds, column by
     /// column, and the solved block, or what is needed of it. The rows are taken in an order in which neighbours share blocks; blocks come back in that order,
     /// which does not depend on the threads.
     pub(super) fn solve_rows<T: Send>(
@@ -212,7 +213,9 @@ impl System {
                 Ok(consume(buffer, chunk, &block.rows))
             })
         };
-        loads.in_blocks().par_iter().map(of_chunk).collect()
+        let blocks = loads.in_blocks();
+        let in_turn = self.in_turn(blocks.len());
+        (blocks.par_iter().with_min_len(in_turn).map(of_chunk)).collect()
     }
 
     /// The lower triangle divided out of some rows of `loads`, one column each, below a cut: of the supernodes that they reach
@@ -231,6 +234,15 @@ impl System {
         });
         tally::count(Done::Solve, rows.len());
         self.factor.reduce(reached, cut, values, scratch, into);
+    }
+
+    /// How many of so many blocks are taken one after the other, so that those in work together take no more than a share of the
+    /// memory, on however many threads.
+    pub(super) fn in_turn(&self, blocks: usize) -> usize {
+        const SHARE: f64 = 0.25;
+        let bytes = (self.dimension() * BLOCK * size_of::<f64>()) as f64;
+        let at_once = (SHARE * memory::allowed() / bytes).max(1.0);
+        ((blocks as f64 / at_once).ceil() as usize).max(1)
     }
 
     /// An empty block.

@@ -268,6 +268,35 @@ fn loads_and_outputs_are_reciprocal() {
     assert_eq!((fewer(5).side, fewer(5).solves), (Side::Loads, 5));
 }
 
+/// Blocks are used again and again, with only what was filled taken out of them.
+#[test]
+fn what_a_block_held_before_leaves_no_trace() {
+    let inputs = bundled();
+    let m = model(&inputs);
+    let part = &inputs.part;
+    let at = hapdef::mesh::sample::random(part, 600, 1, |_| true).into_iter();
+    let touches: Vec<Touch> = at.map(|at| touch(&inputs, part.point(at))).collect();
+    let sites = hapdef::mesh::sample::random(part, 400, 3, |_| true);
+    let observer = m.observer(&sites, Face::Inside);
+    let one = m.solve(&m.forces(&touches[333]));
+    let direct = observer.strain_of(&m, &one);
+    for side in [
+        Side::Loads,
+        Side::Outputs,
+        Side::LoadsAbove,
+        Side::OutputsAbove,
+    ] {
+        let read = respond_from(side, &m, &touches, &observer, Reading::Strain, &unwatched);
+        let read = table(&read.unwrap(), touches.len());
+        let of_one = read.iter().skip(333).step_by(touches.len());
+        let (mut apart, mut size) = (0.0_f64, 0.0_f64);
+        for (read, direct) in of_one.zip(direct.iter().flatten()) {
+            (apart, size) = (apart.max((read - direct).abs()), size.max(direct.abs()));
+        }
+        assert!(apart < 1e-9 * size, "{side:?}: {apart:e} of {size:e}");
+    }
+}
+
 #[test]
 fn the_inside_face_is_the_outside_face_of_the_shell_turned_over() {
     let inputs = bundled();

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::super::layout::simulation_gb;
 use super::super::{Inputs, SLOPE_TOUCHES};
 use crate::budget::Budget;
 use crate::elasticity::solid::ground::{Foreseen, SolidGround};
@@ -79,6 +80,8 @@ pub struct Asked {
     pub touches: usize,
     /// m.
     tip: f64,
+    /// What is read at all sites of all touches (GB).
+    read_gb: f64,
     /// Of the middles of the walls (m²).
     area: f64,
     /// Thickness of the wall and the radius it is bent to (m).
@@ -92,9 +95,13 @@ impl Asked {
     /// Of a part whose walls have middles of this area (m²) and are bent to a radius (m).
     #[must_use]
     pub fn new(inputs: &Inputs, area: f64, radius: f64, shape: Shape) -> Self {
-        let budget = inputs.project.budget.budget();
+        let (project, budget) = (&inputs.project, inputs.project.budget.budget());
+        let touches = project.touch.count.min(budget.touches);
+        let spacing = project.sites.spacing_mm * 1e-3;
+        let sites = area / (spacing * spacing) * project.gauge.directions as f64;
         Self {
-            touches: inputs.project.touch.count.min(budget.touches),
+            read_gb: simulation_gb(sites as usize, touches, project.gauge.signal),
+            touches,
             tip: inputs.project.tip().1,
             budget,
             area,
@@ -122,7 +129,7 @@ impl Asked {
             element_mm: size * 1e3,
             unknowns,
             seconds: SHELL.seconds(elements.passes as f64 * unknowns, unknowns, self.touches),
-            memory_gb: SHELL.memory_gb(unknowns),
+            memory_gb: SHELL.memory_gb(unknowns) + self.read_gb,
             error_percent: OF_TIP * (size / self.tip).powi(2),
             theory_percent: OF_THEORY * self.wall / self.radius,
         }
@@ -157,7 +164,7 @@ impl Asked {
             element_mm: size * 1e3,
             unknowns: last,
             seconds: SOLID.seconds(sizes.iter().map(unknowns).sum(), last, self.touches),
-            memory_gb: SOLID.memory_gb(last),
+            memory_gb: SOLID.memory_gb(last) + self.read_gb,
             error_percent: SolidGround::error_percent(size, self.wall.min(self.tip)),
             theory_percent: 0.0,
         }
@@ -172,14 +179,14 @@ impl Asked {
         let built = CUT * foreseen.boxes
             + ASSEMBLE * foreseen.assembled
             + FACTOR * foreseen.multiplications;
-        let solved = (SOLVE * loads).min(HALF * (loads + outputs)) * foreseen.entries;
+        let solved = (SOLVE * loads).min(READ * (loads + outputs)) * foreseen.entries;
         Cost {
             model: PartModel::Solid,
             order,
             element_mm: foreseen.size * 1e3,
             unknowns: foreseen.unknowns,
             seconds: SOLID.once + built + PRESS * loads + solved,
-            memory_gb: (foreseen.bytes + foreseen.before) / 1e9,
+            memory_gb: (foreseen.bytes + foreseen.before) / 1e9 + self.read_gb,
             error_percent: foreseen.estimate.displacement_percent,
             theory_percent: 0.0,
         }
@@ -187,13 +194,14 @@ impl Asked {
 }
 
 /// CPU time (s) of each box that a surface is found with, each entry of an element's matrix, each multiplication of a
-/// factorization, each entry of a factor that a touch is solved with or that it is divided out of a touch or an output, and
-/// of laying a touch on the elements: as on limbs with tetrahedra and in cells.
+/// factorization, each entry of a factor that a touch is solved with, or that is met by a touch or an output where one side is
+/// solved for above a cut and the other divided out below it, and of laying a touch on the elements: as on limbs with tetrahedra
+/// and in cells.
 const CUT: f64 = 6e-6;
 const ASSEMBLE: f64 = 4e-8;
 const FACTOR: f64 = 5e-11;
 const SOLVE: f64 = 6e-11;
-const HALF: f64 = 4e-12;
+const READ: f64 = 4e-12;
 const PRESS: f64 = 6e-4;
 
 /// Error of the displacement under a touch (%) with triangles as large as the tip's radius, which falls with the

@@ -6,16 +6,18 @@
 //! the boxes that hold the part where these are turned; points, gradients and displacements are the file's for everybody
 //! else.
 
+use std::sync::OnceLock;
+
 use faer::{Accum, Mat, MatRef, Par};
 use glam::DVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::cut::{Cell, Cutter, Cutting, Moments};
+use super::elements::{Elements, Shape, dissected};
 use super::grid::{Grid, Place};
 use super::isotropic::isotropic;
 use super::lagrange::{Lagrange, gauss};
-use super::{Elements, Shape};
 use crate::budget::{Cancelled, Watch, report};
 use crate::elasticity::Material;
 use crate::mesh::inside::SignedDistance;
@@ -37,6 +39,8 @@ pub struct FiniteCells {
     positions: Vec<DVec3>,
     /// Gradients of the shape functions along the cell's coordinates at its Gauss points: rows 3 a + i.
     gradients: Mat<f64>,
+    /// Of elimination: asked for by who plans and by who factors.
+    order: OnceLock<Vec<u32>>,
 }
 
 /// Cells cut between two looks at whether to stop.
@@ -96,6 +100,7 @@ impl FiniteCells {
             moments,
             nodes,
             positions,
+            order: OnceLock::new(),
         })
     }
 
@@ -242,6 +247,10 @@ impl Elements for FiniteCells {
             nodes: self.nodes_of(number as usize).to_vec(),
             values: shapes.map(|(n, g)| (n, gradient(g))).collect(),
         }
+    }
+
+    fn elimination(&self) -> Vec<u32> {
+        self.order.get_or_init(|| dissected(self)).clone()
     }
 }
 

@@ -7,17 +7,12 @@
 mod bisect;
 mod hypergraph;
 
-use std::collections::HashMap;
-
 use glam::DVec3;
 
 use self::bisect::halves;
-use self::hypergraph::Hypergraph;
+use self::hypergraph::{Hypergraph, merged};
 
 pub use self::hypergraph::Net;
-
-/// Pieces of more elements are parted side by side.
-const BOTH: usize = 500;
 
 /// The pieces that elements are parted into, as a tree.
 pub struct Dissection {
@@ -44,7 +39,7 @@ impl Dissection {
                 wholes: Vec::new(),
             };
         }
-        let branch = part(&Hypergraph::new(nets, centres));
+        let branch = part(Hypergraph::new(nets, centres));
         for (element, piece) in branch.leaves {
             leaves[element as usize] = piece;
         }
@@ -67,18 +62,11 @@ impl Dissection {
                 elements[node as usize].push(element as u32);
             }
         }
-        let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
-        let mut nets: Vec<Net> = Vec::new();
-        for elements in elements.into_iter().filter(|e| e.len() > 1) {
-            let at = *known.entry(elements).or_insert_with_key(|elements| {
-                nets.push(Net {
-                    elements: elements.clone(),
-                    nodes: 0,
-                });
-                nets.len() - 1
-            });
-            nets[at].nodes += 1;
-        }
+        let nets = merged(
+            elements
+                .into_iter()
+                .map(|elements| Net { elements, nodes: 1 }),
+        );
         Self::new(nets, centres)
     }
 
@@ -107,20 +95,17 @@ impl Dissection {
     }
 }
 
-fn part(piece: &Hypergraph) -> Branch {
+fn part(piece: Hypergraph) -> Branch {
     if let [element] = piece.elements() {
         return Branch {
             leaves: vec![(*element, 0)],
             wholes: vec![0],
         };
     }
-    let sides = halves(piece);
-    let half = |side| part(&piece.half(&sides, side));
-    let (mut one, other) = if piece.count() > BOTH {
-        rayon::join(|| half(false), || half(true))
-    } else {
-        (half(false), half(true))
-    };
+    let sides = halves(&piece);
+    let [one, other] = [false, true].map(|side| piece.half(&sides, side));
+    drop(piece);
+    let (mut one, other) = (part(one), part(other));
     let first = one.wholes.len() as u32;
     one.leaves
         .extend(other.leaves.into_iter().map(|(e, at)| (e, first + at)));

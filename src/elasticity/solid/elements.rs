@@ -55,14 +55,18 @@ pub trait Elements: Send + Sync {
     }
 
     /// Nodes in a good order of elimination.
-    fn elimination(&self) -> Vec<u32> {
-        let (nodes, nodes_of) = (self.nodes().len(), |element| self.nodes_of(element));
-        Dissection::of(nodes, nodes_of, self.centres()).order(nodes, nodes_of)
-    }
+    fn elimination(&self) -> Vec<u32>;
 
     /// Entries of all elements' matrices: what assembling costs.
     fn entries(&self) -> f64 {
         let of = |element| (3.0 * self.nodes_of(element).len() as f64).powi(2);
         (0..self.count()).map(of).sum()
     }
+}
+
+/// The nodes of elements in an order of elimination that parts them by what they have in common.
+#[must_use]
+pub fn dissected(elements: &dyn Elements) -> Vec<u32> {
+    let (nodes, nodes_of) = (elements.nodes().len(), |e| elements.nodes_of(e));
+    Dissection::of(nodes, nodes_of, elements.centres()).order(nodes, nodes_of)
 }

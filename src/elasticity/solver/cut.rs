@@ -1,7 +1,7 @@
 //! Where the elimination tree is cut in two.
 
-/// A branch with no more than this share of all rows lies below the cut, whole. Between a fiftieth and a fifth it makes next to no
-/// difference to what reading thousands of sites under thousands of touches takes.
+/// A branch with no more than this share of all rows lies below the cut, whole. Twice or half as many make a tenth of a difference to
+/// what reading thousands of sites under thousands of touches takes.
 const SHARE: usize = 16;
 
 /// Which supernodes lie above the cut: with every one all that are above it in the tree.

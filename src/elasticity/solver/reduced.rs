@@ -110,8 +110,16 @@ impl Reduced {
                 gathered.extend_from_slice(&solved[row as usize * BLOCK..][..BLOCK]);
             }
             let (these, others) = own.split_at(gathered.len());
-            add_product(gathered, these, into);
             own = others;
+            if rows.len() > 1 {
+                add_product(gathered, these, into);
+            } else {
+                // Sums of one product are rounded otherwise than those of several.
+                let mut padded = [0.0; 2 * BLOCK];
+                padded[..BLOCK].copy_from_slice(these);
+                gathered.resize(2 * BLOCK, 0.0);
+                add_product(gathered, &padded, into);
+            }
         }
     }
 }
@@ -136,5 +144,49 @@ pub fn common(one: &[u32], other: &[u32], mut each: impl FnMut(usize, usize)) {
                 (i, j) = (i + 1, j + 1);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of rows above, each with values of its own.
+    fn above(rows: &[u32], empty: &[u32]) -> Reduced {
+        let of = |row: &u32| -> [f64; BLOCK] {
+            let is_empty = empty.contains(row);
+            std::array::from_fn(|k| {
+                if is_empty {
+                    0.0
+                } else {
+                    f64::from(*row + k as u32).sin()
+                }
+            })
+        };
+        Reduced {
+            nodes: Vec::new(),
+            starts: vec![0],
+            above: rows.to_vec(),
+            rows: rows.iter().flat_map(of).collect(),
+        }
+    }
+
+    #[test]
+    fn rows_that_only_others_reach_change_no_bit() {
+        let solved: Vec<f64> = (0..400 * BLOCK).map(|k| (0.7 * k as f64).cos()).collect();
+        let read = |block: &Reduced| {
+            let mut into = vec![0.0; BLOCK * BLOCK];
+            block.read((&solved, &[]), |_| 0, &mut Vec::new(), &mut into);
+            into.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+        };
+        let alone = read(&above(&[3, 128, 300, 301], &[]));
+        let empty = [2, 64, 127, 129, 130, 200, 255, 302, 383];
+        let mut rows: Vec<u32> = [3, 128, 300, 301].into_iter().chain(empty).collect();
+        rows.sort_unstable();
+        assert_eq!(alone, read(&above(&rows, &empty)));
+        let naive: f64 = ([3_u32, 128, 300, 301].iter())
+            .map(|&row| solved[row as usize * BLOCK + 5] * f64::from(row + 9).sin())
+            .sum();
+        assert!((f64::from_bits(alone[5 * BLOCK + 9]) - naive).abs() < 1e-12);
     }
 }

@@ -10,7 +10,6 @@ use std::collections::BTreeSet;
 use super::hypergraph::{Hypergraph, Net};
 
 /// Which side each element is on, how many of either side a net has, and what that comes to.
-#[derive(Clone)]
 struct Halves<'a> {
     graph: &'a Hypergraph,
     sides: Vec<bool>,
@@ -30,7 +29,7 @@ struct Movable {
 const FEW: usize = 60;
 /// Cuts that are mended: those with the fewest nodes between.
 const MENDED: usize = 3;
-/// The smaller half is no less than this share.
+/// The smaller half is no less than this share, rounded down.
 const SMALLER: f64 = 0.4;
 /// Moves in vain after which one looks no further: so many, and a share of the elements.
 const PATIENCE: (usize, f64) = (25, 0.02);
@@ -203,7 +202,7 @@ impl<'a> Halves<'a> {
     /// The one that gains most, of the larger half where two do: no half becomes too small.
     fn next(&self, movable: &Movable) -> Option<u32> {
         let all = self.sizes[0] + self.sizes[1];
-        let least = ((SMALLER * f64::from(all)) as u32).max(1);
+        let least = (SMALLER * f64::from(all)).floor().max(1.0) as u32;
         let of = |side: usize| {
             let &(gain, element) = movable.by_side[side].last()?;
             let fits = self.sizes[side] >= least + self.graph.weights[element as usize];
@@ -247,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_squaresis_cut_across() {
+    fn a_long_board_is_cut_across() {
         for (width, height) in [(40, 5), (5, 40), (9, 3)] {
             let squares = board(width, height);
             let found = Halves::new(&squares, halves(&squares));

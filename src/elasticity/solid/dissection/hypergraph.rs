@@ -164,27 +164,17 @@ impl Hypergraph {
         nets.map(|&net| &self.nets[net as usize])
     }
 
-    /// The nets between elements that have become others: equal ones are one.
+    /// The nets between elements that have become others.
     fn nets_of(&self, places: &[u32]) -> Vec<Net> {
-        let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
-        let mut nets: Vec<Net> = Vec::new();
-        for net in &self.nets {
+        merged(self.nets.iter().map(|net| {
             let mut elements: Vec<u32> = net.elements.iter().map(|&e| places[e as usize]).collect();
             elements.sort_unstable();
             elements.dedup();
-            if elements.len() < 2 {
-                continue;
+            Net {
+                elements,
+                nodes: net.nodes,
             }
-            let at = *known.entry(elements).or_insert_with_key(|elements| {
-                nets.push(Net {
-                    elements: elements.clone(),
-                    nodes: 0,
-                });
-                nets.len() - 1
-            });
-            nets[at].nodes += net.nodes;
-        }
-        nets
+        }))
     }
 
     /// Orders of the elements that may be cut in the middle.
@@ -233,4 +223,22 @@ impl Hypergraph {
         }
         order
     }
+}
+
+/// Those between at least two elements, equal ones as one.
+#[must_use]
+pub fn merged(nets: impl Iterator<Item = Net>) -> Vec<Net> {
+    let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
+    let mut merged: Vec<Net> = Vec::new();
+    for Net { elements, nodes } in nets.filter(|net| net.elements.len() > 1) {
+        let at = *known.entry(elements).or_insert_with_key(|elements| {
+            merged.push(Net {
+                elements: elements.clone(),
+                nodes: 0,
+            });
+            merged.len() - 1
+        });
+        merged[at].nodes += nodes;
+    }
+    merged
 }
