@@ -1,6 +1,6 @@
 //! An order of elimination for the nodes of any elements: nested dissection (A. George 1973).
 //!
-//! The elements are parted into two halves with few nodes between them ([`halves`]), each half likewise, down to single
+//! The elements are parted into two halves with few nodes between them (`bisect.rs`), each half likewise, down to single
 //! elements. A node that elements of both halves have is eliminated after all nodes that only one half has. Where elements
 //! part does not depend on how many nodes they have, so that one dissection serves all orders of shape functions.
 
