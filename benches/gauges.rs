@@ -322,15 +322,15 @@ fn by_matching(text: &mut String, found: &Evaluation) {
     for row in found.matched.iter().filter(|r| r.region == EVERYWHERE) {
         let middle = found.judging.middle_n() == Some(row.force_n);
         let lost = (found.failures.iter())
-            .filter(|f| middle && f.selector == row.selector)
+            .filter(|f| middle && f.set.chooser == row.set.chooser)
             .flat_map(|f| &f.rows)
             .find(|f| f.failed == LOST);
         let cell = |mm: Option<f64>| mm.map_or("–".into(), |mm| format!("{mm:.2}"));
         let _ = writeln!(
             text,
             "| {} | {} | matching | {} | {:.2} / {:.2} / {:.2} | {:.2} | {} | {} | {:.0} % |",
-            row.selector,
-            row.sensors,
+            row.set.chooser.name(),
+            row.set.sensors,
             row.force_n,
             row.error_mm,
             row.median_mm,

@@ -14,6 +14,7 @@ use hapdef::dataset::{self, Signal};
 use hapdef::design::{self, Design, Inputs};
 use hapdef::elasticity::grade::ShellGround;
 use hapdef::elasticity::load::Touch;
+use hapdef::evaluation::{Chooser, EVERYWHERE};
 use hapdef::feasible::Filter;
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::remesh::Remeshed;
@@ -226,18 +227,14 @@ fn errors(text: &mut String, designs: &[(Quality, Signal, Design)]) {
         "## Localization error on unseen touches\n\nMean / median in mm. Strain carries 1 microstrain of noise in training and test; displacement none, as in the paper. The paper's figures are for its own limb and its model's own data: below 10 mm with 5 and about 2.5 mm with 10 gauges (greedy SVR), 0.6 mm with all candidates.\n\n| quality | signal | selector | gauges | all touches | away from the boundaries | aim or paper |\n|---|---|---|---|---|---|---|"
     );
     for (quality, signal, design) in designs {
-        let rows = &design.evaluation.rows;
-        let mut line = |selector: &str, sensors: usize| {
+        let mut line = |chooser: Chooser, sensors: usize| {
+            let (set, selector) = (chooser.set(sensors), chooser.name());
             let find = |all: bool| {
-                rows.iter()
-                    .find(|r| {
-                        r.selector == selector
-                            && r.sensors == sensors
-                            && (r.region == "all touches") == all
-                    })
-                    .map_or("–".to_owned(), |r| {
-                        format!("{:.2} / {:.2}", r.error_mm, r.median_mm)
-                    })
+                let mut rows = design.evaluation.of(set);
+                let row = rows.find(|r| (r.region == EVERYWHERE) == all);
+                row.map_or("–".to_owned(), |r| {
+                    format!("{:.2} / {:.2}", r.error_mm, r.median_mm)
+                })
             };
             let aim: Option<(f64, &str)> = match (quality, signal, sensors) {
                 (Quality::Standard, Signal::Displacement, 5) => Some((6.0, ", paper < 10")),
@@ -245,12 +242,8 @@ fn errors(text: &mut String, designs: &[(Quality, Signal, Design)]) {
                 (Quality::Draft, _, 10) => Some((12.0, "")),
                 _ => None,
             };
-            let reached = rows
-                .iter()
-                .find(|r| {
-                    r.selector == selector && r.sensors == sensors && r.region == "all touches"
-                })
-                .map_or(f64::NAN, |r| r.error_mm);
+            let reached = design.evaluation.over_all(set);
+            let reached = reached.map_or(f64::NAN, |r| r.error_mm);
             let aim = aim.map_or(String::new(), |(aim, paper)| {
                 let verdict = if reached <= aim { "met" } else { "missed" };
                 format!("{aim}{paper}: {verdict}")
@@ -264,11 +257,11 @@ fn errors(text: &mut String, designs: &[(Quality, Signal, Design)]) {
                 find(false)
             );
         };
-        for selector in SelectorKind::PAPER.map(SelectorKind::name) {
-            line(selector, 5);
-            line(selector, 10);
+        for selector in SelectorKind::PAPER {
+            line(selector.into(), 5);
+            line(selector.into(), 10);
         }
-        line("all-candidates", design.candidate_count());
+        line(Chooser::AllCandidates, design.candidate_count());
     }
     text.push('\n');
 }
@@ -290,11 +283,8 @@ fn curves(text: &mut String, designs: &[(Quality, Signal, Design)]) {
             let cells: Vec<String> = kinds
                 .iter()
                 .map(|kind| {
-                    let row = design.evaluation.rows.iter().find(|r| {
-                        r.selector == kind.name()
-                            && r.sensors == sensors
-                            && r.region == "all touches"
-                    });
+                    let set = Chooser::from(*kind).set(sensors);
+                    let row = design.evaluation.over_all(set);
                     row.map_or("–".into(), |r| {
                         format!(
                             "{:.2} / {:.2} / {:.1}; {:.1}",

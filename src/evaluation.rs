@@ -5,6 +5,7 @@ pub mod failures;
 pub mod judging;
 pub mod matched;
 mod rows;
+mod set_id;
 
 use std::borrow::Cow;
 
@@ -15,13 +16,14 @@ use serde::Serialize;
 
 pub use self::judging::{EstimatorKind, Forces, Judging};
 pub use self::matched::{Matched, MatchedRow};
-pub use self::rows::{EVERYWHERE, EvaluationRow, TouchRegion};
+pub use self::rows::{EVERYWHERE, EvaluationRow, JudgedSet, TouchRegion};
+pub use self::set_id::{Chooser, SetId};
 
 use self::failures::{FailureRow, FailureTrial, MOST_FAILED, failures};
-use self::rows::Said;
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Signal, SignalMatrix};
 use crate::draw::normal;
+use crate::placement::SelectorKind;
 use crate::regression::folds::evenly;
 use crate::regression::tune::{self, CrossValidation, Effort, Grid, distances};
 use crate::regression::{Grouping, Hyper, PositionModel, scale};
@@ -55,31 +57,33 @@ pub struct Trial<'a> {
 /// of the smaller.
 const TUNED_SIZES: [usize; 6] = [1, 2, 3, 5, 8, 13];
 
-/// The name under which all candidates together are judged.
-pub const BASELINE: &str = "all-candidates";
-
 /// A set to judge: whose it is and which rows of the trial's matrices it has.
 pub struct Candidate {
-    /// Name of the selector.
-    pub selector: String,
+    /// Who chose it.
+    pub chooser: Chooser,
     /// Rows of the set's gauges.
     pub rows: Vec<usize>,
     /// Settings of its regression; searched where there are none.
     pub hyper: Option<Hyper>,
 }
 
-/// The outcome: rows by set and region, and each set's errors touch by touch (mm), as drawn and as a
-/// workshop would build it.
+impl Candidate {
+    /// Which set it is.
+    #[must_use]
+    pub fn id(&self) -> SetId {
+        self.chooser.set(self.rows.len())
+    }
+}
+
+/// The outcome: every set's errors touch by touch, and rows of them by set and region.
 #[derive(Clone, Default)]
 pub struct Evaluation {
     /// What judged.
     pub judging: Judging,
     /// By matching: at the force in the middle.
     pub rows: Vec<EvaluationRow>,
-    /// As drawn: for each set the error at each test touch (mm).
-    pub errors: Vec<Vec<f64>>,
-    /// The same as built (mm).
-    pub built: Vec<Vec<f64>>,
+    /// Errors touch by touch; by matching, at the force in the middle.
+    pub sets: Vec<JudgedSet>,
     /// What is left of each selector's largest set when gauges fail.
     pub failures: Vec<Failures>,
     /// By matching: what was found of each set at each force, and what is quoted of that. The largest set of each
@@ -96,10 +100,9 @@ pub struct Evaluation {
 /// Errors of one set with failed gauges.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Failures {
-    /// Name of the selector.
-    pub selector: String,
-    /// Gauges of the whole set.
-    pub sensors: usize,
+    /// The whole set.
+    #[serde(flatten)]
+    pub set: SetId,
     /// Touches that were learned from; by matching, which learns from none, those that were judged.
     pub touches: usize,
     /// Rising in failed gauges.
@@ -129,10 +132,9 @@ pub fn evaluate(
             Ok(judge(&noisy, trial, set, hyper, budget))
         })
         .collect();
-    for (rows, [errors, built], work) in results? {
-        evaluation.rows.extend(rows);
-        evaluation.errors.push(errors);
-        evaluation.built.push(built);
+    for (set, work) in results? {
+        evaluation.rows.extend(set.rows(trial.regions));
+        evaluation.sets.push(set);
         evaluation.work += work;
     }
     evaluation.failures = fail(&noisy, trial, sets, &hypers, budget, watch)?;
@@ -173,8 +175,7 @@ fn fail(
                 watch,
             )?;
             Ok(Failures {
-                selector: set.selector.clone(),
-                sensors: set.rows.len(),
+                set: set.id(),
                 touches: touches.len(),
                 rows,
             })
@@ -184,8 +185,8 @@ fn fail(
 
 /// Whether a set is the last of its selector's, and so its largest; the baseline of all candidates is nobody's.
 pub(crate) fn is_largest(sets: &[Candidate], k: usize) -> bool {
-    let next = sets.get(k + 1);
-    sets[k].selector != BASELINE && next.is_none_or(|next| next.selector != sets[k].selector)
+    let (chooser, next) = (sets[k].chooser, sets.get(k + 1));
+    chooser != Chooser::AllCandidates && next.is_none_or(|next| next.chooser != chooser)
 }
 
 /// The trial's signals with noise, the same noise for a site in every set it is part of.
@@ -262,7 +263,7 @@ fn tune_sets(
     let columns = evenly(trial.train_targets.len(), budget.tuning_touches);
     let targets: Vec<[f64; 3]> = columns.iter().map(|&c| trial.train_targets[c]).collect();
     let mut hypers: Vec<Hyper> = Vec::with_capacity(sets.len());
-    let mut known: Vec<(String, usize, Hyper)> = Vec::new();
+    let mut known: Vec<(SetId, Hyper)> = Vec::new();
     for set in sets {
         let size = set.rows.len();
         let tuned = TUNED_SIZES
@@ -271,12 +272,11 @@ fn tune_sets(
             .filter(|&t| t <= size)
             .max()
             .unwrap_or(size);
-        let reuse = known
-            .iter()
-            .find(|k| k.0 == set.selector && k.1 == tuned && size != tuned);
+        let (own, smaller) = (set.id(), set.chooser.set(tuned));
+        let reuse = (known.iter()).find(|(of, _)| *of == smaller && own != smaller);
         let hyper = if let Some(hyper) = set.hyper {
             hyper
-        } else if let Some((_, _, hyper)) = reuse {
+        } else if let Some((_, hyper)) = reuse {
             Hyper {
                 gamma: hyper.gamma * tuned as f64 / size as f64,
                 ..*hyper
@@ -285,7 +285,7 @@ fn tune_sets(
             let x = noisy.train.select_rows(&set.rows).select_columns(&columns);
             let (search, cost) = tune::search(&x, &targets, &grid, &validation, watch)?;
             *work += cost;
-            known.push((set.selector.clone(), size, search.best()));
+            known.push((own, search.best()));
             search.best()
         };
         hypers.push(hyper);
@@ -308,7 +308,7 @@ fn judge(
     set: &Candidate,
     hyper: &Hyper,
     budget: &Budget,
-) -> (Vec<EvaluationRow>, [Vec<f64>; 2], Work) {
+) -> (JudgedSet, Work) {
     let effort = Effort {
         tolerance: budget.svr_tolerance_mm,
         max_steps: budget.svr_steps,
@@ -317,44 +317,29 @@ fn judge(
     let train = noisy.train.select_rows(&set.rows);
     let model = PositionModel::train(&train, trial.train_targets, hyper, effort);
     let predicted = model.predict(&noisy.test.select_rows(&set.rows));
-    let errors = distances(&predicted, trial.test_targets);
     let built = model.predict(&noisy.workshop.select_rows(&set.rows));
-    let built = distances(&built, trial.test_targets);
-    let said = Said {
-        selector: &set.selector,
-        sensors: set.rows.len(),
+    let judged = JudgedSet {
+        set: set.id(),
         hyper: Some(*hyper),
         converged: Some(model.converged().0),
+        drawn: distances(&predicted, trial.test_targets),
+        built: distances(&built, trial.test_targets),
     };
-    let rows = said.rows(trial.regions, [&errors, &built]);
-    (rows, [errors, built], model.work)
+    (judged, model.work)
 }
 
 impl Evaluation {
     /// The same errors, quoted for other regions of the same test touches.
     #[must_use]
     pub fn in_regions(&self, regions: &[TouchRegion]) -> Self {
-        let whole = self.rows.iter().filter(|r| r.region == EVERYWHERE);
-        let rows = whole.zip(self.errors.iter().zip(&self.built));
-        let rows = rows.flat_map(|(row, (errors, built))| {
-            let said = Said {
-                selector: &row.selector,
-                sensors: row.sensors,
-                hyper: row.hyper,
-                converged: row.converged,
-            };
-            said.rows(regions, [errors, built])
-        });
-        let found = self.found.iter();
+        let (sets, found) = (self.sets.iter(), self.found.iter());
         Self {
-            rows: rows.collect(),
+            rows: sets.flat_map(|set| set.rows(regions)).collect(),
             matched: found.flat_map(|m| m.rows(regions)).collect(),
             ..self.clone()
         }
     }
-}
 
-impl Evaluation {
     /// Of what was found by matching: rows and errors of every set are those at the force in the middle.
     #[must_use]
     pub(crate) fn of_matched(
@@ -363,13 +348,11 @@ impl Evaluation {
         regions: &[TouchRegion],
     ) -> Self {
         let middle = judging.middle_n();
-        let of_set = || found.iter().filter(move |m| Some(m.force_n) == middle);
+        let in_middle = found.iter().filter(|m| Some(m.force_n) == middle);
+        let sets: Vec<JudgedSet> = in_middle.map(Matched::judged).collect();
         Self {
-            rows: of_set()
-                .flat_map(|m| m.said().rows(regions, [&m.errors, &m.built]))
-                .collect(),
-            errors: of_set().map(|m| m.errors.clone()).collect(),
-            built: of_set().map(|m| m.built.clone()).collect(),
+            rows: sets.iter().flat_map(|set| set.rows(regions)).collect(),
+            sets,
             matched: found.iter().flat_map(|m| m.rows(regions)).collect(),
             found,
             judging,
@@ -377,11 +360,39 @@ impl Evaluation {
         }
     }
 
+    /// What was found of a set, over all touches and in each region.
+    pub fn of(&self, set: SetId) -> impl Iterator<Item = &EvaluationRow> {
+        self.rows.iter().filter(move |r| r.set == set)
+    }
+
+    /// What was found of a set over all touches.
+    #[must_use]
+    pub fn over_all(&self, set: SetId) -> Option<&EvaluationRow> {
+        self.of(set).find(|r| r.region == EVERYWHERE)
+    }
+
+    /// What was found of all candidates together in a region.
+    #[must_use]
+    pub fn baseline(&self, region: &str) -> Option<&EvaluationRow> {
+        let of_all = |r: &&EvaluationRow| r.set.chooser == Chooser::AllCandidates;
+        (self.rows.iter().filter(of_all)).find(|r| r.region == region)
+    }
+
+    /// Errors of a set touch by touch.
+    #[must_use]
+    pub fn judged(&self, set: SetId) -> Option<&JudgedSet> {
+        self.sets.iter().find(|judged| judged.set == set)
+    }
+
+    /// What is left of a selector's largest set when gauges fail.
+    #[must_use]
+    pub fn failures_of(&self, selector: SelectorKind) -> Option<&Failures> {
+        (self.failures.iter()).find(|f| f.set.chooser == selector.into())
+    }
+
     /// What was found of a set by matching over all touches, a row for each force.
-    pub fn by_force(&self, selector: &str, sensors: usize) -> impl Iterator<Item = &MatchedRow> {
-        let of_set = move |r: &&MatchedRow| {
-            r.selector == selector && r.sensors == sensors && r.region == EVERYWHERE
-        };
+    pub fn by_force(&self, set: SetId) -> impl Iterator<Item = &MatchedRow> {
+        let of_set = move |r: &&MatchedRow| r.set == set && r.region == EVERYWHERE;
         self.matched.iter().filter(of_set)
     }
 }

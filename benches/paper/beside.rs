@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use hapdef::evaluation::{Evaluation, MatchedRow};
+use hapdef::evaluation::{Chooser, Evaluation, MatchedRow};
 use hapdef::placement::SelectorKind;
 
 use crate::displaced::{Judged, baseline, row, with_failed};
@@ -70,7 +70,7 @@ fn by_regression(found: &Evaluation, on: &str) -> Vec<Line> {
         Line {
             what: format!(
                 "displacement, all candidates ({}; the paper: 407), {on}",
-                all.map_or(0, |r| r.sensors)
+                all.map_or(0, |r| r.set.sensors)
             ),
             paper: "0.6",
             here: all.map(|r| r.error_mm),
@@ -80,7 +80,7 @@ fn by_regression(found: &Evaluation, on: &str) -> Vec<Line> {
 }
 
 fn by_matching(found: &Evaluation) -> Vec<Line> {
-    let rows = |gauges: usize| found.by_force(SELECTOR.name(), gauges);
+    let rows = |gauges: usize| found.by_force(Chooser::from(SELECTOR).set(gauges));
     let at = |gauges: usize, of: fn(&MatchedRow) -> Option<f64>| {
         rows(gauges).find(|r| r.force_n == FORCE_N).and_then(of)
     };

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use hapdef::budget::{Budget, unwatched};
 use hapdef::dataset;
 use hapdef::design::{self, DesignError, Inputs, Reduced, Reference, Simulated};
-use hapdef::evaluation::{BASELINE, EVERYWHERE, EstimatorKind, Evaluation, EvaluationRow};
+use hapdef::evaluation::{Chooser, EVERYWHERE, EstimatorKind, Evaluation, EvaluationRow};
 use hapdef::feasible::Feasibility;
 use hapdef::placement::{Selection, SelectorKind};
 
@@ -154,15 +154,12 @@ pub fn of_sizes(selection: &Selection, sizes: &[usize]) -> Selection {
 
 /// What was found of a selector's set of so many gauges.
 pub fn row(found: &Evaluation, kind: SelectorKind, gauges: usize) -> Option<&EvaluationRow> {
-    let is_it = |r: &&EvaluationRow| r.selector == kind.name() && r.sensors == gauges;
-    let mut rows = found.rows.iter().filter(|r| r.region == EVERYWHERE);
-    rows.find(is_it)
+    found.over_all(Chooser::from(kind).set(gauges))
 }
 
 /// What was found of all candidates together.
 pub fn baseline(found: &Evaluation) -> Option<&EvaluationRow> {
-    let mut rows = found.rows.iter().filter(|r| r.region == EVERYWHERE);
-    rows.find(|r| r.selector == BASELINE)
+    found.baseline(EVERYWHERE)
 }
 
 /// What is left of a selector's largest set when so many of its gauges fail: mean error and the worst one (mm).
@@ -172,7 +169,7 @@ pub fn with_failed(
     failed: usize,
     retrained: bool,
 ) -> Option<(f64, f64)> {
-    let set = found.failures.iter().find(|f| f.selector == kind.name())?;
+    let set = found.failures_of(kind)?;
     let mut rows = set.rows.iter().filter(|r| r.failed == failed);
     let row = rows.find(|r| failed == 0 || r.retrained == retrained)?;
     Some((row.error_mm, row.worst_mm))

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use hapdef::budget::unwatched;
 use hapdef::dataset::Signal;
 use hapdef::design::{self, DesignError};
-use hapdef::evaluation::{EstimatorKind, Evaluation};
+use hapdef::evaluation::{Chooser, EstimatorKind, Evaluation};
 use hapdef::placement::{Selection, SelectorKind, SensorSet};
 
 use crate::displaced::{Displaced, with_failed};
@@ -55,7 +55,7 @@ pub fn judged(displaced: &Displaced, stages: &mut Stages) -> Result<Evaluation, 
 pub fn write(text: &mut String, found: &Evaluation) {
     text.push_str("### Strain by matching\n\nSites by expected error, gauges of 1 microstrain of noise, the same touches at several forces. As built: every gauge off by what `gauge.tolerance` says, of which matching knows no more than that; calibrated by twelve known presses made by hand. Blind: touches that move no gauge by three times its noise.\n\n| gauges | force (N) | as designed: mean / median / 95 % (mm) | as built (mm) | calibrated (mm) | blind |\n|---|---|---|---|---|---|\n");
     for gauges in [FEW, MANY] {
-        for row in found.by_force(SELECTOR.name(), gauges) {
+        for row in found.by_force(Chooser::from(SELECTOR).set(gauges)) {
             let _ = writeln!(
                 text,
                 "| {gauges} | {} | {:.2} / {:.2} / {:.2} | {:.2} | {} | {:.0} % |",

@@ -8,7 +8,7 @@ use clap::Args;
 use super::common::{Common, SelectorArg, prepare_folder};
 use super::{out, progress::Bar};
 use crate::design::{self, Design};
-use crate::evaluation::{BASELINE, EvaluationRow, MatchedRow};
+use crate::evaluation::{Chooser, EvaluationRow, MatchedRow};
 use crate::io::artifacts::{self, Provenance};
 use crate::io::together::Together;
 use crate::paper::Format;
@@ -131,11 +131,15 @@ fn print_summary(design: &Design) -> anyhow::Result<()> {
         out::line(&words)?;
     }
     let chosen = design.chosen().len();
-    print_forces(design, chosen)?;
+    print_forces(design)?;
     for row in design.evaluation.rows.iter().filter(|r| tells(r, chosen)) {
         out::line(&format!(
             "{:>14}, {:>3} gauges, {:<26} {:7.2} mm mean {:7.2} mm median",
-            row.selector, row.sensors, row.region, row.error_mm, row.median_mm
+            row.set.chooser.name(),
+            row.set.sensors,
+            row.region,
+            row.error_mm,
+            row.median_mm
         ))?;
     }
     for doubt in design.doubts() {
@@ -155,8 +159,8 @@ fn print_summary(design: &Design) -> anyhow::Result<()> {
 }
 
 /// What matching does with the chosen gauges at every force that it was judged at.
-fn print_forces(design: &Design, chosen: usize) -> anyhow::Result<()> {
-    for row in design.evaluation.by_force(design.lead.name(), chosen) {
+fn print_forces(design: &Design) -> anyhow::Result<()> {
+    for row in design.evaluation.by_force(design.chosen_id()) {
         let calibrated = row.calibrated_mm;
         let calibrated = calibrated.map_or(String::new(), |mm| format!(", {mm:.2} mm calibrated"));
         out::line(&format!(
@@ -200,7 +204,7 @@ fn print_gauges(design: &Design) -> anyhow::Result<()> {
 /// Whether a row stands in the summary: those of as many gauges as were chosen, and of the paper's five and ten to
 /// compare with.
 fn tells(row: &EvaluationRow, chosen: usize) -> bool {
-    [5, 10, chosen].contains(&row.sensors) || row.selector == BASELINE
+    [5, 10, chosen].contains(&row.set.sensors) || row.set.chooser == Chooser::AllCandidates
 }
 
 #[cfg(test)]

@@ -5,12 +5,14 @@ use std::sync::Arc;
 use super::judge::{judge_as_asked, reference};
 use super::{Design, DesignError, Inputs};
 use crate::budget::Watch;
-use crate::evaluation::{Candidate, Evaluation, EvaluationRow, Matched, MatchedRow};
+use crate::evaluation::{
+    Candidate, Chooser, Evaluation, EvaluationRow, JudgedSet, Matched, MatchedRow, SetId,
+};
 use crate::placement::SensorSet;
 
 /// Judges one set of sites (as numbered in the dataset) that nobody selected, as a design's own sets were:
 /// with its test touches, its noise and, where it has a set of as many gauges by the selector in the lead,
-/// the settings of that set's regression. Its name in the rows is `name`.
+/// the settings of that set's regression. Its rows are those of [`Chooser::Hand`].
 ///
 /// # Errors
 /// As [`reference()`].
@@ -18,7 +20,6 @@ pub fn judge_set(
     inputs: &Inputs,
     design: &Design,
     sites: &[usize],
-    name: &str,
     watch: Watch,
 ) -> Result<Evaluation, DesignError> {
     let (simulated, budget) = (&design.simulated, &design.budget);
@@ -26,10 +27,10 @@ pub fn judge_set(
     let rows = sites
         .iter()
         .filter_map(|s| reference.sites.binary_search(s).ok());
-    let own = (design.evaluation.rows.iter())
-        .find(|r| r.selector == design.lead.name() && r.sensors == sites.len());
+    let as_many = Chooser::from(design.lead).set(sites.len());
+    let own = design.evaluation.over_all(as_many);
     let set = Candidate {
-        selector: name.to_owned(),
+        chooser: Chooser::Hand,
         rows: rows.collect(),
         hyper: own.and_then(|r| r.hyper),
     };
@@ -53,11 +54,8 @@ impl Design {
     pub fn with_hand(&self, sites: Vec<usize>, judged: &Evaluation) -> Self {
         let mut design = self.clone();
         design.by_hand = true;
-        let (name, old) = (self.lead.name(), self.chosen().len());
-        let set = (self.selections.iter())
-            .flat_map(|s| s.sets.iter().map(move |set| (s.selector, set.sites.len())))
-            .position(|set| set == (self.lead, old));
-        let count = sites.len();
+        let old = self.chosen_id();
+        let new = old.chooser.set(sites.len());
         let selections = Arc::make_mut(&mut design.selections);
         if let Some(led) = selections.iter_mut().find(|s| s.selector == self.lead) {
             led.achieved.cautions.push(
@@ -78,58 +76,28 @@ impl Design {
             }
         }
         let evaluation = Arc::make_mut(&mut design.evaluation);
-        replace_rows(evaluation, (name, old), count, judged);
-        if let (Some(k), Some(errors), Some(built)) =
-            (set, judged.errors.first(), judged.built.first())
-        {
-            evaluation.errors[k].clone_from(errors);
-            evaluation.built[k].clone_from(built);
-        }
+        replace_judged(evaluation, old, new, judged);
         design
     }
 }
 
-/// Puts what was judged of a set of `count` gauges in the place of a selector's set of so many (`old`).
-fn replace_rows(
-    evaluation: &mut Evaluation,
-    (name, old): (&str, usize),
-    count: usize,
-    judged: &Evaluation,
-) {
-    let is_old = |selector: &str, sensors: usize| selector == name && sensors == old;
-    let rows = judged.rows.iter().map(|r| EvaluationRow {
-        selector: name.to_owned(),
-        sensors: count,
-        ..r.clone()
-    });
-    put_in_place(
-        &mut evaluation.rows,
-        |r| is_old(&r.selector, r.sensors),
-        rows,
-    );
-    let found = judged.found.iter().map(|m| Matched {
-        selector: name.to_owned(),
-        sensors: count,
-        ..m.clone()
-    });
-    put_in_place(
-        &mut evaluation.found,
-        |m| is_old(&m.selector, m.sensors),
-        found,
-    );
-    let matched = judged.matched.iter().map(|r| MatchedRow {
-        selector: name.to_owned(),
-        sensors: count,
-        ..r.clone()
-    });
-    put_in_place(
-        &mut evaluation.matched,
-        |r| is_old(&r.selector, r.sensors),
-        matched,
-    );
+/// Puts what was judged of one set in the place of another, as if it were that one with other gauges.
+fn replace_judged(evaluation: &mut Evaluation, old: SetId, new: SetId, judged: &Evaluation) {
+    let rows = judged.rows.iter().cloned();
+    let rows = rows.map(|r| EvaluationRow { set: new, ..r });
+    put_in_place(&mut evaluation.rows, |r| r.set == old, rows);
+    let sets = judged.sets.iter().cloned();
+    let sets = sets.map(|s| JudgedSet { set: new, ..s });
+    put_in_place(&mut evaluation.sets, |s| s.set == old, sets);
+    let found = judged.found.iter().cloned();
+    let found = found.map(|m| Matched { set: new, ..m });
+    put_in_place(&mut evaluation.found, |m| m.set == old, found);
+    let matched = judged.matched.iter().cloned();
+    let matched = matched.map(|r| MatchedRow { set: new, ..r });
+    put_in_place(&mut evaluation.matched, |r| r.set == old, matched);
     if let Some(failed) = judged.failures.first() {
-        for own in (evaluation.failures.iter_mut()).filter(|f| f.selector == name) {
-            own.sensors = count;
+        for own in evaluation.failures.iter_mut().filter(|f| f.set == old) {
+            own.set = new;
             own.rows.clone_from(&failed.rows);
         }
     }

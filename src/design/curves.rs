@@ -1,20 +1,8 @@
 //! What a design found as curves with their names, for pages and windows alike.
 
 use super::pipeline::Design;
-use crate::evaluation::{BASELINE, EstimatorKind, Failures};
+use crate::evaluation::{EstimatorKind, Failures};
 use crate::placement::SelectorKind;
-
-/// What a set was chosen by, as read by people.
-#[must_use]
-pub fn title_of(selector: &str) -> &str {
-    if selector == BASELINE {
-        return "All candidates";
-    }
-    SelectorKind::ALL
-        .into_iter()
-        .find(|k| k.name() == selector)
-        .map_or(selector, |kind| kind.title())
-}
 
 /// Error against number of gauges for one selector and region.
 #[must_use]
@@ -23,8 +11,8 @@ pub fn curve(design: &Design, selector: SelectorKind, region: &str) -> Vec<(f64,
         .evaluation
         .rows
         .iter()
-        .filter(|r| r.selector == selector.name() && r.region == region)
-        .map(|r| (r.sensors as f64, r.error_mm))
+        .filter(|r| r.set.chooser == selector.into() && r.region == region)
+        .map(|r| (r.set.sensors as f64, r.error_mm))
         .collect()
 }
 
@@ -38,12 +26,6 @@ pub fn failure_ways(by: EstimatorKind) -> &'static [(bool, &'static str)] {
         ],
         EstimatorKind::Matching => &[(false, "Failed gauges, left out")],
     }
-}
-
-/// The selector of a set with failed gauges, as read by people.
-#[must_use]
-pub fn failure_name(set: &Failures) -> &str {
-    title_of(&set.selector)
 }
 
 /// Error against number of failed gauges.

@@ -153,7 +153,7 @@ impl Design {
 fn blind(rows: &[MatchedRow]) -> Option<Doubt> {
     let everywhere = rows.iter().filter(|r| r.region == EVERYWHERE);
     let best = everywhere.min_by(|a, b| {
-        let largest = b.sensors.cmp(&a.sensors);
+        let largest = b.set.sensors.cmp(&a.set.sensors);
         let lightest = largest.then(a.force_n.total_cmp(&b.force_n));
         lightest.then(a.blind.total_cmp(&b.blind))
     })?;
@@ -173,14 +173,14 @@ fn blind(rows: &[MatchedRow]) -> Option<Doubt> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::EstimatorKind;
+    use crate::evaluation::{Chooser, EstimatorKind};
+    use crate::placement::SelectorKind;
 
     fn row(sensors: usize, force_n: f64, blind: f64) -> MatchedRow {
         MatchedRow {
             estimator: EstimatorKind::Matching,
             force_n,
-            selector: "expected-error".into(),
-            sensors,
+            set: Chooser::from(SelectorKind::ExpectedError).set(sensors),
             region: EVERYWHERE.into(),
             error_mm: 1.0,
             median_mm: 1.0,

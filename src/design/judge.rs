@@ -19,7 +19,7 @@ use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
 use crate::elasticity::Model;
 use crate::elasticity::load::{Push, Touch};
 use crate::elasticity::sensitivity::{Gauge, Sensitivity};
-use crate::evaluation::{self, Candidate, EstimatorKind, Evaluation, Judging, Trial};
+use crate::evaluation::{self, Candidate, Chooser, EstimatorKind, Evaluation, Judging, Trial};
 use crate::mesh::TriMesh;
 use crate::placement::Selection;
 use crate::regression::folds::evenly;
@@ -197,7 +197,7 @@ pub fn evaluate(
     for selection in selections {
         for set in &selection.sets {
             sets.push(Candidate {
-                selector: selection.selector.name().to_owned(),
+                chooser: selection.selector.into(),
                 rows: set.sites.iter().filter_map(row_of).collect(),
                 hyper: None,
             });
@@ -206,7 +206,7 @@ pub fn evaluate(
     let all = reduced.candidate_sites();
     if inputs.project.judging() == Judging::Svr && !all.is_empty() {
         sets.push(Candidate {
-            selector: evaluation::BASELINE.to_owned(),
+            chooser: Chooser::AllCandidates,
             rows: all.iter().filter_map(row_of).collect(),
             hyper: None,
         });

@@ -10,7 +10,7 @@ use super::{
     reduce_sites, reference, refine, select_step_by_step, simulate, sites_to_judge,
 };
 use crate::budget::{Budget, Watch, Work};
-use crate::evaluation::{Evaluation, EvaluationRow, Matched};
+use crate::evaluation::{Chooser, Evaluation, EvaluationRow, SetId};
 use crate::feasible::Feasibility;
 use crate::mesh::{TriMesh, scatter};
 use crate::placement::candidates::Candidates;
@@ -117,21 +117,23 @@ impl Design {
         self.chosen_set().map_or(&[], |set| &set.sites)
     }
 
+    /// Which of the judged sets [`Self::chosen_set`] is.
+    #[must_use]
+    pub fn chosen_id(&self) -> SetId {
+        Chooser::from(self.lead).set(self.chosen().len())
+    }
+
     /// What the chosen set was found to do, over all touches.
     #[must_use]
     pub fn chosen_row(&self) -> Option<&EvaluationRow> {
-        let (name, count) = (self.lead.name(), self.chosen().len());
-        let mut rows = self.evaluation.rows.iter();
-        rows.find(|r| r.selector == name && r.sensors == count)
+        self.evaluation.over_all(self.chosen_id())
     }
 
     /// Errors touch by touch (mm) of a selector's set of so many gauges, beside the held-out touches of the reference model.
     #[must_use]
     pub fn touch_errors(&self, kind: SelectorKind, sensors: usize) -> Option<&[f64]> {
-        let mut sets = (self.selections.iter())
-            .flat_map(|s| s.sets.iter().map(|set| (s.selector, set.sites.len())));
-        let k = sets.position(|set| set == (kind, sensors))?;
-        self.evaluation.errors.get(k).map(Vec::as_slice)
+        let judged = self.evaluation.judged(Chooser::from(kind).set(sensors))?;
+        Some(&judged.drawn)
     }
 
     /// The mean error (mm) around each vertex of a mesh that lies where the part does, for the chosen set.
@@ -148,9 +150,8 @@ impl Design {
     /// was judged; absent where all are felt, or where nobody asked.
     #[must_use]
     pub fn blind_map(&self, mesh: &TriMesh) -> Option<(f64, Vec<f64>)> {
-        let (lead, chosen) = (self.lead.name(), self.chosen().len());
-        let of_set = |m: &&Matched| m.selector == lead && m.sensors == chosen;
-        let found = self.evaluation.found.iter().filter(of_set);
+        let chosen = self.chosen_id();
+        let found = self.evaluation.found.iter().filter(|m| m.set == chosen);
         let lightest = found.min_by(|a, b| a.force_n.total_cmp(&b.force_n))?;
         if !lightest.blind.contains(&true) {
             return None;

@@ -4,16 +4,15 @@
 use serde::Serialize;
 
 use super::judging::EstimatorKind;
-use super::rows::{Said, TouchRegion, quoted, row};
+use super::rows::{EvaluationRow, JudgedSet, TouchRegion, quoted};
+use super::set_id::SetId;
 use crate::statistics::mean;
 
 /// What was found of one set under touches of one force: errors touch by touch (mm).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matched {
-    /// Selector's name.
-    pub selector: String,
-    /// Gauges of the set.
-    pub sensors: usize,
+    /// Which set.
+    pub set: SetId,
     /// N.
     pub force_n: f64,
     /// As drawn.
@@ -33,10 +32,9 @@ pub struct MatchedRow {
     pub estimator: EstimatorKind,
     /// How hard the touches were (N).
     pub force_n: f64,
-    /// Selector's name.
-    pub selector: String,
-    /// Gauges of the set.
-    pub sensors: usize,
+    /// Which set.
+    #[serde(flatten)]
+    pub set: SetId,
     /// Name of the region, or of all touches.
     pub region: String,
     /// Mean Euclidean error as drawn.
@@ -58,31 +56,32 @@ pub struct MatchedRow {
 }
 
 impl Matched {
-    pub(super) fn said(&self) -> Said<'_> {
-        Said {
-            selector: &self.selector,
-            sensors: self.sensors,
+    /// Its errors as those of any other set.
+    pub(super) fn judged(&self) -> JudgedSet {
+        JudgedSet {
+            set: self.set,
             hyper: None,
             converged: None,
+            drawn: self.errors.clone(),
+            built: self.built.clone(),
         }
     }
 
     /// A row for all touches, and one for each region that has any.
     pub(super) fn rows(&self, regions: &[TouchRegion]) -> Vec<MatchedRow> {
-        let regions = quoted(regions, self.errors.len());
-        regions.iter().map(|region| self.row(region)).collect()
+        let (regions, judged) = (quoted(regions, self.errors.len()), self.judged());
+        let row = |region| self.row(region, judged.row(region));
+        regions.iter().map(row).collect()
     }
 
-    fn row(&self, region: &TouchRegion) -> MatchedRow {
-        let all = row(&self.said(), region, [&self.errors, &self.built]);
+    fn row(&self, region: &TouchRegion, all: EvaluationRow) -> MatchedRow {
         let blind = region.within(&self.blind);
         let errors = region.within(&self.errors).into_iter().zip(&blind);
         let sighted: Vec<f64> = errors.filter_map(|(e, b)| (!b).then_some(e)).collect();
         MatchedRow {
             estimator: EstimatorKind::Matching,
             force_n: self.force_n,
-            selector: all.selector,
-            sensors: all.sensors,
+            set: self.set,
             region: all.region,
             error_mm: all.error_mm,
             median_mm: all.median_mm,
@@ -99,13 +98,16 @@ impl Matched {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::{EVERYWHERE, Forces};
-    use crate::evaluation::{Evaluation, Judging};
+    use crate::evaluation::{Chooser, EVERYWHERE, Evaluation, Forces, Judging};
+    use crate::placement::SelectorKind;
+
+    fn pca_qr(sensors: usize) -> SetId {
+        Chooser::from(SelectorKind::PcaQr).set(sensors)
+    }
 
     fn matched(sensors: usize, force_n: f64) -> Matched {
         Matched {
-            selector: "pca-qr".into(),
-            sensors,
+            set: pca_qr(sensors),
             force_n,
             errors: vec![1.0, 2.0, 3.0, 30.0],
             built: vec![2.0, 2.0, 4.0, 40.0],
@@ -150,16 +152,14 @@ mod tests {
             matched(2, 25.0),
         ];
         let evaluation = Evaluation::of_matched(judging, found, &[]);
-        assert_eq!((evaluation.rows.len(), evaluation.errors.len()), (2, 2));
+        assert_eq!((evaluation.rows.len(), evaluation.sets.len()), (2, 2));
         assert_eq!(evaluation.rows[1].workshop_mm, 12.0);
-        let forces: Vec<f64> = evaluation
-            .by_force("pca-qr", 2)
-            .map(|r| r.force_n)
-            .collect();
+        let forces = evaluation.by_force(pca_qr(2)).map(|r| r.force_n);
+        let forces: Vec<f64> = forces.collect();
         assert_eq!(forces, [3.0, 10.0, 25.0]);
         let quoted = evaluation.in_regions(&[half()]);
         assert_eq!((quoted.rows.len(), quoted.matched.len()), (4, 8));
-        assert_eq!(quoted.errors, evaluation.errors);
+        assert_eq!(quoted.sets, evaluation.sets);
         assert_eq!(quoted.in_regions(&[]).matched, evaluation.matched);
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::set_id::SetId;
 use crate::regression::Hyper;
 use crate::statistics::{mean, quantile};
 
@@ -26,10 +27,9 @@ impl TouchRegion {
 /// Errors of one set of sites in one region (mm).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EvaluationRow {
-    /// Selector's name, or "all-candidates" for the baseline.
-    pub selector: String,
-    /// Gauges of the set.
-    pub sensors: usize,
+    /// Which set.
+    #[serde(flatten)]
+    pub set: SetId,
     /// Name of the region, or of all touches.
     pub region: String,
     /// Mean Euclidean error.
@@ -52,19 +52,43 @@ pub struct EvaluationRow {
 /// The region of all touches.
 pub const EVERYWHERE: &str = "all touches";
 
-/// What all rows of a set have in common.
-pub(super) struct Said<'a> {
-    pub(super) selector: &'a str,
-    pub(super) sensors: usize,
-    pub(super) hyper: Option<Hyper>,
-    pub(super) converged: Option<bool>,
+/// Errors of one set touch by touch (mm).
+#[derive(Clone, Debug, PartialEq)]
+pub struct JudgedSet {
+    /// Which set.
+    pub set: SetId,
+    /// Settings of the regression, where it was one.
+    pub hyper: Option<Hyper>,
+    /// Whether the regression met its tolerance, where it was one.
+    pub converged: Option<bool>,
+    /// As drawn.
+    pub drawn: Vec<f64>,
+    /// As a workshop would build it.
+    pub built: Vec<f64>,
 }
 
-impl Said<'_> {
+impl JudgedSet {
     /// A row for all touches, and one for each region that has any.
-    pub(super) fn rows(&self, regions: &[TouchRegion], errors: [&[f64]; 2]) -> Vec<EvaluationRow> {
-        let regions = quoted(regions, errors[0].len());
-        regions.iter().map(|r| row(self, r, errors)).collect()
+    pub(super) fn rows(&self, regions: &[TouchRegion]) -> Vec<EvaluationRow> {
+        let regions = quoted(regions, self.drawn.len());
+        regions.iter().map(|region| self.row(region)).collect()
+    }
+
+    pub(super) fn row(&self, region: &TouchRegion) -> EvaluationRow {
+        let mut drawn = region.within(&self.drawn);
+        drawn.sort_by(f64::total_cmp);
+        let share = |q: f64| quantile(&drawn, q).unwrap_or(f64::NAN);
+        EvaluationRow {
+            set: self.set,
+            region: region.name.clone(),
+            error_mm: mean(&drawn),
+            median_mm: share(0.5),
+            p95_mm: share(0.95),
+            workshop_mm: mean(&region.within(&self.built)),
+            touches: drawn.len(),
+            hyper: self.hyper,
+            converged: self.converged,
+        }
     }
 }
 
@@ -79,22 +103,4 @@ pub(super) fn quoted(regions: &[TouchRegion], touches: usize) -> Vec<TouchRegion
         .filter(|region| region.contains.contains(&true))
         .cloned()
         .collect()
-}
-
-pub(super) fn row(set: &Said, region: &TouchRegion, [errors, built]: [&[f64]; 2]) -> EvaluationRow {
-    let (mut inside, built) = (region.within(errors), region.within(built));
-    inside.sort_by(f64::total_cmp);
-    let share = |q: f64| quantile(&inside, q).unwrap_or(f64::NAN);
-    EvaluationRow {
-        selector: set.selector.to_owned(),
-        sensors: set.sensors,
-        region: region.name.clone(),
-        error_mm: mean(&inside),
-        median_mm: share(0.5),
-        p95_mm: share(0.95),
-        workshop_mm: mean(&built),
-        touches: inside.len(),
-        hyper: set.hyper,
-        converged: set.converged,
-    }
 }

@@ -13,9 +13,9 @@ use self::settings::settings;
 use super::run::{Provenance, range, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Paint, Series, escape};
 use crate::colormap::ColorMap;
-use crate::design::curves::{curve, failure_curve, failure_name, failure_ways, title_of};
+use crate::design::curves::{curve, failure_curve, failure_ways};
 use crate::design::{BLIND, Design, Inputs};
-use crate::evaluation::{BASELINE, EstimatorKind};
+use crate::evaluation::EstimatorKind;
 use crate::gaussian_process::GpTrial;
 use crate::mesh::flatten::Flat;
 use crate::placement::candidates::Candidates;
@@ -86,12 +86,7 @@ fn head(page: &mut String, inputs: &Inputs, design: &Design) {
     );
     let at_force =
         (design.evaluation.judging.middle_n()).map_or(String::new(), |f| format!(", at {f} N"));
-    for row in design
-        .evaluation
-        .rows
-        .iter()
-        .filter(|r| r.sensors == chosen && r.selector == design.lead.name())
-    {
+    for row in design.evaluation.of(design.chosen_id()) {
         number(
             page,
             &format!("{:.2} mm", row.error_mm),
@@ -413,7 +408,7 @@ fn failures(page: &mut String, design: &Design) {
             .failures
             .iter()
             .map(|set| Series {
-                name: failure_name(set),
+                name: set.set.chooser.title(),
                 points: failure_curve(set, retrained),
             })
             .collect();
@@ -425,8 +420,8 @@ fn failures(page: &mut String, design: &Design) {
             let _ = write!(
                 page,
                 "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{} of {}</td></tr>",
-                escape(title_of(&set.selector)),
-                set.sensors,
+                escape(set.set.chooser.title()),
+                set.set.sensors,
                 r.failed,
                 if r.retrained { "yes" } else { "no" },
                 r.error_mm,
@@ -440,14 +435,10 @@ fn failures(page: &mut String, design: &Design) {
 }
 
 fn baseline<'a>(design: &Design, region: &str) -> Option<Series<'a>> {
-    let row = design
-        .evaluation
-        .rows
-        .iter()
-        .find(|r| r.selector == BASELINE && r.region == region)?;
+    let row = design.evaluation.baseline(region)?;
     let most = design.selections.iter().map(|s| s.sets.len()).max()? as f64;
     Some(Series {
-        name: "All candidates",
+        name: row.set.chooser.title(),
         points: vec![(1.0, row.error_mm), (most, row.error_mm)],
     })
 }

@@ -41,9 +41,8 @@ pub fn figures(
 
 /// Errors over all touches: at every force by matching, else by the regression at its own.
 fn errors(design: &Design) -> Vec<Figure> {
-    let (lead, chosen) = (design.lead.name(), design.chosen().len());
     let mut all = Vec::new();
-    for row in design.evaluation.by_force(lead, chosen) {
+    for row in design.evaluation.by_force(design.chosen_id()) {
         let at = |what: &str| format!("{what}_{}n_mm", row.force_n);
         all.extend([
             (at("error"), Some(row.error_mm)),
@@ -67,8 +66,7 @@ fn errors(design: &Design) -> Vec<Figure> {
 
 /// What is left when gauges are lost and nothing is done about it.
 fn lost(design: &Design) -> Vec<Figure> {
-    let mut sets = design.evaluation.failures.iter();
-    let of_lead = sets.find(|f| f.selector == design.lead.name());
+    let of_lead = design.evaluation.failures_of(design.lead);
     let rows = of_lead.iter().flat_map(|f| &f.rows);
     rows.filter(|r| r.failed > 0 && !r.retrained)
         .map(|r| (format!("lost_{}_mm", r.failed), Some(r.error_mm)))

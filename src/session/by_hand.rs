@@ -10,9 +10,6 @@ use crate::design;
 use crate::evaluation::EVERYWHERE;
 use crate::job::{Reporter, Stop};
 
-/// What selections made by hand are called in results.
-pub const BY_HAND: &str = "by-hand";
-
 impl Session {
     fn hand_inputs(&self) -> HandInputs {
         HandInputs {
@@ -87,10 +84,8 @@ impl Session {
         let design = Arc::clone(&result.value.design);
         let snapshot = result.value.snapshot.clone();
         let work = move |_: &Reporter| {
-            let (lead, count) = (design.lead.name(), design.chosen().len());
-            let exact =
-                (design.evaluation.rows.iter()).find(|r| r.selector == lead && r.sensors == count);
-            let tuned = exact.and_then(|r| r.hyper).map(|h| h.gamma * count as f64);
+            let (exact, count) = (design.chosen_row(), design.chosen().len() as f64);
+            let tuned = exact.and_then(|r| r.hyper).map(|h| h.gamma * count);
             let gamma = tuned.unwrap_or(1.0) / sites.len().max(1) as f64;
             let dataset = &design.simulated.dataset;
             let of = |sites: &[usize]| design::estimate(&snapshot, dataset, sites, gamma);
@@ -116,7 +111,7 @@ impl Session {
         let snapshot = result.value.snapshot.clone();
         let work = move |r: &Reporter| {
             let watch = |p| r.report(p);
-            let found = design::judge_set(&snapshot, &design, &sites, BY_HAND, &watch);
+            let found = design::judge_set(&snapshot, &design, &sites, &watch);
             let found = found.map_err(|e| stop(&e))?;
             if found.rows.is_empty() {
                 return Err(Stop::Failed("no test touch lies in any region".into()));

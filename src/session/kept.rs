@@ -2,10 +2,9 @@
 
 use glam::DVec3;
 
-use super::by_hand::BY_HAND;
 use super::news::Event;
 use super::state::Session;
-use crate::evaluation::Evaluation;
+use crate::evaluation::{Chooser, Evaluation};
 use crate::placement::SelectorKind;
 use crate::project::{Kept, KeptError, KeptFailure};
 
@@ -31,35 +30,32 @@ impl Session {
             .sum();
         let designed = self.as_designed() && self.design_holds() == Some(true);
         let known = self.knows_hand();
-        let (selector, evaluation, seconds): (_, Option<&Evaluation>, f64) =
+        let (chooser, evaluation, seconds): (Chooser, Option<&Evaluation>, f64) =
             match self.results.design.as_ref().map(|d| &d.value) {
                 Some(d) if designed => {
-                    let name = d.design.lead.name();
-                    let stage = format!("select {name}");
+                    let stage = format!("select {}", d.design.lead.name());
                     let took = d.design.seconds.iter().find(|s| s.stage == stage);
                     (
-                        name,
+                        d.design.lead.into(),
                         Some(&d.design.evaluation),
                         took.map_or(0.0, |s| s.seconds),
                     )
                 }
-                _ if known => (BY_HAND, self.caches.by_hand.exact().map(|e| &**e), 0.0),
-                _ => (BY_HAND, None, 0.0),
+                _ => {
+                    let exact = self.caches.by_hand.exact().filter(|_| known);
+                    (Chooser::Hand, exact.map(|e| &**e), 0.0)
+                }
             };
         let quality = (self.results.design.as_ref()).map_or(self.quality(), |d| d.value.quality);
         let kept = Kept {
-            name: self.free_name(&format!(
-                "{}, {} gauges",
-                chooser_title(selector),
-                sites.len()
-            )),
-            selector: selector.into(),
+            name: self.free_name(&format!("{}, {} gauges", chooser.title(), sites.len())),
+            selector: chooser.name().into(),
             quality,
             cost,
             seconds: (seconds * 10.0).round() / 10.0,
             sites,
-            errors: evaluation.map_or_else(Vec::new, |e| errors_of(e, selector)),
-            failures: evaluation.map_or_else(Vec::new, |e| failures_of(e, selector)),
+            errors: evaluation.map_or_else(Vec::new, |e| errors_of(e, chooser)),
+            failures: evaluation.map_or_else(Vec::new, |e| failures_of(e, chooser)),
         };
         let name = kept.name.clone();
         self.document.state.project.kept.push(kept);
@@ -99,12 +95,12 @@ impl Session {
     }
 }
 
-fn errors_of(evaluation: &Evaluation, selector: &str) -> Vec<KeptError> {
-    let rows = evaluation.rows.iter().filter(|r| r.selector == selector);
+fn errors_of(evaluation: &Evaluation, chooser: Chooser) -> Vec<KeptError> {
+    let rows = evaluation.rows.iter().filter(|r| r.set.chooser == chooser);
     let round = |x: f64| (x * 1e4).round() / 1e4;
     rows.map(|r| KeptError {
         region: r.region.clone(),
-        sensors: r.sensors,
+        sensors: r.set.sensors,
         mean_mm: round(r.error_mm),
         median_mm: round(r.median_mm),
         p95_mm: round(r.p95_mm),
@@ -112,11 +108,9 @@ fn errors_of(evaluation: &Evaluation, selector: &str) -> Vec<KeptError> {
     .collect()
 }
 
-fn failures_of(evaluation: &Evaluation, selector: &str) -> Vec<KeptFailure> {
-    let sets = evaluation
-        .failures
-        .iter()
-        .filter(|f| f.selector == selector);
+fn failures_of(evaluation: &Evaluation, chooser: Chooser) -> Vec<KeptFailure> {
+    let sets = evaluation.failures.iter();
+    let sets = sets.filter(|f| f.set.chooser == chooser);
     sets.flat_map(|set| &set.rows)
         .map(|r| KeptFailure {
             failed: r.failed,

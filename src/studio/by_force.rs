@@ -33,7 +33,7 @@ pub fn has_forces(design: &Design) -> bool {
 }
 
 fn rows(design: &Design) -> impl Iterator<Item = &MatchedRow> {
-    (design.evaluation).by_force(design.lead.name(), design.chosen().len())
+    design.evaluation.by_force(design.chosen_id())
 }
 
 /// The table, over all touches; of the gauges as they were selected, which is said where they have been moved since.

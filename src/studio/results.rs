@@ -10,8 +10,8 @@ use super::commands::UiCommand;
 use super::paint::empty;
 use super::theme::{kept_colour, still};
 use super::view::{Tab, Tool};
-use crate::design::curves::{curve, failure_curve, failure_name, failure_ways};
-use crate::evaluation::{BASELINE, EVERYWHERE, EstimatorKind};
+use crate::design::curves::{curve, failure_curve, failure_ways};
+use crate::evaluation::EstimatorKind;
 use crate::io::artifacts::{range, signal_to_noise, signal_unit};
 use crate::placement::SensorSet;
 use crate::placement::expected_error::ASSUMES;
@@ -176,11 +176,8 @@ fn by_hand_label(ask: &Ask<'_>, ui: &mut Ui) {
         (Some(mm), None) => format!("by hand: {mm:.2} mm {}, judging …", expected_of(ask)),
         (None, None) => "by hand: …".into(),
     };
-    let chosen = ask.session.results.design.as_ref().and_then(|d| {
-        let (lead, count) = (d.value.design.lead.name(), d.value.design.chosen().len());
-        let mut rows = d.value.design.evaluation.rows.iter();
-        rows.find(|r| r.selector == lead && r.sensors == count && r.region == EVERYWHERE)
-    });
+    let result = ask.session.results.design.as_ref();
+    let chosen = result.and_then(|d| d.value.design.chosen_row());
     let beside = chosen.map_or(String::new(), |r| {
         format!("; as selected judged {:.2} mm", r.error_mm)
     });
@@ -271,9 +268,8 @@ fn error_curves(ask: &Ask<'_>, plot: &mut PlotUi<'_>, region: &str) {
             let colour = COLOURS[k % COLOURS.len()];
             draw(plot, selection.selector.title(), &points, colour, false);
         }
-        let mut rows = design.evaluation.rows.iter();
-        if let Some(row) = rows.find(|r| r.selector == BASELINE && r.region == *region) {
-            let name = format!("all {} candidates", row.sensors);
+        if let Some(row) = design.evaluation.baseline(region) {
+            let name = format!("all {} candidates", row.set.sensors);
             plot.hline(HLine::new(name, row.error_mm).color(Color32::GRAY));
         }
     }
@@ -318,7 +314,7 @@ fn failure_curves(ask: &Ask<'_>, plot: &mut PlotUi<'_>, retrained: bool) {
         let colour = COLOURS[k % COLOURS.len()];
         draw(
             plot,
-            failure_name(set),
+            set.set.chooser.title(),
             &failure_curve(set, retrained),
             colour,
             false,

@@ -224,10 +224,8 @@ fn evaluation_lines(session: &Session) -> Vec<String> {
     let Some(d) = &session.results.design else {
         return Vec::new();
     };
-    let (lead, chosen) = (d.value.design.lead.name(), d.value.design.chosen().len());
-    let rows = d.value.design.evaluation.rows.iter();
+    let rows = d.value.design.evaluation.of(d.value.design.chosen_id());
     let mut lines: Vec<String> = rows
-        .filter(|r| r.sensors == chosen && r.selector == lead)
         .map(|r| format!("{:.2} mm, {}", r.error_mm, r.region))
         .collect();
     let judging = &d.value.design.evaluation.judging;

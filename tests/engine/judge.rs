@@ -8,7 +8,7 @@ use coarse::limb;
 use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::dataset::Signal;
 use hapdef::design::{self, Design, Inputs};
-use hapdef::evaluation::{EVERYWHERE, EstimatorKind, MatchedRow};
+use hapdef::evaluation::{Chooser, EVERYWHERE, EstimatorKind, MatchedRow, SetId};
 use hapdef::io::artifacts;
 use hapdef::placement::SelectorKind;
 use hapdef::project::RegionKeys;
@@ -52,8 +52,12 @@ fn matched() -> &'static Design {
     DESIGN.get_or_init(|| run(&inputs(EstimatorKind::Matching), 2))
 }
 
+fn of_so_many(sensors: usize) -> SetId {
+    Chooser::from(KINDS[0]).set(sensors)
+}
+
 fn by_force(design: &Design) -> Vec<&MatchedRow> {
-    let all = design.evaluation.by_force(KINDS[0].name(), GAUGES);
+    let all = design.evaluation.by_force(of_so_many(GAUGES));
     all.collect()
 }
 
@@ -66,7 +70,7 @@ fn the_largest_set_is_judged_at_all_forces_and_the_others_at_one() {
     assert!(rows.iter().all(|r| r.touches == 120));
     assert!(rows.iter().all(|r| r.calibrated_mm.is_some()));
     for sensors in 1..GAUGES {
-        let mut fewer = design.evaluation.by_force(KINDS[0].name(), sensors);
+        let mut fewer = design.evaluation.by_force(of_so_many(sensors));
         let only = fewer.next().unwrap();
         assert_eq!((only.force_n, only.calibrated_mm), (10.0, None));
         assert!(fewer.next().is_none());
@@ -217,7 +221,7 @@ fn a_set_put_by_hand_is_judged_by_the_same_estimator() {
     let mut sites = design.chosen().to_vec();
     let free = (design.reduced.feasible.iter()).find(|s| !sites.contains(s));
     sites[0] = *free.unwrap();
-    let judged = design::judge_set(&asked, design, &sites, "by-hand", &unwatched).unwrap();
+    let judged = design::judge_set(&asked, design, &sites, &unwatched).unwrap();
     assert_eq!(judged.matched.len(), 3);
     let hand = design.with_hand(sites, &judged);
     let rows = by_force(&hand);

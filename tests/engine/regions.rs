@@ -240,11 +240,12 @@ fn other_regions_are_quoted_from_the_same_errors() {
             .iter()
             .any(|r| r.region == "upper half")
     );
-    assert_eq!(quoted.evaluation.errors, anew.evaluation.errors);
+    assert_eq!(quoted.evaluation.sets, anew.evaluation.sets);
 }
 
 #[test]
 fn gauges_put_by_hand_are_what_the_report_shows() {
+    use hapdef::evaluation::Chooser;
     use hapdef::io::artifacts;
     use hapdef::placement::SelectorKind;
     let mut inputs = limb();
@@ -254,9 +255,8 @@ fn gauges_put_by_hand_are_what_the_report_shows() {
     let kinds = [SelectorKind::PcaQr, SelectorKind::Entropy];
     let design = design::run(&inputs, &kinds, &budget, &|| 0.0, &unwatched).unwrap();
     let row = |design: &design::Design, sensors: usize| {
-        let mut rows = design.evaluation.rows.iter();
-        let found = rows.find(|r| r.selector == "pca-qr" && r.sensors == sensors);
-        found.map(|r| r.error_mm)
+        let set = Chooser::from(SelectorKind::PcaQr).set(sensors);
+        design.evaluation.over_all(set).map(|r| r.error_mm)
     };
     // One moved; and one more.
     let free: Vec<usize> = (design.reduced.feasible.iter().copied())
@@ -266,12 +266,12 @@ fn gauges_put_by_hand_are_what_the_report_shows() {
         let mut sites = design.chosen().to_vec();
         sites[1] = free[free.len() / 2];
         sites.extend(&free[..extra]);
-        let judged = design::judge_set(&inputs, &design, &sites, "by-hand", &unwatched).unwrap();
+        let judged = design::judge_set(&inputs, &design, &sites, &unwatched).unwrap();
         let hand = design.with_hand(sites.clone(), &judged);
         assert_eq!(hand.chosen(), sites);
         assert_eq!(row(&hand, sites.len()), Some(judged.rows[0].error_mm));
         assert_eq!(row(&hand, 2), row(&design, 2));
-        assert_eq!(hand.evaluation.errors.len(), design.evaluation.errors.len());
+        assert_eq!(hand.evaluation.sets.len(), design.evaluation.sets.len());
         let table = artifacts::sites_csv(&inputs, &hand);
         assert_eq!(table.lines().count(), 1 + sites.len());
         assert!(table.contains(&format!(",{},2,", sites[1])), "{table}");

@@ -7,7 +7,7 @@ use crate::arrows::{arrows, circles, each_use};
 use crate::source::Source;
 
 /// From the bottom up; a module may use those above it in this list, itself included.
-const ORDER: [&[&str]; 14] = [
+const ORDER: [&[&str]; 15] = [
     &[
         "bounds",
         "budget",
@@ -29,7 +29,8 @@ const ORDER: [&[&str]; 14] = [
     &["feasible", "regression"],
     &["learning", "pca"],
     &["gaussian_process"],
-    &["placement", "evaluation"],
+    &["placement"],
+    &["evaluation"],
     &["inference"],
     &["live", "board", "bench"],
     &["project"],

@@ -268,8 +268,7 @@ fn judged_alike(w: &Window, by_hand: f64) {
     let (inputs, design) = (&result.value.snapshot, &result.value.design);
     let chosen = design.chosen();
     let judge = |sites: &[usize]| {
-        let found =
-            hapdef::design::judge_set(inputs, design, sites, "again", &hapdef::budget::unwatched);
+        let found = hapdef::design::judge_set(inputs, design, sites, &hapdef::budget::unwatched);
         let found = found.unwrap();
         found
             .rows
@@ -278,9 +277,7 @@ fn judged_alike(w: &Window, by_hand: f64) {
             .unwrap()
             .error_mm
     };
-    let mut rows = design.evaluation.rows.iter();
-    let own = rows.find(|r| r.selector == design.lead.name() && r.sensors == chosen.len());
-    let own = own.unwrap().error_mm;
+    let own = design.chosen_row().unwrap().error_mm;
     let again = judge(chosen);
     assert!((again / own - 1.0).abs() < 1e-9, "{again} {own}");
     assert_ne!(again, by_hand);

@@ -182,7 +182,7 @@ fn from_the_limb_to_the_report() {
             .evaluation
             .rows
             .iter()
-            .any(|r| r.selector == "pca-qr")
+            .any(|r| r.set.chooser.name() == "pca-qr")
     );
     // Wherever on the limb they are: from one side or from the other.
     let mut orange = 0;

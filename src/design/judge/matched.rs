@@ -259,8 +259,7 @@ impl<'a> Set<'a> {
             errors_mm(matching, &x.select_rows(rows), touches)
         };
         Matched {
-            selector: self.candidate.selector.clone(),
-            sensors: rows.len(),
+            set: self.candidate.id(),
             force_n: readings.force_n,
             errors: errors(&self.drawn, &readings.drawn),
             built: errors(&self.built, &readings.built),
@@ -343,8 +342,7 @@ impl<'a> Set<'a> {
             })?);
         }
         Ok(Some(Failures {
-            selector: self.candidate.selector.clone(),
-            sensors: gauges,
+            set: self.candidate.id(),
             touches: sample.len(),
             rows,
         }))
@@ -385,11 +383,12 @@ fn taking_turns(estimators: &[Matching], x: &SignalMatrix, touches: &[Touch]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::Chooser;
 
     #[test]
     fn sets_go_together_as_long_as_they_have_few_sites() {
         let set = |rows: Range<usize>| Candidate {
-            selector: String::new(),
+            chooser: Chooser::Hand,
             rows: rows.collect(),
             hyper: None,
         };

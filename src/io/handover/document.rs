@@ -2,7 +2,7 @@
 
 use super::source::Source;
 use super::{cards, drawing, jig_pages};
-use crate::design::curves::{failure_ways, title_of};
+use crate::design::curves::failure_ways;
 use crate::design::{BLIND, Design};
 use crate::io::report::{compared_n, part, settings};
 use crate::paper::{Flow, Sheet};
@@ -60,16 +60,14 @@ fn promise(flow: &mut Flow, source: &Source<'_>) {
     ));
     flow.heading("What is promised");
     by_force(flow, design);
-    let regions = (design.evaluation.rows.iter())
-        .filter(|r| r.sensors == chosen && r.selector == design.lead.name())
-        .map(|r| {
-            vec![
-                r.region.clone(),
-                format!("{:.2}", r.error_mm),
-                format!("{:.2}", r.median_mm),
-                format!("{:.2}", r.p95_mm),
-            ]
-        });
+    let regions = design.evaluation.of(design.chosen_id()).map(|r| {
+        vec![
+            r.region.clone(),
+            format!("{:.2}", r.error_mm),
+            format!("{:.2}", r.median_mm),
+            format!("{:.2}", r.p95_mm),
+        ]
+    });
     let regions: Vec<Vec<String>> = regions.collect();
     if !regions.is_empty() {
         flow.table(
@@ -95,7 +93,7 @@ fn by_force(flow: &mut Flow, design: &Design) {
     let cell = |mm: Option<f64>| mm.map_or("–".into(), |mm| format!("{mm:.2}"));
     let rows: Vec<Vec<String>> = design
         .evaluation
-        .by_force(design.lead.name(), design.chosen().len())
+        .by_force(design.chosen_id())
         .map(|r| {
             vec![
                 format!("{} N", r.force_n),
@@ -129,8 +127,7 @@ fn by_force(flow: &mut Flow, design: &Design) {
 
 /// What lost gauges cost.
 fn failures(flow: &mut Flow, design: &Design) {
-    let lead = design.lead.name();
-    let Some(set) = (design.evaluation.failures.iter()).find(|f| f.selector == lead) else {
+    let Some(set) = design.evaluation.failures_of(design.lead) else {
         return;
     };
     let retrained = failure_ways(design.evaluation.judging.estimator()).len() > 1;
@@ -147,7 +144,7 @@ fn failures(flow: &mut Flow, design: &Design) {
         .collect();
     flow.text(&format!(
         "When gauges of the set by {} fail{}:",
-        title_of(&set.selector),
+        set.set.chooser.title(),
         if retrained {
             ", as trained with all"
         } else {

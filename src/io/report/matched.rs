@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use super::words::judged_on;
-use crate::design::curves::title_of;
 use crate::design::{BLIND, Design, Pressed};
 use crate::evaluation::MatchedRow;
 use crate::io::svg::escape;
@@ -15,8 +14,7 @@ fn cell(mm: Option<f64>) -> String {
 
 /// What the chosen gauges do at every force, over all touches.
 pub(super) fn by_force(page: &mut String, design: &Design) {
-    let (lead, chosen) = (design.lead.name(), design.chosen().len());
-    let mut rows = design.evaluation.by_force(lead, chosen).peekable();
+    let mut rows = design.evaluation.by_force(design.chosen_id()).peekable();
     if rows.peek().is_none() {
         return;
     }
@@ -65,8 +63,8 @@ pub(super) fn errors(page: &mut String, design: &Design) {
         let _ = write!(
             page,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>{}</tr>",
-            escape(title_of(&r.selector)),
-            r.sensors,
+            escape(r.set.chooser.title()),
+            r.set.sensors,
             r.force_n,
             escape(&r.region),
             r.touches,

@@ -5,8 +5,7 @@ use std::fmt::Write as _;
 
 use super::words::judged_on;
 use crate::design::Design;
-use crate::design::curves::title_of;
-use crate::evaluation::{EstimatorKind, EvaluationRow};
+use crate::evaluation::{Chooser, EstimatorKind};
 use crate::io::svg::escape;
 use crate::placement::SelectorKind;
 use crate::regression::Hyper;
@@ -24,7 +23,7 @@ pub(super) fn comparison(page: &mut String, design: &Design) {
     }
     let rows = &design.evaluation.rows;
     let sizes: BTreeSet<usize> = (SIZES.into_iter())
-        .filter(|size| rows.iter().any(|r| r.sensors == *size))
+        .filter(|size| rows.iter().any(|r| r.set.sensors == *size))
         .chain([design.chosen().len()])
         .collect();
     page.push_str("<h2>The paper's comparison</h2><p>Four selectors, each set read by a support vector regression that was trained for it. Mean, median and 95 % of the error (mm) on unseen touches.</p><table><tr><th>Selector</th><th>Region</th>");
@@ -51,9 +50,8 @@ pub(super) fn comparison(page: &mut String, design: &Design) {
 
 /// The cell of a selector's set of so many gauges in a region.
 fn errors_of(design: &Design, kind: SelectorKind, size: usize, region: &str) -> String {
-    let is_of =
-        |r: &&EvaluationRow| r.selector == kind.name() && r.sensors == size && r.region == region;
-    let row = design.evaluation.rows.iter().find(is_of);
+    let mut rows = design.evaluation.of(Chooser::from(kind).set(size));
+    let row = rows.find(|r| r.region == region);
     let figures = row.map_or("–".into(), |r| {
         format!("{:.2} / {:.2} / {:.2}", r.error_mm, r.median_mm, r.p95_mm)
     });
@@ -76,8 +74,8 @@ pub(super) fn errors(page: &mut String, design: &Design) {
         let _ = write!(
             page,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td>{c}</td><td>{epsilon}</td><td>{gamma}</td></tr>",
-            escape(title_of(&r.selector)),
-            r.sensors,
+            escape(r.set.chooser.title()),
+            r.set.sensors,
             escape(&r.region),
             r.error_mm,
             r.median_mm,
