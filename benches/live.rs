@@ -19,7 +19,7 @@ use hapdef::design::{self, Inputs, Sensing, Workshop};
 use hapdef::elasticity::Touch;
 use hapdef::elasticity::sensitivity::Sensitivity;
 use hapdef::inference::{
-    Deviations, Errors, Features, Known, Lessons, Matching, ResponseMap, Trained, calibrate,
+    Deviations, Errors, Features, KnownPress, Lessons, Matching, ResponseMap, Trained, calibrate,
     cramer_rao,
 };
 use hapdef::link::{Address, BAUD, Doorway, Listener, Pace, SessionEvent, State, host};
@@ -220,9 +220,9 @@ impl Lab {
             .touches(&self.inputs, 12, 77, true)
             .expect("places");
         let mut rng = ChaCha8Rng::seed_from_u64(21);
-        let known: Vec<Known> = places
+        let known: Vec<KnownPress> = places
             .iter()
-            .map(|t| Known {
+            .map(|t| KnownPress {
                 at: self.sensing.drawn.map.mesh.index().nearest(t.position).0,
                 force: 10.0,
                 reading: read(

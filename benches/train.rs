@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use hapdef::budget::unwatched;
 use hapdef::dataset::SignalMatrix;
 use hapdef::io::dataset_file;
-use hapdef::learning::{Asked, Family, Lessons, Scores, Still, Trained, train, update};
+use hapdef::learning::{Family, Lessons, Scores, Still, Trained, TrainingRequest, train, update};
 use hapdef::regression::Grouping;
 use hapdef::study::Data;
 use rand::{RngExt, SeedableRng};
@@ -61,7 +61,7 @@ fn skin(path: &Path) -> String {
         data.x.rows(),
         data.targets.len()
     );
-    let asked = |family, seed, train_touches| Asked {
+    let asked = |family, seed, train_touches| TrainingRequest {
         family,
         seed,
         train_touches,
@@ -78,7 +78,7 @@ fn skin(path: &Path) -> String {
     text
 }
 
-fn row(data: &Data, groups: &[usize], asked: &Asked) -> String {
+fn row(data: &Data, groups: &[usize], asked: &TrainingRequest) -> String {
     let lessons = Lessons {
         x: &data.x,
         places_mm: &data.targets,
@@ -169,7 +169,7 @@ fn learned(x: &SignalMatrix, data: &Data, touches: &[usize]) -> Trained {
         forces: &[],
         groups: &groups,
     };
-    train(&lessons, &Asked::default(), &unwatched).expect("enough to learn from")
+    train(&lessons, &TrainingRequest::default(), &unwatched).expect("enough to learn from")
 }
 
 fn some(

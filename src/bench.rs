@@ -20,6 +20,6 @@ pub use contact::Contact;
 pub use machine::{Axis, Machine, Pose, TipSensor};
 pub use marlin::{Heard, Marlin, position_in};
 pub use mount::{Mount, Touched};
-pub use plan::{Planned, Reach, plan};
-pub use press::{Limits, Reading};
+pub use plan::{MachineReach, Planned, plan};
+pub use press::{Limits, Samples};
 pub use printer::{PrinterFaults, SimulatedPrinter};

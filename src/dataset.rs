@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::budget::{Cancelled, Watch, Work};
 use crate::elasticity::observe::{Face, along};
-use crate::elasticity::respond::{Reading, respond};
+use crate::elasticity::respond::{Quantity, respond};
 use crate::elasticity::{Model, Push, Touch};
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 use crate::uncertainty::Making;
@@ -309,8 +309,8 @@ pub fn simulate(
 ) -> Result<Dataset, Cancelled> {
     let observer = model.observer(points, Face::Inside);
     let reading = match signal {
-        Signal::Strain => Reading::Strain,
-        Signal::Displacement | Signal::NormalDisplacement => Reading::StrainAndDisplacement,
+        Signal::Strain => Quantity::Strain,
+        Signal::Displacement | Signal::NormalDisplacement => Quantity::StrainAndDisplacement,
     };
     let responses = respond(model, &touches, &observer, reading, watch)?;
     let count = touches.len();
@@ -388,8 +388,8 @@ pub fn measure(
 ) -> Result<(SignalMatrix, usize), Cancelled> {
     let (observer, angles) = gauges_on(model, sites);
     let reading = match signal {
-        Signal::Strain => Reading::Gauge(&angles),
-        Signal::Displacement | Signal::NormalDisplacement => Reading::Displacement,
+        Signal::Strain => Quantity::Gauge(&angles),
+        Signal::Displacement | Signal::NormalDisplacement => Quantity::Displacement,
     };
     let responses = respond(model, touches, &observer, reading, watch)?;
     let mut values = vec![0.0; sites.len() * touches.len()];

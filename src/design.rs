@@ -58,7 +58,7 @@ pub use self::layout::*;
 pub use self::meshed::Meshed;
 pub use self::nearness::*;
 pub use self::pipeline::*;
-pub use self::presses::{Press, Pressed};
+pub use self::presses::{Press, PressReadings};
 pub use self::reduce::{Located, Reduced, reduce_sites};
 pub use self::reference::Reference;
 pub use self::refine::refine;

@@ -11,7 +11,7 @@ use crate::design::{self, Built, Checks, DesignError, Inputs};
 use crate::elasticity::estimate::{BEYOND, Discretization};
 use crate::elasticity::linearity::Linearity;
 use crate::elasticity::observe::{Face, Observer, SiteFrame};
-use crate::elasticity::respond::{Reading, Responses, respond};
+use crate::elasticity::respond::{Quantity, Responses, respond};
 use crate::elasticity::{Model, Touch};
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::plain;
@@ -131,7 +131,7 @@ pub fn answer_sifted(
     notes.extend(under_tips(&touches, sites, &rows.sites));
     let held = design::on_what_is_held(&inputs, &touches)?;
     notes.extend(pressed_on_supports(&held, &rows));
-    let reading = Reading::GaugeAndDisplacement(&angles);
+    let reading = Quantity::GaugeAndDisplacement(&angles);
     let responses = respond(&*model, &touches, &observer, reading, watch)?;
     Ok(Answer {
         model,

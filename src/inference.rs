@@ -14,10 +14,10 @@ pub mod several;
 pub mod trained;
 
 pub use bound::cramer_rao;
-pub use calibration::{Calibration, Known, calibrate};
+pub use calibration::{Calibration, KnownPress, calibrate};
 pub use chain::Chain;
 pub use deviation::{Deviations, Nuisances};
-pub use drawn::{AsDrawn, AsGlued, Doubt};
+pub use drawn::{AsDrawn, AsGlued, GluingCovariance};
 pub use map::ResponseMap;
 pub use matching::{Contact, Errors, Matching};
 pub use measured::MeasuredMatching;

@@ -25,10 +25,10 @@ mod tests;
 
 pub use arm::Arm;
 pub use convex::{bar, outline};
-pub use frame::{Entry, Frame};
+pub use frame::{Entry, JigFrame};
 pub use parts::{Part, parts};
 pub use plan::{Jig, Stack, plan};
-pub use reach::Reach;
+pub use reach::RodReach;
 pub use sizes::{FILM, Sizes};
-pub use wall::{Pressed, Wall};
+pub use wall::{PressedGauge, Wall};
 pub use why::{LeftOut, Why};

@@ -32,5 +32,5 @@ pub use family::{ByModel, Family, Method};
 pub use lessons::{LearningError, Lessons};
 pub use score::Scores;
 pub use still::Still;
-pub use train::{Asked, Trained, train};
+pub use train::{Trained, TrainingRequest, train};
 pub use update::{Updated, update};

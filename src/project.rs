@@ -30,7 +30,7 @@ use crate::placement::candidates::Reduction;
 use crate::regression::Hyper;
 use crate::uncertainty::{Gluing, Making, Pressing, Uncertainty};
 
-use value::{MM, is_default};
+use value::{MICRO, MM, is_default};
 
 pub use axis::PartAxis;
 pub use gauge::{CalibrationKeys, GaugeKeys, ToleranceKeys};
@@ -49,8 +49,6 @@ pub use value::{BadValue, Value};
 
 /// Version of the file format this program writes and the newest it reads.
 pub const FORMAT: u32 = 1;
-
-const MICRO: f64 = 1e-6;
 
 /// The whole project.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -147,22 +145,23 @@ impl Project {
                 youngs_modulus: self.material.youngs_modulus_gpa * 1e9,
                 poissons_ratio: self.material.poissons_ratio,
             },
-            thickness: self.part.thickness_mm * MM,
+            thickness: self.part.thickness(),
         }
     }
 
     /// What a gauge needs, in SI units.
     #[must_use]
     pub fn feasible_rules(&self) -> FeasibleRules {
+        let [grid_length, grid_width] = self.gauge.grid();
         FeasibleRules {
             // Film and tape are about twice as wide as the grid.
-            pad: self.gauge.grid_width_mm * MM,
+            pad: grid_width,
             support_clearance: self.feasible.support_clearance_mm * MM,
             // Sites at one place are neighbours of each other, which move no centre of mass.
             edge_neighbours: (self.feasible.edge_neighbours + 1) * self.gauge.directions - 1,
             edge_radius: self.feasible.edge_radius_mm * MM,
-            grid_length: self.gauge.grid_length_mm * MM,
-            grid_width: self.gauge.grid_width_mm * MM,
+            grid_length,
+            grid_width,
             flatness: self.gauge.flatness_mm * MM,
             noise: self.uncertainty().of_channel(),
             least_signal_to_noise: self.gauge.least_signal_to_noise,
@@ -253,7 +252,7 @@ impl Project {
     #[must_use]
     pub fn uncertainty(&self) -> Uncertainty {
         Uncertainty {
-            noise: self.gauge.noise_microstrain * MICRO,
+            noise: self.gauge.noise(),
             resolution: self.gauge.resolution_microstrain * MICRO,
             gluing: self.gluing(),
             model: self.live.model_error_of_any(),

@@ -52,7 +52,7 @@ pub use live::{
 };
 pub use news::{Event, Message, News};
 pub use opening::Opened;
-pub use shape::Shape;
+pub use shape::PartShape;
 pub use slot::{Slot, current};
 pub use standing::{NOBODY_REDUCES, Stage, Standing};
 pub use state::bench::{Bench, BenchDesk, PressState, Pressing};

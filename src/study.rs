@@ -41,7 +41,7 @@ pub struct Data {
 
 /// How a choice is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct ChoiceSettings {
     /// Who chooses.
     pub kind: SelectorKind,
     /// Greedy SVR's own, and what every choice's criterion in mm is computed with.
@@ -112,7 +112,7 @@ pub fn add_criteria(
     data: &Data,
     selection: &mut Selection,
     constraints: &Constraints,
-    settings: &Settings,
+    settings: &ChoiceSettings,
     watch: Watch,
 ) -> Result<(), PlacementError> {
     let noisy = add_noise(&data.x, settings.noise, settings.svr.seed);
@@ -143,7 +143,7 @@ pub fn add_criteria(
 
 /// The fold that each touch is tested in, so that anyone can compute the criterion again.
 #[must_use]
-pub fn folds(data: &Data, settings: &Settings) -> Vec<usize> {
+pub fn folds(data: &Data, settings: &ChoiceSettings) -> Vec<usize> {
     fold_of_touch(&settings.svr, &data.targets)
 }
 

@@ -13,7 +13,7 @@ mod rounds;
 mod run;
 mod simulated;
 
-pub use asked::{Asked, Flaws};
+pub use asked::{BenchRequest, Flaws};
 pub use dataset::{Collected, Wanted};
 pub use ready::{Ready, pressed};
 pub use rounds::{Errors, Goal, Met, Round};

@@ -17,7 +17,7 @@ use crate::budget::Watch;
 use crate::design::{self, DesignError, Finest, Inputs, StageTime};
 use crate::project::BadValue;
 
-pub use self::front::{Asked, answer, clock, front};
+pub use self::front::{TradeConstraint, answer, clock, front};
 pub use self::knobs::{Bought, KnobReport, knobs};
 pub use self::setting::Setting;
 pub use self::spent::{Knob, Spent};

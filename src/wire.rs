@@ -6,7 +6,7 @@ mod frame;
 mod lines;
 
 pub use frame::{Decoder, Event, Hello, Message, Refusal, encode};
-pub use lines::{LineReader, Reading};
+pub use lines::{LineReader, TextLine};
 
 /// Version of the protocol.
 pub const VERSION: u8 = 1;

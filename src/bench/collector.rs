@@ -13,7 +13,7 @@ use super::check::{Answer, Check};
 use super::machine::Machine;
 use super::marlin::Marlin;
 use super::plan::Planned;
-use super::press::{Limits, Reading};
+use super::press::{Limits, Samples};
 
 /// What whoever drives it is told.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,7 +94,7 @@ enum Doing {
     Reading {
         from_us: u64,
         until_us: u64,
-        reading: Reading,
+        reading: Samples,
         kept: bool,
     },
     Nothing,
@@ -148,7 +148,7 @@ pub struct Collector {
 }
 
 impl Collector {
-    /// For these presses, each with its number; `retreat` (m) as [`super::Reach::retreat`].
+    /// For these presses, each with its number; `retreat` (m) as [`super::MachineReach::retreat`].
     #[must_use]
     pub fn new(
         machine: Machine,

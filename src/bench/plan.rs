@@ -19,7 +19,7 @@ pub struct Planned {
 
 /// What the machine gets to.
 #[derive(Clone, Debug, Default)]
-pub struct Reach {
+pub struct MachineReach {
     /// The presses, in their order.
     pub presses: Vec<Planned>,
     /// Which of the places asked for they are of, counted from 0.
@@ -39,7 +39,7 @@ pub fn plan(
     limb: &TriMesh,
     machine: &Machine,
     mount: &Mount,
-) -> Result<Reach, String> {
+) -> Result<MachineReach, String> {
     let retreat = retreat(limb, machine, mount);
     let number = machine.radial.number(retreat * 1e3);
     if !machine.radial.reaches(number) {
@@ -49,9 +49,9 @@ pub fn plan(
             machine.radial.letter
         ));
     }
-    let mut reach = Reach {
+    let mut reach = MachineReach {
         retreat,
-        ..Reach::default()
+        ..MachineReach::default()
     };
     let mut near = 0.0;
     for (k, &(at, normal)) in places.iter().enumerate() {

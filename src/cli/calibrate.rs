@@ -21,7 +21,7 @@ use crate::design::{Sensing, check_reach};
 use crate::elasticity::Touch;
 use crate::inference::calibration::judged::{Outlook, misfits, outlook};
 use crate::inference::calibration::part::of_part;
-use crate::inference::{Calibration, Known, calibrate};
+use crate::inference::{Calibration, KnownPress, calibrate};
 use crate::io::points::{AskedPoint, read_points};
 use crate::io::project_file::{self, LoadedProject};
 use crate::link::{Address, BAUD, Held, Listener, Pace, SessionEvent};
@@ -29,7 +29,7 @@ use crate::live::Pipeline;
 use crate::mesh::SurfacePoint;
 use crate::uncertainty::{Pressing, Uncertainty};
 
-use asked::Asked;
+use asked::AskedPresses;
 use part::{FittedPart, PartArg};
 use summary::{FoundOfPart, Row, Summary};
 
@@ -217,7 +217,7 @@ fn read(
     loaded: &LoadedProject,
     sensing: &Sensing,
     points: Vec<AskedPoint>,
-) -> anyhow::Result<Asked> {
+) -> anyhow::Result<AskedPresses> {
     let project = &loaded.inputs.project;
     let settings = project.live.settings(sensing.gauges.len());
     let mut plain = project.live.clone();
@@ -230,7 +230,7 @@ fn read(
         listen::obey_stdin(commands);
         out::say("hapdef: waiting for the board; leave the limb alone until its rest is taken");
     }
-    let mut asked = Asked::new(points, prompts);
+    let mut asked = AskedPresses::new(points, prompts);
     let stop = AtomicBool::new(false);
     let listener = Listener::new(address, pipeline).holding(held);
     let ended = listener.run(&stop, &inbox, |event| {
@@ -260,7 +260,7 @@ fn fit(
 ) -> anyhow::Result<Summary> {
     loop {
         let used: Vec<usize> = (0..rows.len()).filter(|&k| rows[k].used).collect();
-        let known: Vec<Known> = (used.iter())
+        let known: Vec<KnownPress> = (used.iter())
             .filter_map(|&k| rows[k].known.clone())
             .collect();
         for (&k, misfit) in used.iter().zip(misfits(&sensing.drawn, &known, noise, off)) {
@@ -298,7 +298,7 @@ fn fit(
 /// Where to press next, among places that a finger reaches.
 fn next(
     (sensing, loaded): (&Sensing, &LoadedProject),
-    found: (&[Known], &Calibration),
+    found: (&[KnownPress], &Calibration),
     uncertain: (&[f64], &Uncertainty),
     force: f64,
 ) -> anyhow::Result<Outlook> {

@@ -20,7 +20,7 @@ use crate::placement::expected_error::Detail;
 use crate::placement::greedy_svr::{Audit, Comparison};
 use crate::placement::{Constraints, SelectorKind, SensorSet};
 use crate::plain;
-use crate::study::{self, Choice, Data, Settings};
+use crate::study::{self, Choice, ChoiceSettings, Data};
 
 #[derive(Args, Debug, Clone)]
 pub struct SelectArgs {
@@ -190,7 +190,7 @@ impl SelectArgs {
         data: &Data,
         kept_out: &[usize],
         constraints: &Constraints,
-        settings: &Settings,
+        settings: &ChoiceSettings,
         watch: Watch,
     ) -> anyhow::Result<(Choice, f64, Vec<Comparison>)> {
         let mut choice = study::select(
@@ -227,7 +227,7 @@ impl SelectArgs {
         data: &Data,
         kept_out: &[usize],
         choice: &Choice,
-        settings: &Settings,
+        settings: &ChoiceSettings,
         watch: Watch,
     ) -> anyhow::Result<Vec<Comparison>> {
         if self.audit == 0 {
@@ -301,7 +301,7 @@ impl SelectArgs {
         }
     }
 
-    fn settings(&self, data: &Data) -> anyhow::Result<Settings> {
+    fn settings(&self, data: &Data) -> anyhow::Result<ChoiceSettings> {
         let mut svr = self.criterion.criterion(&data.targets)?;
         svr.tolerance = self.selection_tolerance.unwrap_or(svr.tolerance);
         svr.landmarks = self.landmarks.unwrap_or(svr.landmarks);
@@ -312,7 +312,7 @@ impl SelectArgs {
             power: self.power.unwrap_or(paper.power),
             noise: kernel_noise,
         });
-        Ok(Settings {
+        Ok(ChoiceSettings {
             kind: self.selector.into(),
             svr,
             kernel,
@@ -406,7 +406,7 @@ fn known(flag: &str, sites: &[usize], data: &Data) -> anyhow::Result<()> {
 
 fn summary(
     data: &Data,
-    settings: &Settings,
+    settings: &ChoiceSettings,
     choice: &Choice,
     criterion_seconds: f64,
     notes: &[String],

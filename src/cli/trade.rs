@@ -15,7 +15,7 @@ use crate::io::project_file::LoadedProject;
 use crate::io::together::Together;
 use crate::io::trade_file::{self, Judge, Record};
 use crate::io::{ProcessMeter, project_file};
-use crate::trade::{Asked, Point, Sweep, answer, clock, front, measure};
+use crate::trade::{Point, Sweep, TradeConstraint, answer, clock, front, measure};
 
 #[derive(Args, Debug, Clone)]
 pub struct TradeArgs {
@@ -52,8 +52,8 @@ pub fn run(args: &TradeArgs) -> anyhow::Result<()> {
     make_folder(&args.out)?;
     let threads = args.common.in_pool(|| Ok(rayon::current_num_threads()))?;
     let asked = match (args.within_s, args.of_the_best_mm) {
-        (Some(seconds), _) => Some(Asked::Within(seconds)),
-        (None, Some(mm)) => Some(Asked::OfTheBest(mm)),
+        (Some(seconds), _) => Some(TradeConstraint::Within(seconds)),
+        (None, Some(mm)) => Some(TradeConstraint::OfTheBest(mm)),
         (None, None) => None,
     };
     if let Some(asked) = asked {
@@ -164,9 +164,9 @@ fn reply(
     args: &TradeArgs,
     loaded: &LoadedProject,
     record: &Record,
-    asked: Asked,
+    asked: TradeConstraint,
 ) -> anyhow::Result<()> {
-    let (Asked::Within(wish) | Asked::OfTheBest(wish)) = asked;
+    let (TradeConstraint::Within(wish) | TradeConstraint::OfTheBest(wish)) = asked;
     anyhow::ensure!(
         wish >= 0.0,
         "--within-s and --of-the-best-mm take zero or more, not {wish}"

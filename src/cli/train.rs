@@ -19,7 +19,7 @@ use crate::design::{
 use crate::io::project_file::LoadedProject;
 use crate::io::{bench_folder, cpu_seconds, touch_file};
 use crate::learning::score::ForceRow;
-use crate::learning::{Asked, ByModel, Family, Lessons, Method, Scores};
+use crate::learning::{ByModel, Family, Lessons, Method, Scores, TrainingRequest};
 use crate::plain;
 use crate::regression::Grouping;
 use crate::study::{self, Data};
@@ -121,7 +121,7 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     }
     notes.extend(note);
     if let Some(old) = &args.update {
-        let asked = train_update::Asked {
+        let asked = train_update::UpdateRequest {
             old,
             out: &args.out,
             seed: args.seed,
@@ -161,7 +161,7 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
 /// What was learned, and the key of the limb where there is a model of it.
 fn trained(args: &TrainArgs, lessons: &Lessons) -> anyhow::Result<(Outcome, Option<String>)> {
     let method = args.estimator.method();
-    let asked = Asked {
+    let asked = TrainingRequest {
         family: match method {
             Some(Method::Regression(family)) => Some(family),
             _ => None,

@@ -15,7 +15,7 @@ use crate::plain;
 use crate::study::Data;
 
 /// What is asked for.
-pub struct Asked<'a> {
+pub struct UpdateRequest<'a> {
     /// The estimator's file.
     pub old: &'a Path,
     /// Where the new one goes.
@@ -33,7 +33,7 @@ pub struct Asked<'a> {
 /// # Errors
 /// A message in the user's terms.
 pub fn run(
-    asked: &Asked<'_>,
+    asked: &UpdateRequest<'_>,
     args: &DataArgs,
     (data, groups): (&Data, &[usize]),
     notes: &[String],

@@ -6,7 +6,7 @@
 use super::columns::Columns;
 use super::site::{Site, gauges_on};
 use crate::budget::{Cancelled, Watch};
-use crate::elasticity::respond::{Reading, Responses, respond};
+use crate::elasticity::respond::{Quantity, Responses, respond};
 use crate::elasticity::{Model, Push, Touch};
 use crate::uncertainty::Making;
 
@@ -57,7 +57,7 @@ impl MakingSlopes {
             }
             let pushes: Vec<Push> = pressed.iter().flat_map(ways).collect();
             let (observer, angles) = gauges_on(model, sites);
-            let reading = Reading::Gauge(&angles);
+            let reading = Quantity::Gauge(&angles);
             respond(model, &pushes, &observer, reading, watch).map(Some)
         };
         let mut found = Self {

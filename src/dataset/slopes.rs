@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::columns::Columns;
 use super::site::{Site, gauges_on};
 use crate::budget::{Cancelled, Watch};
-use crate::elasticity::respond::{Pressed, Reading, Responses, respond};
+use crate::elasticity::respond::{PressedModel, Quantity, Responses, respond};
 use crate::elasticity::{Model, Touch};
 use crate::uncertainty::Gluing;
 
@@ -56,7 +56,7 @@ impl GluingSlopes {
             model,
             &pressed,
             &observer,
-            Reading::GaugeDifference(&angles, SLOPE),
+            Quantity::GaugeDifference(&angles, SLOPE),
             watch,
         )?;
         let slopes = Self::read(&responses, sites.len(), columns.to_vec(), turned);
@@ -68,14 +68,15 @@ impl GluingSlopes {
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
     pub(super) fn under(
-        pressed: &Pressed,
+        pressed: &PressedModel,
         sites: &[Site],
         turned: Vec<f32>,
         watch: Watch,
     ) -> Result<(Self, usize), Cancelled> {
         let moved: Vec<Site> = sites.iter().flat_map(shifted).collect();
         let (observer, angles) = gauges_on(pressed.model(), &moved);
-        let responses = pressed.read(&observer, Reading::GaugeDifference(&angles, SLOPE), watch)?;
+        let responses =
+            pressed.read(&observer, Quantity::GaugeDifference(&angles, SLOPE), watch)?;
         let columns = (0..pressed.touches()).collect();
         let slopes = Self::read(&responses, sites.len(), columns, turned);
         Ok((slopes, responses.solves))

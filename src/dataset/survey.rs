@@ -6,7 +6,7 @@ use super::slopes::{self, GluingSlopes};
 use crate::budget::{Cancelled, Watch};
 use crate::elasticity::Touch;
 use crate::elasticity::observe::along;
-use crate::elasticity::respond::{Pressed, Reading};
+use crate::elasticity::respond::{PressedModel, Quantity};
 use crate::uncertainty::Making;
 
 /// A gauge and what it reads of every touch (strain).
@@ -57,13 +57,13 @@ impl Surveyed {
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
 pub fn survey(
-    pressed: &Pressed,
+    pressed: &PressedModel,
     gauges: &[Site],
     (touches, making): (&[Touch], &Making),
     watch: Watch,
 ) -> Result<(Vec<Surveyed>, usize), Cancelled> {
     let (observer, angles) = gauges_on(pressed.model(), gauges);
-    let strains = pressed.read(&observer, Reading::Strain, watch)?;
+    let strains = pressed.read(&observer, Quantity::Strain, watch)?;
     let count = pressed.touches();
     let columns: Vec<usize> = (0..count).collect();
     let mut turned = Vec::with_capacity(gauges.len() * count);

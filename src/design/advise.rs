@@ -7,13 +7,13 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use self::cost::Asked;
+use self::cost::Workload;
 use super::ground::solid_ground;
 use super::layout::size_mm;
 use super::{DesignError, Ground, Inputs, ground};
 use crate::budget::Watch;
 use crate::elasticity::solid::ground::{Foreseen, SolidGround};
-use crate::elasticity::solid::sizing::Shape;
+use crate::elasticity::solid::sizing::CellSizing;
 use crate::elasticity::{ElasticError, Touch, scope};
 use crate::mesh::TriMesh;
 use crate::mesh::sample;
@@ -94,7 +94,7 @@ fn advise_on(inputs: &Inputs, solves: bool, watch: Watch) -> Result<Advice, Desi
 
 /// What the elements of a closed part would cost, and why their error could not be computed where that is so.
 fn of_solid(
-    asked: &Asked,
+    asked: &Workload,
     inputs: &Inputs,
     solid: &SolidGround,
     watch: Watch,
@@ -126,7 +126,7 @@ fn of_solid(
 
 /// About how many sites lie on the inside.
 fn sites(inputs: &Inputs, solid: &SolidGround) -> f64 {
-    let spacing = inputs.project.sites.spacing_mm * 1e-3;
+    let spacing = inputs.project.sites.spacing();
     solid.inside.area() / (spacing * spacing)
 }
 
@@ -144,7 +144,7 @@ fn of_closed(
         .collect();
     let area: f64 = faces.iter().map(|&t| whole.facet_area(t)).sum();
     let radius = scope::radii(whole, &faces, solid.wall());
-    let asked = Asked::new(inputs, area / 2.0, radius[0], solid.shape());
+    let asked = Workload::new(inputs, area / 2.0, radius[0], solid.shape());
     let (cells, why) = if solves {
         of_solid(&asked, inputs, solid, watch)?
     } else {
@@ -213,11 +213,11 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
     let facets: Vec<u32> = (0..part.triangles().len() as u32).collect();
     let wall = project.part.thickness_mm;
     let radius = scope::radii(part, &facets, wall * 1e-3);
-    let asked = Asked::new(
+    let asked = Workload::new(
         inputs,
         part.area(),
         radius[0],
-        Shape::of_wall(wall * 1e-3, 2.0 * part.area()),
+        CellSizing::of_wall(wall * 1e-3, 2.0 * part.area()),
     );
     let costs = [asked.shell(), asked.solid()];
     let [shell, cells] = &costs;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::known::{Known, detail};
+use super::known::{KnownSimulation, detail};
 use super::reduce::{Located, Reduced, noisy_signals};
 use super::{DesignError, Inputs, Simulated};
 use crate::budget::{Budget, Watch};
@@ -244,7 +244,7 @@ fn select_by_expected_error(
     budget: &Budget,
     telling: Telling,
 ) -> Result<Selection, DesignError> {
-    let known = Known::new(inputs, simulated);
+    let known = KnownSimulation::new(inputs, simulated);
     let variance = |row: usize, touch: usize| known.variance(reduced.feasible[row], touch);
     let felt = |row: usize, touch: usize| known.felt(reduced.feasible[row], touch);
     let shared = known.shared(&felt);

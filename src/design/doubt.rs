@@ -165,7 +165,7 @@ fn blind(rows: &[MatchedRow]) -> Option<Doubt> {
             "{:.0} % of the touches of {} N move none of {} above its noise: nothing is felt there. See where (what is blind is marked on the part), add gauges near by or take quieter ones, or paint where touches come (touch.region).",
             100.0 * best.blind,
             crate::plain::digits(best.force_n),
-            crate::plain::count(best.sensors, "gauge"),
+            crate::plain::count(best.set.sensors, "gauge"),
         ),
     })
 }

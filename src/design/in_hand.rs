@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::known::{FINE, Known};
+use super::known::{FINE, KnownSimulation};
 use super::{Inputs, Simulated};
 use crate::budget::{Cancelled, Watch, report};
 use crate::memory;
@@ -161,7 +161,7 @@ impl InHand {
 }
 
 fn scene(inputs: &Inputs, simulated: &Simulated, watch: Watch) -> Result<Scene, Cancelled> {
-    let known = Known::new(inputs, simulated);
+    let known = KnownSimulation::new(inputs, simulated);
     let variance = |site: usize, touch: usize| known.variance(site, touch);
     let felt = |site: usize, touch: usize| known.felt(site, touch);
     let dataset = &simulated.dataset;

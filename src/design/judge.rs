@@ -10,7 +10,7 @@ use super::as_built::{WORKSHOPS, gains, of_workshop, sites_as_built};
 use super::drawn::{gauge_at, proposed};
 use super::known;
 use super::layout::test_touches;
-use super::presses::{self, Press, Pressed};
+use super::presses::{self, Press, PressReadings};
 use super::reference::{Reference, grid, regions};
 use super::{DesignError, Inputs, MADE_SEED, NOISE_SEED, PRESS_SEED, Reduced, Simulated};
 use crate::as_made::as_made;
@@ -125,7 +125,7 @@ pub(super) fn measured_by(
     let each = presses.as_ref().map_or(0, |p| p.len() / WORKSHOPS as usize);
     Ok(Reference {
         workshop: of_workshops.read(0..touches.len(), |k| k % WORKSHOPS as usize),
-        pressed: presses.map(|presses| Pressed {
+        pressed: presses.map(|presses| PressReadings {
             x: of_workshops.read(touches.len()..pushes.len(), |k| k / each.max(1)),
             presses,
         }),

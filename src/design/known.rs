@@ -20,7 +20,7 @@ pub(super) const FINE: Detail = Detail {
 };
 
 /// What a choice by expected error is told of a simulation.
-pub(super) struct Known<'a> {
+pub(super) struct KnownSimulation<'a> {
     simulated: &'a Simulated,
     off: Uncertainty,
     /// Force of each touch (N).
@@ -32,7 +32,7 @@ pub(super) struct Known<'a> {
     seed: u64,
 }
 
-impl<'a> Known<'a> {
+impl<'a> KnownSimulation<'a> {
     /// Gathers it from the project and from what was simulated of it.
     pub fn new(inputs: &Inputs, simulated: &'a Simulated) -> Self {
         let project = &inputs.project;
@@ -188,7 +188,7 @@ pub fn expected_errors(
     sets: &[Vec<usize>],
     watch: Watch,
 ) -> Result<Vec<f64>, Cancelled> {
-    let known = Known::new(inputs, simulated);
+    let known = KnownSimulation::new(inputs, simulated);
     let mut sites: Vec<usize> = sets.concat();
     sites.sort_unstable();
     sites.dedup();

@@ -92,7 +92,7 @@ pub(super) fn check_foreseen(inputs: &Inputs, budget: &Budget) -> Result<(), Des
 /// # Errors
 /// [`DesignError::TooManySites`].
 fn count_sites(mesh: &TriMesh, project: &Project) -> Result<usize, DesignError> {
-    let spacing = project.sites.spacing_mm * 1e-3;
+    let spacing = project.sites.spacing();
     let places = mesh.area() / (spacing * spacing);
     let sites = places * project.gauge.directions as f64;
     if sites > MOST_SITES as f64 {
@@ -139,7 +139,7 @@ fn unrolled_sites(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<SurfacePoint>, 
     /// Places of the lattice that are looked at, whether the part is there or not.
     const MOST_PLACES: f64 = 5e6;
     let project = &inputs.project;
-    let spacing = project.sites.spacing_mm * 1e-3;
+    let spacing = project.sites.spacing();
     let unrolling = Unrolling::of(mesh, inputs.stance());
     let round = unrolling.circumference();
     let high = unrolling.height.1 - unrolling.height.0;
@@ -194,7 +194,7 @@ pub(super) fn touches_on(
     (even, weighed): (bool, bool),
 ) -> Result<Vec<Touch>, DesignError> {
     let project = &inputs.project;
-    let margin = project.touch.edge_margin_mm * 1e-3;
+    let margin = project.touch.edge_margin();
     let mask = Project::mask("touch.region", project.touch.region.as_ref(), &inputs.masks)?;
     let index = inputs.part.index();
     let reached = reached_places(inputs)?;
@@ -285,7 +285,7 @@ fn no_touches(mesh: &TriMesh, inputs: &Inputs) -> DesignError {
             mesh,
             TRIED,
             seed,
-            margin_mm * 1e-3,
+            project.touch.edge_margin(),
             false,
             project.tip(),
             None,
@@ -367,7 +367,7 @@ fn simulation_numbers(sites: usize, touches: usize, signal: Signal) -> f64 {
 /// inward.
 #[must_use]
 pub fn expected_size(inputs: &Inputs, budget: &Budget) -> (usize, usize, f64) {
-    let spacing = inputs.project.sites.spacing_mm * 1e-3;
+    let spacing = inputs.project.sites.spacing();
     let share = match inputs.project.part.model {
         PartModel::Solid => 0.5,
         PartModel::Shell => 1.0,

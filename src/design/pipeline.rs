@@ -45,7 +45,7 @@ pub struct Design {
 
 /// What is there already of a design: each as its stage would bring it anew from the same inputs.
 #[derive(Clone, Default)]
-pub struct Known {
+pub struct KnownStages {
     /// Feasibility, and the sites that passed.
     pub reduced: Option<(Arc<Feasibility>, Arc<Reduced>)>,
     /// By the same selectors in the same order; of the simulation that goes with them, which has the gauges that were
@@ -294,7 +294,14 @@ pub fn run_from(
         found: &|_, _, _| (),
         entered: &|_| (),
     };
-    run_step_by_step(inputs, simulated, kinds, budget, Known::default(), &hooks)
+    run_step_by_step(
+        inputs,
+        simulated,
+        kinds,
+        budget,
+        KnownStages::default(),
+        &hooks,
+    )
 }
 
 /// As [`run_from`], from what is known already, telling of every step.
@@ -306,7 +313,7 @@ pub fn run_step_by_step(
     simulated: Arc<Simulated>,
     kinds: &[SelectorKind],
     budget: &Budget,
-    known: Known,
+    known: KnownStages,
     hooks: &Hooks,
 ) -> Result<Design, DesignError> {
     let watch = hooks.watch;

@@ -24,7 +24,7 @@ pub struct Press {
 
 /// Presses, and what gauges read of them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pressed {
+pub struct PressReadings {
     /// Workshop by workshop, as many on the gauges of each: what one would do depends on how that hand was off.
     pub presses: Vec<Press>,
     /// Sites, as the workshop built them that is pressed, × presses; without noise.
@@ -59,7 +59,7 @@ pub(super) fn by_hand(mesh: &TriMesh, asked: Vec<Touch>, hand: &Pressing, seed: 
     asked.into_iter().map(make).collect()
 }
 
-impl Pressed {
+impl PressReadings {
     /// The numbers of the presses on the gauges of each workshop.
     pub fn of_each(&self) -> impl Iterator<Item = Range<usize>> {
         let each = self.presses.len() / WORKSHOPS as usize;

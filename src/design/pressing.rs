@@ -8,12 +8,12 @@ use rayon::prelude::*;
 use super::{Inputs, Simulated};
 use crate::budget::unwatched;
 use crate::dataset::Site;
-use crate::jig::{FILM, Pressed, Reach, Wall};
+use crate::jig::{FILM, PressedGauge, RodReach, Wall};
 use crate::project::PartModel;
 
 /// The jig that sites are filtered by.
 pub(super) struct Pressing {
-    reach: Reach,
+    reach: RodReach,
     /// Whether normals of sites look inwards.
     looks_in: bool,
     /// From a site to the inner face (m).
@@ -45,8 +45,8 @@ impl Pressing {
         };
         let grid = DVec2::new(project.gauge.grid_length_mm, project.gauge.grid_width_mm);
         let sites = &simulated.dataset.sites[..simulated.lattice];
-        let places: Vec<Pressed> = sites.iter().map(|s| pressed(s, looks_in, depth)).collect();
-        let reach = Reach::new(wall, &places, grid / 2.0 + FILM, &unwatched).ok()?;
+        let places: Vec<PressedGauge> = sites.iter().map(|s| pressed(s, looks_in, depth)).collect();
+        let reach = RodReach::new(wall, &places, grid / 2.0 + FILM, &unwatched).ok()?;
         Some(Self {
             reach,
             looks_in,
@@ -61,9 +61,9 @@ impl Pressing {
     }
 }
 
-fn pressed(site: &Site, looks_in: bool, depth: f64) -> Pressed {
+fn pressed(site: &Site, looks_in: bool, depth: f64) -> PressedGauge {
     let out = if looks_in { -site.normal } else { site.normal };
-    Pressed {
+    PressedGauge {
         number: 0,
         place: site.position - out * depth,
         out,

@@ -26,14 +26,14 @@ pub struct Reduced {
     pub feasible: Vec<usize>,
     /// Signals of the feasible sites.
     pub x: SignalMatrix,
-    asked: Asked,
+    asked: AskedSites,
     components: OnceLock<Pca>,
     candidates: OnceLock<Arc<Candidates>>,
     geometry: OnceLock<Located>,
 }
 
 /// How a reduction is to be made.
-struct Asked {
+struct AskedSites {
     reduction: Reduction,
     /// Most candidates.
     limit: usize,
@@ -73,7 +73,7 @@ impl Reduced {
         if let Some(known) = self.candidates.get() {
             return Ok(known);
         }
-        let Asked {
+        let AskedSites {
             reduction,
             limit,
             sensors,
@@ -168,7 +168,7 @@ pub fn reduce_sites(
     Ok(Reduced {
         feasible,
         x,
-        asked: Asked {
+        asked: AskedSites {
             reduction: inputs.project.reduction(),
             limit: budget.candidates.max(sensors),
             sensors,

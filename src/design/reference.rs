@@ -1,6 +1,6 @@
 //! The judge's model, and what gauges read on it.
 
-use super::presses::Pressed;
+use super::presses::PressReadings;
 use super::{Inputs, NOISE_SEED};
 use crate::budget::Work;
 use crate::dataset::{SignalMatrix, Site};
@@ -34,15 +34,14 @@ pub struct Reference {
     /// learn from.
     pub grid: Option<[f64; 2]>,
     /// Known presses on the gauges of each workshop, where an estimator learns from them.
-    pub pressed: Option<Pressed>,
+    pub pressed: Option<PressReadings>,
 }
 
 /// Length and width of the grids (m) that a project's gauges are judged with: those that live touch reads them over, and
 /// none where a regression has learned from points.
 pub(super) fn grid(project: &Project) -> Option<[f64; 2]> {
-    let keys = &project.gauge;
     let matching = project.judging().estimator() == EstimatorKind::Matching;
-    matching.then_some([keys.grid_length_mm * 1e-3, keys.grid_width_mm * 1e-3])
+    matching.then_some(project.gauge.grid())
 }
 
 pub(super) fn regions(project: &Project, touches: &[Touch]) -> Vec<TouchRegion> {
@@ -161,7 +160,7 @@ mod tests {
         project.evaluation.estimator = EstimatorKind::Matching;
         let matched = Reference {
             grid: grid(&project),
-            pressed: Some(Pressed {
+            pressed: Some(PressReadings {
                 presses: Vec::new(),
                 x: SignalMatrix::default(),
             }),

@@ -22,12 +22,12 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use self::room::Room;
-use super::known::{FINE, Known, detail};
+use super::known::{FINE, KnownSimulation, detail};
 use super::{DesignError, Inputs, Reduced, Simulated};
 use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Move, Signal, Site, Surveyed, survey};
 use crate::elasticity::Touch;
-use crate::elasticity::respond::Pressed;
+use crate::elasticity::respond::PressedModel;
 use crate::placement::expected_error::{Moving, NUISANCES};
 use crate::placement::{Constraints, Selection, SensorSet};
 use crate::uncertainty::Making;
@@ -149,7 +149,7 @@ fn search(
     watch: Watch,
 ) -> Result<Refined, DesignError> {
     let keys = &inputs.project.selection;
-    let known = Known::new(inputs, simulated);
+    let known = KnownSimulation::new(inputs, simulated);
     // Of gauges that move it is told seat by seat.
     let unasked = |_: usize, _: usize| 0.0;
     let shared = known.shared(&|_, _| [0.0; NUISANCES]);
@@ -174,7 +174,7 @@ fn search(
     )?;
     let confirming = Moving::new(x, &targets, &confirmed, (FINE, seats + 1), &whole, watch)?;
     let model = simulated.meshed.model(watch)?;
-    let pressed = Pressed::new(&*model, &simulated.dataset.touches);
+    let pressed = PressedModel::new(&*model, &simulated.dataset.touches);
     let sites: Vec<Site> = set.iter().map(|&s| simulated.dataset.sites[s]).collect();
     let making = inputs.project.uncertainty().making_allowed();
     let made = (&simulated.dataset.touches[..], &making);
@@ -206,8 +206,8 @@ fn search(
 
 struct Search<'a> {
     room: Room<'a>,
-    known: &'a Known<'a>,
-    pressed: &'a Pressed<'a>,
+    known: &'a KnownSimulation<'a>,
+    pressed: &'a PressedModel<'a>,
     /// The touches that are pressed, and how far off they are made.
     made: (&'a [Touch], &'a Making),
     gauges: Vec<Gauge>,
@@ -367,7 +367,7 @@ impl Search<'_> {
 }
 
 /// Puts a gauge into a seat that reads `x`, and is off as `like` is.
-fn seat_in(moving: &mut Moving, known: &Known, seat: usize, x: &[f64], like: &Surveyed) {
+fn seat_in(moving: &mut Moving, known: &KnownSimulation, seat: usize, x: &[f64], like: &Surveyed) {
     let variance = |touch: usize| known.variance_of(x[touch], Some(&like.slopes), 0, touch);
     let felt = |touch: usize| known.felt_of(&like.making, 0, touch);
     moving.seat(seat, x, &variance, &felt);

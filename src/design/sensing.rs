@@ -132,8 +132,8 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
 /// # Errors
 /// [`DesignError::OffThePart`] for the first that does.
 pub fn check_chosen(inputs: &Inputs) -> Result<(), DesignError> {
-    let places = inputs.project.selection.sites.iter();
-    let places = places.map(|site| DVec3::from_array(site.position_mm) * 1e-3);
+    let sites = inputs.project.selection.sites.iter();
+    let places = sites.map(ChosenSite::position);
     check_on_part(&inputs.part, "gauge of [[selection.site]]", places)
 }
 
@@ -151,12 +151,10 @@ fn laid(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<(Ground, Built
 
 /// The chosen gauges on the model's own surface.
 fn chosen_gauges(project: &Project, model: &dyn Model) -> Vec<Gauge> {
-    let keys = &project.gauge;
+    let [length, width] = project.gauge.grid();
     (project.selection.sites.iter())
         .map(|site| {
-            let (at, _) = model
-                .index()
-                .nearest(DVec3::from_array(site.position_mm) * 1e-3);
+            let (at, _) = model.index().nearest(site.position());
             let normal = model.mesh().normal(at);
             let direction = DVec3::from_array(site.direction);
             let flat = (direction - normal * direction.dot(normal)).try_normalize();
@@ -164,8 +162,8 @@ fn chosen_gauges(project: &Project, model: &dyn Model) -> Vec<Gauge> {
                 position: model.mesh().point(at),
                 direction: flat.unwrap_or_else(|| normal.any_orthonormal_vector()),
                 normal,
-                length: keys.grid_length_mm * 1e-3,
-                width: keys.grid_width_mm * 1e-3,
+                length,
+                width,
             }
         })
         .collect()

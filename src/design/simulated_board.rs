@@ -13,7 +13,7 @@ use crate::elasticity::respond;
 use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Push, Touch};
 use crate::inference::calibration::noise_of_mean;
-use crate::inference::{Chain, Known};
+use crate::inference::{Chain, KnownPress};
 
 /// In which what all channels drift by comes and goes (s).
 const WANDER_S: f64 = 10.0;
@@ -26,7 +26,7 @@ pub fn options(inputs: &Inputs, channels: usize) -> Options {
         rate_hz: 1000,
         chain: Chain::default(),
         channels,
-        noise: inputs.project.gauge.noise_microstrain * 1e-6,
+        noise: inputs.project.gauge.noise(),
         drift: 0.1e-6,
         offset: 100e-6,
         disturbances: wandering(inputs.project.uncertainty().drift),
@@ -107,7 +107,7 @@ pub fn pressed_by_hand(
     sensing: &Sensing,
     (truth, gains): (&Sensitivity, &[f64]),
     seed: u64,
-) -> Vec<Known> {
+) -> Vec<KnownPress> {
     let surface = &sensing.drawn.map.mesh;
     let (asked, off) = (sensing.proposed.clone(), &sensing.off);
     let noise = noise_of_mean(&vec![off.of_channel(); gains.len()]);
@@ -118,7 +118,7 @@ pub fn pressed_by_hand(
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(2));
     let mut known = |(press, push): (&Press, &Push)| {
         let read = truth.read_push(push).into_iter().zip(gains).zip(&noise);
-        Known {
+        KnownPress {
             at: surface.index().nearest(press.asked.position).0,
             force: press.asked.force,
             reading: (read.map(|((x, gain), noise)| x * gain + noise * normal(&mut rng))).collect(),

@@ -15,9 +15,9 @@ use crate::budget::{Cancelled, Watch};
 use crate::dataset::SignalMatrix;
 use crate::inference::calibration::{calibrate, noise_of_mean};
 use crate::inference::remainder::{self, Remainder};
-use crate::inference::{Deviations, Errors, Known, Matching, Nuisances, ResponseMap};
+use crate::inference::{Deviations, Errors, KnownPress, Matching, Nuisances, ResponseMap};
 use crate::learning::{Answer, ByModel, Lessons};
-use crate::live::{GaugeModel, Settings};
+use crate::live::{GaugeModel, PipelineSettings};
 use crate::project::Project;
 use crate::regression::folds::evenly;
 use crate::uncertainty::{Gluing, Pressing, Uncertainty};
@@ -68,7 +68,7 @@ pub struct Knowledge {
     /// See [`Self::tip`].
     pub stiffness: f64,
     /// What was learned beside the gluing.
-    pub remainder: Option<remainder::Settings>,
+    pub remainder: Option<remainder::RemainderSettings>,
 }
 
 /// Why presses teach a model nothing.
@@ -114,7 +114,7 @@ pub struct PressLessons<'a> {
     project: &'a Project,
     off: Uncertainty,
     noise: Vec<f64>,
-    known: Vec<Known>,
+    known: Vec<KnownPress>,
 }
 
 impl<'a> PressLessons<'a> {
@@ -145,7 +145,7 @@ impl<'a> PressLessons<'a> {
             .map(|(t, (place, &force))| {
                 let (at, distance) = mesh.index().nearest(DVec3::from_array(*place) * 1e-3);
                 away.push(distance);
-                Known {
+                KnownPress {
                     at,
                     force,
                     reading: (0..data).map(|c| lessons.x.row(c)[t]).collect(),
@@ -197,10 +197,10 @@ impl<'a> PressLessons<'a> {
     /// [`Cancelled`] when the watch asks for it.
     pub fn teach(&self, some: &[usize], way: ByModel, watch: Watch) -> Result<Taught, Cancelled> {
         let pushes = |t: &&usize| self.known[**t].force > 0.0;
-        let known: Vec<Known> = (some.iter().filter(pushes))
+        let known: Vec<KnownPress> = (some.iter().filter(pushes))
             .map(|&t| self.known[t].clone())
             .collect();
-        let few: Vec<Known> = (evenly(known.len(), CALIBRATED_BY).into_iter())
+        let few: Vec<KnownPress> = (evenly(known.len(), CALIBRATED_BY).into_iter())
             .map(|k| known[k].clone())
             .collect();
         let drawn = &self.sensing.drawn;
@@ -271,8 +271,8 @@ impl Taught {
 
     /// A project's settings of live touch, with what was learned in place of what the project knows.
     #[must_use]
-    pub fn settings(&self, of: Settings) -> Settings {
-        Settings {
+    pub fn settings(&self, of: PipelineSettings) -> PipelineSettings {
+        PipelineSettings {
             relative: self.known.relative,
             most_force: self.known.most_force,
             ..of

@@ -9,7 +9,7 @@ use glam::DVec3;
 use nalgebra::DMatrix;
 
 use super::taught::Taught;
-use crate::inference::remainder::{Settings, matern};
+use crate::inference::remainder::{RemainderSettings, matern};
 use crate::inference::{Errors, cramer_rao};
 use crate::regression::folds::evenly;
 
@@ -65,9 +65,9 @@ pub fn most_telling(
 }
 
 /// As they were learned, or as they are thought to be beforehand.
-fn settings(taught: &Taught) -> Settings {
+fn settings(taught: &Taught) -> RemainderSettings {
     let (lower, upper) = taught.map.mesh.bounds();
-    taught.known.remainder.unwrap_or(Settings {
+    taught.known.remainder.unwrap_or(RemainderSettings {
         share: SHARE,
         length: LENGTH * (upper - lower).length(),
         scatter: SCATTER,
@@ -75,8 +75,8 @@ fn settings(taught: &Taught) -> Settings {
 }
 
 /// What the map is to blame for, of the squared error (m²) of a touch of a force (N) at a place (m).
-fn blamed_on_map(taught: &Taught, place: DVec3, force: f64, settings: &Settings) -> f64 {
-    let Settings { share, scatter, .. } = *settings;
+fn blamed_on_map(taught: &Taught, place: DVec3, force: f64, settings: &RemainderSettings) -> f64 {
+    let RemainderSettings { share, scatter, .. } = *settings;
     squared_error(taught, place, force, share.hypot(scatter))
         - squared_error(taught, place, force, scatter)
 }
@@ -109,7 +109,7 @@ struct Unknown {
 
 impl Unknown {
     /// Before anything is pressed.
-    fn new(taught: &Taught, places: &[DVec3], settings: Settings, force: f64) -> Self {
+    fn new(taught: &Taught, places: &[DVec3], settings: RemainderSettings, force: f64) -> Self {
         let prior = settings.share * settings.share;
         let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
             prior * matern(places[i].distance(places[j]) / settings.length)

@@ -8,8 +8,8 @@ use crate::learning::lessons::Division;
 use crate::learning::still::over_radius;
 use crate::learning::train::Trial;
 use crate::learning::{
-    Answer, Asked, ByModel, Family, LearningError, Lessons, Method, Scores, TouchEstimator,
-    Trained, train,
+    Answer, ByModel, Family, LearningError, Lessons, Method, Scores, TouchEstimator, Trained,
+    TrainingRequest, train,
 };
 use crate::regression::tune::distances;
 use crate::statistics::{mean, midpoint_median};
@@ -97,7 +97,7 @@ pub struct Candidates<'a> {
 /// [`LearningError`] for touches that nothing can be learned from, or when the watch asks for a stop.
 pub fn train_all(
     lessons: &Lessons,
-    asked: &Asked,
+    asked: &TrainingRequest,
     candidates: &Candidates,
     watch: Watch,
 ) -> Result<Outcome, LearningError> {

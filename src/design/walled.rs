@@ -15,7 +15,7 @@ pub fn walled(inputs: &Inputs) -> Option<Inputs> {
     if inputs.project.part.model == PartModel::Solid {
         return None;
     }
-    let thickness = inputs.project.part.thickness_mm * 1e-3;
+    let thickness = inputs.project.part.thickness();
     let mut project = inputs.project.clone();
     project.part.model = PartModel::Solid;
     for support in &mut project.supports {

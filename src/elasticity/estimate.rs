@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::Model;
 use super::load::Touch;
 use super::observe::{Face, turn};
-use super::respond::{Reading, gives_way, respond};
+use super::respond::{Quantity, gives_way, respond};
 use crate::budget::{Cancelled, ElementBudget, Watch};
 use crate::statistics::median;
 
@@ -126,7 +126,7 @@ impl Sample {
     ) -> Result<Self, Cancelled> {
         let points: Vec<_> = places.iter().map(|&p| model.index().nearest(p).0).collect();
         let observer = model.observer(&points, Face::Inside);
-        let responses = respond(model, touches, &observer, Reading::Strain, watch)?;
+        let responses = respond(model, touches, &observer, Quantity::Strain, watch)?;
         let mut strains = vec![vec![[0.0; 3]; places.len()]; touches.len()];
         let mut row = vec![0.0; touches.len()];
         for output in 0..responses.rows() {

@@ -30,7 +30,7 @@ pub enum Side {
 
 /// What is read at the points of an observer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reading<'a> {
+pub enum Quantity<'a> {
     /// Strain tensors: rows 3 i … 3 i + 2 are xx, yy, 2xy at point i.
     Strain,
     /// As [`Self::Strain`] for all points, then displacements: rows 3 (n + i) … are x, y, z at point i.
@@ -105,7 +105,7 @@ impl Responses {
     }
 }
 
-impl Reading<'_> {
+impl Quantity<'_> {
     fn displaces(&self) -> bool {
         match self {
             Self::Strain | Self::Gauge(_) | Self::GaugeDifference(..) => false,
@@ -145,7 +145,7 @@ pub fn respond(
     model: &dyn Model,
     touches: &[impl Copy + Sync + Into<Push>],
     observer: &Observer,
-    reading: Reading,
+    reading: Quantity,
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
     by(None, model, touches, observer, reading, watch)
@@ -160,7 +160,7 @@ pub fn respond_from(
     model: &dyn Model,
     touches: &[impl Copy + Sync + Into<Push>],
     observer: &Observer,
-    reading: Reading,
+    reading: Quantity,
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
     by(Some(side), model, touches, observer, reading, watch)
@@ -171,24 +171,24 @@ fn by(
     model: &dyn Model,
     touches: &[impl Copy + Sync + Into<Push>],
     observer: &Observer,
-    reading: Reading,
+    reading: Quantity,
     watch: Watch,
 ) -> Result<Responses, Cancelled> {
     let loads = touch_rows(model, touches);
     let outputs = output_rows(observer, reading);
     let read: Read = &|solved, buffer, keep| {
         match reading {
-            Reading::Strain | Reading::StrainAndDisplacement => {
+            Quantity::Strain | Quantity::StrainAndDisplacement => {
                 keep(observer.strain_into(solved, buffer));
             }
-            Reading::Gauge(angles) | Reading::GaugeAndDisplacement(angles) => {
+            Quantity::Gauge(angles) | Quantity::GaugeAndDisplacement(angles) => {
                 keep(&along_gauges(observer.strain_into(solved, buffer), angles));
             }
-            Reading::GaugeDifference(angles, times) => {
+            Quantity::GaugeDifference(angles, times) => {
                 let along = along_gauges(observer.strain_into(solved, buffer), angles);
                 keep(&differences(&along, times));
             }
-            Reading::Displacement => {}
+            Quantity::Displacement => {}
         }
         if reading.displaces() {
             keep(observer.displacement_into(solved, buffer));
@@ -342,12 +342,12 @@ fn solves(side: Side, loads: &Rows, outputs: &Rows) -> usize {
 }
 
 /// Touches that ever other gauges are read under: their forces are laid on the model once, and each gauge is solved for.
-pub struct Pressed<'a> {
+pub struct PressedModel<'a> {
     model: &'a dyn Model,
     loads: Rows,
 }
 
-impl<'a> Pressed<'a> {
+impl<'a> PressedModel<'a> {
     /// These touches as loads of a model.
     #[must_use]
     pub fn new(model: &'a dyn Model, touches: &[Touch]) -> Self {
@@ -374,7 +374,7 @@ impl<'a> Pressed<'a> {
     pub fn read(
         &self,
         observer: &Observer,
-        reading: Reading,
+        reading: Quantity,
         watch: Watch,
     ) -> Result<Responses, Cancelled> {
         debug_assert!(!reading.displaces(), "displacements may be carried on");
@@ -420,7 +420,7 @@ fn touch_rows(model: &dyn Model, touches: &[impl Copy + Sync + Into<Push>]) -> R
     rows
 }
 
-pub(super) fn output_rows(observer: &Observer, reading: Reading) -> Rows {
+pub(super) fn output_rows(observer: &Observer, reading: Quantity) -> Rows {
     let weighed = |(i, angle): (u32, f64), times: f64| {
         let weights = observe::along(angle);
         (0..3).map(move |k| (3 * i + k as u32, times * weights[k]))
@@ -448,11 +448,11 @@ pub(super) fn output_rows(observer: &Observer, reading: Reading) -> Rows {
         first
     };
     match reading {
-        Reading::Strain => observer.strain_rows(),
-        Reading::StrainAndDisplacement => both(observer.strain_rows()),
-        Reading::Gauge(angles) => gauge(angles),
-        Reading::GaugeAndDisplacement(angles) => both(gauge(angles)),
-        Reading::GaugeDifference(angles, times) => difference(angles, times),
-        Reading::Displacement => observer.displacement_rows().clone(),
+        Quantity::Strain => observer.strain_rows(),
+        Quantity::StrainAndDisplacement => both(observer.strain_rows()),
+        Quantity::Gauge(angles) => gauge(angles),
+        Quantity::GaugeAndDisplacement(angles) => both(gauge(angles)),
+        Quantity::GaugeDifference(angles, times) => difference(angles, times),
+        Quantity::Displacement => observer.displacement_rows().clone(),
     }
 }

@@ -11,7 +11,7 @@ use glam::DVec3;
 use super::Model;
 use super::load::{Push, Touch, pushed};
 use super::observe::Face;
-use super::respond::{Reading, output_rows};
+use super::respond::{Quantity, output_rows};
 use super::rows::Rows;
 use crate::budget::{Cancelled, Watch};
 use crate::mesh::{SurfacePoint, TriMesh};
@@ -171,7 +171,7 @@ fn mean_rows(model: &dyn Model, gauges: &[Gauge]) -> Rows {
     let angles: Vec<f64> = (directions.iter().zip(observer.frames()))
         .map(|(d, f)| d.dot(f.y_axis).atan2(d.dot(f.x_axis)))
         .collect();
-    means.times(&output_rows(&observer, Reading::Gauge(&angles)))
+    means.times(&output_rows(&observer, Quantity::Gauge(&angles)))
 }
 
 #[cfg(test)]
@@ -224,7 +224,7 @@ mod tests {
             &model,
             &touches,
             &observer,
-            Reading::Gauge(&angles),
+            Quantity::Gauge(&angles),
             &unwatched,
         );
         let solved = solved.unwrap();

@@ -29,7 +29,7 @@ use faer::Mat;
 use glam::DVec3;
 use rayon::prelude::*;
 
-pub use self::elements::{Elements, Shape};
+pub use self::elements::{Elements, ShapeFunctions};
 
 use self::grip::Grip;
 use self::pressed::nodal_shares;
@@ -116,7 +116,7 @@ impl SolidModel {
     }
 
     /// The shape functions at a point of the surface.
-    fn shape(&self, at: SurfacePoint) -> Shape {
+    fn shape(&self, at: SurfacePoint) -> ShapeFunctions {
         let point = self.mesh.point(at);
         self.elements
             .shape(point, self.mesh.facet_normal(at.triangle))
@@ -144,7 +144,7 @@ impl SolidModel {
 
     /// Rows x, y, z of the displacement at each point.
     fn displacement_rows(&self, points: &[SurfacePoint]) -> Rows {
-        let shapes: Vec<Shape> = points.par_iter().map(|&at| self.shape(at)).collect();
+        let shapes: Vec<ShapeFunctions> = points.par_iter().map(|&at| self.shape(at)).collect();
         let mut rows = Rows::default();
         for shape in shapes {
             for axis in 0..3 {
@@ -157,7 +157,7 @@ impl SolidModel {
 
     /// Rows xx, yy, 2xy of the strain at each point in its frame.
     fn strain_rows(&self, points: &[SurfacePoint], frames: &[glam::DMat3]) -> Rows {
-        let shapes: Vec<Shape> = points.par_iter().map(|&at| self.shape(at)).collect();
+        let shapes: Vec<ShapeFunctions> = points.par_iter().map(|&at| self.shape(at)).collect();
         let mut rows = Rows::default();
         for (shape, frame) in shapes.iter().zip(frames) {
             let (t, s) = (frame.x_axis, frame.y_axis);

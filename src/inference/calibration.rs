@@ -33,7 +33,7 @@ pub mod part;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
 
-use super::drawn::{AsDrawn, AsGlued, Doubt, covariance, doubt, upper_triangle};
+use super::drawn::{AsDrawn, AsGlued, GluingCovariance, covariance, doubt, upper_triangle};
 use super::map::{ResponseMap, Slope};
 use super::matching::Errors;
 use crate::mesh::SurfacePoint;
@@ -41,7 +41,7 @@ use crate::uncertainty::Uncertainty;
 
 /// A touch that was put where it was asked for, or nearly: see [`crate::uncertainty::Pressing`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Known {
+pub struct KnownPress {
     /// Where it was asked for.
     pub at: SurfacePoint,
     /// N.
@@ -57,7 +57,7 @@ pub struct Calibration {
     /// How the gauge of each channel is glued.
     pub glued: Vec<AsGlued>,
     /// What is not known of these.
-    pub doubts: Vec<Doubt>,
+    pub doubts: Vec<GluingCovariance>,
     /// Standard deviation of each gain.
     pub deviations: Vec<f64>,
     /// What is still off beside that, over the reading; see [`Errors::relative`].
@@ -92,7 +92,7 @@ const BEFORE: f64 = 10.0;
 #[must_use]
 pub fn calibrate(
     drawn: &AsDrawn,
-    known: &[Known],
+    known: &[KnownPress],
     noise: &[f64],
     off: &Uncertainty,
 ) -> Calibration {
@@ -118,8 +118,8 @@ pub fn calibrate(
 }
 
 /// The touches that enough channels have read.
-fn sound(known: &[Known]) -> Vec<&Known> {
-    let read = |k: &&Known| k.reading.iter().filter(|x| x.is_finite()).count() >= FEWEST;
+fn sound(known: &[KnownPress]) -> Vec<&KnownPress> {
+    let read = |k: &&KnownPress| k.reading.iter().filter(|x| x.is_finite()).count() >= FEWEST;
     known.iter().filter(read).collect()
 }
 
@@ -132,7 +132,7 @@ struct Fitted {
 }
 
 /// By the noise of each press (strain, a channel each).
-fn fitted(drawn: &AsDrawn, known: &[&Known], noise: &[f64], off: &Uncertainty) -> Fitted {
+fn fitted(drawn: &AsDrawn, known: &[&KnownPress], noise: &[f64], off: &Uncertainty) -> Fitted {
     let mut fitted = Fitted {
         glued: vec![AsGlued::DRAWN; noise.len()],
         relative: off.elements.max(LEAST),
@@ -173,7 +173,7 @@ struct Press {
 }
 
 impl Press {
-    fn new(drawn: &AsDrawn, known: &Known, glued: &[AsGlued], off: &Uncertainty) -> Self {
+    fn new(drawn: &AsDrawn, known: &KnownPress, glued: &[AsGlued], off: &Uncertainty) -> Self {
         let basis = drawn.basis(known.at);
         let pairs = known.reading.iter().zip(&basis);
         let or_expected = |(x, b): (&f64, &Vector4<f64>)| {
@@ -339,7 +339,7 @@ impl Fit {
     }
 
     /// What is not known of each gauge.
-    fn doubts(&self, channels: usize) -> Vec<Doubt> {
+    fn doubts(&self, channels: usize) -> Vec<GluingCovariance> {
         let all = self.normal.inverse();
         let of = |c: usize| -> Matrix4<f64> {
             let first = PER_GAUGE * c;

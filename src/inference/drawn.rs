@@ -72,11 +72,11 @@ impl From<AsGlued> for [f64; 4] {
 
 /// What is not known of one gauge, as far as a covariance of its gain, millimetres along and across, and degrees says
 /// it: the upper triangle by rows.
-pub type Doubt = [f64; 10];
+pub type GluingCovariance = [f64; 10];
 
 /// Before anything is known but how a workshop glues.
 #[must_use]
-pub fn doubt(gluing: &Gluing) -> Doubt {
+pub fn doubt(gluing: &Gluing) -> GluingCovariance {
     let place = (gluing.place * 1e3).powi(2) / 2.0;
     let angle = gluing.angle.to_degrees().powi(2);
     [
@@ -94,13 +94,13 @@ pub fn doubt(gluing: &Gluing) -> Doubt {
 }
 
 /// As a matrix.
-pub(super) fn covariance(doubt: &Doubt) -> Matrix4<f64> {
+pub(super) fn covariance(doubt: &GluingCovariance) -> Matrix4<f64> {
     let [a, b, c, d, e, f, g, h, i, j] = *doubt;
     Matrix4::new(a, b, c, d, b, e, f, g, c, f, h, i, d, g, i, j)
 }
 
 /// And back.
-pub(super) fn upper_triangle(covariance: &Matrix4<f64>) -> Doubt {
+pub(super) fn upper_triangle(covariance: &Matrix4<f64>) -> GluingCovariance {
     let m = |i: usize, j: usize| covariance[(i, j)];
     [
         m(0, 0),
@@ -133,7 +133,7 @@ impl AsDrawn {
 
     /// As [`Self::deviations`], by what is still not known of each gauge.
     #[must_use]
-    pub fn deviations_of(&self, doubts: &[Doubt], off: &Uncertainty) -> Deviations {
+    pub fn deviations_of(&self, doubts: &[GluingCovariance], off: &Uncertainty) -> Deviations {
         let mesh = &self.map.mesh;
         let nodes = mesh.positions().len() + mesh.edges().len();
         let doubts: Vec<Matrix4<f64>> = doubts.iter().map(covariance).collect();

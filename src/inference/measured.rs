@@ -10,7 +10,7 @@ use glam::DVec3;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::dataset::SignalMatrix;
-use crate::placement::expected_error::{Knowledge, Reading, Template, templates};
+use crate::placement::expected_error::{Knowledge, SiteSignal, Template, templates};
 
 /// Matches readings of some sites to those of touches that are known.
 #[derive(Clone, Debug)]
@@ -76,7 +76,7 @@ impl MeasuredMatching {
     /// in units of the largest.
     fn fit<'a, I>(&self, template: &Template, sites: &dyn Fn() -> I) -> Fit
     where
-        I: Iterator<Item = (&'a Reading, &'a f64)>,
+        I: Iterator<Item = (&'a SiteSignal, &'a f64)>,
     {
         let force = self.most_force.map_or(1.0, |most| force(sites, most));
         let mut information = Matrix3::<f64>::identity();
@@ -116,7 +116,7 @@ impl MeasuredMatching {
 /// The force (N) that fits a reading best at a template, whose weights depend on it.
 fn force<'a, I>(sites: &dyn Fn() -> I, most: f64) -> f64
 where
-    I: Iterator<Item = (&'a Reading, &'a f64)>,
+    I: Iterator<Item = (&'a SiteSignal, &'a f64)>,
 {
     let mut force = 0.0;
     for _ in 0..=TURNS {

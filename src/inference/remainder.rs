@@ -25,7 +25,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::calibration::Known;
+use super::calibration::KnownPress;
 use super::map::ResponseMap;
 use crate::budget::{Cancelled, Watch, report};
 use crate::regression::folds::evenly;
@@ -43,7 +43,7 @@ const LAST_STEP: f64 = 0.1;
 
 /// How far a map is off, and over which distance that changes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
+pub struct RemainderSettings {
     /// ρ: standard deviation of what is smooth, as a share of the reading.
     pub share: f64,
     /// ℓ (m).
@@ -55,7 +55,7 @@ pub struct Settings {
 /// What presses show of a map.
 pub struct Remainder {
     /// Of the process.
-    pub settings: Settings,
+    pub settings: RemainderSettings,
     places: Vec<Place>,
 }
 
@@ -75,7 +75,7 @@ impl Remainder {
     /// [`Cancelled`] when the watch asks for it.
     pub fn learn(
         map: &ResponseMap,
-        known: &[Known],
+        known: &[KnownPress],
         noise: &[f64],
         watch: Watch,
     ) -> Result<Option<Self>, Cancelled> {
@@ -135,7 +135,7 @@ impl Remainder {
     fn foreseen(&self, at: DVec3, channels: usize) -> Vec<[f64; 2]> {
         let all = 0..self.places.len();
         let near = nearest(&self.places, all, at, AROUND);
-        let Settings { share, length, .. } = self.settings;
+        let RemainderSettings { share, length, .. } = self.settings;
         let prior = share * share;
         let block = Block::new(&self.places, &near, at, length);
         (0..channels)
@@ -172,7 +172,7 @@ impl Scales {
 }
 
 /// What presses say of the map at each place, those at one and the same place together: the force of each is its weight.
-fn places(map: &ResponseMap, known: &[Known], noise: &[f64]) -> Vec<Place> {
+fn places(map: &ResponseMap, known: &[KnownPress], noise: &[f64]) -> Vec<Place> {
     let scales = Scales::of(map);
     let channels = map.channels();
     let mut order: Vec<usize> = Vec::new();
@@ -263,7 +263,7 @@ impl Block {
         places: &[Place],
         near: &[usize],
         channel: usize,
-        settings: &Settings,
+        settings: &RemainderSettings,
     ) -> Option<[f64; 2]> {
         let prior = settings.share * settings.share;
         let own = settings.scatter * settings.scatter;
@@ -319,9 +319,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn settings(&self, logs: [f64; 3]) -> Settings {
+    fn settings(&self, logs: [f64; 3]) -> RemainderSettings {
         let [share, length, scatter] = logs.map(f64::exp);
-        Settings {
+        RemainderSettings {
             share,
             length: length * self.size,
             scatter,
@@ -329,7 +329,7 @@ impl<'a> Search<'a> {
     }
 
     /// The settings whose posterior is highest: along one direction after the other, in ever smaller steps.
-    fn best(&self, watch: Watch) -> Result<Settings, Cancelled> {
+    fn best(&self, watch: Watch) -> Result<RemainderSettings, Cancelled> {
         let mut best = USUAL.map(|(middle, _)| f64::ln(middle));
         let mut highest = self.posterior(best);
         let mut step = FIRST_STEP;
@@ -367,7 +367,7 @@ impl<'a> Search<'a> {
     }
 
     /// Of what was read at one place, by what was read before it.
-    fn likelihood(&self, k: usize, before: &[usize], settings: &Settings) -> f64 {
+    fn likelihood(&self, k: usize, before: &[usize], settings: &RemainderSettings) -> f64 {
         let place = &self.places[k];
         let block = Block::new(self.places, before, place.position, settings.length);
         let own = settings.scatter * settings.scatter;

@@ -3,10 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::convex::{Body, bar, block};
-use super::frame::Frame;
+use super::frame::JigFrame;
 use super::pad::Pad;
 use super::sizes::Sizes;
-use super::wall::{Pressed, Wall};
+use super::wall::{PressedGauge, Wall};
 use super::why::Why;
 
 /// Of one gauge.
@@ -46,8 +46,8 @@ impl Arm {
     /// Why an arm on this rod cannot press the gauge.
     pub fn new(
         on: &Wall,
-        gauge: &Pressed,
-        frame: &Frame,
+        gauge: &PressedGauge,
+        frame: &JigFrame,
         film: DVec2,
         sizes: &Sizes,
     ) -> Result<Self, Why> {

@@ -5,7 +5,7 @@ use parry3d_f64::math::Pose;
 use parry3d_f64::query::intersection_test;
 use parry3d_f64::shape::{ConvexPolyhedron, TriMesh as ParryMesh};
 
-use super::frame::Frame;
+use super::frame::JigFrame;
 use crate::mesh::TriMesh;
 
 /// The hull of these points (mm).
@@ -19,7 +19,7 @@ pub struct Obstacle {
 impl Obstacle {
     /// Nothing for a part without triangles.
     #[must_use]
-    pub fn new(part: &TriMesh, frame: &Frame) -> Option<Self> {
+    pub fn new(part: &TriMesh, frame: &JigFrame) -> Option<Self> {
         let places = part.positions().iter().map(|&p| frame.here(p)).collect();
         let mesh = ParryMesh::new(places, part.triangles().to_vec()).ok()?;
         Some(Self { mesh })

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::shapes::{Shape, cuboid, joined};
+use super::shapes::{JigSolid, cuboid, joined};
 
 /// The segments of each digit: top, its two sides, the middle, their two sides below, bottom.
 const SEGMENTS: [u8; 10] = [
@@ -24,7 +24,7 @@ pub struct Hand {
 /// A number around the origin, in the plane of x and y, standing out along z from a little below it, so that it holds on what it
 /// is put on.
 #[must_use]
-pub fn number(number: usize, hand: &Hand) -> Shape {
+pub fn number(number: usize, hand: &Hand) -> JigSolid {
     /// How deep it is sunk (mm).
     const SUNK: f64 = 0.4;
     let digits: Vec<usize> = number

@@ -26,12 +26,12 @@ impl Entry {
 
 /// Millimetres from the middle of an opening: z along the rod into the part, x to the part's front.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub struct JigFrame {
     origin: DVec3,
     turn: DMat3,
 }
 
-impl Frame {
+impl JigFrame {
     /// At an end of a part, on a line beside its middle. `middle` and `end` are in the stance's coordinates (m): where the line
     /// runs, and how high the end is.
     #[must_use]

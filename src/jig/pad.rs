@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::frame::Frame;
+use super::frame::JigFrame;
 use super::sizes::Sizes;
-use super::wall::{Pressed, Wall};
+use super::wall::{PressedGauge, Wall};
 
 /// A pad as it lies at the wall. Its points are `out · distance + along · u + across · v + up`, with u and v over its half sizes.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +34,13 @@ impl Pad {
     /// For a gauge with a film of half these sizes (mm). The wall is felt along the way that the pad moves in; where it ends
     /// before the pad does, it goes on as it was at its end.
     #[must_use]
-    pub fn new(on: &Wall, gauge: &Pressed, frame: &Frame, film: DVec2, sizes: &Sizes) -> Self {
+    pub fn new(
+        on: &Wall,
+        gauge: &PressedGauge,
+        frame: &JigFrame,
+        film: DVec2,
+        sizes: &Sizes,
+    ) -> Self {
         let (place, wall) = (frame.here(gauge.place), frame.way(gauge.out));
         let out = place.with_z(0.0).normalize_or(DVec3::X);
         let line = frame.way(gauge.direction).reject_from_normalized(out);
@@ -106,7 +112,7 @@ impl Pad {
 }
 
 /// How far (mm) beyond a point the wall is, along the way out; nothing where there is none nearby.
-fn wall_at(on: &Wall, frame: &Frame, point: DVec3, out: DVec3) -> Option<f64> {
+fn wall_at(on: &Wall, frame: &JigFrame, point: DVec3, out: DVec3) -> Option<f64> {
     /// How far the wall may be off the straight one (mm).
     const NEAR: f64 = 5.0;
     let start = frame.out_of(point - out * NEAR);

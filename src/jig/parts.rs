@@ -11,8 +11,8 @@ use super::pad::{ACROSS, ALONG, Pad};
 use super::plan::{Jig, Stack};
 use super::rod::HEAD;
 use super::shapes::{
-    Shape, closed, cuboid, cylinder, hole_along_x, hole_along_y, hull, joined, moved, placed, read,
-    turned,
+    JigSolid, closed, cuboid, cylinder, hole_along_x, hole_along_y, hull, joined, moved, placed,
+    read, turned,
 };
 use super::sizes::Sizes;
 use crate::mesh::Facets;
@@ -63,7 +63,7 @@ pub fn parts(jig: &Jig, stack: &Stack) -> Vec<Part> {
 }
 
 /// The rod's section, or that of a hole for it, between two heights.
-fn shaft(sizes: &Sizes, play: f64, from: f64, to: f64) -> Shape {
+fn shaft(sizes: &Sizes, play: f64, from: f64, to: f64) -> JigSolid {
     let radius = sizes.rod + play;
     let flat = sizes.rod - sizes.flat + play;
     let off = cuboid(
@@ -221,7 +221,7 @@ fn sleeve(sizes: &Sizes, stack: &Stack, k: usize) -> Option<Part> {
 }
 
 /// A ring with strut, guide, the eyelet of its cord, and its number.
-fn ring(sizes: &Sizes, arm: &Arm) -> Shape {
+fn ring(sizes: &Sizes, arm: &Arm) -> JigSolid {
     let (half, hole) = (sizes.guide_half(), sizes.stem / 2.0 + sizes.play);
     let [from, to] = arm.guide(sizes);
     let [low, high] = arm.ring(sizes);
@@ -282,7 +282,7 @@ fn ring(sizes: &Sizes, arm: &Arm) -> Shape {
 }
 
 /// A pad with its stem and its number.
-fn pad(sizes: &Sizes, arm: &Arm) -> Shape {
+fn pad(sizes: &Sizes, arm: &Arm) -> JigSolid {
     let pad = &arm.pad;
     let half = sizes.stem / 2.0;
     let end = pad.back - arm.stem(sizes);

@@ -4,12 +4,12 @@ use glam::{DVec2, DVec3};
 
 use super::arm::{Arm, Bodies};
 use super::convex::{meet, swept};
-use super::frame::{Entry, Frame};
-use super::reach::Reach;
+use super::frame::{Entry, JigFrame};
+use super::reach::RodReach;
 use super::rod::{Line, Site, cover};
 use super::sizes::Sizes;
 use super::slots::slots;
-use super::wall::{Pressed, Wall};
+use super::wall::{PressedGauge, Wall};
 use super::why::{LeftOut, Why};
 use crate::budget::{Cancelled, Watch};
 
@@ -21,7 +21,7 @@ pub struct Stack {
     /// The end that it comes in at.
     pub entry: Entry,
     /// Where its rod runs.
-    pub frame: Frame,
+    pub frame: JigFrame,
     /// From the opening inwards.
     pub arms: Vec<Arm>,
     /// The rim of the opening about the rod (mm): the seat rests on it.
@@ -35,7 +35,7 @@ pub struct Jig {
     /// Of its pieces.
     pub sizes: Sizes,
     /// What else its rods get to.
-    pub reach: Reach,
+    pub reach: RodReach,
     /// One after another: a second one for what does not fit beside the first, or comes in at the other end.
     pub stacks: Vec<Stack>,
     /// What must be pressed by hand.
@@ -46,7 +46,12 @@ pub struct Jig {
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
-pub fn plan(wall: Wall, gauges: &[Pressed], film: DVec2, watch: Watch) -> Result<Jig, Cancelled> {
+pub fn plan(
+    wall: Wall,
+    gauges: &[PressedGauge],
+    film: DVec2,
+    watch: Watch,
+) -> Result<Jig, Cancelled> {
     /// Rods, one after another.
     const RODS: usize = 6;
     let site = Site::new(wall, gauges, film);
@@ -82,7 +87,7 @@ pub fn plan(wall: Wall, gauges: &[Pressed], film: DVec2, watch: Watch) -> Result
     left_out.sort_by_key(|left| left.number);
     Ok(Jig {
         sizes: site.sizes,
-        reach: Reach::of(site, lines),
+        reach: RodReach::of(site, lines),
         stacks,
         left_out,
     })

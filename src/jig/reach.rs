@@ -3,23 +3,23 @@
 use glam::DVec2;
 
 use super::rod::{Line, Site, cover};
-use super::wall::{Pressed, Wall};
+use super::wall::{PressedGauge, Wall};
 use crate::budget::{Cancelled, Watch};
 
 /// The rods that get to most of a part.
-pub struct Reach {
+pub struct RodReach {
     site: Site,
     lines: Vec<Line>,
 }
 
-impl Reach {
+impl RodReach {
     /// Of a part on which gauges may sit at these places, with a film of half these sizes (mm).
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
     pub fn new(
         wall: Wall,
-        places: &[Pressed],
+        places: &[PressedGauge],
         film: DVec2,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
@@ -28,9 +28,9 @@ impl Reach {
         const PLACES: usize = 60;
         let site = Site::new(wall, places, film);
         let apart = places.len().div_ceil(PLACES).max(1);
-        let some: Vec<Pressed> = (0..)
+        let some: Vec<PressedGauge> = (0..)
             .zip(places.iter().step_by(apart))
-            .map(|(number, place)| Pressed { number, ..*place })
+            .map(|(number, place)| PressedGauge { number, ..*place })
             .collect();
         let rods = cover(&site, &some, RODS, watch)?;
         let lines = rods.into_iter().map(|rod| rod.line).collect();
@@ -45,7 +45,7 @@ impl Reach {
 
     /// Whether an arm on one of the rods gets to a gauge.
     #[must_use]
-    pub fn gets_to(&self, gauge: &Pressed) -> bool {
+    pub fn gets_to(&self, gauge: &PressedGauge) -> bool {
         let mut lines = self.lines.iter();
         lines.any(|&line| self.site.arm(line, gauge).is_ok())
     }

@@ -4,9 +4,9 @@ use glam::{DVec2, DVec3};
 
 use super::arm::Arm;
 use super::convex::{Obstacle, bar, swept};
-use super::frame::{Entry, Frame};
+use super::frame::{Entry, JigFrame};
 use super::sizes::Sizes;
-use super::wall::{Pressed, Wall};
+use super::wall::{PressedGauge, Wall};
 use super::why::{LeftOut, Why};
 use crate::budget::{Cancelled, Watch, report};
 use crate::mesh::TriMesh;
@@ -33,7 +33,7 @@ pub struct Site {
 struct End {
     entry: Entry,
     /// Of a rod in the middle.
-    frame: Frame,
+    frame: JigFrame,
     obstacle: Obstacle,
     /// The part's end there, about the middle (mm).
     rim: Vec<DVec2>,
@@ -62,9 +62,9 @@ pub struct Rod {
 impl Site {
     /// For gauges with a film of half these sizes (mm).
     #[must_use]
-    pub fn new(wall: Wall, gauges: &[Pressed], film: DVec2) -> Self {
+    pub fn new(wall: Wall, gauges: &[PressedGauge], film: DVec2) -> Self {
         let middle = middle(&wall.face, wall.stance);
-        let distance = |g: &Pressed| {
+        let distance = |g: &PressedGauge| {
             let at = wall.stance.coordinates(g.place).truncate();
             at.distance(middle) * 1e3
         };
@@ -102,7 +102,7 @@ impl Site {
 
     /// The frame of a rod there.
     #[must_use]
-    pub fn frame(&self, line: Line) -> Frame {
+    pub fn frame(&self, line: Line) -> JigFrame {
         self.ends[line.end].frame.beside(line.beside)
     }
 
@@ -121,7 +121,7 @@ impl Site {
 
     /// A rod for these gauges.
     #[must_use]
-    pub fn rod<'g>(&self, line: Line, gauges: impl IntoIterator<Item = &'g Pressed>) -> Rod {
+    pub fn rod<'g>(&self, line: Line, gauges: impl IntoIterator<Item = &'g PressedGauge>) -> Rod {
         let mut rod = Rod {
             line,
             arms: Vec::new(),
@@ -143,7 +143,7 @@ impl Site {
     ///
     /// # Errors
     /// Why there is none on this line.
-    pub fn arm(&self, line: Line, gauge: &Pressed) -> Result<Arm, Why> {
+    pub fn arm(&self, line: Line, gauge: &PressedGauge) -> Result<Arm, Why> {
         /// Travels that are tried (mm).
         const STEP: f64 = 1.0;
         let sizes = &self.sizes;
@@ -198,7 +198,7 @@ impl End {
             Entry::Foot => heights.fold(f64::INFINITY, f64::min),
             Entry::Top => heights.fold(f64::NEG_INFINITY, f64::max),
         };
-        let frame = Frame::at(entry, stance, middle, end);
+        let frame = JigFrame::at(entry, stance, middle, end);
         let places = part.positions().iter().map(|&p| frame.here(p));
         Some(Self {
             entry,
@@ -227,7 +227,7 @@ fn middle(face: &TriMesh, stance: Stance) -> DVec2 {
 /// [`Cancelled`] when the watch asks for it.
 pub fn cover(
     site: &Site,
-    gauges: &[Pressed],
+    gauges: &[PressedGauge],
     most: usize,
     watch: Watch,
 ) -> Result<Vec<Rod>, Cancelled> {

@@ -15,7 +15,7 @@ use crate::mesh::{Facets, TriMesh};
 const HALF_FILM: DVec2 = DVec2::new(6.3, 3.0);
 
 /// The bundled limb with ten gauges, some of them at one height.
-fn limb() -> (TriMesh, Vec<Pressed>) {
+fn limb() -> (TriMesh, Vec<PressedGauge>) {
     const PLACES: [(f64, f64); 10] = [
         (34.0, 177.0),
         (66.0, 49.0),
@@ -33,7 +33,7 @@ fn limb() -> (TriMesh, Vec<Pressed>) {
         let way = DVec2::from_angle(f64::to_radians(degrees)) * 0.04;
         let (at, _) = mesh.index().nearest(way.extend(height * 1e-3));
         let out = mesh.normal(at);
-        Pressed {
+        PressedGauge {
             number,
             place: mesh.point(at),
             out,
@@ -209,7 +209,7 @@ fn what_is_in_the_way_is_found_and_said() {
 fn gauges_that_are_too_near_to_each_other_are_pressed_in_turn() {
     let (mesh, gauges) = limb();
     let first = gauges[0];
-    let second = Pressed {
+    let second = PressedGauge {
         number: 2,
         place: first.place + DVec3::Z * 4e-3,
         ..first
@@ -222,10 +222,10 @@ fn gauges_that_are_too_near_to_each_other_are_pressed_in_turn() {
 #[test]
 fn what_a_filter_lets_through_is_reached() {
     let (mesh, gauges) = limb();
-    let reach = Reach::new(of(&mesh, &mesh), &gauges, HALF_FILM, &unwatched).unwrap();
+    let reach = RodReach::new(of(&mesh, &mesh), &gauges, HALF_FILM, &unwatched).unwrap();
     assert!(gauges.iter().all(|g| reach.gets_to(g)));
     // A gauge on a wall that looks along the axis cannot be pressed from it.
-    let tilted = Pressed {
+    let tilted = PressedGauge {
         out: DVec3::new(0.3, 0.0, 0.95).normalize(),
         ..gauges[0]
     };

@@ -9,7 +9,7 @@ use crate::mesh::stance::Stance;
 
 /// A gauge that is to be pressed to its wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pressed {
+pub struct PressedGauge {
     /// By which its pieces are named.
     pub number: usize,
     /// On the inner face (m).

@@ -27,7 +27,7 @@ const BEFOREHAND: f64 = 5.0;
 
 /// What was learned of errors, in the units of the outputs.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Doubt {
+pub struct ErrorModel {
     /// The squared error at each known touch when its place was left out.
     pub off: Vec<f64>,
     /// Distance to the nearest known touch, over the lengths, within which most touches are.
@@ -36,7 +36,7 @@ pub struct Doubt {
     pub factor: f64,
 }
 
-impl Doubt {
+impl ErrorModel {
     /// From squared distances among known touches, their groups and their errors when they were left out; and from
     /// squared distances of others (others × known) with their errors.
     #[must_use]
@@ -138,7 +138,7 @@ mod tests {
         let groups: Vec<usize> = (0..n).collect();
         let others = Mat::from_fn(3, 1, |t, _| [0.2, 0.8, 3.0][t]);
         let apart = squared(&others, &points);
-        let doubt = Doubt::learn(&among(&points), &groups, &errors, &apart, &[0.05, 0.5, 0.5]);
+        let doubt = ErrorModel::learn(&among(&points), &groups, &errors, &apart, &[0.05, 0.5, 0.5]);
         let radii = doubt.radii(&apart);
         assert!((0.06..0.15).contains(&radii[0]), "{radii:?}");
         assert!((0.6..1.5).contains(&radii[1]), "{radii:?}");
@@ -147,7 +147,7 @@ mod tests {
         let within = (0..n).filter(|&t| errors[t] <= own[t]).count() as f64 / n as f64;
         assert!((within - 0.9).abs() < 0.06, "{within}");
         // Others that were farther off say that the known ones flatter.
-        let wary = Doubt::learn(
+        let wary = ErrorModel::learn(
             &among(&points),
             &groups,
             &errors,

@@ -1,10 +1,10 @@
 //! A trained estimator: from a reading to place, radius and force.
 
-use super::doubt::Doubt;
+use super::doubt::ErrorModel;
 use super::family::Family;
 use super::inputs::Inputs;
 use super::machine::Machine;
-use super::targets::{Frame, Scale};
+use super::targets::{Scale, TargetFrame};
 use crate::dataset::SignalMatrix;
 
 /// What was learned, ready to answer.
@@ -13,11 +13,11 @@ pub struct TouchEstimator {
     /// How readings become features.
     pub inputs: Inputs,
     /// How outputs become places.
-    pub frame: Frame,
+    pub frame: TargetFrame,
     /// Places from features.
     pub place: Machine,
     /// How far places may be off.
-    pub doubt: Doubt,
+    pub doubt: ErrorModel,
     /// Forces from features, where forces were known.
     pub force: Option<ForceEstimator>,
 }

@@ -3,7 +3,7 @@
 use faer::Mat;
 use serde::{Deserialize, Serialize};
 
-use super::lessons::Known;
+use super::lessons::KnownTouches;
 use super::machine::Machine;
 use super::ridge::{self, Smoothness};
 use super::{gaussian_process, nearest, svr};
@@ -57,14 +57,14 @@ impl Family {
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for a stop.
-    pub fn search(self, known: &Known, watch: Watch) -> Result<Settings, Cancelled> {
+    pub fn search(self, known: &KnownTouches, watch: Watch) -> Result<TunedMethod, Cancelled> {
         report(watch, self.stage(), 0, 1)?;
         Ok(match self {
-            Self::Svr => Settings::Svr(svr::search(known, self.stage(), watch)?),
-            Self::Nearest => Settings::Nearest(nearest::search(known)),
-            Self::KernelRidge => Settings::Smooth(ridge::search(known)),
+            Self::Svr => TunedMethod::Svr(svr::search(known, self.stage(), watch)?),
+            Self::Nearest => TunedMethod::Nearest(nearest::search(known)),
+            Self::KernelRidge => TunedMethod::Smooth(ridge::search(known)),
             Self::GaussianProcess => {
-                Settings::Smooth(gaussian_process::learn(known, self.stage(), watch)?)
+                TunedMethod::Smooth(gaussian_process::learn(known, self.stage(), watch)?)
             }
         })
     }
@@ -115,7 +115,7 @@ impl From<Family> for Method {
 
 /// What a search found.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Settings {
+pub enum TunedMethod {
     /// Of support vectors, for outputs of size one.
     Svr(Hyper),
     /// How many neighbours are averaged.
@@ -124,12 +124,12 @@ pub enum Settings {
     Smooth(Smoothness),
 }
 
-impl Settings {
+impl TunedMethod {
     /// The regression on all known touches; nothing where it cannot be computed.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for a stop.
-    pub fn fit(&self, known: &Known, watch: Watch) -> Result<Option<Machine>, Cancelled> {
+    pub fn fit(&self, known: &KnownTouches, watch: Watch) -> Result<Option<Machine>, Cancelled> {
         match self {
             Self::Svr(hyper) => svr::fit(known, hyper, watch).map(Some),
             Self::Nearest(count) => Ok(Some(nearest::fit(known, *count))),
@@ -141,7 +141,11 @@ impl Settings {
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for a stop.
-    pub fn left_out(&self, known: &Known, watch: Watch) -> Result<Option<Mat<f64>>, Cancelled> {
+    pub fn left_out(
+        &self,
+        known: &KnownTouches,
+        watch: Watch,
+    ) -> Result<Option<Mat<f64>>, Cancelled> {
         match self {
             Self::Svr(hyper) => svr::left_out(known, hyper, watch).map(Some),
             Self::Nearest(count) => Ok(Some(nearest::left_out(known, *count))),

@@ -11,7 +11,7 @@ use faer::{Mat, Side};
 use super::distance::{among, median, over};
 use super::kernel::Kernel;
 use super::lbfgs::{self, Valued};
-use super::lessons::Known;
+use super::lessons::KnownTouches;
 use super::ridge::{Smoothness, noisy};
 use crate::budget::{Cancelled, Watch, report};
 
@@ -32,7 +32,11 @@ const REACH: f64 = 8.0;
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for a stop.
-pub fn learn(known: &Known, stage: &'static str, watch: Watch) -> Result<Smoothness, Cancelled> {
+pub fn learn(
+    known: &KnownTouches,
+    stage: &'static str,
+    watch: Watch,
+) -> Result<Smoothness, Cancelled> {
     let some = known.thinned(LEARNED);
     let channels = some.features.ncols();
     let usual = median(&among(&some.features)).ln();
@@ -58,7 +62,7 @@ const KERNEL: Kernel = Kernel::Matern;
 
 /// Minus the logarithm of how likely the outputs are at logarithms of lengths and, last, of the noise, and its
 /// gradient; nothing where the covariance has no factor.
-fn surprise(known: &Known, at: &[f64]) -> Valued {
+fn surprise(known: &KnownTouches, at: &[f64]) -> Valued {
     let (noise, logs) = at.split_last()?;
     let noise = noise.exp();
     let lengths: Vec<f64> = logs.iter().map(|l| l.exp()).collect();
@@ -122,9 +126,9 @@ mod tests {
     use crate::budget::unwatched;
 
     /// Two outputs of three features, the last of which says nothing.
-    fn known() -> Known {
+    fn known() -> KnownTouches {
         let at = |t: usize, c: usize| ((t * [7, 11, 23][c] % 97) as f64 / 97.0 - 0.5) * 4.0;
-        Known {
+        KnownTouches {
             features: Mat::from_fn(97, 3, at),
             outputs: Mat::from_fn(97, 2, |t, k| {
                 (at(t, 0) * 1.3).sin() + k as f64 * (at(t, 1) * 0.4).cos()

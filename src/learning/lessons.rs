@@ -122,7 +122,7 @@ impl Division {
 
 /// Known touches as a regression sees them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Known {
+pub struct KnownTouches {
     /// Touches × features.
     pub features: Mat<f64>,
     /// Touches × outputs.
@@ -131,7 +131,7 @@ pub struct Known {
     pub groups: Vec<usize>,
 }
 
-impl Known {
+impl KnownTouches {
     /// At most so many of the touches, evenly spaced: they come in no order.
     #[must_use]
     pub fn thinned(&self, most: usize) -> Self {

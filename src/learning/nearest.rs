@@ -3,7 +3,7 @@
 use faer::Mat;
 
 use super::distance::{among, nearest};
-use super::lessons::{Known, lengths};
+use super::lessons::{KnownTouches, lengths};
 use super::machine::{By, Machine, mean_of};
 use crate::statistics::mean;
 
@@ -14,7 +14,7 @@ const MOST: usize = 128;
 
 /// The number of neighbours whose mean, place by place left out, is nearest.
 #[must_use]
-pub fn search(known: &Known) -> usize {
+pub fn search(known: &KnownTouches) -> usize {
     let some = known.thinned(SEARCHED);
     let near = neighbours(&some, MOST);
     // All of them: noise has a pattern, so that one more may be worse where many more are better.
@@ -27,7 +27,7 @@ pub fn search(known: &Known) -> usize {
 
 /// The regression on all touches, of so many neighbours.
 #[must_use]
-pub fn fit(known: &Known, count: usize) -> Machine {
+pub fn fit(known: &KnownTouches, count: usize) -> Machine {
     Machine {
         lengths: vec![1.0; known.features.ncols()],
         points: known.features.clone(),
@@ -40,12 +40,12 @@ pub fn fit(known: &Known, count: usize) -> Machine {
 
 /// Its residuals at touches of places that it does not know: touches × outputs.
 #[must_use]
-pub fn left_out(known: &Known, count: usize) -> Mat<f64> {
+pub fn left_out(known: &KnownTouches, count: usize) -> Mat<f64> {
     residuals(known, &neighbours(known, count), count)
 }
 
 /// The nearest touches of other groups, for each, with their squared distances.
-fn neighbours(known: &Known, count: usize) -> Vec<Vec<(usize, f64)>> {
+fn neighbours(known: &KnownTouches, count: usize) -> Vec<Vec<(usize, f64)>> {
     let squared = among(&known.features);
     let near = |t: usize| {
         let others = (0..known.groups.len()).filter(|&i| known.groups[i] != known.groups[t]);
@@ -54,7 +54,7 @@ fn neighbours(known: &Known, count: usize) -> Vec<Vec<(usize, f64)>> {
     (0..known.groups.len()).map(near).collect()
 }
 
-fn residuals(known: &Known, near: &[Vec<(usize, f64)>], count: usize) -> Mat<f64> {
+fn residuals(known: &KnownTouches, near: &[Vec<(usize, f64)>], count: usize) -> Mat<f64> {
     let outputs = &known.outputs;
     let mut left = Mat::zeros(outputs.nrows(), outputs.ncols());
     for (t, near) in near.iter().enumerate() {
@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn noise_is_averaged_away_and_clean_readings_are_not() {
-        let known = |noise: f64| Known {
+        let known = |noise: f64| KnownTouches {
             features: Mat::from_fn(200, 1, |t, _| (t * 61 % 200) as f64 / 200.0),
             outputs: Mat::from_fn(200, 1, |t, _| {
                 let rough = (t * 7919 % 1000) as f64 / 500.0 - 1.0;

@@ -8,7 +8,7 @@ use faer::{Mat, Side};
 use super::distance::{among, median, over};
 use super::kernel::Kernel;
 use super::left_out;
-use super::lessons::{Known, lengths as norms};
+use super::lessons::{KnownTouches, lengths as norms};
 use super::machine::{By, Machine};
 use super::walk::walk;
 use crate::statistics::mean;
@@ -34,7 +34,7 @@ const FIRST_RIDGE: f64 = 1e-3;
 
 /// The length and the ridge whose error, place by place left out, is smallest.
 #[must_use]
-pub fn search(known: &Known) -> Smoothness {
+pub fn search(known: &KnownTouches) -> Smoothness {
     let some = known.thinned(SEARCHED);
     let squared = among(&some.features);
     let usual = median(&squared);
@@ -63,7 +63,7 @@ pub fn search(known: &Known) -> Smoothness {
 impl Smoothness {
     /// The regression on all touches; nothing where their covariance has no factor.
     #[must_use]
-    pub fn fit(&self, known: &Known) -> Option<Machine> {
+    pub fn fit(&self, known: &KnownTouches) -> Option<Machine> {
         let points = over(&known.features, &self.lengths);
         let covariance = noisy(self.kernel.of(among(&points)), self.noise);
         let weights = covariance.llt(Side::Lower).ok()?.solve(&known.outputs);
@@ -80,7 +80,7 @@ impl Smoothness {
 
     /// Its residuals at touches of places that it has not learned from: touches × outputs.
     #[must_use]
-    pub fn left_out(&self, known: &Known) -> Option<Mat<f64>> {
+    pub fn left_out(&self, known: &KnownTouches) -> Option<Mat<f64>> {
         let points = over(&known.features, &self.lengths);
         let covariance = noisy(self.kernel.of(among(&points)), self.noise);
         left_out::residuals(&covariance, &known.outputs, &known.groups)
@@ -101,10 +101,10 @@ mod tests {
     use super::*;
 
     /// A wave over one feature, with noise of this size.
-    fn wave(by: f64, noise: f64) -> Known {
+    fn wave(by: f64, noise: f64) -> KnownTouches {
         let at = |t: usize| (t * 61 % 150) as f64 / 150.0 * by;
         let rough = |t: usize| ((t * 7919 % 1000) as f64 / 500.0 - 1.0) * noise;
-        Known {
+        KnownTouches {
             features: Mat::from_fn(150, 1, |t, _| at(t)),
             outputs: Mat::from_fn(150, 1, |t, _| (9.0 * at(t) / by).sin() + rough(t)),
             groups: (0..150).collect(),

@@ -4,7 +4,7 @@ use faer::Mat;
 
 use super::distance::among;
 use super::kernel::Kernel;
-use super::lessons::{Known, lengths as norms};
+use super::lessons::{KnownTouches, lengths as norms};
 use super::machine::{By, Machine};
 use super::walk::walk;
 use crate::budget::{Cancelled, Watch, report};
@@ -42,7 +42,7 @@ pub fn paper() -> Hyper {
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for a stop.
-pub fn search(known: &Known, stage: &'static str, watch: Watch) -> Result<Hyper, Cancelled> {
+pub fn search(known: &KnownTouches, stage: &'static str, watch: Watch) -> Result<Hyper, Cancelled> {
     let some = known.thinned(SEARCHED);
     // A kernel of standardized features falls with their number.
     let usual = Hyper::default().scaled(USUAL_SPREAD_MM.recip());
@@ -75,7 +75,7 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(known: &Known) -> Self {
+    fn new(known: &KnownTouches) -> Self {
         let folds = Folds::of_groups(&dense(&known.groups), FOLDS, 0);
         let ordered = known.some(&folds.order);
         Self {
@@ -126,7 +126,7 @@ const STAGE: &str = "Support vectors";
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for a stop.
-pub fn fit(known: &Known, hyper: &Hyper, watch: Watch) -> Result<Machine, Cancelled> {
+pub fn fit(known: &KnownTouches, hyper: &Hyper, watch: Watch) -> Result<Machine, Cancelled> {
     let kernel = gaussian(&flat(&among(&known.features)), hyper.gamma);
     let mut fits: Vec<Fit> = Vec::with_capacity(known.outputs.ncols());
     for column in known.outputs.col_iter() {
@@ -157,7 +157,7 @@ pub fn fit(known: &Known, hyper: &Hyper, watch: Watch) -> Result<Machine, Cancel
 ///
 /// # Errors
 /// [`Cancelled`] when the watch asks for a stop.
-pub fn left_out(known: &Known, hyper: &Hyper, watch: Watch) -> Result<Mat<f64>, Cancelled> {
+pub fn left_out(known: &KnownTouches, hyper: &Hyper, watch: Watch) -> Result<Mat<f64>, Cancelled> {
     let bench = Bench::new(known);
     let ordered = bench.residuals(hyper, LONG, watch)?;
     let mut left = Mat::zeros(ordered.nrows(), ordered.ncols());
@@ -202,9 +202,9 @@ mod tests {
     use super::*;
     use crate::budget::unwatched;
 
-    fn known(by: f64) -> Known {
+    fn known(by: f64) -> KnownTouches {
         let at = |t: usize| (t * 37 % 80) as f64 / 80.0;
-        Known {
+        KnownTouches {
             features: Mat::from_fn(80, 2, |t, c| (3.0 * at(t) + c as f64).sin()),
             outputs: Mat::from_fn(80, 1, |t, _| by * (at(t) - 0.5)),
             groups: (0..80).map(|t| 2 * t).collect(),

@@ -8,7 +8,7 @@ const FLAT: f64 = 1e-6;
 
 /// The frame of places: the middle, the directions that they spread in, and how far.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
+pub struct TargetFrame {
     /// mm.
     pub middle: [f64; 3],
     /// One to three directions of length one, at right angles.
@@ -17,7 +17,7 @@ pub struct Frame {
     pub size: f64,
 }
 
-impl Frame {
+impl TargetFrame {
     /// Of places (mm); nothing where all are the same.
     #[must_use]
     pub fn of(places: &[[f64; 3]]) -> Option<Self> {
@@ -125,23 +125,23 @@ mod tests {
     #[test]
     fn a_flat_skin_has_two_directions_however_it_leans() {
         let places = leaning();
-        let frame = Frame::of(&places).unwrap();
+        let frame = TargetFrame::of(&places).unwrap();
         assert_eq!(frame.axes.len(), 2);
         let back = frame.back(&frame.apply(&places));
         for (a, b) in back.iter().zip(&places) {
             assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-9), "{a:?} {b:?}");
         }
-        assert_eq!(Frame::of(&[[1.0, 2.0, 3.0]; 9]), None);
-        assert_eq!(Frame::of(&[]), None);
+        assert_eq!(TargetFrame::of(&[[1.0, 2.0, 3.0]; 9]), None);
+        assert_eq!(TargetFrame::of(&[]), None);
     }
 
     #[test]
     fn the_unit_of_places_changes_nothing() {
         let plain = leaning();
-        let values = Frame::of(&plain).unwrap().apply(&plain);
+        let values = TargetFrame::of(&plain).unwrap().apply(&plain);
         for by in [0.01, 100.0] {
             let places: Vec<[f64; 3]> = plain.iter().map(|p| p.map(|v| v * by)).collect();
-            let same = Frame::of(&places).unwrap().apply(&places);
+            let same = TargetFrame::of(&places).unwrap().apply(&places);
             assert!((&values - &same).norm_max() < 1e-9);
         }
     }

@@ -5,21 +5,21 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::distance::among;
-use super::doubt::Doubt;
+use super::doubt::ErrorModel;
 use super::estimator::{ForceEstimator, TouchEstimator};
-use super::family::{Family, Method, Settings};
+use super::family::{Family, Method, TunedMethod};
 use super::inputs::Inputs;
-use super::lessons::{Division, Known, LearningError, Lessons, lengths};
+use super::lessons::{Division, KnownTouches, LearningError, Lessons, lengths};
 use super::machine::Machine;
 use super::score::Scores;
-use super::targets::{Frame, Scale};
+use super::targets::{Scale, TargetFrame};
 use crate::budget::Watch;
 use crate::plain;
 use crate::statistics::mean;
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Asked {
+pub struct TrainingRequest {
     /// The one family, or all.
     pub family: Option<Family>,
     /// Of the division.
@@ -64,7 +64,11 @@ const MOST: usize = 6000;
 ///
 /// # Errors
 /// [`LearningError`] for touches that nothing can be learned from, or when the watch asks for a stop.
-pub fn train(lessons: &Lessons, asked: &Asked, watch: Watch) -> Result<Trained, LearningError> {
+pub fn train(
+    lessons: &Lessons,
+    asked: &TrainingRequest,
+    watch: Watch,
+) -> Result<Trained, LearningError> {
     let mut division = Division::draw(lessons.groups, asked.seed, asked.train_touches)?;
     let mut notes = Vec::new();
     if division.train.len() > MOST {
@@ -76,7 +80,7 @@ pub fn train(lessons: &Lessons, asked: &Asked, watch: Watch) -> Result<Trained, 
     }
     let school = School::new(lessons, &division)?;
     notes.extend(school.note());
-    let frame = Frame::of(&school.places(&division.train)).ok_or(LearningError::OnePlace)?;
+    let frame = TargetFrame::of(&school.places(&division.train)).ok_or(LearningError::OnePlace)?;
     let outputs = |touches: &[usize]| frame.apply(&school.places(touches));
     let lesson = Lesson {
         known: school.known(&division.train, outputs(&division.train)),
@@ -154,8 +158,8 @@ impl<'a> School<'a> {
         touches.iter().map(|&t| self.lessons.places_mm[t]).collect()
     }
 
-    fn known(&self, touches: &[usize], outputs: Mat<f64>) -> Known {
-        Known {
+    fn known(&self, touches: &[usize], outputs: Mat<f64>) -> KnownTouches {
+        KnownTouches {
             features: super::lessons::rows(&self.features, touches),
             outputs,
             groups: touches.iter().map(|&t| self.lessons.groups[t]).collect(),
@@ -196,14 +200,14 @@ impl<'a> School<'a> {
 
 /// What is learned from and what is chosen by.
 struct Lesson {
-    known: Known,
-    others: Known,
+    known: KnownTouches,
+    others: KnownTouches,
 }
 
 /// A family with what it made of a lesson.
 struct Chosen {
     family: Family,
-    settings: Settings,
+    settings: TunedMethod,
     machine: Machine,
     /// Mean error on the others, in the unit of the outputs.
     error: f64,
@@ -250,11 +254,11 @@ impl Lesson {
     }
 
     /// How far a chosen machine may be off.
-    fn doubt(&self, chosen: &Chosen, watch: Watch) -> Result<Doubt, LearningError> {
+    fn doubt(&self, chosen: &Chosen, watch: Watch) -> Result<ErrorModel, LearningError> {
         let left = chosen.settings.left_out(&self.known, watch)?;
         let left = left.ok_or(LearningError::Singular)?;
         let machine = &chosen.machine;
-        Ok(Doubt::learn(
+        Ok(ErrorModel::learn(
             &among(&machine.points),
             &self.known.groups,
             &lengths(&left),

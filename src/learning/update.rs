@@ -313,7 +313,7 @@ mod tests {
     use super::*;
     use crate::budget::unwatched;
     use crate::dataset::SignalMatrix;
-    use crate::learning::{Asked, Family, train};
+    use crate::learning::{Family, TrainingRequest, train};
 
     const CHANNELS: usize = 6;
 
@@ -364,9 +364,9 @@ mod tests {
     fn a_few_presses_find_gains_and_rests_that_have_changed() {
         let groups: Vec<usize> = (0..500).collect();
         let (x, places) = presses(500, 1);
-        let asked = Asked {
+        let asked = TrainingRequest {
             family: Some(Family::KernelRidge),
-            ..Asked::default()
+            ..TrainingRequest::default()
         };
         let old = train(&lessons(&x, &places, &groups), &asked, &unwatched).unwrap();
         let (new_x, new_places) = presses(15, 2);
@@ -392,9 +392,9 @@ mod tests {
         let (x, places) = presses(500, 1);
         let old = train(
             &lessons(&x, &places, &groups),
-            &Asked {
+            &TrainingRequest {
                 family: Some(Family::KernelRidge),
-                ..Asked::default()
+                ..TrainingRequest::default()
             },
             &unwatched,
         )

@@ -14,7 +14,7 @@ use std::sync::mpsc::Receiver as Inbox;
 use std::time::{Duration, Instant};
 
 use super::{Got, Held, Port, old_note};
-use crate::live::{Doubt, Input};
+use crate::live::{Input, Unusable};
 use crate::plain;
 use crate::wire::{Hello, Message};
 
@@ -79,7 +79,7 @@ impl Listener {
             self.enter(State::Ended, tell);
             return Ok(());
         }
-        let why = self.receiver.doubt().and_then(Doubt::in_words);
+        let why = self.receiver.doubt().and_then(Unusable::in_words);
         let why = why.map_or(String::new(), |why| format!(": {why}"));
         Err(format!(
             "{}: there is no reading in this recording that can be used{why}",

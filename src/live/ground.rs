@@ -4,7 +4,7 @@ use super::drift::Drift;
 use super::hum::Hum;
 use super::tare::Rest;
 use super::tremble::Tremble;
-use super::update::Settings;
+use super::update::PipelineSettings;
 use crate::inference::{Errors, Matching, Touches};
 use crate::uncertainty::rounding;
 
@@ -58,7 +58,7 @@ impl KnownRest {
     }
 
     /// Takes a rest, with what hummed while it was taken.
-    pub fn take(&mut self, rest: Rest, hum: Hum, settings: &Settings, rate: f64) {
+    pub fn take(&mut self, rest: Rest, hum: Hum, settings: &PipelineSettings, rate: f64) {
         self.rest = Some(rest);
         self.hum = hum;
         self.tremble.forget();
@@ -67,7 +67,7 @@ impl KnownRest {
     }
 
     /// Forgets all but the rest as it is now.
-    pub fn begin_anew(&mut self, settings: &Settings, rate: f64) {
+    pub fn begin_anew(&mut self, settings: &PipelineSettings, rate: f64) {
         self.rest = self.now(settings);
         // What hums has to be found again, and is noise until then.
         if let Some(rest) = &mut self.rest {
@@ -82,7 +82,7 @@ impl KnownRest {
     }
 
     /// The rest as it is now.
-    fn now(&self, settings: &Settings) -> Option<Rest> {
+    fn now(&self, settings: &PipelineSettings) -> Option<Rest> {
         let mut rest = self.rest.clone()?;
         let per_strain = settings.chain.counts_per_strain();
         if let Some(drift) = &self.drift {
@@ -100,7 +100,7 @@ impl KnownRest {
         &mut self,
         step_s: f64,
         counts: &mut [f64],
-        settings: &Settings,
+        settings: &PipelineSettings,
         at_rest: bool,
     ) -> Option<[Vec<f64>; 2]> {
         (self.hum).take_off(step_s, counts, at_rest && self.rest.is_some());
@@ -132,7 +132,7 @@ impl KnownRest {
         &mut self,
         [raw, strain]: [&[f64]; 2],
         under: &Under<'_>,
-        (step_s, settings): (f64, &Settings),
+        (step_s, settings): (f64, &PipelineSettings),
         matching: &Matching,
     ) -> bool {
         let strange = matches!(under, Under::Strange);
@@ -183,7 +183,7 @@ impl KnownRest {
     }
 
     /// Takes what channels do at rest for their noise.
-    fn tremble(&mut self, strain: &[f64], step_s: f64, settings: &Settings, used: &[bool]) {
+    fn tremble(&mut self, strain: &[f64], step_s: f64, settings: &PipelineSettings, used: &[bool]) {
         let Some(rest) = &mut self.rest else {
             return;
         };
@@ -197,7 +197,7 @@ impl KnownRest {
     }
 
     /// How the rest walks is not known yet.
-    fn begin_to_drift(&mut self, settings: &Settings, rate: f64) {
+    fn begin_to_drift(&mut self, settings: &PipelineSettings, rate: f64) {
         let per_strain = settings.chain.counts_per_strain();
         let rest = self.rest.as_ref().zip(settings.drift_s);
         self.drift = rest.map(|(rest, follows_s)| {
@@ -208,7 +208,7 @@ impl KnownRest {
     }
 
     /// The noise of the rest, as strain.
-    fn know_noise(&mut self, settings: &Settings) {
+    fn know_noise(&mut self, settings: &PipelineSettings) {
         let Some(rest) = &self.rest else {
             return;
         };

@@ -15,7 +15,7 @@ use super::news::News;
 use super::receiver::Sample;
 use super::release::Release;
 use super::tare::{Rest, Taring};
-use super::update::{GaugeModel, Guess, Settings, Update};
+use super::update::{GaugeModel, Guess, PipelineSettings, Update};
 use crate::dataset::SignalMatrix;
 use crate::inference::{Contact, Matching, Touches, Trained};
 use crate::learning::TouchEstimator;
@@ -34,7 +34,7 @@ const RATE: f64 = 1000.0;
 /// The state between samples.
 pub struct Pipeline {
     /// Thresholds and constants.
-    pub settings: Settings,
+    pub settings: PipelineSettings,
     matching: Matching,
     trained: [Option<Arc<Trained>>; 2],
     /// What the trained ones were trained with: with other channels they say nothing.
@@ -66,7 +66,7 @@ pub struct Pipeline {
 impl Pipeline {
     /// Not tared, by a model of the gauges.
     #[must_use]
-    pub fn new(model: impl Into<GaugeModel>, settings: Settings) -> Self {
+    pub fn new(model: impl Into<GaugeModel>, settings: PipelineSettings) -> Self {
         let model: GaugeModel = model.into();
         let gauges = model.map.channels();
         let noise = vec![settings.least_noise.max(1e-9); gauges];
@@ -99,7 +99,7 @@ impl Pipeline {
 
     /// Another model of the same gauges, or other settings: after a calibration. What the board has said of
     /// itself stays.
-    pub fn set_model(&mut self, model: impl Into<GaugeModel>, settings: Settings) {
+    pub fn set_model(&mut self, model: impl Into<GaugeModel>, settings: PipelineSettings) {
         if settings.channels != self.settings.channels {
             // Other channels have another rest.
             (self.ground.rest, self.taring) = (None, None);
@@ -108,7 +108,7 @@ impl Pipeline {
         if let Some(hello) = &self.hello {
             chain = chain.of_board(hello);
         }
-        self.settings = Settings { chain, ..settings };
+        self.settings = PipelineSettings { chain, ..settings };
         let used = self.matching.used.clone();
         let model: GaugeModel = model.into();
         self.known_drift = model.off.drift;

@@ -15,7 +15,7 @@ const SHARE: f64 = 0.02;
 
 /// A press that is over.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pressed {
+pub struct FinishedPress {
     /// When it was first and last felt (µs).
     pub from_us: u64,
     /// See [`Self::from_us`].
@@ -42,7 +42,7 @@ impl Presses {
     }
 
     /// Takes in a sample, with the noise of each channel (strain) and whether it is trusted; the press that is over by now.
-    pub fn push(&mut self, update: &Update, noise: &[f64], used: &[bool]) -> Option<Pressed> {
+    pub fn push(&mut self, update: &Update, noise: &[f64], used: &[bool]) -> Option<FinishedPress> {
         let now = update.time_us;
         if let (Some(_), Some(strain)) = (&update.touches, &update.strain) {
             let from = self.felt.map_or(now, |[from, _]| from);
@@ -57,7 +57,7 @@ impl Presses {
         }
         let reading = self.reading.take();
         *self = Self::default();
-        Some(Pressed {
+        Some(FinishedPress {
             from_us,
             until_us,
             reading,
@@ -148,7 +148,7 @@ mod tests {
             _ => 1e-4,
         };
         let used = [true, true, false];
-        let over: Vec<Pressed> = (0..300)
+        let over: Vec<FinishedPress> = (0..300)
             .filter_map(|k| presses.push(&update(k, force(k)), &[1e-7; 3], &used))
             .collect();
         assert_eq!(over.len(), 1);

@@ -1,6 +1,6 @@
 //! Bytes in, samples out, whatever the board speaks.
 
-use crate::wire::{Decoder, Event, Hello, LineReader, Message, Reading, Refusal, Timeline};
+use crate::wire::{Decoder, Event, Hello, LineReader, Message, Refusal, TextLine, Timeline};
 
 /// What was understood.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,7 +63,7 @@ enum Speech {
 
 /// Why nothing that comes can be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Doubt {
+pub enum Unusable {
     /// Frames that are refused.
     Refused(Refusal),
     /// Rows of numbers with commas that may be decimal ones.
@@ -80,7 +80,7 @@ pub enum Doubt {
     Changed,
 }
 
-impl Doubt {
+impl Unusable {
     /// Whether waiting will not help.
     #[must_use]
     pub fn is_lasting(self) -> bool {
@@ -143,7 +143,7 @@ pub struct Receiver {
     unread: u64,
     time: Timeline,
     /// Why what came since the last sample was not used.
-    doubt: Option<Doubt>,
+    doubt: Option<Unusable>,
     /// What came through so far.
     pub traffic: Traffic,
     /// What had come when the line was cut last.
@@ -177,7 +177,7 @@ impl Receiver {
             ..
         } = self;
         lines.push(bytes, |reading| match reading {
-            Reading::Values(counts) => {
+            TextLine::Values(counts) => {
                 (*rows, *sound) = (*rows + 1, 0);
                 if *rows >= ROWS {
                     (*speech, *doubt) = (Speech::Lines, None);
@@ -188,16 +188,16 @@ impl Receiver {
                     }));
                 }
             }
-            Reading::Unclear => {
-                (*rows, *doubt) = (0, Some(Doubt::Commas));
+            TextLine::Unclear => {
+                (*rows, *doubt) = (0, Some(Unusable::Commas));
                 traffic.refused += 1;
             }
-            Reading::NoNumber(place) => {
-                *doubt = Some(Doubt::NoNumber(place));
+            TextLine::NoNumber(place) => {
+                *doubt = Some(Unusable::NoNumber(place));
                 traffic.refused += 1;
             }
-            Reading::Other if *speech == Speech::Lines => traffic.refused += 1,
-            Reading::Other => *rows = 0,
+            TextLine::Other if *speech == Speech::Lines => traffic.refused += 1,
+            TextLine::Other => *rows = 0,
         });
     }
 
@@ -221,7 +221,7 @@ impl Receiver {
         }
         self.traffic.refused += 1;
         if why.is_lasting() || (why == Refusal::NoLayout && self.doubt.is_none()) {
-            self.doubt = Some(Doubt::Refused(why));
+            self.doubt = Some(Unusable::Refused(why));
         }
     }
 
@@ -284,17 +284,17 @@ impl Receiver {
 
     /// Why nothing that came since the last sample can be used, as far as that is known.
     #[must_use]
-    pub fn doubt(&self) -> Option<Doubt> {
+    pub fn doubt(&self) -> Option<Unusable> {
         let silent = self.traffic.samples == self.before.samples;
         let guess = match self.speech {
             Speech::Unknown if self.rows == 0 && self.traffic.bytes > self.before.bytes => {
-                Some(Doubt::Neither)
+                Some(Unusable::Neither)
             }
-            Speech::Frames => Some(Doubt::NoData),
+            Speech::Frames => Some(Unusable::NoData),
             _ => None,
         };
         let changed = self.speech == Speech::Frames && !silent && self.unread > UNREAD;
-        let changed = changed.then_some(Doubt::Changed);
+        let changed = changed.then_some(Unusable::Changed);
         self.doubt.or(guess.filter(|_| silent)).or(changed)
     }
 
@@ -342,9 +342,9 @@ mod tests {
         let rows = "1,2\n".repeat(8) + &"1,nan\n".repeat(3);
         receiver.push(rows.as_bytes(), 0, |_| samples += 1);
         assert_eq!((samples, receiver.traffic.refused), (5, 3));
-        let words = receiver.doubt().and_then(Doubt::in_words).unwrap();
+        let words = receiver.doubt().and_then(Unusable::in_words).unwrap();
         assert!(words.contains("number 2 is none"), "{words}");
-        assert!(receiver.doubt().is_some_and(Doubt::is_lasting));
+        assert!(receiver.doubt().is_some_and(Unusable::is_lasting));
         receiver.push(b"1,2\n", 0, |_| samples += 1);
         assert_eq!((samples, receiver.doubt()), (6, None));
     }
@@ -399,7 +399,7 @@ mod tests {
         assert!(receiver.speaks_lines());
         receiver.push(&data(1, 9), 0, |_| {});
         assert!(!receiver.speaks_lines());
-        assert_eq!(receiver.doubt(), Some(Doubt::Refused(Refusal::NoLayout)));
+        assert_eq!(receiver.doubt(), Some(Unusable::Refused(Refusal::NoLayout)));
     }
 
     #[test]
@@ -417,8 +417,8 @@ mod tests {
             receiver.push(bytes, 0, |_| {});
             receiver.doubt()
         };
-        let refused = |doubt: Option<Doubt>| match doubt {
-            Some(Doubt::Refused(why)) => why.in_words().unwrap(),
+        let refused = |doubt: Option<Unusable>| match doubt {
+            Some(Unusable::Refused(why)) => why.in_words().unwrap(),
             other => panic!("{other:?}"),
         };
         let other = greeting(Hello {
@@ -443,15 +443,15 @@ mod tests {
             said.contains("3 bytes") && said.contains("take 5"),
             "{said}"
         );
-        assert_eq!(doubt(b"1,5;2,5\n1,6;2,4\n"), Some(Doubt::Commas));
-        assert_eq!(doubt(b"\x81\xf3\x17 ready\n"), Some(Doubt::Neither));
-        assert_eq!(doubt(&greeting(hello())), Some(Doubt::NoData));
+        assert_eq!(doubt(b"1,5;2,5\n1,6;2,4\n"), Some(Unusable::Commas));
+        assert_eq!(doubt(b"\x81\xf3\x17 ready\n"), Some(Unusable::Neither));
+        assert_eq!(doubt(&greeting(hello())), Some(Unusable::NoData));
         assert_eq!(doubt(&[&greeting(hello())[..], &data(1, 9)].concat()), None);
         let framed = [&greeting(hello())[..], &data(1, 9)].concat();
         let mut receiver = Receiver::default();
         for (bytes, doubt) in [
             (framed, None),
-            (b"2011,1987,2004\n".repeat(20), Some(Doubt::Changed)),
+            (b"2011,1987,2004\n".repeat(20), Some(Unusable::Changed)),
             (data(9, 12), None),
         ] {
             receiver.push(&bytes, 0, |_| {});

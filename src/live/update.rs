@@ -39,7 +39,7 @@ impl ShownEstimator {
 
 /// What the pipeline must know beside the samples.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
+pub struct PipelineSettings {
     /// Gauge factor and active arms; what the board says of itself takes the place of the rest.
     pub chain: Chain,
     /// The board's channel of each gauge.
@@ -57,7 +57,7 @@ pub struct Settings {
     pub tare_s: f64,
 }
 
-impl Settings {
+impl PipelineSettings {
     /// For so many gauges, the first channel for the first of them.
     #[must_use]
     pub fn of(gauges: usize) -> Self {
@@ -155,7 +155,7 @@ impl From<Arc<ResponseMap>> for GaugeModel {
 
 impl GaugeModel {
     /// The estimator, with this noise of each channel (strain).
-    pub(super) fn matching(self, noise: Vec<f64>, settings: &Settings) -> Matching {
+    pub(super) fn matching(self, noise: Vec<f64>, settings: &PipelineSettings) -> Matching {
         let channels = self.map.channels();
         let errors = Errors {
             noise,

@@ -24,14 +24,14 @@ const UNTURNED: f64 = 0.99;
 
 /// Where a part lies, and how large it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub struct CanonicalFrame {
     /// The lower corner of the box around it (m).
     origin: DVec3,
     /// The power of two that is nearest to its longest side (m), so that steps have no rounding of their own.
     size: f64,
 }
 
-impl Frame {
+impl CanonicalFrame {
     /// The frame of a part.
     #[must_use]
     pub fn of(part: &TriMesh) -> Self {
@@ -84,7 +84,7 @@ pub struct Canonical {
     /// The part in that frame and order (m).
     pub mesh: Arc<TriMesh>,
     /// From the file's coordinates and back.
-    pub frame: Frame,
+    pub frame: CanonicalFrame,
     /// For each vertex its number in the part.
     pub numbers: Vec<u32>,
 }
@@ -93,7 +93,7 @@ impl Canonical {
     /// The canonical form of a part.
     #[must_use]
     pub fn of(part: &TriMesh) -> Self {
-        let frame = Frame::of(part);
+        let frame = CanonicalFrame::of(part);
         let given = part.positions();
         let snapped: Vec<DVec3> = given.iter().map(|&p| frame.snapped(p)).collect();
         let mut numbers: Vec<u32> = (0..given.len() as u32).collect();

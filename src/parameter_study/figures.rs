@@ -105,7 +105,7 @@ fn volume_mm3(inputs: &Inputs) -> f64 {
     let part = &inputs.part;
     let m3 = match inputs.project.part.model {
         PartModel::Solid => part.volume_enclosed().abs(),
-        PartModel::Shell => part.area() * inputs.project.part.thickness_mm * 1e-3,
+        PartModel::Shell => part.area() * inputs.project.part.thickness(),
     };
     1e9 * m3
 }

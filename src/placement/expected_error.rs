@@ -22,7 +22,7 @@ pub use self::hand::{BLIND, Hand, blind, least_helpful, most_helpful};
 pub use self::mistaken::{Mistaken, Pair, posterior, taken_for, worst_pairs};
 pub use self::moving::Moving;
 pub use self::scene::{
-    Detail, Forces, Knowledge, NUISANCES, Reading, Scatter, Scene, Shared, Template, Variance,
+    Detail, Forces, Knowledge, NUISANCES, Scatter, Scene, Shared, SiteSignal, Template, Variance,
     templates,
 };
 pub use super::exchange::ROUNDS;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::key::{Range, from};
 use super::keys::keys;
 use super::ranges::{FRICTION, LENGTH, OFF_MM, OFF_PERCENT, ROOM};
-use super::value::{any, is_default};
+use super::value::{MICRO, MM, any, is_default};
 use crate::dataset::Signal;
 
 any!(Signal);
@@ -45,6 +45,20 @@ keys! {
         /// Table `gauge.tolerance`.
         #[serde(skip_serializing_if = "ToleranceKeys::is_usual")]
         tolerance: ToleranceKeys = ToleranceKeys::default();
+    }
+}
+
+impl GaugeKeys {
+    /// Length and width of the measuring grid (m).
+    #[must_use]
+    pub fn grid(&self) -> [f64; 2] {
+        [self.grid_length_mm, self.grid_width_mm].map(|mm| mm * MM)
+    }
+
+    /// Standard deviation of a reading, a strain.
+    #[must_use]
+    pub fn noise(&self) -> f64 {
+        self.noise_microstrain * MICRO
     }
 }
 

@@ -7,8 +7,8 @@ use super::keys::keys;
 use super::ranges::{FRICTION, PLACES};
 use super::selection::ChosenSite;
 use super::value::BadValue;
-use crate::inference::{AsGlued, Calibration, Chain, Doubt};
-use crate::live::Settings;
+use crate::inference::{AsGlued, Calibration, Chain, GluingCovariance};
+use crate::live::PipelineSettings;
 use crate::wire::MOST_CHANNELS;
 
 keys! {
@@ -79,7 +79,7 @@ keys! {
         turned_degrees: f64, "°", from(-1e6, 1e6),
             "how far it is turned from its direction";
         #[serde(skip_serializing_if = "Option::is_none")]
-        covariance: Option<Doubt>, "", from(-1e6, 1e6),
+        covariance: Option<GluingCovariance>, "", from(-1e6, 1e6),
             "of these four, what is not known: its upper triangle";
         #[serde(skip_serializing_if = "Option::is_none")]
         site: Option<[f64; 6]>, "mm", PLACES,
@@ -103,7 +103,7 @@ fn numbers(site: &ChosenSite) -> [f64; 6] {
 impl LiveKeys {
     /// Takes over what known touches have shown of the gauges at these sites.
     pub fn take(&mut self, calibration: &Calibration, sites: &[ChosenSite]) {
-        let keys = |((glued, doubt), site): ((&AsGlued, &Doubt), &ChosenSite)| {
+        let keys = |((glued, doubt), site): ((&AsGlued, &GluingCovariance), &ChosenSite)| {
             let AsGlued {
                 gain,
                 along_mm,
@@ -155,7 +155,7 @@ impl LiveKeys {
 
     /// What is not known of each gauge; nothing without a calibration of these gauges that says so of all of them.
     #[must_use]
-    pub fn doubts(&self, sites: &[ChosenSite]) -> Option<Vec<Doubt>> {
+    pub fn doubts(&self, sites: &[ChosenSite]) -> Option<Vec<GluingCovariance>> {
         if !self.is_of(sites) {
             return None;
         }
@@ -210,9 +210,9 @@ impl LiveKeys {
 
     /// Settings of the pipeline for so many gauges.
     #[must_use]
-    pub fn settings(&self, gauges: usize) -> Settings {
-        let plain = Settings::of(gauges);
-        Settings {
+    pub fn settings(&self, gauges: usize) -> PipelineSettings {
+        let plain = PipelineSettings::of(gauges);
+        PipelineSettings {
             chain: Chain {
                 gauge_factor: self.gauge_factor,
                 active_arms: self.active_arms,

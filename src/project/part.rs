@@ -110,6 +110,12 @@ keys! {
 }
 
 impl Part {
+    /// Of the wall of a shell (m).
+    #[must_use]
+    pub fn thickness(&self) -> f64 {
+        self.thickness_mm * MM
+    }
+
     /// The repairs asked for when the mesh is read.
     #[must_use]
     pub fn repair(&self) -> Repair {

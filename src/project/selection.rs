@@ -77,6 +77,12 @@ keys! {
 }
 
 impl SelectionKeys {
+    /// The least distance between gauges (m).
+    #[must_use]
+    pub fn spacing(&self) -> f64 {
+        self.spacing_mm * MM
+    }
+
     /// What a gauge costs at each position (m).
     #[must_use]
     pub fn costs_at(&self, positions: &[DVec3]) -> Vec<f64> {
@@ -154,5 +160,13 @@ keys! {
             "the middle of a chosen gauge";
         direction: [f64; 3], "", PLACES,
             "along which it measures, a unit vector";
+    }
+}
+
+impl ChosenSite {
+    /// The middle of the gauge (m).
+    #[must_use]
+    pub fn position(&self) -> DVec3 {
+        DVec3::from_array(self.position_mm) * MM
     }
 }

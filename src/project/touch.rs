@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::key::{MASK, Range, SWITCH, from};
 use super::keys::keys;
 use super::ranges::{FORCES, FRICTION, LENGTH, OFF_MM, ROOM};
-use super::value::{any, is_default};
+use super::value::{MM, any, is_default};
 use crate::mesh::reach::FINGERTIP;
 
 keys! {
@@ -43,6 +43,14 @@ keys! {
         #[serde(skip_serializing_if = "is_usually_often")]
         often_times: f64 = OFTEN_TIMES, "", from(1.0, 1e3),
             "how many times as many touches come to a piece of the surface in touch.often as to one beside it";
+    }
+}
+
+impl TouchKeys {
+    /// How far touches keep from edges (m).
+    #[must_use]
+    pub fn edge_margin(&self) -> f64 {
+        self.edge_margin_mm * MM
     }
 }
 
@@ -96,6 +104,14 @@ keys! {
             "between the possible gauge positions on the inside";
         lattice: Lattice = Lattice::Even, "", Range::Words(&["even", "unrolled"]),
             "how they are laid out: \"even\" (any surface) or \"unrolled\" (rows and columns about the axis)";
+    }
+}
+
+impl SiteKeys {
+    /// Between possible gauges (m).
+    #[must_use]
+    pub fn spacing(&self) -> f64 {
+        self.spacing_mm * MM
     }
 }
 

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::key::{Key, Range, number};
 
 pub(super) const MM: f64 = 1e-3;
+pub(super) const MICRO: f64 = 1e-6;
 
 /// A value that cannot be used, by the key it stands under.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

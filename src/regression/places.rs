@@ -178,7 +178,7 @@ fn places(targets: &[[f64; 3]], reach: f64) -> Vec<usize> {
 /// The group of each touch: the first whose first touch is no farther than `reach` (mm), whatever its place along
 /// the axis that does not count.
 fn grouped(targets: &[[f64; 3]], reach: f64, without: Option<usize>) -> Vec<usize> {
-    let mut known = Known {
+    let mut known = FoundPlaces {
         reach,
         firsts: Vec::new(),
         cells: HashMap::new(),
@@ -219,14 +219,14 @@ fn depth(extents: [f64; 3]) -> Option<usize> {
 }
 
 /// The places found so far, in cells as wide as their reach: what is near lies in a cell or beside it.
-struct Known {
+struct FoundPlaces {
     reach: f64,
     /// The first touch of each place.
     firsts: Vec<[f64; 3]>,
     cells: HashMap<[i64; 3], Vec<usize>>,
 }
 
-impl Known {
+impl FoundPlaces {
     /// The place of a touch; a new one where none is near.
     fn place(&mut self, at: [f64; 3]) -> usize {
         let cell = at.map(|v| (v / self.reach).floor() as i64);

@@ -15,7 +15,7 @@ use crate::design::{Inputs, Sensing};
 use crate::io::kept_model;
 use crate::job::{Reporter, Stop};
 use crate::link::{Address, BY_HAND, BenchOrder, Pace};
-use crate::test_bed::{Asked, Ready, Run, press_on_simulated};
+use crate::test_bed::{BenchRequest, Ready, Run, press_on_simulated};
 
 impl Session {
     /// Chooses where is pressed, and shows it. Nothing moves.
@@ -131,7 +131,7 @@ impl Session {
         let path = |text: &str| Some(PathBuf::from(text.trim())).filter(|p| p.as_os_str() != "");
         PlanInputs {
             sensing: self.document.sensing_inputs(),
-            asked: Asked {
+            asked: BenchRequest {
                 machine: path(&desk.machine),
                 points: path(&desk.points),
                 ..desk.asked.clone()

@@ -1,7 +1,7 @@
 //! The dial: the project set to what was measured to be quick or accurate enough.
 
 use super::state::Session;
-use crate::trade::{Asked, Point, Setting, answer, front};
+use crate::trade::{Point, Setting, TradeConstraint, answer, front};
 
 impl Session {
     /// Sets the project to a measured setting; what is kept computed follows.
@@ -11,7 +11,7 @@ impl Session {
     }
 
     /// Turns the dial: the setting of the front that keeps the promise, at once.
-    pub fn ask_for(&mut self, asked: Asked) {
+    pub fn ask_for(&mut self, asked: TradeConstraint) {
         let points = self.measured_points();
         match self.answer_to(asked, &points) {
             Ok((setting, said)) => {
@@ -23,7 +23,11 @@ impl Session {
         }
     }
 
-    fn answer_to(&self, asked: Asked, points: &[Point]) -> Result<(Setting, String), String> {
+    fn answer_to(
+        &self,
+        asked: TradeConstraint,
+        points: &[Point],
+    ) -> Result<(Setting, String), String> {
         if points.is_empty() {
             return Err(
                 "Nothing is measured of this project yet. Press “Measure the trade” first".into(),

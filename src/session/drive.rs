@@ -11,7 +11,7 @@ use super::state::drive::{Goal, Making};
 use super::state::results::{DesignResult, SimulationResult};
 use crate::budget::{Progress, Quality};
 use crate::dataset::Site;
-use crate::design::{self, Design, Hooks, Inputs, Known, Simulated, StageTime};
+use crate::design::{self, Design, Hooks, Inputs, KnownStages, Simulated, StageTime};
 use crate::io::artifacts::as_chosen;
 use crate::job::{Reporter, Stop};
 use crate::placement::{SelectorKind, SensorSet};
@@ -198,17 +198,17 @@ impl Session {
 
     /// What of the last design of a quality still holds, and the simulation to go on from: where its gauges do, that
     /// which has those off the lattice.
-    fn known(&self, quality: Quality, simulated: Arc<Simulated>) -> (Arc<Simulated>, Known) {
+    fn known(&self, quality: Quality, simulated: Arc<Simulated>) -> (Arc<Simulated>, KnownStages) {
         let last = self.results.last_design(quality);
         let last = last.filter(|d| d.value.design.simulated.is_one_with(&simulated));
         let Some(last) = last else {
-            return (simulated, Known::default());
+            return (simulated, KnownStages::default());
         };
         let design = &last.value.design;
         let now = self.document.selection_inputs(quality);
         let reduced = last.inputs.selection.reduction == now.reduction;
         let selections = last.inputs.selection == now;
-        let known = Known {
+        let known = KnownStages {
             reduced: reduced
                 .then(|| (Arc::clone(&design.feasibility), Arc::clone(&design.reduced))),
             selections: selections.then(|| Arc::clone(&design.selections)),
@@ -264,7 +264,7 @@ fn make(
     inputs: &Inputs,
     simulated: Arc<Simulated>,
     quality: Quality,
-    known: Known,
+    known: KnownStages,
     making: &Mutex<Making>,
     r: &Reporter,
 ) -> Result<Design, Stop> {

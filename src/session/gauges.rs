@@ -221,7 +221,7 @@ impl Session {
     fn gauges_among(&self, all: &[Site]) -> Option<Vec<usize>> {
         /// What a direction at right angles counts, as a distance (m).
         const TURNED: f64 = 1e-3;
-        let spacing = self.document.state.project.sites.spacing_mm * 1e-3;
+        let spacing = self.document.state.project.sites.spacing();
         let sites = &self.document.state.project.selection.sites;
         let find = |site: &ChosenSite| {
             let (p, d) = (

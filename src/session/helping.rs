@@ -118,7 +118,7 @@ impl Session {
             return Vec::new();
         };
         let sites = &simulation.value.simulated.dataset.sites;
-        let least = self.document.state.project.selection.spacing_mm * 1e-3;
+        let least = self.document.state.project.selection.spacing();
         let gauges = self.gauge_places();
         let has_room = |s: &usize| {
             let away = |gauge: &glam::DVec3| gauge.distance(sites[*s].position);

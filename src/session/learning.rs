@@ -12,7 +12,7 @@ use crate::io::bench_folder::limb_key;
 use crate::io::kept_model;
 use crate::io::touch_file::{self, Origin};
 use crate::job::{Reporter, Stop};
-use crate::learning::{Asked, ByModel, Lessons};
+use crate::learning::{ByModel, Lessons, TrainingRequest};
 use crate::live::ShownEstimator;
 use crate::test_bed::{Collected, Wanted};
 use crate::uncertainty::Pressing;
@@ -141,9 +141,9 @@ fn learned(
         regressions: true,
         model: presses.as_ref().ok().map(|p| (p, &ByModel::ALL[..])),
     };
-    let asked = Asked {
+    let asked = TrainingRequest {
         seed,
-        ..Asked::default()
+        ..TrainingRequest::default()
     };
     let outcome = train_all(&lessons, &asked, &candidates, watch).map_err(|why| match why {
         crate::learning::LearningError::Cancelled(_) => Stop::Cancelled,

@@ -6,7 +6,7 @@ use super::state::Session;
 use super::state::learned::Learnt;
 use crate::design::{Learned, Sensing};
 use crate::learning::TouchEstimator;
-use crate::live::{GaugeModel, Settings};
+use crate::live::{GaugeModel, PipelineSettings};
 
 impl Session {
     /// The estimator that live touch goes by, where it was learned on the gauges as they are now.
@@ -17,7 +17,7 @@ impl Session {
     }
 
     /// What live touch goes by: what presses have taught, or the project's model as it is calibrated.
-    pub(super) fn gauge_model(&self, sensing: &Sensing) -> (GaugeModel, Settings) {
+    pub(super) fn gauge_model(&self, sensing: &Sensing) -> (GaugeModel, PipelineSettings) {
         let live = &self.document.state.project.live;
         let settings = live.settings(sensing.gauges.len());
         match self.learnt().map(|l| &l.file.estimator) {

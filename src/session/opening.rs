@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::jobs::Task;
 use super::news::Event;
-use super::shape::Shape;
+use super::shape::PartShape;
 use super::state::Session;
 use crate::design::Inputs;
 use crate::document::{Document, State};
@@ -21,7 +21,7 @@ use crate::project::Unit;
 /// A project ready to take the place of the one that is open.
 pub struct Opened {
     document: Document,
-    shape: Shape,
+    shape: PartShape,
     /// What was open when it was asked for: changes made since are not thrown away.
     before: State,
     /// What its user should know.
@@ -39,7 +39,7 @@ impl Opened {
         let body = document.state.project.part.body;
         let said = document.repairs.in_words(body);
         Self {
-            shape: Shape::of(&document),
+            shape: PartShape::of(&document),
             document,
             before,
             said: (said.into_iter())
@@ -150,7 +150,7 @@ impl Session {
 
     /// Puts another project in this one's place. Only what is named here, which belongs to the desk, goes over to it:
     /// whatever else is known or under way was of the one before.
-    fn replace(&mut self, document: Document, shape: Shape) {
+    fn replace(&mut self, document: Document, shape: PartShape) {
         let next = Self::shaped(document, shape, self.wake.clone());
         let old = std::mem::replace(self, next);
         self.jobs = old.jobs.for_another_session();
@@ -254,7 +254,7 @@ fn on_mesh(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inference::Known;
+    use crate::inference::KnownPress;
     use crate::link::BAUD;
     use crate::session::Wake;
     use crate::session::slot::Slot;
@@ -280,7 +280,7 @@ mod tests {
         s.live.recorded = Some("old-part.hapdrec".into());
         s.complain("stays to be read");
         s.tell("the old part is done");
-        let pressed = Known {
+        let pressed = KnownPress {
             at: s.document.inputs().part.vertex_point(0),
             force: 5.0,
             reading: vec![1e-4; 10],

@@ -8,13 +8,13 @@ use crate::mesh::locate::SurfaceIndex;
 
 /// What whoever shows a part needs of it.
 #[derive(Clone)]
-pub struct Shape {
+pub struct PartShape {
     pub index: Arc<SurfaceIndex>,
     /// As the part stands when it is opened.
     pub flat: Arc<Flat>,
 }
 
-impl Shape {
+impl PartShape {
     #[must_use]
     pub fn of(document: &Document) -> Self {
         let part = &document.part;

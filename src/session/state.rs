@@ -21,7 +21,7 @@ use std::sync::Arc;
 use super::desk::Desk;
 use super::jobs::Jobs;
 use super::news::News;
-use super::shape::Shape;
+use super::shape::PartShape;
 use super::slot::Slot;
 use super::wake::Wake;
 use crate::budget::{Budget, Quality};
@@ -61,7 +61,7 @@ pub struct Caches {
 pub struct Session {
     pub document: Document,
     /// Of the part.
-    pub shape: Shape,
+    pub shape: PartShape,
     pub jobs: Jobs<Session>,
     pub results: Results,
     pub caches: Caches,
@@ -82,11 +82,11 @@ impl Session {
     /// A session with nothing computed of its project yet; `wake` is called when there is something to see.
     #[must_use]
     pub fn new(document: Document, wake: Wake) -> Self {
-        let shape = Shape::of(&document);
+        let shape = PartShape::of(&document);
         Self::shaped(document, shape, wake)
     }
 
-    pub(super) fn shaped(document: Document, shape: Shape, wake: Wake) -> Self {
+    pub(super) fn shaped(document: Document, shape: PartShape, wake: Wake) -> Self {
         Self {
             document,
             shape,

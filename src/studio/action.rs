@@ -11,7 +11,7 @@ use crate::link::BenchOrder;
 use crate::mesh::SurfacePoint;
 use crate::project::{ChosenSite, Project, Unit};
 use crate::session::{Desk, Ends, Mishap, Session, Task};
-use crate::trade::{Asked, Setting};
+use crate::trade::{Setting, TradeConstraint};
 
 /// Something to be done.
 pub enum Action {
@@ -69,7 +69,7 @@ pub enum Change {
     Keep,
     DeleteKept(usize),
     ApplySetting(Box<Setting>),
-    AskFor(Asked),
+    AskFor(TradeConstraint),
 }
 
 /// A change of a whole painted layer; lengths in m.

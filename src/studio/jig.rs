@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 
 use super::paint::Look;
 use super::view::Pane;
-use crate::jig::{Frame, Stack, bar, outline};
+use crate::jig::{JigFrame, Stack, bar, outline};
 
 /// Rods that come in one after another, told apart also where colours are not seen.
 const INKS: [[u8; 3]; 3] = [[0xd8, 0xdc, 0xe2], [0xf0, 0xc4, 0x8f], [0x9c, 0xc9, 0xe8]];
@@ -43,7 +43,7 @@ pub fn paint_jig(look: Look<'_>, painter: &Painter, pane: Pane) {
 
 /// The outline of a body on the screen, and how near it is; nothing of one that is not all before the eye, or is cut away.
 fn seen(look: Look<'_>, stack: &Stack, body: &[DVec3], toward: DVec3) -> Option<(f64, Vec<Pos2>)> {
-    let frame: &Frame = &stack.frame;
+    let frame: &JigFrame = &stack.frame;
     let places: Vec<DVec3> = body.iter().map(|&p| frame.out_of(p)).collect();
     let middle = places.iter().sum::<DVec3>() / places.len().max(1) as f64;
     if look.view.is_cut(middle) {

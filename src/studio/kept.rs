@@ -23,7 +23,7 @@ pub fn compare_tab(ask: &mut Ask<'_>, ui: &mut Ui) {
         );
         return;
     }
-    let mut asked = Asked::None;
+    let mut asked = KeptAction::None;
     egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         egui::Grid::new("kept")
             .num_columns(10)
@@ -56,12 +56,12 @@ pub fn compare_tab(ask: &mut Ask<'_>, ui: &mut Ui) {
             });
     });
     match asked {
-        Asked::None => {}
-        Asked::Use(k) => {
+        KeptAction::None => {}
+        KeptAction::Use(k) => {
             let sites = ask.project().kept[k].sites.clone();
             ask.act(Change::UseGauges(sites));
         }
-        Asked::Delete(k) => {
+        KeptAction::Delete(k) => {
             // Its name stays among those shown: when the deletion is taken back, so is this.
             ask.act(Change::DeleteKept(k));
         }
@@ -92,7 +92,7 @@ fn rhomb(at: egui::Pos2, radius: f32, ink: Color32) -> egui::Shape {
     egui::Shape::closed_line(corners, Stroke::new(2.5, ink))
 }
 
-enum Asked {
+enum KeptAction {
     None,
     Use(usize),
     Delete(usize),
@@ -103,7 +103,7 @@ fn kept_row(
     k: usize,
     kept: &mut Kept,
     shown: &mut BTreeSet<String>,
-    asked: &mut Asked,
+    asked: &mut KeptAction,
 ) {
     let name = kept.name.clone();
     let mut on = shown.contains(&name);
@@ -141,11 +141,11 @@ fn kept_row(
             .button("Use")
             .on_hover_text("Make these the project's gauges");
         if button.accessible_name(format!("Use {name}")).clicked() {
-            *asked = Asked::Use(k);
+            *asked = KeptAction::Use(k);
         }
         let button = ui.button("Delete");
         if button.accessible_name(format!("Delete {name}")).clicked() {
-            *asked = Asked::Delete(k);
+            *asked = KeptAction::Delete(k);
         }
     });
     ui.end_row();

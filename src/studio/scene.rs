@@ -16,7 +16,7 @@ use crate::mesh::stance::{Direction, Stance};
 use crate::project::PartAxis;
 use crate::render::camera::Camera;
 use crate::render::gpu::{Solid, Vertex};
-use crate::session::{Session, Shape};
+use crate::session::{PartShape, Session};
 
 /// The part laid flat, as it is drawn and picked.
 pub struct Unrolled {
@@ -63,7 +63,7 @@ pub struct Scene {
 
 impl Scene {
     #[must_use]
-    pub fn of(document: &Document, shape: &Shape) -> Self {
+    pub fn of(document: &Document, shape: &PartShape) -> Self {
         let axis = document.state.project.part.axis;
         let stance = axis.stance(&document.part);
         Self {

@@ -9,7 +9,7 @@ use super::commands::UiCommand;
 use super::paint::empty;
 use super::theme;
 use crate::session::{Promise, Task};
-use crate::trade::{Asked, Setting, knobs};
+use crate::trade::{Setting, TradeConstraint, knobs};
 
 const FRONT: Color32 = Color32::from_rgb(86, 180, 233);
 const OTHER: Color32 = Color32::from_rgb(125, 133, 143);
@@ -200,7 +200,7 @@ fn dial_rows(ask: &mut Ask<'_>, dial: &mut Dial, ui: &mut Ui) {
         )
         .labelled_by(name.id);
         if ui.button("Answer in time").clicked() {
-            asked = Some(Asked::Within(dial.asked_s));
+            asked = Some(TradeConstraint::Within(dial.asked_s));
         }
         ui.end_row();
         let name = ui.label("Of the best within");
@@ -213,7 +213,7 @@ fn dial_rows(ask: &mut Ask<'_>, dial: &mut Dial, ui: &mut Ui) {
         )
         .labelled_by(name.id);
         if ui.button("Answer as good").clicked() {
-            asked = Some(Asked::OfTheBest(dial.asked_mm));
+            asked = Some(TradeConstraint::OfTheBest(dial.asked_mm));
         }
         ui.end_row();
     });

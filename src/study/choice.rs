@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::{Data, Settings, forces_of, knowledge};
+use super::{ChoiceSettings, Data, forces_of, knowledge};
 use crate::budget::Watch;
 use crate::dataset::SignalMatrix;
 use crate::evaluation::add_noise;
@@ -68,7 +68,7 @@ pub fn select(
     data: &Data,
     kept_out: &[usize],
     constraints: &Constraints,
-    settings: &Settings,
+    settings: &ChoiceSettings,
     clock: &dyn Fn() -> f64,
     watch: Watch,
     found: &(dyn Fn(&SensorSet) + Sync),
@@ -111,7 +111,7 @@ pub fn select(
 }
 
 /// Refuses data that nothing can be learned from: a choice needs signals that differ at the least.
-fn enough_touches(data: &Data, settings: &Settings) -> Result<(), PlacementError> {
+fn enough_touches(data: &Data, settings: &ChoiceSettings) -> Result<(), PlacementError> {
     const LEAST: usize = 2;
     let touches = data.targets.len();
     if touches < LEAST {
@@ -140,7 +140,7 @@ impl<'a> Offer<'a> {
         data: &'a Data,
         kept_out: &[usize],
         constraints: &Constraints,
-        settings: &Settings,
+        settings: &ChoiceSettings,
     ) -> Result<Self, PlacementError> {
         // Expected error knows the noise; to the others it is added.
         let added = if settings.kind == SelectorKind::ExpectedError {
@@ -237,7 +237,7 @@ fn by_expected_error(
     pool: &Pool,
     request: &Request,
     data: &Data,
-    settings: &Settings,
+    settings: &ChoiceSettings,
 ) -> Result<(Selection, Weighed), PlacementError> {
     let (noise, seed) = (settings.noise, settings.svr.seed);
     let scatter = Scatter::of(pool.x, pool.targets, forces_of(data));
@@ -300,7 +300,7 @@ fn straight(
     pool: &Pool,
     data: &Data,
     kept_out: &[usize],
-    settings: &Settings,
+    settings: &ChoiceSettings,
     clock: &dyn Fn() -> f64,
     seconds: &mut ChoiceSeconds,
     watch: Watch,
@@ -356,7 +356,7 @@ pub fn audit(
     data: &Data,
     kept_out: &[usize],
     choice: &Choice,
-    settings: &Settings,
+    settings: &ChoiceSettings,
     audit: Audit,
     watch: Watch,
 ) -> Result<Vec<Comparison>, PlacementError> {

@@ -7,7 +7,7 @@ use crate::design::Workshop;
 
 /// Where, how deep and how hard is pressed, and by what.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Asked {
+pub struct BenchRequest {
     /// The machine's file; the paper's bench without one.
     pub machine: Option<PathBuf>,
     /// Places, evenly over what touches get to.
@@ -28,7 +28,7 @@ pub struct Asked {
     pub simulated: Option<Flaws>,
 }
 
-impl Default for Asked {
+impl Default for BenchRequest {
     fn default() -> Self {
         let limits = Limits::default();
         Self {

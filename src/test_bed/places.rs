@@ -8,8 +8,8 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::asked::Asked;
-use crate::bench::{Machine, Mount, Reach, plan};
+use super::asked::BenchRequest;
+use crate::bench::{Machine, MachineReach, Mount, plan};
 use crate::design::{DesignError, Inputs, Sensing, check_reach};
 use crate::io::{bench_folder, points};
 use crate::plain;
@@ -17,7 +17,7 @@ use crate::plain;
 /// Where to press: as it was planned before, as somebody says, or evenly over the part in an order of chance, so that the first
 /// presses cover all of it too.
 pub(super) fn places(
-    asked: &Asked,
+    asked: &BenchRequest,
     folder: &Path,
     inputs: &Inputs,
     sensing: &Sensing,
@@ -63,7 +63,7 @@ pub(super) fn reached(
     sensing: &Sensing,
     machine: &Machine,
     mount: &Mount,
-) -> anyhow::Result<Reach> {
+) -> anyhow::Result<MachineReach> {
     let surface = &sensing.drawn.map.mesh;
     let on_surface: Vec<(DVec3, DVec3)> = (places.iter())
         .map(|place| {

@@ -7,11 +7,13 @@ use std::sync::Arc;
 use anyhow::Context as _;
 use glam::DVec3;
 
-use super::asked::Asked;
+use super::asked::BenchRequest;
 use super::places::{places, reached};
 use super::reference::reference;
 use super::run::Run;
-use crate::bench::{Collector, Ended, Limits, Machine, Mount, News, Planned, Reach, Reference};
+use crate::bench::{
+    Collector, Ended, Limits, Machine, MachineReach, Mount, News, Planned, Reference,
+};
 use crate::design::{Inputs, Sensing};
 use crate::io::bench_folder;
 use crate::link::{Address, BenchOrder, Recorder, bench_presses, press_at_ports};
@@ -20,7 +22,7 @@ use crate::plain;
 /// A run that can be pressed.
 pub struct Ready {
     /// What was asked of it.
-    pub asked: Asked,
+    pub asked: BenchRequest,
     /// Where it is written.
     pub folder: PathBuf,
     /// What presses.
@@ -30,7 +32,7 @@ pub struct Ready {
     /// How far its touched points are from where the limb stands (m).
     pub off: Vec<f64>,
     /// What the machine gets to.
-    pub reach: Reach,
+    pub reach: MachineReach,
     /// The number in the folder's plan of each press.
     pub numbers: Vec<usize>,
     /// Presses that are in the folder already.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::asked::Asked;
+use super::asked::BenchRequest;
 use super::places::reached;
 use crate::bench::{Machine, Mount, Planned, Reference};
 use crate::design::{Inputs, Sensing};
@@ -16,7 +16,7 @@ const CANDIDATES: usize = 200;
 
 /// The reference of a run; nothing where none is wanted, or no place answers to the gauges.
 pub(super) fn reference(
-    asked: &Asked,
+    asked: &BenchRequest,
     folder: &Path,
     inputs: &Inputs,
     sensing: &Sensing,

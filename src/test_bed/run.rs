@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 
-use super::asked::Asked;
+use super::asked::BenchRequest;
 use super::places::points_of;
 use crate::design::Inputs;
 use crate::io::bench_folder::{self, About, limb_key};
@@ -13,7 +13,7 @@ use crate::io::source;
 
 /// What is to be pressed into a folder.
 pub struct Run {
-    pub(super) asked: Asked,
+    pub(super) asked: BenchRequest,
     pub(super) folder: PathBuf,
     pub(super) about: About,
     pub(super) file: MachineFile,
@@ -27,7 +27,7 @@ impl Run {
     /// # Errors
     /// A message in the user's terms: no gauges, a machine that cannot be read, limits that do not go together, or a folder
     /// that something else was begun in.
-    pub fn new(asked: Asked, inputs: &Inputs, folder: &Path) -> anyhow::Result<Self> {
+    pub fn new(asked: BenchRequest, inputs: &Inputs, folder: &Path) -> anyhow::Result<Self> {
         let (about, file) = about(&asked, inputs)?;
         let before = About::read(folder)?;
         // A plan of which nothing was pressed yet gives way to another one.
@@ -50,7 +50,7 @@ impl Run {
 }
 
 /// What is written of it, and its machine.
-fn about(asked: &Asked, inputs: &Inputs) -> anyhow::Result<(About, MachineFile)> {
+fn about(asked: &BenchRequest, inputs: &Inputs) -> anyhow::Result<(About, MachineFile)> {
     let project = &inputs.project;
     let gauges = project.selection.sites.len();
     ensure!(

@@ -6,7 +6,7 @@ use crate::statistics::median;
 
 /// What is asked of speed or of accuracy.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Asked {
+pub enum TradeConstraint {
     /// An answer within so many seconds by the clock.
     Within(f64),
     /// An error at most so much (mm) above the best that was measured.
@@ -47,15 +47,15 @@ pub fn clock(points: &[Point]) -> f64 {
 /// The point of a front that keeps a promise: the most accurate within the time, or the quickest within the
 /// error. Nothing where none does. `clock` is how many seconds pass for one of the processor ([`clock`]).
 #[must_use]
-pub fn answer<'a>(front: &[&'a Point], asked: Asked, clock: f64) -> Option<&'a Point> {
+pub fn answer<'a>(front: &[&'a Point], asked: TradeConstraint, clock: f64) -> Option<&'a Point> {
     let fits =
         |point: &&&Point, fits: &dyn Fn(&Measured) -> bool| point.measured().is_some_and(fits);
     let found = match asked {
-        Asked::Within(seconds) => {
+        TradeConstraint::Within(seconds) => {
             let in_time = |m: &Measured| m.cpu_seconds * clock <= seconds;
             front.iter().rfind(|p| fits(p, &in_time))
         }
-        Asked::OfTheBest(mm) => {
+        TradeConstraint::OfTheBest(mm) => {
             let best = front.last()?.measured()?.error_mm;
             let as_good = |m: &Measured| m.error_mm <= best + mm;
             front.iter().find(|p| fits(p, &as_good))
@@ -111,11 +111,11 @@ mod tests {
                 .and_then(Point::measured)
                 .map(|m| m.error_mm)
         };
-        assert_eq!(found(Asked::Within(2.5)), Some(3.0));
-        assert_eq!(found(Asked::Within(0.5)), None);
-        assert_eq!(found(Asked::OfTheBest(1.0)), Some(3.0));
-        assert_eq!(found(Asked::OfTheBest(0.0)), Some(2.0));
+        assert_eq!(found(TradeConstraint::Within(2.5)), Some(3.0));
+        assert_eq!(found(TradeConstraint::Within(0.5)), None);
+        assert_eq!(found(TradeConstraint::OfTheBest(1.0)), Some(3.0));
+        assert_eq!(found(TradeConstraint::OfTheBest(0.0)), Some(2.0));
         assert_eq!(clock(&points), 0.5);
-        assert_eq!(answer(&[], Asked::OfTheBest(1.0), 1.0), None);
+        assert_eq!(answer(&[], TradeConstraint::OfTheBest(1.0), 1.0), None);
     }
 }

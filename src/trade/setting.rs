@@ -153,7 +153,7 @@ impl Setting {
     #[must_use]
     pub fn raised(&self, project: &Project) -> f64 {
         if self.is_as_solid() {
-            project.part.thickness_mm * 1e-3 / 2.0
+            project.part.thickness() / 2.0
         } else {
             0.0
         }

@@ -163,7 +163,7 @@ fn tube(args: &LimbOptions) -> anyhow::Result<Made> {
     project.evaluation.regions = vec![away([-wide, -wide, 12.0], [wide, wide, top])];
     set(&mut project.part.thickness_mm, args.thickness);
     if args.solid {
-        mesh = mesh.thickened(project.part.thickness_mm * 1e-3);
+        mesh = mesh.thickened(project.part.thickness());
         thicken(&mut project);
     }
     Ok(Made {

@@ -5,7 +5,7 @@ const LONGEST: usize = 1024;
 
 /// What a line says.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Reading {
+pub enum TextLine {
     /// One number a channel.
     Values(Vec<f64>),
     /// Numbers with commas between some and another sign between others, as in “1,5;2,5”: two decimal commas or
@@ -36,7 +36,7 @@ pub struct LineReader {
 
 impl LineReader {
     /// Takes in bytes and tells of every line. No more than one line is held, however long it is.
-    pub fn push(&mut self, bytes: &[u8], mut tell: impl FnMut(Reading)) {
+    pub fn push(&mut self, bytes: &[u8], mut tell: impl FnMut(TextLine)) {
         for &byte in bytes {
             if byte != b'\n' && byte != b'\r' {
                 self.overlong |= self.line.len() >= LONGEST;
@@ -46,7 +46,7 @@ impl LineReader {
                 continue;
             }
             if self.overlong {
-                tell(Reading::Other);
+                tell(TextLine::Other);
             } else if self.line.iter().any(|b| !b.is_ascii_whitespace()) {
                 let reading = self.read();
                 tell(reading);
@@ -56,11 +56,11 @@ impl LineReader {
         }
     }
 
-    fn read(&mut self) -> Reading {
+    fn read(&mut self) -> TextLine {
         /// So many lines of another length are the new length.
         const CHANGED: usize = 3;
         let Ok(text) = std::str::from_utf8(&self.line) else {
-            return Reading::Other;
+            return TextLine::Other;
         };
         let Some(values) = numbers(text) else {
             return self.without_number(text);
@@ -72,17 +72,17 @@ impl LineReader {
             0
         };
         if is_unclear(text) || (self.has_decimal_commas && fractions(text).is_some()) {
-            return Reading::Unclear;
+            return TextLine::Unclear;
         }
         match self.channels {
             Some(known) if known != values.len() && self.others + 1 < CHANGED => {
                 // Half a line, most likely: as when a port is opened in the middle of one.
                 self.others += 1;
-                Reading::Other
+                TextLine::Other
             }
             _ => {
                 (self.channels, self.others) = (Some(values.len()), 0);
-                Reading::Values(values)
+                TextLine::Values(values)
             }
         }
     }
@@ -96,15 +96,15 @@ impl LineReader {
     }
 
     /// What a line says that is no row of numbers: where no rows of another length came before, that one of them is none.
-    fn without_number(&self, text: &str) -> Reading {
+    fn without_number(&self, text: &str) -> TextLine {
         let words: Vec<&str> = words(text).collect();
         // As sketches print what they cannot count: `Serial.print` has a word of its own beside the two of C.
         let is_number = |word: &&str| word.parse::<f64>().is_ok() || *word == "ovf";
         let fits = self.channels.is_none_or(|known| known == words.len());
         let is_row = fits && words.iter().all(is_number);
         match words.iter().position(|word| count(word).is_none()) {
-            Some(place) if is_row => Reading::NoNumber(place + 1),
-            _ => Reading::Other,
+            Some(place) if is_row => TextLine::NoNumber(place + 1),
+            _ => TextLine::Other,
         }
     }
 }
@@ -183,7 +183,7 @@ fn resembles_decimal_commas(text: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn readings(bytes: &[u8]) -> Vec<Reading> {
+    fn readings(bytes: &[u8]) -> Vec<TextLine> {
         let mut reader = LineReader::default();
         let mut all = Vec::new();
         for piece in bytes.chunks(3) {
@@ -195,15 +195,15 @@ mod tests {
     #[test]
     fn rows_of_numbers_are_found_among_anything() {
         let said = readings(b"hello\r\n1,2,3\n4; 5;\t6\r\n7 8\n-1.5e3,0,2\n\n,,\n1,2,nan\n");
-        let values = |v: &[f64]| Reading::Values(v.to_vec());
+        let values = |v: &[f64]| TextLine::Values(v.to_vec());
         let expected = [
-            Reading::Other,
+            TextLine::Other,
             values(&[1.0, 2.0, 3.0]),
             values(&[4.0, 5.0, 6.0]),
-            Reading::Other,
+            TextLine::Other,
             values(&[-1500.0, 0.0, 2.0]),
-            Reading::Other,
-            Reading::NoNumber(3),
+            TextLine::Other,
+            TextLine::NoNumber(3),
         ];
         assert_eq!(said, expected);
     }
@@ -212,13 +212,13 @@ mod tests {
     fn a_number_that_is_none_is_found() {
         let said = readings(b"nan,1\n1,2\novf,1\n1,-inf\n1e16,1\n1,2,nan\n1,no\n");
         let expected = [
-            Reading::NoNumber(1),
-            Reading::Values(vec![1.0, 2.0]),
-            Reading::NoNumber(1),
-            Reading::NoNumber(2),
-            Reading::NoNumber(1),
-            Reading::Other,
-            Reading::Other,
+            TextLine::NoNumber(1),
+            TextLine::Values(vec![1.0, 2.0]),
+            TextLine::NoNumber(1),
+            TextLine::NoNumber(2),
+            TextLine::NoNumber(1),
+            TextLine::Other,
+            TextLine::Other,
         ];
         assert_eq!(said, expected);
     }
@@ -227,34 +227,34 @@ mod tests {
     fn commas_that_may_be_decimal_are_not_guessed_at() {
         let kinds =
             readings(b"1,5;2,5\n1,5 2,5\n1,5\t2\n1000, 999,1000\n 7;8; 9\n1, 2, 3\n1e300,1,1\n");
-        let values = |v: &[f64]| Reading::Values(v.to_vec());
+        let values = |v: &[f64]| TextLine::Values(v.to_vec());
         let expected = [
-            Reading::Unclear,
-            Reading::Unclear,
-            Reading::Unclear,
+            TextLine::Unclear,
+            TextLine::Unclear,
+            TextLine::Unclear,
             values(&[1000.0, 999.0, 1000.0]),
             values(&[7.0, 8.0, 9.0]),
             values(&[1.0, 2.0, 3.0]),
-            Reading::NoNumber(1),
+            TextLine::NoNumber(1),
         ];
         assert_eq!(kinds, expected);
     }
 
     #[test]
     fn commas_that_a_zero_shows_to_be_decimal_are_no_signs_between_numbers() {
-        let values = |v: &[f64]| Reading::Values(v.to_vec());
+        let values = |v: &[f64]| TextLine::Values(v.to_vec());
         // As a sketch prints numbers of two decimals where commas are decimal: the second line shows it.
         let said = readings(b"1,25,-0,50\n1,05,2,50\n1,25,2,50\n1,2,3\n1.5,2\n");
         let expected = [
             values(&[1.0, 25.0, 0.0, 50.0]),
-            Reading::Unclear,
-            Reading::Unclear,
+            TextLine::Unclear,
+            TextLine::Unclear,
         ];
         assert_eq!(said[..3], expected);
         // Counts that are padded on both sides are counts, and so are those with signs.
         let said = readings(b"0512,0034\n0001,0002\n5,-05\n0,0\n10,0\n");
         assert!(
-            said.iter().all(|r| matches!(r, Reading::Values(_))),
+            said.iter().all(|r| matches!(r, TextLine::Values(_))),
             "{said:?}"
         );
         // Where no zero shows it, lines that go on looking like it are told of.
@@ -274,7 +274,7 @@ mod tests {
         let said = readings(b"1,2\n1,2,3\n1,2,3\n1,2,3\n1,2,3\n");
         let kinds: Vec<bool> = said
             .iter()
-            .map(|r| matches!(r, Reading::Values(_)))
+            .map(|r| matches!(r, TextLine::Values(_)))
             .collect();
         assert_eq!(kinds, [true, false, false, true, true]);
     }
@@ -286,6 +286,6 @@ mod tests {
         assert!(reader.line.capacity() <= 2 * LONGEST);
         let mut met = Vec::new();
         reader.push(b"\n1,2\n", |r| met.push(r));
-        assert_eq!(met, [Reading::Other, Reading::Values(vec![1.0, 2.0])]);
+        assert_eq!(met, [TextLine::Other, TextLine::Values(vec![1.0, 2.0])]);
     }
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::dataset::Site;
 use crate::design::{Design, Inputs};
-use crate::jig::Pressed;
+use crate::jig::PressedGauge;
 use crate::mesh::stance::Stance;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::PartModel;
@@ -84,11 +84,11 @@ impl Inner {
         let project = &inputs.project;
         let (looks_in, depth) = match project.part.model {
             PartModel::Solid => (true, 0.0),
-            PartModel::Shell => (false, 0.5e-3 * project.part.thickness_mm),
+            PartModel::Shell => (false, 0.5 * project.part.thickness()),
         };
         let part = &inputs.part;
         let gauges = (1..).zip(&project.selection.sites).map(|(number, site)| {
-            let at = DVec3::from_array(site.position_mm) * 1e-3;
+            let at = site.position();
             let (on, _) = part.index().nearest(at);
             let out = if looks_in {
                 -part.normal(on)
@@ -128,8 +128,8 @@ impl Inner {
 
     /// The gauges as a jig presses them.
     #[must_use]
-    pub fn pressed(&self) -> Vec<Pressed> {
-        let of = |g: &Glued| Pressed {
+    pub fn pressed(&self) -> Vec<PressedGauge> {
+        let of = |g: &Glued| PressedGauge {
             number: g.number,
             place: g.place,
             out: g.out,
@@ -140,13 +140,13 @@ impl Inner {
 
     /// A gauge at a site of the design, as a jig presses it.
     #[must_use]
-    pub fn site(&self, site: &Site) -> Pressed {
+    pub fn site(&self, site: &Site) -> PressedGauge {
         let out = if self.looks_in {
             -site.normal
         } else {
             site.normal
         };
-        Pressed {
+        PressedGauge {
             number: 0,
             place: site.position - out * self.depth,
             out,

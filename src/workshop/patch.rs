@@ -63,7 +63,7 @@ impl Patch {
             .collect();
         let positions: Vec<DVec3> = of.iter().map(|&v| mesh.positions()[v as usize]).collect();
         let distance: Vec<f64> = of.iter().map(|&v| far[v as usize]).collect();
-        let frame = Frame::at(inner, source);
+        let frame = PatchFrame::at(inner, source);
         let pairs = pairs(&triangles);
         let normals: Vec<DVec3> = of.iter().map(|&v| mean_out(inner, v, &facets)).collect();
         let mut flat = unrolled(&frame, &positions, &normals, &distance, &pairs);
@@ -127,14 +127,14 @@ impl Patch {
 }
 
 /// Where it begins: up and to the right as seen from inside.
-struct Frame {
+struct PatchFrame {
     place: DVec3,
     out: DVec3,
     right: DVec3,
     up: DVec3,
 }
 
-impl Frame {
+impl PatchFrame {
     fn at(inner: &Inner, source: SurfacePoint) -> Self {
         let out = inner.out(source);
         let stance = &inner.stance;
@@ -224,7 +224,7 @@ fn pairs(triangles: &[[u32; 3]]) -> BTreeMap<(u32, u32), u32> {
 
 /// Each vertex from those that are nearer to the gauge.
 fn unrolled(
-    frame: &Frame,
+    frame: &PatchFrame,
     positions: &[DVec3],
     normals: &[DVec3],
     distance: &[f64],
@@ -291,7 +291,7 @@ fn relax(flat: &mut [DVec2], positions: &[DVec3], pairs: &BTreeMap<(u32, u32), u
 /// Puts the gauge back to the origin, and up to where it was.
 fn settle(
     flat: &mut [DVec2],
-    frame: &Frame,
+    frame: &PatchFrame,
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     facets: &[u32],

@@ -9,7 +9,7 @@ use glam::DVec3;
 use hapdef::budget::{ElementBudget, Quality, unwatched};
 use hapdef::elasticity::estimate::{self, Sample};
 use hapdef::elasticity::observe::Face;
-use hapdef::elasticity::respond::{self, Reading, gives_way, respond_from};
+use hapdef::elasticity::respond::{self, Quantity, gives_way, respond_from};
 use hapdef::elasticity::solid::ground::{SolidGraded, SolidGround};
 use hapdef::elasticity::{Material, Model, Support, Touch};
 use hapdef::mesh::walls::Side;
@@ -402,7 +402,7 @@ fn carries_on(case: &Case, graded: &SolidGraded, error: f64) {
             model,
             touches,
             &observer,
-            Reading::StrainAndDisplacement,
+            Quantity::StrainAndDisplacement,
             &unwatched,
         );
         let read = read.unwrap();

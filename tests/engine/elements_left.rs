@@ -6,13 +6,13 @@ use hapdef::uncertainty::Gluing;
 
 /// What a gauge reads of a touch by finer elements less what it reads, that, and what it changes by a metre along and
 /// across.
-type Reading = [f64; 4];
+type Quantity = [f64; 4];
 
 /// Noise that nothing is better than (strain).
 const NOISE: f64 = 1e-6;
 
 /// Readings of the chosen gauges, touch by touch.
-fn readings(inputs: &Inputs) -> Vec<Vec<Reading>> {
+fn readings(inputs: &Inputs) -> Vec<Vec<Quantity>> {
     let budget = Quality::Draft.budget();
     let sensing = design::sensing(inputs, &budget, &unwatched).unwrap();
     let (finer, _) = (sensing.reference(inputs, &Gluing::EXACT, 0, &unwatched)).unwrap();
@@ -33,7 +33,10 @@ fn readings(inputs: &Inputs) -> Vec<Vec<Reading>> {
 }
 
 /// Mean square of what is off over its variance, and the mean logarithm of its density.
-fn judged(readings: &[Vec<Reading>], variance: &dyn Fn(&[Reading], &Reading) -> f64) -> [f64; 2] {
+fn judged(
+    readings: &[Vec<Quantity>],
+    variance: &dyn Fn(&[Quantity], &Quantity) -> f64,
+) -> [f64; 2] {
     let (mut sums, mut count) = ([0.0; 2], 0.0);
     for touch in readings {
         for reading in touch {
@@ -68,7 +71,7 @@ fn what_elements_leave_is_as_if_gauges_were_glued_off() {
     let as_said = judged(&readings, &|_, [_, own, along, across]| {
         said.variance(*own, *along, *across, 0.0)
     });
-    let best = |variance: &dyn Fn(&[Reading], &Reading) -> f64| {
+    let best = |variance: &dyn Fn(&[Quantity], &Quantity) -> f64| {
         let of = |k: i32| {
             let share = 1e-3 * 1.05_f64.powi(k);
             let [squares, density] =

@@ -10,7 +10,7 @@ use hapdef::design::{self, Inputs, Sensing, Workshop};
 use hapdef::elasticity::Touch;
 use hapdef::inference::calibration::noise_of_mean;
 use hapdef::inference::{
-    AsGlued, Errors, Features, Known, Lessons, Matching, Trained, calibrate, cramer_rao,
+    AsGlued, Errors, Features, KnownPress, Lessons, Matching, Trained, calibrate, cramer_rao,
 };
 use hapdef::live::{Health, Input, Pipeline, Receiver, Update};
 use hapdef::regression::Hyper;
@@ -159,12 +159,12 @@ fn known_touches_show_how_gauges_are_glued() {
         .collect();
     let real = lab.sensing.drawn.glued(&glued);
     let noise = vec![NOISE; glued.len()];
-    let known: Vec<Known> = touches(24, 8, 10.0)
+    let known: Vec<KnownPress> = touches(24, 8, 10.0)
         .iter()
         .map(|t| {
             let at = real.mesh.index().nearest(t.position).0;
             let clean: Vec<f64> = real.at(at).iter().map(|g| 10.0 * g).collect();
-            Known {
+            KnownPress {
                 at,
                 force: 10.0,
                 reading: (clean.iter().zip(noise_of_mean(&noise)))

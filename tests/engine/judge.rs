@@ -193,7 +193,7 @@ fn another_region_is_quoted_from_what_was_found() {
             found: &|_, _, _| (),
             entered: &|_| (),
         };
-        let known = design::Known {
+        let known = design::KnownStages {
             reduced: Some((Arc::clone(&first.feasibility), Arc::clone(&first.reduced))),
             selections: Some(Arc::clone(&first.selections)),
             reference: Some(Arc::clone(&first.reference)),

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use hapdef::budget::unwatched;
 use hapdef::dataset::SignalMatrix;
 use hapdef::io::npz::NpzFile;
-use hapdef::learning::{Asked, Family, Lessons, Method, Trained, train};
+use hapdef::learning::{Family, Lessons, Method, Trained, TrainingRequest, train};
 use hapdef::regression::Grouping;
 use serde_json::Value;
 
@@ -52,7 +52,7 @@ fn skin(channels: usize, touches: usize) -> Skin {
 }
 
 impl Skin {
-    fn train(&self, asked: &Asked) -> Trained {
+    fn train(&self, asked: &TrainingRequest) -> Trained {
         let groups = Grouping::Place.of(&self.places_mm);
         let lessons = Lessons {
             x: &self.x,
@@ -75,17 +75,17 @@ impl Skin {
     }
 }
 
-fn only(family: Family) -> Asked {
-    Asked {
+fn only(family: Family) -> TrainingRequest {
+    TrainingRequest {
         family: Some(family),
-        ..Asked::default()
+        ..TrainingRequest::default()
     }
 }
 
 #[test]
 fn the_best_on_validation_is_taken_and_its_radius_holds() {
     let skin = skin(8, 500);
-    let trained = skin.train(&Asked::default());
+    let trained = skin.train(&TrainingRequest::default());
     assert_eq!(trained.tried.len(), Family::ALL.len());
     let least = trained
         .tried
@@ -160,7 +160,7 @@ fn units_of_readings_and_places_change_nothing() {
 fn more_touches_teach_more_and_the_same_seed_the_same() {
     let skin = skin(8, 500);
     let with = |touches: usize| {
-        let asked = Asked {
+        let asked = TrainingRequest {
             train_touches: Some(touches),
             ..only(Family::KernelRidge)
         };
@@ -180,7 +180,7 @@ fn the_same_bytes_come_of_any_number_of_threads() {
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| skin.train(&Asked::default()))
+        pool.install(|| skin.train(&TrainingRequest::default()))
     };
     assert_eq!(on(1), on(3));
 }

@@ -11,7 +11,7 @@ use hapdef::dataset::{self, Signal, SignalMatrix, Site};
 use hapdef::design::{self, Inputs};
 use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::Face;
-use hapdef::elasticity::respond::{Reading, Responses, Side, respond, respond_from};
+use hapdef::elasticity::respond::{Quantity, Responses, Side, respond, respond_from};
 use hapdef::elasticity::support::held_freedoms;
 use hapdef::elasticity::{DofSet, Model as _, ShellModel, Touch};
 use hapdef::mesh::TriMesh;
@@ -194,7 +194,7 @@ fn blocks_give_the_bytes_of_single_touches() {
     let touches = many_touches(&inputs);
     let observer = m.observer(&some_sites(&inputs), Face::Inside);
     let read = |side: Side, touches: &[Touch]| {
-        let reading = Reading::StrainAndDisplacement;
+        let reading = Quantity::StrainAndDisplacement;
         let r = respond_from(side, &m, touches, &observer, reading, &unwatched).unwrap();
         table(&r, touches.len())
     };
@@ -227,12 +227,12 @@ fn loads_and_outputs_are_reciprocal() {
     let observer = m.observer(&some_sites(&inputs), Face::Inside);
     let angles: Vec<f64> = (0..12).map(|k| 0.3 * f64::from(k)).collect();
     for reading in [
-        Reading::Strain,
-        Reading::StrainAndDisplacement,
-        Reading::Gauge(&angles),
-        Reading::GaugeAndDisplacement(&angles),
-        Reading::GaugeDifference(&angles, 3.0),
-        Reading::Displacement,
+        Quantity::Strain,
+        Quantity::StrainAndDisplacement,
+        Quantity::Gauge(&angles),
+        Quantity::GaugeAndDisplacement(&angles),
+        Quantity::GaugeDifference(&angles, 3.0),
+        Quantity::Displacement,
     ] {
         // More touches than outputs, and fewer.
         for touches in [&touches[..], &touches[..20]] {
@@ -261,7 +261,7 @@ fn loads_and_outputs_are_reciprocal() {
         }
     }
     let fewer = |count: usize| {
-        let reading = Reading::Gauge(&angles);
+        let reading = Quantity::Gauge(&angles);
         respond(&m, &touches[..count], &observer, reading, &unwatched).unwrap()
     };
     assert_eq!((fewer(70).side, fewer(70).solves), (Side::Outputs, 12));
@@ -286,7 +286,7 @@ fn what_a_block_held_before_leaves_no_trace() {
         Side::LoadsAbove,
         Side::OutputsAbove,
     ] {
-        let read = respond_from(side, &m, &touches, &observer, Reading::Strain, &unwatched);
+        let read = respond_from(side, &m, &touches, &observer, Quantity::Strain, &unwatched);
         let read = table(&read.unwrap(), touches.len());
         let of_one = read.iter().skip(333).step_by(touches.len());
         let (mut apart, mut size) = (0.0_f64, 0.0_f64);

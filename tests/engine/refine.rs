@@ -9,7 +9,7 @@ use coarse::limb;
 use glam::DVec3;
 use hapdef::budget::{Budget, Progress, Quality, unwatched};
 use hapdef::dataset::Signal;
-use hapdef::design::{self, Design, Hooks, Inputs, Known, Simulated};
+use hapdef::design::{self, Design, Hooks, Inputs, KnownStages, Simulated};
 use hapdef::io::artifacts;
 use hapdef::placement::{Selection, SelectorKind};
 
@@ -242,7 +242,7 @@ fn what_is_written_has_the_gauges_as_they_are() {
 #[test]
 fn what_is_known_of_a_refined_design_is_taken_over() {
     let (count, _, design) = refined();
-    let known = Known {
+    let known = KnownStages {
         reduced: Some((Arc::clone(&design.feasibility), Arc::clone(&design.reduced))),
         selections: Some(Arc::clone(&design.selections)),
         reference: Some(Arc::clone(&design.reference)),

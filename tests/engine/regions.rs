@@ -200,7 +200,7 @@ fn a_region_that_is_not_there_is_named() {
 
 #[test]
 fn other_regions_are_quoted_from_the_same_errors() {
-    use hapdef::design::{Hooks, Known};
+    use hapdef::design::{Hooks, KnownStages};
     use hapdef::placement::SelectorKind;
     use hapdef::project::RegionKeys;
     let mut inputs = limb();
@@ -215,23 +215,23 @@ fn other_regions_are_quoted_from_the_same_errors() {
         entered: &|_| (),
     };
     let simulated = Arc::new(design::simulate(&inputs, &budget, &unwatched).unwrap());
-    let run = |inputs: &Inputs, known: Known| {
+    let run = |inputs: &Inputs, known: KnownStages| {
         let simulated = Arc::clone(&simulated);
         design::run_step_by_step(inputs, simulated, &kinds, &budget, known, &hooks).unwrap()
     };
-    let first = run(&inputs, Known::default());
+    let first = run(&inputs, KnownStages::default());
     inputs.project.evaluation.regions = vec![RegionKeys {
         name: "upper half".into(),
         box_mm: [[-100.0, -100.0, 60.0], [100.0, 100.0, 200.0]],
         box_axis: None,
     }];
-    let known = Known {
+    let known = KnownStages {
         reduced: Some((Arc::clone(&first.feasibility), Arc::clone(&first.reduced))),
         selections: Some(Arc::clone(&first.selections)),
         reference: Some(Arc::clone(&first.reference)),
         evaluation: Some(Arc::clone(&first.evaluation)),
     };
-    let (quoted, anew) = (run(&inputs, known), run(&inputs, Known::default()));
+    let (quoted, anew) = (run(&inputs, known), run(&inputs, KnownStages::default()));
     assert_eq!(quoted.evaluation.rows, anew.evaluation.rows);
     assert!(
         quoted

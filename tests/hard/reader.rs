@@ -15,7 +15,7 @@ use hapdef::io::mesh_file::parse_mesh;
 use hapdef::io::{dataset_file, npz, points, project_file, touch_file, trade_file};
 use hapdef::limb::LimbSpec;
 use hapdef::link::{Address, Listener, Pace, SessionEvent};
-use hapdef::live::{Pipeline, Receiver, Settings};
+use hapdef::live::{Pipeline, PipelineSettings, Receiver};
 use hapdef::mesh::TriMesh;
 use hapdef::mesh::repair::Repair;
 use hapdef::plain;
@@ -457,7 +457,7 @@ fn recording(path: &Path) -> Result<Outcome, String> {
         path: path.to_owned(),
         pace: Pace::Fast,
     };
-    let pipeline = Pipeline::new(Arc::clone(&MAP), Settings::of(GAUGES));
+    let pipeline = Pipeline::new(Arc::clone(&MAP), PipelineSettings::of(GAUGES));
     let (_commands, inbox) = channel();
     let (stop, begun) = (AtomicBool::new(false), Instant::now());
     let mut held = Ok(());

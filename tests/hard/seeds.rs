@@ -13,7 +13,7 @@ use hapdef::design::Outcome;
 use hapdef::io::glb::write_glb;
 use hapdef::io::touch_file::{self, Origin};
 use hapdef::io::trade_file::Record;
-use hapdef::learning::{Asked, Family, Lessons, train};
+use hapdef::learning::{Family, Lessons, TrainingRequest, train};
 use hapdef::mesh::TriMesh;
 use hapdef::wire::{Hello, Message, encode};
 
@@ -444,9 +444,9 @@ pub fn trained(family: Family) -> Vec<u8> {
         forces: &forces,
         groups: &(0..TOUCHES).collect::<Vec<_>>(),
     };
-    let asked = Asked {
+    let asked = TrainingRequest {
         family: Some(family),
-        ..Asked::default()
+        ..TrainingRequest::default()
     };
     let learned: Outcome = train(&lessons, &asked, &unwatched)
         .expect("enough to learn from")

@@ -7,15 +7,23 @@ use syn::Item;
 use crate::source::Source;
 
 /// Words that each had two meanings and more.
-const WORDS: [&str; 8] = [
+const WORDS: [&str; 16] = [
+    "Asked",
     "Command",
+    "Doubt",
     "Elements",
     "Estimator",
     "Field",
     "Ground",
+    "Known",
     "Matched",
     "Measured",
+    "Pressed",
+    "Reach",
+    "Reading",
     "Region",
+    "Settings",
+    "Shape",
 ];
 
 #[test]

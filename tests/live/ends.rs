@@ -185,7 +185,7 @@ fn the_same_bytes_with_one_two_and_eight_threads() {
 #[test]
 fn all_channels_dead() {
     use hapdef::inference::ResponseMap;
-    use hapdef::live::{Pipeline, Sample, Settings};
+    use hapdef::live::{Pipeline, PipelineSettings, Sample};
     use std::sync::Arc;
 
     const GAUGES: usize = 4;
@@ -199,7 +199,7 @@ fn all_channels_dead() {
     let value = |k: usize| 1e-5 * (1.7 * k as f64).sin();
     let values = (0..nodes * GAUGES).map(value).collect();
     let map = Arc::new(ResponseMap::of(Arc::new(mesh), GAUGES, values));
-    let mut pipeline = Pipeline::new(map, Settings::of(GAUGES));
+    let mut pipeline = Pipeline::new(map, PipelineSettings::of(GAUGES));
     pipeline.tare();
     for k in 0..4000_u64 {
         let sample = Sample {

@@ -13,7 +13,7 @@ use hapdef::design::{self, Finest, Inputs};
 use hapdef::io::ProcessMeter;
 use hapdef::io::trade_file::{self, Record};
 use hapdef::studio::{Stage, Standing};
-use hapdef::trade::{Asked, Knob, Measured, Setting, measure};
+use hapdef::trade::{Knob, Measured, Setting, TradeConstraint, measure};
 use window::Window;
 
 fn hapdef(arguments: &[&str]) -> Output {
@@ -290,7 +290,7 @@ fn the_dial_turns_in_the_window() {
     assert!(clicked != before && clicked.budget != before.budget);
     w.key(egui::Modifiers::COMMAND, egui::Key::Z);
     // The dial: the quickest there is, at once.
-    w.session_mut().ask_for(Asked::OfTheBest(1e3));
+    w.session_mut().ask_for(TradeConstraint::OfTheBest(1e3));
     w.wait("the answer", 120, |s| {
         !s.busy() && s.standing(Stage::Evaluation) == Standing::Current
     });
@@ -312,7 +312,7 @@ fn the_dial_turns_in_the_window() {
         .any(|m| m.text.starts_with("Set to "));
     assert!(said);
     // No time at all.
-    w.session_mut().ask_for(Asked::Within(0.0));
+    w.session_mut().ask_for(TradeConstraint::Within(0.0));
     w.harness.run_ok();
     let refused = w
         .session()

@@ -2,15 +2,15 @@
 
 use super::summary::Row;
 use crate::cli::out;
-use crate::inference::Known;
+use crate::inference::KnownPress;
 use crate::io::points::AskedPoint;
-use crate::live::{Pipeline, Pressed, Presses, Update};
+use crate::live::{FinishedPress, Pipeline, Presses, Update};
 use crate::mesh::TriMesh;
 
 /// What was asked for, and what came.
-pub struct Asked {
+pub struct AskedPresses {
     points: Vec<AskedPoint>,
-    taken: Vec<Option<Pressed>>,
+    taken: Vec<Option<FinishedPress>>,
     presses: Presses,
     /// Whether somebody is told where to press.
     prompts: bool,
@@ -21,7 +21,7 @@ pub struct Asked {
     pub noise: Vec<f64>,
 }
 
-impl Asked {
+impl AskedPresses {
     /// For these points, in this order; or as their times say.
     pub fn new(points: Vec<AskedPoint>, prompts: bool) -> Self {
         Self {
@@ -86,7 +86,7 @@ impl Asked {
     }
 
     /// A press that is over belongs to the point of its time, where these have any; otherwise to the next one.
-    fn place(&mut self, pressed: Pressed, first_us: u64) {
+    fn place(&mut self, pressed: FinishedPress, first_us: u64) {
         self.said_read = false;
         let seconds = |us: u64| us.saturating_sub(first_us) as f64 * 1e-6;
         let middle = f64::midpoint(seconds(pressed.from_us), seconds(pressed.until_us));
@@ -117,7 +117,7 @@ impl Asked {
 
     /// All that was asked for, with what was read on the part.
     pub fn rows(self, mesh: &TriMesh) -> Vec<Row> {
-        let row = |(point, pressed): (AskedPoint, Option<Pressed>)| {
+        let row = |(point, pressed): (AskedPoint, Option<FinishedPress>)| {
             let why = match &pressed {
                 None => Some("nothing pressed then".to_owned()),
                 Some(pressed) if pressed.reading.is_none() => {
@@ -126,7 +126,7 @@ impl Asked {
                 Some(_) => None,
             };
             let force = point.force.unwrap_or(0.0);
-            let known = pressed.and_then(|p| p.reading).map(|reading| Known {
+            let known = pressed.and_then(|p| p.reading).map(|reading| KnownPress {
                 at: mesh.index().nearest(point.position).0,
                 force,
                 reading,

@@ -12,7 +12,7 @@ use super::summary::{Row, Summary};
 use crate::cli::common::Common;
 use crate::cli::progress::Bar;
 use crate::design::{self, Sensing};
-use crate::inference::Known;
+use crate::inference::KnownPress;
 use crate::inference::calibration::part::of_part;
 use crate::io::project_file::LoadedProject;
 use crate::project::{PartModel, Project};
@@ -111,12 +111,12 @@ impl FittedPart {
 }
 
 /// The presses on a model's own surface.
-fn known(rows: &[Row], sensing: &Sensing) -> Vec<Known> {
+fn known(rows: &[Row], sensing: &Sensing) -> Vec<KnownPress> {
     let mesh = &sensing.drawn.map.mesh;
     let known = rows.iter().filter(|row| row.used).filter_map(|row| {
         let known = row.known.clone()?;
         let at = mesh.index().nearest(row.place * 1e-3).0;
-        Some(Known { at, ..known })
+        Some(KnownPress { at, ..known })
     });
     known.collect()
 }

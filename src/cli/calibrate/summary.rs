@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::cli::out;
 use crate::design::Sensing;
 use crate::inference::calibration::judged::Outlook;
-use crate::inference::{Calibration, Known};
+use crate::inference::{Calibration, KnownPress};
 use crate::io::atomic;
 use crate::io::table::Writing;
 use crate::plain::digits;
@@ -21,7 +21,7 @@ pub struct Row {
     pub force: f64,
     pub used: bool,
     /// Absent where nothing was read.
-    pub known: Option<Known>,
+    pub known: Option<KnownPress>,
     /// Weighted squares a channel, by what the others foresee.
     pub misfit: Option<f64>,
     /// Why it is not used.

@@ -9,7 +9,7 @@ use crate::cli::common::Common;
 use crate::cli::ranges::{between, whole};
 use crate::design::Workshop;
 use crate::link::BAUD;
-use crate::test_bed::{Asked, Flaws};
+use crate::test_bed::{BenchRequest, Flaws};
 
 #[derive(Args, Debug, Clone)]
 pub struct CollectArgs {
@@ -101,7 +101,7 @@ pub struct FaultArgs {
 
 impl CollectArgs {
     /// What is asked of the run.
-    pub(super) fn asked(&self) -> Asked {
+    pub(super) fn asked(&self) -> BenchRequest {
         let faults = &self.faults;
         let flaws = || Flaws {
             workshop: faults.workshop,
@@ -111,7 +111,7 @@ impl CollectArgs {
             stall: faults.stall,
             askew_mm: faults.askew,
         };
-        Asked {
+        BenchRequest {
             machine: self.machine.clone(),
             places: self.places,
             points: self.points.clone(),

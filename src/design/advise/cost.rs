@@ -6,7 +6,7 @@ use super::super::layout::simulation_gb;
 use super::super::{Inputs, SLOPE_TOUCHES};
 use crate::budget::Budget;
 use crate::elasticity::solid::ground::{Foreseen, SolidGround};
-use crate::elasticity::solid::sizing::Shape;
+use crate::elasticity::solid::sizing::CellSizing;
 use crate::plain::digits;
 use crate::project::PartModel;
 
@@ -73,7 +73,7 @@ impl Cost {
 }
 
 /// What the cost of a model hangs on, whichever it is.
-pub struct Asked {
+pub struct Workload {
     /// What may be spent.
     pub budget: Budget,
     /// How many touches are computed.
@@ -88,16 +88,16 @@ pub struct Asked {
     wall: f64,
     radius: f64,
     /// Of the solid.
-    shape: Shape,
+    shape: CellSizing,
 }
 
-impl Asked {
+impl Workload {
     /// Of a part whose walls have middles of this area (m²) and are bent to a radius (m).
     #[must_use]
-    pub fn new(inputs: &Inputs, area: f64, radius: f64, shape: Shape) -> Self {
+    pub fn new(inputs: &Inputs, area: f64, radius: f64, shape: CellSizing) -> Self {
         let (project, budget) = (&inputs.project, inputs.project.budget.budget());
         let touches = project.touch.count.min(budget.touches);
-        let spacing = project.sites.spacing_mm * 1e-3;
+        let spacing = project.sites.spacing();
         let sites = area / (spacing * spacing) * project.gauge.directions as f64;
         Self {
             read_gb: simulation_gb(sites as usize, touches, project.gauge.signal),

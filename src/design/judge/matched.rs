@@ -24,7 +24,7 @@ use crate::elasticity::{Model, Touch};
 use crate::evaluation::failures::{Draw, FailureRow, MOST_FAILED};
 use crate::evaluation::{Candidate, Evaluation, Failures, Forces, Judging, Matched, is_largest};
 use crate::inference::calibration::SAMPLES;
-use crate::inference::{AsDrawn, Deviations, Errors, Known, Matching, calibrate};
+use crate::inference::{AsDrawn, Deviations, Errors, KnownPress, Matching, calibrate};
 use crate::mesh::TriMesh;
 use crate::placement::expected_error::BLIND;
 use crate::regression::folds::evenly;
@@ -282,7 +282,7 @@ impl<'a> Set<'a> {
         let x = x.select_rows(&self.candidate.rows);
         let known = |k: usize| {
             let press = &pressed.presses[k];
-            Known {
+            KnownPress {
                 at: drawn.map.mesh.index().nearest(press.asked.position).0,
                 force: press.asked.force,
                 reading: reading(&x, k),
@@ -293,7 +293,7 @@ impl<'a> Set<'a> {
             .collect()
     }
 
-    fn calibrated_by(&self, drawn: &AsDrawn, known: &[Known]) -> Matching {
+    fn calibrated_by(&self, drawn: &AsDrawn, known: &[KnownPress]) -> Matching {
         let (before, off) = (&self.built.errors, self.trial.off());
         let calibration = calibrate(drawn, known, &before.noise, &off);
         let errors = Errors {

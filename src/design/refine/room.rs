@@ -35,7 +35,7 @@ impl<'a> Room<'a> {
             rules: inputs.project.feasible_rules(),
             clearance: clearance(&simulated.mesh, &held),
             lattice: sites.iter().map(|site| site.position).collect(),
-            spacing: inputs.project.sites.spacing_mm * 1e-3,
+            spacing: inputs.project.sites.spacing(),
             pressing: Pressing::of(inputs, simulated),
             inputs,
             simulated,
@@ -124,7 +124,7 @@ impl<'a> Room<'a> {
     pub(super) fn keeps_apart(&self, from: DVec3, to: DVec3, other: DVec3) -> bool {
         /// Nearer than this (m) is the same place.
         const SAME: f64 = 1e-9;
-        let least = self.inputs.project.selection.spacing_mm * 1e-3;
+        let least = self.inputs.project.selection.spacing();
         let (before, after) = (from.distance(other), to.distance(other));
         if before <= SAME {
             return after <= SAME;

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::cut::{Cell, Cutter, Cutting, Moments};
-use super::elements::{Elements, Shape, dissected};
+use super::elements::{Elements, ShapeFunctions, dissected};
 use super::grid::{Grid, Place};
 use super::isotropic::isotropic;
 use super::lagrange::{Lagrange, gauss};
@@ -235,14 +235,14 @@ impl Elements for FiniteCells {
         self.shapes.values(place, into);
     }
 
-    fn shape(&self, point: DVec3, outward: DVec3) -> Shape {
+    fn shape(&self, point: DVec3, outward: DVec3) -> ShapeFunctions {
         let [point, outward] = [point, outward].map(|v| self.stance.coordinates(v));
         let number = self.holding(point, outward);
         let cell = self.cell(number as usize);
         let scale = 2.0 / cell.sides;
         let shapes = self.shapes.at(cell.local(point)).into_iter();
         let gradient = |g: DVec3| self.stance.place(g * scale);
-        Shape {
+        ShapeFunctions {
             element: number,
             nodes: self.nodes_of(number as usize).to_vec(),
             values: shapes.map(|(n, g)| (n, gradient(g))).collect(),

@@ -8,7 +8,7 @@ use crate::elasticity::Material;
 
 /// What a displacement at a point is made of.
 #[derive(Clone, Debug)]
-pub struct Shape {
+pub struct ShapeFunctions {
     /// The element that holds the point.
     pub element: u32,
     /// Its nodes.
@@ -45,7 +45,7 @@ pub trait Elements: Send + Sync {
     fn values(&self, place: DVec3, into: &mut Vec<f64>);
 
     /// The shape functions at a point of the surface (m) with this outward normal.
-    fn shape(&self, point: DVec3, outward: DVec3) -> Shape;
+    fn shape(&self, point: DVec3, outward: DVec3) -> ShapeFunctions;
 
     /// The points in the middle of all elements (m).
     fn centres(&self) -> Vec<DVec3> {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::elements::{Elements, Shape};
+use super::elements::{Elements, ShapeFunctions};
 use crate::bounds::Bounds;
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::solver::SymmetricMatrix;
@@ -28,7 +28,7 @@ pub struct Grip {
 #[derive(Clone, Debug)]
 struct Spring {
     point: DVec3,
-    shape: Shape,
+    shape: ShapeFunctions,
     held: DofSet,
     /// N/m.
     stiffness: f64,

@@ -19,7 +19,7 @@ use super::SolidModel;
 use super::immersed::{Fineness, Immersed};
 use super::orders;
 use super::simplex::HIGHEST;
-use super::sizing::{FINER, Shape};
+use super::sizing::{CellSizing, FINER};
 use crate::budget::{Cancelled, Watch, report};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::grade::even_size;
@@ -235,11 +235,11 @@ impl SolidGround {
 
     /// What the size of its cells hangs on.
     #[must_use]
-    pub fn shape(&self) -> Shape {
+    pub fn shape(&self) -> CellSizing {
         let (lower, upper) = self.whole.bounds();
         let mut sides = (upper - lower).to_array();
         sides.sort_by(f64::total_cmp);
-        Shape {
+        CellSizing {
             area: self.whole.area(),
             volume: self.whole.volume_enclosed(),
             wall: self.wall(),

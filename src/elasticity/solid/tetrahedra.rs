@@ -15,7 +15,7 @@ use glam::DVec3;
 use super::dissection::{Dissection, Net};
 use super::isotropic::isotropic;
 use super::simplex::Simplex;
-use super::{Elements, Shape, neighbours};
+use super::{Elements, ShapeFunctions, neighbours};
 use crate::elasticity::Material;
 use crate::elasticity::solver::Plan;
 use crate::mesh::locate::SurfaceIndex;
@@ -249,12 +249,12 @@ impl Elements for Tetrahedra {
         self.simplex.values(place, into);
     }
 
-    fn shape(&self, point: DVec3, outward: DVec3) -> Shape {
+    fn shape(&self, point: DVec3, outward: DVec3) -> ShapeFunctions {
         let (element, place) = self.find(point, outward, &mut 0);
         let nodes = self.corners(element as usize);
         let inverse = jacobian(&nodes, place).inverse().transpose();
         let values = self.simplex.at(place).into_iter();
-        Shape {
+        ShapeFunctions {
             element,
             nodes: self.nodes_of(element as usize).to_vec(),
             values: values.map(|(n, g)| (n, inverse * g)).collect(),

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::{Calibration, Errors, Known, Least, PER_GAUGE, Press, noise_of_mean};
+use super::{Calibration, Errors, KnownPress, Least, PER_GAUGE, Press, noise_of_mean};
 use crate::inference::drawn::AsDrawn;
 use crate::mesh::SurfacePoint;
 use crate::uncertainty::Uncertainty;
@@ -17,10 +17,15 @@ const WORTH: f64 = 0.05;
 /// How far off each press is from what all others foresee: weighted squares over the channels that read it, about one where
 /// it fits. With fewer than two presses nothing is foreseen.
 #[must_use]
-pub fn misfits(drawn: &AsDrawn, known: &[Known], noise: &[f64], off: &Uncertainty) -> Vec<f64> {
+pub fn misfits(
+    drawn: &AsDrawn,
+    known: &[KnownPress],
+    noise: &[f64],
+    off: &Uncertainty,
+) -> Vec<f64> {
     let noise = &noise_of_mean(noise);
     let misfit = |k: usize| {
-        let others: Vec<Known> = (known.iter().enumerate())
+        let others: Vec<KnownPress> = (known.iter().enumerate())
             .filter(|(i, _)| *i != k)
             .map(|(_, other)| other.clone())
             .collect();
@@ -31,8 +36,8 @@ pub fn misfits(drawn: &AsDrawn, known: &[Known], noise: &[f64], off: &Uncertaint
 
 fn misfit(
     drawn: &AsDrawn,
-    press: &Known,
-    others: &[Known],
+    press: &KnownPress,
+    others: &[KnownPress],
     noise: &[f64],
     off: &Uncertainty,
 ) -> Option<f64> {
@@ -97,7 +102,7 @@ impl Outlook {
 #[must_use]
 pub fn outlook(
     drawn: &AsDrawn,
-    (known, calibration): (&[Known], &Calibration),
+    (known, calibration): (&[KnownPress], &Calibration),
     (noise, off): (&[f64], &Uncertainty),
     places: &[SurfacePoint],
     force: f64,
@@ -110,7 +115,7 @@ pub fn outlook(
     let made = |at: SurfacePoint, force: f64| {
         let reading: Vec<f64> = drawn.slope(at, &calibration.glued).reading;
         let reading = reading.iter().map(|g| force * g).collect();
-        let known = Known { at, force, reading };
+        let known = KnownPress { at, force, reading };
         Press::new(drawn, &known, &calibration.glued, off)
     };
     let share = places.len().div_ceil(PLACES).max(1);

@@ -12,7 +12,9 @@
 
 use nalgebra::{Cholesky, Dyn};
 
-use super::{BEFORE, Errors, Fitted, Known, LEAST, Least, Press, fitted, noise_of_mean, sound};
+use super::{
+    BEFORE, Errors, Fitted, KnownPress, LEAST, Least, Press, fitted, noise_of_mean, sound,
+};
 use crate::inference::drawn::AsDrawn;
 use crate::uncertainty::Uncertainty;
 
@@ -30,7 +32,7 @@ pub struct OfPart {
 #[must_use]
 pub fn of_part(
     drawn: &AsDrawn,
-    known: &[Known],
+    known: &[KnownPress],
     noise: &[f64],
     off: &Uncertainty,
 ) -> Option<OfPart> {

@@ -63,7 +63,7 @@ fn built(gluing: &Gluing, rng: &mut ChaCha8Rng) -> Vec<AsGlued> {
 }
 
 /// A press of gauges as built, as it is taken to be.
-fn press(real: &ResponseMap, pressing: &Pressing, rng: &mut ChaCha8Rng) -> Known {
+fn press(real: &ResponseMap, pressing: &Pressing, rng: &mut ChaCha8Rng) -> KnownPress {
     let at = somewhere(rng);
     let beside = pressing.place / 2.0_f64.sqrt();
     let moved = DVec3::X * (beside * normal(rng)) + DVec3::Y * (beside * normal(rng));
@@ -71,7 +71,7 @@ fn press(real: &ResponseMap, pressing: &Pressing, rng: &mut ChaCha8Rng) -> Known
     let force = FORCE * (1.0 + pressing.force * normal(rng));
     let noise = noise_of_mean(&NOISE)[0];
     let read = |g: f64| force * g + noise * normal(rng);
-    Known {
+    KnownPress {
         at,
         force: FORCE,
         reading: real.at(there).into_iter().map(read).collect(),
@@ -83,7 +83,7 @@ fn what_is_integrated_out_is_what_would_be_solved_for() {
     let (drawn, off) = (drawn(), off());
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let real = drawn.glued(&built(&off.gluing, &mut rng));
-    let known: Vec<Known> = (0..3)
+    let known: Vec<KnownPress> = (0..3)
         .map(|_| press(&real, &off.pressing, &mut rng))
         .collect();
     let glued = [AsGlued::DRAWN; CHANNELS];
@@ -154,7 +154,7 @@ fn presses_by_hand_never_make_it_worse() {
         for seed in 0..WORLDS {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let real = drawn.glued(&built(&off.gluing, &mut rng));
-            let known: Vec<Known> = (0..count)
+            let known: Vec<KnownPress> = (0..count)
                 .map(|_| press(&real, &off.pressing, &mut rng))
                 .collect();
             let found = calibrate(&drawn, &known, &NOISE, &off);
@@ -196,7 +196,7 @@ fn a_machine_finds_a_part_that_is_softer() {
         ..AsGlued::DRAWN
     }; CHANNELS];
     let real = drawn.glued(&softer);
-    let known: Vec<Known> = (0..12)
+    let known: Vec<KnownPress> = (0..12)
         .map(|_| press(&real, &off.pressing, &mut rng))
         .collect();
     let found = calibrate(&drawn, &known, &NOISE, &off);
@@ -277,7 +277,7 @@ fn presses_speak_for_the_part_that_was_pressed() {
         .map(|of| of.times(1.3))
         .collect();
     let real = drawn.glued(&built);
-    let known: Vec<Known> = (0..12)
+    let known: Vec<KnownPress> = (0..12)
         .map(|_| press(&real, &off.pressing, &mut rng))
         .collect();
     let right = part::of_part(&drawn, &known, &NOISE, &off).unwrap();
@@ -299,7 +299,7 @@ fn a_channel_that_was_not_read_learns_nothing() {
     let (drawn, off) = (drawn(), off());
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let real = drawn.glued(&built(&off.gluing, &mut rng));
-    let mut known: Vec<Known> = (0..12)
+    let mut known: Vec<KnownPress> = (0..12)
         .map(|_| press(&real, &off.pressing, &mut rng))
         .collect();
     let all = calibrate(&drawn, &known, &NOISE, &off);

@@ -37,14 +37,14 @@ fn read(p: DVec2, truth: bool) -> [f64; CHANNELS] {
 }
 
 /// Presses of `truth`, in no order, at so many places.
-fn presses(truth: &ResponseMap, count: usize) -> Vec<Known> {
+fn presses(truth: &ResponseMap, count: usize) -> Vec<KnownPress> {
     (0..count)
         .map(|k| {
             let at = [0.618_034, 0.754_878].map(|by| (by * (k + 1) as f64).fract());
             let place = DVec3::new(at[0], at[1], 0.0) * f64::from(SIDE - 1) * STEP;
             let at = truth.mesh.index().nearest(place).0;
             let force = 5.0 + 10.0 * (0.3 * k as f64).fract();
-            Known {
+            KnownPress {
                 at,
                 force,
                 reading: truth.at(at).iter().map(|g| force * g).collect(),
@@ -64,7 +64,7 @@ fn off(map: &ResponseMap, deviation: &ResponseMap, truth: &ResponseMap) -> [f64;
     [squares, said].map(|s| (s / map.values().len() as f64).sqrt())
 }
 
-fn learned(known: &[Known]) -> ([ResponseMap; 2], Settings) {
+fn learned(known: &[KnownPress]) -> ([ResponseMap; 2], RemainderSettings) {
     let model = plate(false);
     let nothing = vec![0.0; model.values().len()];
     let none = ResponseMap::of(Arc::clone(&model.mesh), CHANNELS, nothing);
@@ -133,8 +133,8 @@ fn a_channel_that_was_not_read_says_nothing_and_the_others_what_they_said() {
         pairs.map(|(m, t)| (m - t).powi(2)).sum()
     };
     assert!(off(0) < 0.1 * off(1) && off(2) < 0.1 * off(1));
-    let unread: Vec<Known> = (all.into_iter())
-        .map(|k| Known {
+    let unread: Vec<KnownPress> = (all.into_iter())
+        .map(|k| KnownPress {
             reading: vec![f64::NAN; CHANNELS],
             ..k
         })
@@ -149,9 +149,9 @@ fn a_channel_that_was_not_read_says_nothing_and_the_others_what_they_said() {
 fn many_depths_at_a_place_are_one_press_of_them_all() {
     let truth = plate(true);
     let once = presses(&truth, 60);
-    let twice: Vec<Known> = (once.iter())
+    let twice: Vec<KnownPress> = (once.iter())
         .flat_map(|k| {
-            let half = Known {
+            let half = KnownPress {
                 force: k.force / 2.0,
                 reading: k.reading.iter().map(|x| x / 2.0).collect(),
                 ..k.clone()
@@ -159,7 +159,7 @@ fn many_depths_at_a_place_are_one_press_of_them_all() {
             [k.clone(), half]
         })
         .collect();
-    let map = |known: &[Known]| learned(known).0[0].values().to_vec();
+    let map = |known: &[KnownPress]| learned(known).0[0].values().to_vec();
     for (a, b) in map(&once).into_iter().zip(map(&twice)) {
         assert!((a - b).abs() < 1e-8, "{a} {b}");
     }

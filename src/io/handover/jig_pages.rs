@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::marks::{ACCENT, INK};
 use super::source::Source;
-use crate::jig::{Arm, Jig, Pressed, Stack, bar, outline};
+use crate::jig::{Arm, Jig, PressedGauge, Stack, bar, outline};
 use crate::paper::{Align, Flow, Ink, Line, Sheet};
 use crate::workshop::Inner;
 
@@ -60,8 +60,8 @@ fn instead(source: &Source<'_>, number: usize) -> Option<String> {
     const TRIED: usize = 150;
     let gauge = source.inner.gauges.iter().find(|g| g.number == number)?;
     let all = &source.design.simulated.dataset.sites;
-    let far = |p: &Pressed| p.place.distance(gauge.place);
-    let mut sites: Vec<Pressed> = (source.design.feasibility.sites().into_iter())
+    let far = |p: &PressedGauge| p.place.distance(gauge.place);
+    let mut sites: Vec<PressedGauge> = (source.design.feasibility.sites().into_iter())
         .map(|s| source.inner.site(&all[s]))
         .collect();
     sites.sort_by(|a, b| far(a).total_cmp(&far(b)));

@@ -25,7 +25,7 @@ use stream::{Lines, Stream};
 
 /// What an element is, its corners coming first among its nodes.
 #[derive(Clone, Copy, PartialEq)]
-enum Shape {
+enum ElementShape {
     /// Points and lines: outlines of the part, which carry nothing.
     Outline,
     Triangle,
@@ -39,33 +39,33 @@ enum Shape {
 struct Kind {
     dimension: u64,
     nodes: usize,
-    shape: Shape,
+    shape: ElementShape,
 }
 
 /// Elements by Gmsh's numbers of their kinds.
 fn kind(number: u64) -> Option<Kind> {
     let (dimension, nodes, shape) = match number {
-        15 => (0, 1, Shape::Outline),
-        1 => (1, 2, Shape::Outline),
-        8 => (1, 3, Shape::Outline),
-        26 => (1, 4, Shape::Outline),
-        2 => (2, 3, Shape::Triangle),
-        9 => (2, 6, Shape::Triangle),
-        3 => (2, 4, Shape::Quadrangle),
-        10 => (2, 9, Shape::Quadrangle),
-        16 => (2, 8, Shape::Quadrangle),
-        4 => (3, 4, Shape::Tetrahedron),
-        11 => (3, 10, Shape::Tetrahedron),
-        29 => (3, 20, Shape::Other("tetrahedron of 20 nodes")),
-        5 => (3, 8, Shape::Other("hexahedron")),
-        12 => (3, 27, Shape::Other("hexahedron")),
-        17 => (3, 20, Shape::Other("hexahedron")),
-        6 => (3, 6, Shape::Other("prism")),
-        13 => (3, 18, Shape::Other("prism")),
-        18 => (3, 15, Shape::Other("prism")),
-        7 => (3, 5, Shape::Other("pyramid")),
-        14 => (3, 14, Shape::Other("pyramid")),
-        19 => (3, 13, Shape::Other("pyramid")),
+        15 => (0, 1, ElementShape::Outline),
+        1 => (1, 2, ElementShape::Outline),
+        8 => (1, 3, ElementShape::Outline),
+        26 => (1, 4, ElementShape::Outline),
+        2 => (2, 3, ElementShape::Triangle),
+        9 => (2, 6, ElementShape::Triangle),
+        3 => (2, 4, ElementShape::Quadrangle),
+        10 => (2, 9, ElementShape::Quadrangle),
+        16 => (2, 8, ElementShape::Quadrangle),
+        4 => (3, 4, ElementShape::Tetrahedron),
+        11 => (3, 10, ElementShape::Tetrahedron),
+        29 => (3, 20, ElementShape::Other("tetrahedron of 20 nodes")),
+        5 => (3, 8, ElementShape::Other("hexahedron")),
+        12 => (3, 27, ElementShape::Other("hexahedron")),
+        17 => (3, 20, ElementShape::Other("hexahedron")),
+        6 => (3, 6, ElementShape::Other("prism")),
+        13 => (3, 18, ElementShape::Other("prism")),
+        18 => (3, 15, ElementShape::Other("prism")),
+        7 => (3, 5, ElementShape::Other("pyramid")),
+        14 => (3, 14, ElementShape::Other("pyramid")),
+        19 => (3, 13, ElementShape::Other("pyramid")),
         _ => return None,
     };
     Some(Kind {
@@ -337,21 +337,21 @@ impl Reader {
         known.ok_or_else(|| format!("{place}: the element names node {node}, which is not there"))
     }
 
-    fn take(&mut self, shape: Shape, nodes: &[u32], origin: Origin) -> Result<(), String> {
+    fn take(&mut self, shape: ElementShape, nodes: &[u32], origin: Origin) -> Result<(), String> {
         let triangles = &mut self.soup.triangles;
         match shape {
-            Shape::Outline => {}
-            Shape::Triangle => {
+            ElementShape::Outline => {}
+            ElementShape::Triangle => {
                 triangles.push([nodes[0], nodes[1], nodes[2]]);
                 self.curved += usize::from(nodes.len() > 3);
             }
-            Shape::Quadrangle => {
+            ElementShape::Quadrangle => {
                 triangles.push([nodes[0], nodes[1], nodes[2]]);
                 triangles.push([nodes[0], nodes[2], nodes[3]]);
                 self.curved += usize::from(nodes.len() > 4);
             }
-            Shape::Tetrahedron => self.tetrahedra.push(tetrahedron(nodes), origin)?,
-            Shape::Other(what) => {
+            ElementShape::Tetrahedron => self.tetrahedra.push(tetrahedron(nodes), origin)?,
+            ElementShape::Other(what) => {
                 return Err(format!(
                     "{origin}: the element is a {what}: only tetrahedra of 4 or 10 nodes are computed on. Mesh the part with them"
                 ));

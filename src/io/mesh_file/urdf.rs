@@ -42,7 +42,7 @@ pub fn link_of(path: &Path) -> Option<String> {
 }
 
 /// A link's mesh.
-struct Shape {
+struct LinkMesh {
     link: String,
     file: String,
     scale: DVec3,
@@ -53,7 +53,7 @@ struct Shape {
 /// A link's mesh: the file, and how it lies in the link's frame.
 pub(super) struct Link {
     pub mesh: PathBuf,
-    shape: Shape,
+    shape: LinkMesh,
 }
 
 /// The mesh of a link, as the description says.
@@ -86,7 +86,7 @@ impl Link {
 }
 
 /// All links with a mesh: what is seen where there is one, else what collides.
-fn shapes(text: &str) -> Result<Vec<Shape>, String> {
+fn shapes(text: &str) -> Result<Vec<LinkMesh>, String> {
     let document = Document::parse(text).map_err(|e| format!("this is no XML: {e}"))?;
     let root = document.root_element();
     if !root.has_tag_name("robot") {
@@ -108,7 +108,7 @@ fn shapes(text: &str) -> Result<Vec<Shape>, String> {
     Ok(shapes)
 }
 
-fn shape(link: &Node, of: &Node) -> Result<Option<Shape>, String> {
+fn shape(link: &Node, of: &Node) -> Result<Option<LinkMesh>, String> {
     let child = |node: &Node, name: &str| {
         node.children()
             .find(|n| n.has_tag_name(name))
@@ -144,7 +144,7 @@ fn shape(link: &Node, of: &Node) -> Result<Option<Shape>, String> {
             "the mesh of the link “{name}” is scaled to nothing"
         ));
     }
-    Ok(Some(Shape {
+    Ok(Some(LinkMesh {
         file: mesh.attribute("filename").unwrap_or_default().to_owned(),
         scale,
         shift: three(origin, "xyz", DVec3::ZERO)?,
@@ -153,7 +153,7 @@ fn shape(link: &Node, of: &Node) -> Result<Option<Shape>, String> {
     }))
 }
 
-fn chosen(mut shapes: Vec<Shape>, link: Option<&str>) -> Result<Shape, String> {
+fn chosen(mut shapes: Vec<LinkMesh>, link: Option<&str>) -> Result<LinkMesh, String> {
     let names: Vec<&str> = shapes.iter().map(|s| s.link.as_str()).collect();
     let names = names.join(", ");
     let at = match (link, &shapes[..]) {

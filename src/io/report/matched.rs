@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::words::judged_on;
-use crate::design::{BLIND, Design, Pressed};
+use crate::design::{BLIND, Design, PressReadings};
 use crate::evaluation::MatchedRow;
 use crate::io::svg::escape;
 
@@ -42,7 +42,7 @@ fn figures(r: &MatchedRow) -> String {
 /// How sets were judged, and every figure.
 pub(super) fn errors(page: &mut String, design: &Design) {
     let reference = &design.reference;
-    let workshops = reference.pressed.iter().flat_map(Pressed::of_each);
+    let workshops = reference.pressed.iter().flat_map(PressReadings::of_each);
     let presses: Vec<usize> = workshops.map(|of_one| of_one.len()).collect();
     let known = presses.first().copied().unwrap_or_default();
     let turns = match presses.len() {

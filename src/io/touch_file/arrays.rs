@@ -8,7 +8,7 @@ use super::header::{MachineEntry, RegressionEntry};
 use crate::io::FileError;
 use crate::io::npz::{Arrays, NpzFile};
 use crate::learning::TouchEstimator;
-use crate::learning::doubt::Doubt;
+use crate::learning::doubt::ErrorModel;
 use crate::learning::estimator::ForceEstimator;
 use crate::learning::inputs::Inputs;
 use crate::learning::machine::{By, Machine};
@@ -79,7 +79,7 @@ pub fn read(
     let live = inputs.live().len();
     let frame = header.frame();
     let place = from.machine("place", &header.place, live, frame.axes.len())?;
-    let doubt = Doubt {
+    let doubt = ErrorModel {
         off: from.list("place_off", Some(place.points.nrows()))?,
         usual: header.doubt.usual,
         factor: header.doubt.factor,

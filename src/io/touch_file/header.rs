@@ -8,7 +8,7 @@ use crate::design::{Knowledge, Learned, Outcome};
 use crate::io::FileError;
 use crate::io::fingerprint::Fingerprint;
 use crate::learning::machine::{self, Machine};
-use crate::learning::targets::{Frame, Scale};
+use crate::learning::targets::{Scale, TargetFrame};
 use crate::learning::train::Trial;
 use crate::learning::{Family, Method, Scores, TouchEstimator, kernel::Kernel};
 use crate::plain::quote;
@@ -233,7 +233,7 @@ impl Header {
 
 impl RegressionEntry {
     fn new(estimator: &TouchEstimator) -> Self {
-        let Frame { middle, axes, size } = &estimator.frame;
+        let TargetFrame { middle, axes, size } = &estimator.frame;
         Self {
             frame: FrameEntry {
                 middle_mm: *middle,
@@ -268,8 +268,8 @@ impl RegressionEntry {
         Ok(())
     }
 
-    pub(super) fn frame(&self) -> Frame {
-        Frame {
+    pub(super) fn frame(&self) -> TargetFrame {
+        TargetFrame {
             middle: self.frame.middle_mm,
             axes: self.frame.axes.clone(),
             size: self.frame.size_mm,

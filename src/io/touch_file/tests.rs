@@ -7,7 +7,7 @@ use crate::dataset::SignalMatrix;
 use crate::design::{Knowledge, Learned, Outcome, Taught};
 use crate::inference::ResponseMap;
 use crate::io::npz::NpzFile;
-use crate::learning::{Asked, Family, Lessons, train};
+use crate::learning::{Family, Lessons, TrainingRequest, train};
 use crate::mesh::TriMesh;
 
 /// Four channels that feel what is near them, on a flat skin, pressed at random.
@@ -36,9 +36,9 @@ fn trained(family: Family) -> Outcome {
         forces: &forces,
         groups: &groups,
     };
-    let asked = Asked {
+    let asked = TrainingRequest {
         family: Some(family),
-        ..Asked::default()
+        ..TrainingRequest::default()
     };
     train(&lessons, &asked, &unwatched).unwrap().into()
 }

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::timing::Timing;
 use crate::link::counted_line::CountedLine;
 use crate::link::{Address, Held, Port, Recorder, Truths};
-use crate::live::{Doubt, Pipeline, Receiver, Rest, Sample, Traffic, Update};
+use crate::live::{Pipeline, Receiver, Rest, Sample, Traffic, Unusable, Update};
 use crate::wire::{Hello, Message, encode};
 
 /// How the connection stands.
@@ -81,7 +81,7 @@ pub struct Listener {
     /// When the last sample came, or the port was opened.
     pub(super) last_arrival: Instant,
     /// Why nothing can be used, as far as it was told.
-    pub(super) explained: Vec<Doubt>,
+    pub(super) explained: Vec<Unusable>,
     /// How many channels were compared with those of the gauges.
     pub(super) compared: Option<usize>,
     /// What a recording brings in pieces: a rest, and the counts of a line.

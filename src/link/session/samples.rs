@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::listener::{Listener, SessionEvent, State};
-use crate::live::{Doubt, Sample};
+use crate::live::{Sample, Unusable};
 
 impl Listener {
     /// Says where a gauge is on a channel that does not come, whether a board has told how many there are or its
@@ -48,7 +48,7 @@ impl Listener {
 
     /// Says once that the commas of plain lines may be decimal ones.
     fn doubt_commas(&mut self, tell: &mut impl FnMut(SessionEvent)) {
-        let doubt = Doubt::Fractions;
+        let doubt = Unusable::Fractions;
         if !self.receiver.may_have_decimal_commas() || self.explained.contains(&doubt) {
             return;
         }

@@ -11,7 +11,7 @@ use crate::inference::ResponseMap;
 use crate::limb::LimbSpec;
 use crate::link::Pace;
 use crate::link::{Address, Recorder};
-use crate::live::Settings;
+use crate::live::PipelineSettings;
 use crate::live::{Pipeline, Sample};
 use crate::wire::MOST_CHANNELS;
 use crate::wire::encode;
@@ -28,7 +28,7 @@ fn pipeline() -> Pipeline {
     let value = |k: usize| 1e-5 * (1.7 * k as f64).sin();
     let values = (0..nodes * GAUGES).map(value).collect();
     let map = ResponseMap::of(Arc::new(mesh), GAUGES, values);
-    Pipeline::new(Arc::new(map), Settings::of(GAUGES))
+    Pipeline::new(Arc::new(map), PipelineSettings::of(GAUGES))
 }
 
 fn hello() -> Hello {

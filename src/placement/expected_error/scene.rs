@@ -395,12 +395,12 @@ pub struct Template {
     /// Standard deviation (mm) along either of where a touch is that this place stands for.
     pub reach: f64,
     /// Of each site.
-    pub sites: Vec<Reading>,
+    pub sites: Vec<SiteSignal>,
 }
 
 /// What one site reports of a template.
 #[derive(Clone, Copy, Debug)]
-pub struct Reading {
+pub struct SiteSignal {
     /// How much.
     pub value: f64,
     /// A millimetre.
@@ -435,7 +435,7 @@ pub fn templates(
         let reading = |site: usize| {
             let [value, along, across, variance] =
                 reader.report(&values[site], site, place, &surroundings.neighbours);
-            Reading {
+            SiteSignal {
                 value,
                 slopes: [along, across],
                 variance,

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::gathering::{Awaited, Gathered};
 use crate::design::Sensing;
-use crate::inference::{Calibration, Known, calibrate};
+use crate::inference::{Calibration, KnownPress, calibrate};
 use crate::job::Reporter;
 use crate::session::jobs::Task;
 use crate::session::slot::{Slot, current};
@@ -57,7 +57,7 @@ impl Session {
     }
 
     /// Those that these gauges have read.
-    fn known_presses(&self) -> impl Iterator<Item = &Known> {
+    fn known_presses(&self) -> impl Iterator<Item = &KnownPress> {
         let inputs = self.document.sensing_inputs();
         let all = self.live.known.iter();
         all.filter_map(move |slot| current(Some(slot), &inputs))
@@ -84,7 +84,7 @@ impl Session {
         let trusted = |c: usize| used.get(c).copied().unwrap_or(true);
         let read = |c: usize| gathered.strain.get(c).copied().filter(|_| trusted(c));
         let reading = (0..sensing.gauges.len()).map(|c| read(c).unwrap_or(f64::NAN));
-        let value = Known {
+        let value = KnownPress {
             at: sensing.drawn.map.mesh.index().nearest(gathered.at).0,
             force: gathered.force,
             reading: reading.collect(),
@@ -98,7 +98,7 @@ impl Session {
         let Some(sensing) = self.sensing().map(Arc::clone) else {
             return;
         };
-        let known: Vec<Known> = self.known_presses().cloned().collect();
+        let known: Vec<KnownPress> = self.known_presses().cloned().collect();
         let noise = self.live.look(|f| f.noise.clone()).unwrap_or_default();
         if known.len() < LEAST || noise.len() != sensing.gauges.len() {
             return self.complain(format!(

@@ -8,12 +8,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crate::bench::{Ended, News};
 use crate::document::SensingInputs;
 use crate::link::BenchOrder;
-use crate::test_bed::{Asked, Ready};
+use crate::test_bed::{BenchRequest, Ready};
 
 /// What is typed at the bench, none of it a project's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BenchDesk {
-    pub asked: Asked,
+    pub asked: BenchRequest,
     /// Of the run: beside the project where it is empty.
     pub folder: String,
     /// The machine's file: the paper's bench where it is empty.
@@ -30,9 +30,9 @@ impl Default for BenchDesk {
     fn default() -> Self {
         Self {
             // Nothing moves that is not asked for by its port.
-            asked: Asked {
+            asked: BenchRequest {
                 simulated: Some(crate::test_bed::Flaws::default()),
-                ..Asked::default()
+                ..BenchRequest::default()
             },
             folder: String::new(),
             machine: String::new(),
@@ -48,7 +48,7 @@ impl Default for BenchDesk {
 #[derive(Clone, PartialEq)]
 pub struct PlanInputs {
     pub sensing: SensingInputs,
-    pub asked: Asked,
+    pub asked: BenchRequest,
     pub folder: PathBuf,
 }
 

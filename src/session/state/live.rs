@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use crate::design::Sensing;
 use crate::document::SensingInputs;
-use crate::inference::Known;
+use crate::inference::KnownPress;
 use crate::link::{Address, Connection, Hosted, ListenerCommand, State};
 use crate::live::Update;
 use crate::project::LiveKeys;
@@ -38,7 +38,7 @@ pub struct Live {
     pub(in crate::session) feed: Shared,
     pub(in crate::session) target: Option<Target>,
     /// Known presses, with the gauges that read them: of others they say nothing.
-    pub(in crate::session) known: Vec<Slot<SensingInputs, Known>>,
+    pub(in crate::session) known: Vec<Slot<SensingInputs, KnownPress>>,
     /// Whether all of them were read off a board that tells where it is pressed, and how hard.
     pub(in crate::session) exact: bool,
     pub(in crate::session) trained: Option<Slot<SensingInputs, TrainedFor>>,

@@ -9,7 +9,7 @@ use super::super::learned::estimator_shown;
 use super::super::theme;
 use crate::plain;
 use crate::session::{BenchDesk, PressState, Pressing};
-use crate::test_bed::{Asked, Flaws};
+use crate::test_bed::{BenchRequest, Flaws};
 
 /// Failed presses that are named.
 const NAMED: usize = 5;
@@ -116,7 +116,7 @@ fn text_row(ui: &mut Ui, label: &str, text: &mut String, hint: &str) {
     ui.end_row();
 }
 
-fn press_rows(ui: &mut Ui, asked: &mut Asked) {
+fn press_rows(ui: &mut Ui, asked: &mut BenchRequest) {
     rows(ui, "Presses", |ui| {
         counted(
             ui,

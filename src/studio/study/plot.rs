@@ -12,12 +12,12 @@ use crate::session::{Column, OpenStudy};
 const NEAR: f32 = 14.0;
 
 /// A range of two columns, and where units lie in it: shares from the upper left.
-struct Frame<'a> {
+struct PlotFrame<'a> {
     columns: [&'a Column; 2],
     ranges: [[f64; 2]; 2],
 }
 
-impl Frame<'_> {
+impl PlotFrame<'_> {
     fn share(&self, unit: usize) -> Option<Vec2> {
         let part = |k: usize| {
             let [low, high] = self.ranges[k];
@@ -63,7 +63,7 @@ pub fn scatter(
         ui.weak("No design has both figures yet");
         return None;
     };
-    let frame = Frame {
+    let frame = PlotFrame {
         columns,
         ranges: [across, up],
     };
@@ -88,7 +88,7 @@ pub fn scatter(
 /// The designs as a picture, and over it those that stand out.
 fn plot(
     view: &mut StudyView,
-    (study, frame): (&OpenStudy, &Frame<'_>),
+    (study, frame): (&OpenStudy, &PlotFrame<'_>),
     kept: &[bool],
     ui: &mut Ui,
 ) -> PlotResponse<()> {
