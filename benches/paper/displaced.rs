@@ -212,7 +212,7 @@ fn errors(text: &mut String, found: &Evaluation, told: impl Fn(&EvaluationRow) -
         let _ = writeln!(
             text,
             "\nAll {} candidates together: {}.",
-            all.sensors,
+            all.set.sensors,
             told(Some(all))
         );
     }
