@@ -15,7 +15,7 @@ use std::sync::Arc;
 use agreement::{FORCES_N, Touched, Trial};
 use hapdef::budget::{Budget, Quality, unwatched};
 use hapdef::design::{self, Design, Inputs, Simulated};
-use hapdef::evaluation::{EVERYWHERE, EstimatorKind, Evaluation};
+use hapdef::evaluation::{Chooser, EVERYWHERE, EstimatorKind, Evaluation};
 use hapdef::io::mesh_file::read_mesh;
 use hapdef::io::svg::{self, Series};
 use hapdef::mesh::repair::Repair;
@@ -344,13 +344,18 @@ fn by_matching(text: &mut String, found: &Evaluation) {
 }
 
 fn by_regression(text: &mut String, found: &Evaluation, force: f64) {
-    let known = |name: &str| SelectorKind::ALL.iter().any(|k| k.name() == name);
     let rows = found.rows.iter();
-    for row in rows.filter(|r| r.region == EVERYWHERE && known(&r.selector)) {
+    let of_selectors = rows.filter(|r| matches!(r.set.chooser, Chooser::Selector(_)));
+    for row in of_selectors.filter(|r| r.region == EVERYWHERE) {
         let _ = writeln!(
             text,
             "| {} | {} | svr | {force} | {:.2} / {:.2} / {:.2} | {:.2} | – | – | – |",
-            row.selector, row.sensors, row.error_mm, row.median_mm, row.p95_mm, row.workshop_mm
+            row.set.chooser.name(),
+            row.set.sensors,
+            row.error_mm,
+            row.median_mm,
+            row.p95_mm,
+            row.workshop_mm
         );
     }
 }

@@ -40,13 +40,12 @@ impl<'a> Offer<'a> {
             .map(|&s| simulated.dataset.sites[s].position)
             .collect();
         let keys = &inputs.project.selection;
-        let near = |at: &[f64; 3]| nearest(&positions, *at).ok_or(PlacementError::NoSites);
-        let required: Result<Vec<usize>, PlacementError> =
-            keys.required_mm.iter().map(near).collect();
+        let near = |at: DVec3| nearest(&positions, at).ok_or(PlacementError::NoSites);
+        let required: Result<Vec<usize>, PlacementError> = keys.required().map(near).collect();
         let constraints = Constraints {
             sensors: keys.sensors,
             required: required?,
-            spacing: keys.spacing_mm / 1000.0,
+            spacing: keys.spacing(),
             costs: (!keys.costs.is_empty()).then(|| keys.costs_at(&positions)),
             budget: keys.cost_budget,
             target_mm: keys.target_mm,
@@ -87,9 +86,8 @@ impl<'a> Offer<'a> {
     }
 }
 
-/// Which of some positions (m) is nearest to a place (mm).
-fn nearest(positions: &[DVec3], at_mm: [f64; 3]) -> Option<usize> {
-    let at = DVec3::from_array(at_mm) / 1000.0;
+/// Which of some positions (m) is nearest to a place (m).
+fn nearest(positions: &[DVec3], at: DVec3) -> Option<usize> {
     (0..positions.len()).min_by(|&a, &b| {
         (positions[a].distance_squared(at)).total_cmp(&positions[b].distance_squared(at))
     })
@@ -266,8 +264,8 @@ fn required_rows(inputs: &Inputs, simulated: &Simulated, reduced: &Reduced) -> V
     let positions: Vec<DVec3> = (reduced.feasible.iter())
         .map(|&s| simulated.dataset.sites[s].position)
         .collect();
-    let required = inputs.project.selection.required_mm.iter();
-    required.filter_map(|&at| nearest(&positions, at)).collect()
+    let required = inputs.project.selection.required();
+    required.filter_map(|at| nearest(&positions, at)).collect()
 }
 
 fn select_by_svr(

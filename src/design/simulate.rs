@@ -177,25 +177,20 @@ pub fn simulate(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Simula
 /// Refuses gauges that are required farther from the part than it is large.
 fn check_required(inputs: &Inputs) -> Result<(), DesignError> {
     let what = "place of selection.required_mm";
-    check_reach(&inputs.part, what, required(inputs))
-}
-
-/// Where gauges are required (m).
-fn required(inputs: &Inputs) -> impl Iterator<Item = DVec3> {
-    let places = inputs.project.selection.required_mm.iter();
-    places.map(|place| DVec3::from_array(*place) * 1e-3)
+    check_reach(&inputs.part, what, inputs.project.selection.required())
 }
 
 /// What has to be known of required gauges that are nowhere near the part.
 fn required_off(inputs: &Inputs) -> Option<String> {
     /// In spacings of the sites.
     const OFF: f64 = 3.0;
-    let most = OFF * inputs.project.sites.spacing_mm;
+    let most = OFF * inputs.project.sites.spacing();
     let near = Nearness::of(&inputs.part);
-    let distances = required(inputs).map(|place| near.distance(place) * 1e3);
+    let required = inputs.project.selection.required();
+    let distances = required.map(|place| near.distance(place));
     let off: Vec<String> = (distances.enumerate())
         .filter(|&(_, distance)| distance > most)
-        .map(|(number, distance)| format!("place {number} by {} mm", digits(distance)))
+        .map(|(number, distance)| format!("place {number} by {} mm", digits(distance * 1e3)))
         .collect();
     (!off.is_empty()).then(|| {
         format!(

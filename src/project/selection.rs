@@ -77,6 +77,11 @@ keys! {
 }
 
 impl SelectionKeys {
+    /// Where gauges must be (m).
+    pub fn required(&self) -> impl Iterator<Item = DVec3> {
+        (self.required_mm.iter()).map(|place| DVec3::from_array(*place) * MM)
+    }
+
     /// The least distance between gauges (m).
     #[must_use]
     pub fn spacing(&self) -> f64 {

@@ -15,7 +15,7 @@ use crate::evaluation::EstimatorKind;
 use crate::io::artifacts::{range, signal_to_noise, signal_unit};
 use crate::placement::SensorSet;
 use crate::placement::expected_error::ASSUMES;
-use crate::session::NOBODY_REDUCES;
+use crate::session::{NOBODY_REDUCES, Session, Task};
 
 /// One for each selector; told apart by colour-blind eyes too (Okabe and Ito).
 const COLOURS: [Color32; 5] = [
@@ -83,17 +83,22 @@ pub fn header(ask: &mut Ask<'_>, ui: &mut Ui) -> bool {
         || ask.view.compared(ask.project()).next().is_some()
         || !ask.view.tab.is_of_design();
     if !any {
-        let press = "Press “Select gauges” to choose the sites and judge them on unseen touches";
-        let shown = ask.session.gauges_before_selection();
-        empty(
-            ui,
-            &shown.map_or_else(
-                || format!("Nothing selected yet. {press}"),
-                |shown| format!("{shown}, and not judged yet. {press}"),
-            ),
-        );
+        empty(ui, &nothing_judged(ask.session));
     }
     any
+}
+
+/// Why there are no figures yet.
+fn nothing_judged(session: &Session) -> String {
+    let mut running = session.jobs.running().iter();
+    if running.any(|job| matches!(job.task, Task::Design(_))) {
+        return "Gauges are being selected, then judged on unseen touches".into();
+    }
+    let press = "Press “Select gauges” to choose the sites and judge them on unseen touches";
+    session.gauges_before_selection().map_or_else(
+        || format!("Nothing selected yet. {press}"),
+        |shown| format!("{shown}, and not judged yet. {press}"),
+    )
 }
 
 /// Width in which what holds for all that a design found is beside the names of the tabs; below it is under them.
