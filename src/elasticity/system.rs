@@ -13,6 +13,22 @@ use crate::budget::{Cancelled, Watch, Work, report};
 use crate::memory;
 use crate::tally::{self, Done};
 
+/// Share of the memory that blocks of right-hand sides in work may take together.
+const SHARE: f64 = 0.25;
+
+/// What a block of right-hand sides takes (bytes).
+fn block_bytes(unknowns: f64) -> f64 {
+    unknowns * (BLOCK * size_of::<f64>()) as f64
+}
+
+/// What blocks of right-hand sides take while loads are solved for (bytes): two a thread, the one that is solved and the one that
+/// is kept for the next.
+#[must_use]
+pub fn bytes_in_work(unknowns: f64) -> f64 {
+    let blocks = 2 * rayon::current_num_threads();
+    (blocks as f64 * block_bytes(unknowns)).min(SHARE * memory::allowed())
+}
+
 /// Assembled once, factored once.
 pub struct System {
     /// Unknown of each degree of freedom, or `HELD`.
@@ -239,9 +255,7 @@ impl System {
     /// How many of so many blocks are taken one after the other, so that those in work together take no more than a share of the
     /// memory, on however many threads.
     pub(super) fn in_turn(&self, blocks: usize) -> usize {
-        const SHARE: f64 = 0.25;
-        let bytes = (self.dimension() * BLOCK * size_of::<f64>()) as f64;
-        let at_once = (SHARE * memory::allowed() / bytes).max(1.0);
+        let at_once = (SHARE * memory::allowed() / block_bytes(self.dimension() as f64)).max(1.0);
         ((blocks as f64 / at_once).ceil() as usize).max(1)
     }
 

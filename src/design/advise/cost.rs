@@ -7,6 +7,7 @@ use super::super::{Inputs, SLOPE_TOUCHES};
 use crate::budget::Budget;
 use crate::elasticity::solid::ground::{Foreseen, SolidGround};
 use crate::elasticity::solid::sizing::CellSizing;
+use crate::elasticity::system::bytes_in_work;
 use crate::plain::digits;
 use crate::project::PartModel;
 
@@ -180,13 +181,14 @@ impl Workload {
             + ASSEMBLE * foreseen.assembled
             + FACTOR * foreseen.multiplications;
         let solved = (SOLVE * loads).min(READ * (loads + outputs)) * foreseen.entries;
+        let held = foreseen.bytes + foreseen.before + bytes_in_work(foreseen.unknowns);
         Cost {
             model: PartModel::Solid,
             order,
             element_mm: foreseen.size * 1e3,
             unknowns: foreseen.unknowns,
             seconds: SOLID.once + built + PRESS * loads + solved,
-            memory_gb: (foreseen.bytes + foreseen.before) / 1e9 + self.read_gb,
+            memory_gb: held / 1e9 + self.read_gb,
             error_percent: foreseen.estimate.displacement_percent,
             theory_percent: 0.0,
         }
