@@ -323,7 +323,7 @@ fn failures(text: &mut String, designs: &[(Quality, Signal, Design)]) {
                     "| {} | {} | {} | {} | {} |",
                     quality.name(),
                     signal.name(),
-                    set.selector,
+                    set.set.chooser.name(),
                     if retrained { "yes" } else { "no" },
                     cells.join(" | ")
                 );
