@@ -18,7 +18,7 @@ pub use check::{Answer, Reference};
 pub use collector::{Collector, Ended, News};
 pub use contact::Contact;
 pub use machine::{Axis, Machine, Pose, TipSensor};
-pub use marlin::{Heard, Marlin, position_in};
+pub use marlin::{MachineReply, Marlin, position_in};
 pub use mount::{Mount, Touched};
 pub use plan::{MachineReach, Planned, plan};
 pub use press::{Limits, Samples};

@@ -17,7 +17,7 @@ const LONGEST: usize = 512;
 
 /// What came of listening.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Heard {
+pub enum MachineReply {
     /// The line came through, and this was said meanwhile.
     Done(Vec<String>),
     /// The machine has begun anew: it knows no longer where it is.
@@ -109,8 +109,8 @@ impl Marlin {
     }
 
     /// Takes in what the machine says.
-    pub fn push(&mut self, bytes: &[u8], now_us: u64, out: &mut Vec<u8>) -> Vec<Heard> {
-        let mut heard = Vec::new();
+    pub fn push(&mut self, bytes: &[u8], now_us: u64, out: &mut Vec<u8>) -> Vec<MachineReply> {
+        let mut replies = Vec::new();
         for &byte in bytes {
             if byte != b'\n' && byte != b'\r' {
                 if self.open.len() < LONGEST {
@@ -121,17 +121,17 @@ impl Marlin {
             let text = String::from_utf8_lossy(&self.open).trim().to_owned();
             self.open.clear();
             if !text.is_empty() {
-                heard.extend(self.take(&text, now_us, out));
+                replies.extend(self.take(&text, now_us, out));
             }
         }
-        heard
+        replies
     }
 
-    fn take(&mut self, text: &str, now_us: u64, out: &mut Vec<u8>) -> Option<Heard> {
+    fn take(&mut self, text: &str, now_us: u64, out: &mut Vec<u8>) -> Option<MachineReply> {
         let lower = text.to_ascii_lowercase();
         if lower == "start" {
             self.sent = None;
-            return Some(Heard::Restarted);
+            return Some(MachineReply::Restarted);
         }
         if let Some(number) = wanted(&lower) {
             return self.resend(number, now_us, out);
@@ -150,7 +150,7 @@ impl Marlin {
             let of_lines = ["line", "checksum"];
             if !of_lines.iter().any(|what| lower.contains(what)) {
                 self.sent = None;
-                return Some(Heard::Failed(format!(
+                return Some(MachineReply::Failed(format!(
                     "it says {}",
                     crate::plain::quote(text)
                 )));
@@ -161,7 +161,7 @@ impl Marlin {
         None
     }
 
-    fn ok(&mut self, text: &str) -> Option<Heard> {
+    fn ok(&mut self, text: &str) -> Option<MachineReply> {
         // What stands behind it may be a report.
         if text.len() > 2 {
             self.said.push(text[2..].trim().to_owned());
@@ -171,11 +171,11 @@ impl Marlin {
             return None;
         }
         self.sent.take()?;
-        Some(Heard::Done(std::mem::take(&mut self.said)))
+        Some(MachineReply::Done(std::mem::take(&mut self.said)))
     }
 
     /// The machine wants a line again, or the one behind it: then it has this one.
-    fn resend(&mut self, number: u32, now_us: u64, out: &mut Vec<u8>) -> Option<Heard> {
+    fn resend(&mut self, number: u32, now_us: u64, out: &mut Vec<u8>) -> Option<MachineReply> {
         let sent = self.sent.as_mut()?;
         // A resend is closed by an answer of its own.
         self.stale += 1;
@@ -184,7 +184,7 @@ impl Marlin {
         }
         if number == sent.number + 1 {
             self.sent = None;
-            return Some(Heard::Done(std::mem::take(&mut self.said)));
+            return Some(MachineReply::Done(std::mem::take(&mut self.said)));
         }
         // An ok that was of a line that it refused: that one and those behind it are sent in their order.
         if let Some(k) = self.before.iter().position(|(n, _)| *n == number) {
@@ -206,12 +206,12 @@ impl Marlin {
         self.again(now_us, out)
     }
 
-    fn again(&mut self, now_us: u64, out: &mut Vec<u8>) -> Option<Heard> {
+    fn again(&mut self, now_us: u64, out: &mut Vec<u8>) -> Option<MachineReply> {
         let sent = self.sent.as_mut()?;
         if sent.tries >= TRIES {
             let tries = sent.tries;
             self.sent = None;
-            return Some(Heard::Failed(format!(
+            return Some(MachineReply::Failed(format!(
                 "a line was sent {tries} times, and never came through"
             )));
         }
@@ -223,7 +223,7 @@ impl Marlin {
     }
 
     /// Sends again what was never answered. Answers of both may come then.
-    pub fn look(&mut self, now_us: u64, out: &mut Vec<u8>) -> Option<Heard> {
+    pub fn look(&mut self, now_us: u64, out: &mut Vec<u8>) -> Option<MachineReply> {
         let sent = self.sent.as_ref()?;
         if now_us.saturating_sub(sent.since_us) < sent.patience_us {
             return None;
@@ -273,8 +273,8 @@ pub fn position_in(said: &[String], axis: char) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn done(said: &[&str]) -> Heard {
-        Heard::Done(said.iter().map(|s| (*s).to_owned()).collect())
+    fn done(said: &[&str]) -> MachineReply {
+        MachineReply::Done(said.iter().map(|s| (*s).to_owned()).collect())
     }
 
     /// A machine whose first line has been taken.
@@ -339,8 +339,8 @@ mod tests {
         out.clear();
         assert_eq!(marlin.look(PATIENCE, &mut out), None);
         assert_eq!(out, [b"\n".as_slice(), &line(1, "G1 X1")].concat());
-        let heard = marlin.push(b"Resend: 2\nok\n", PATIENCE, &mut out);
-        assert_eq!(heard, [done(&[])]);
+        let replies = marlin.push(b"Resend: 2\nok\n", PATIENCE, &mut out);
+        assert_eq!(replies, [done(&[])]);
         marlin.order("G1 X2", 0, PATIENCE, &mut out);
         assert_eq!(marlin.push(b"ok\n", PATIENCE, &mut out), [done(&[])]);
     }
@@ -354,8 +354,8 @@ mod tests {
         marlin.push(b"R?send: 1\nok\n", 0, &mut out);
         marlin.order("M400", 0, 0, &mut out);
         let second = std::mem::take(&mut out);
-        let heard = marlin.push(b"Resend: 1\nok\nok\n", 0, &mut out);
-        assert_eq!((heard, out.clone()), (vec![], [first, second].concat()));
+        let replies = marlin.push(b"Resend: 1\nok\nok\n", 0, &mut out);
+        assert_eq!((replies, out.clone()), (vec![], [first, second].concat()));
         assert_eq!(marlin.push(b"ok\n", 0, &mut out), [done(&[])]);
     }
 
@@ -370,7 +370,9 @@ mod tests {
             marlin.push(b"echo:busy: processing\n", now, &mut out);
         }
         let ended = (1..10).find_map(|k| marlin.look(now + k * PATIENCE, &mut out));
-        assert!(matches!(ended, Some(Heard::Failed(why)) if why.contains("never came through")));
+        assert!(
+            matches!(ended, Some(MachineReply::Failed(why)) if why.contains("never came through"))
+        );
     }
 
     #[test]
@@ -384,13 +386,13 @@ mod tests {
         ] {
             let (mut marlin, mut out) = (begun(), Vec::new());
             marlin.order("G1 X1", 0, 0, &mut out);
-            let heard = marlin.push(said.as_bytes(), 0, &mut out);
-            assert!(matches!(&heard[..], [Heard::Failed(why)] if why.contains(part)));
+            let replies = marlin.push(said.as_bytes(), 0, &mut out);
+            assert!(matches!(&replies[..], [MachineReply::Failed(why)] if why.contains(part)));
         }
         let (mut marlin, mut out) = (begun(), Vec::new());
         marlin.order("G1 X1", 0, 0, &mut out);
-        let heard = marlin.push(b"start\necho: Marlin 2.1\n", 0, &mut out);
-        assert_eq!(heard, [Heard::Restarted]);
+        let replies = marlin.push(b"start\necho: Marlin 2.1\n", 0, &mut out);
+        assert_eq!(replies, [MachineReply::Restarted]);
     }
 
     #[test]

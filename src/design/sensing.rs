@@ -101,7 +101,7 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
         return Err(DesignError::NoGauges);
     }
     check_chosen(inputs)?;
-    let (ground, graded) = laid(inputs, budget, watch)?;
+    let (ground, graded) = graded_model(inputs, budget, watch)?;
     let gauges = chosen_gauges(project, &*graded.model);
     let sensitivity = Sensitivity::new(&*graded.model, &gauges, watch)?;
     let tip_radius = project.tip().1;
@@ -138,7 +138,11 @@ pub fn check_chosen(inputs: &Inputs) -> Result<(), DesignError> {
 }
 
 /// The elements that a design of this project and budget has, with the model on them.
-fn laid(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<(Ground, Built), DesignError> {
+fn graded_model(
+    inputs: &Inputs,
+    budget: &Budget,
+    watch: Watch,
+) -> Result<(Ground, Built), DesignError> {
     let ground = ground(inputs, watch)?;
     ground.check(&inputs.project)?;
     let even = ground.site_layout();
@@ -204,7 +208,7 @@ impl Sensing {
         if let Some(meshed) = self.meshed.get() {
             return Ok(meshed);
         }
-        let (_, built) = laid(inputs, &self.budget, watch)?;
+        let (_, built) = graded_model(inputs, &self.budget, watch)?;
         Ok(self.meshed.get_or_init(|| built.meshed))
     }
 

@@ -25,7 +25,7 @@ pub struct Part {
     /// As it sits on its rod, pads at the wall (mm, in the stack's frame).
     pub solid: Facets,
     /// As it is laid to be printed: the frame's directions turned.
-    pub laid: DMat3,
+    pub print_turn: DMat3,
 }
 
 /// Height of the seat, outside (mm).
@@ -48,13 +48,13 @@ pub fn parts(jig: &Jig, stack: &Stack) -> Vec<Part> {
         parts.push(Part {
             name: format!("ring-{:02}", arm.number),
             solid: read(&ring(sizes, arm)),
-            laid: DMat3::IDENTITY,
+            print_turn: DMat3::IDENTITY,
         });
         parts.push(Part {
             name: format!("pad-{:02}", arm.number),
             solid: read(&pad(sizes, arm)),
             // On a side of its stem.
-            laid: DMat3::from_rotation_x(FRAC_PI_2) * DMat3::from_rotation_z(-arm.angle),
+            print_turn: DMat3::from_rotation_x(FRAC_PI_2) * DMat3::from_rotation_z(-arm.angle),
         });
         parts.extend(sleeve(sizes, stack, k));
     }
@@ -88,7 +88,7 @@ fn rod(sizes: &Sizes, stack: &Stack) -> Vec<Part> {
             -stack.lift - SEAT - PINS[0] - 0.2,
         ));
     // Lying on its flat.
-    let laid = DMat3::from_rotation_y(FRAC_PI_2);
+    let print_turn = DMat3::from_rotation_y(FRAC_PI_2);
     let length = inner + HEAD - foot;
     let pieces = (length / (sizes.longest - PEG)).ceil().max(1.0) as usize;
     let each = length / pieces as f64;
@@ -121,7 +121,7 @@ fn rod(sizes: &Sizes, stack: &Stack) -> Vec<Part> {
             Part {
                 name: format!("rod-{}{of}", stack.letter),
                 solid: read(&piece),
-                laid,
+                print_turn,
             }
         })
         .collect()
@@ -165,7 +165,7 @@ fn seat(sizes: &Sizes, stack: &Stack) -> Part {
     Part {
         name: format!("seat-{}", stack.letter),
         solid: read(&body.difference(&cut)),
-        laid: DMat3::IDENTITY,
+        print_turn: DMat3::IDENTITY,
     }
 }
 
@@ -216,7 +216,7 @@ fn sleeve(sizes: &Sizes, stack: &Stack, k: usize) -> Option<Part> {
     Some(Part {
         name: format!("sleeve-{}{}", stack.letter, k + 1),
         solid: read(&body),
-        laid: DMat3::IDENTITY,
+        print_turn: DMat3::IDENTITY,
     })
 }
 

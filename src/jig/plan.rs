@@ -114,7 +114,7 @@ fn passes(site: &Site, line: Line, arms: Vec<Arm>) -> (Vec<Vec<Arm>>, Vec<Arm>) 
             let Some(arm) = left.take() else { break };
             let mut with = pass.clone();
             with.push(arm.clone());
-            spread(&site.sizes, &mut with);
+            space_rings(&site.sizes, &mut with);
             if fit(site, line, &with) {
                 *pass = with;
             } else {
@@ -123,7 +123,7 @@ fn passes(site: &Site, line: Line, arms: Vec<Arm>) -> (Vec<Vec<Arm>>, Vec<Arm>) 
         }
         if let Some(arm) = left {
             let mut alone = vec![arm];
-            spread(&site.sizes, &mut alone);
+            space_rings(&site.sizes, &mut alone);
             if fit(site, line, &alone) {
                 passes.push(alone);
             } else {
@@ -144,7 +144,7 @@ fn lift(sizes: &Sizes, arms: &[Arm]) -> f64 {
 }
 
 /// Makes room for rings on their rod.
-fn spread(sizes: &Sizes, arms: &mut [Arm]) {
+fn space_rings(sizes: &Sizes, arms: &mut [Arm]) {
     let wanted: Vec<f64> = arms.iter().map(|a| a.pad.height).collect();
     let lowest = sizes.ring / 2.0;
     let found = slots(&wanted, lowest, sizes.ring, sizes.wall);

@@ -35,7 +35,7 @@ impl Inputs {
             .map(|r| midpoint_median(x.row(r).to_vec()))
             .collect();
         let spread: Vec<f64> = (0..x.rows())
-            .map(|r| spread(x.row(r), middle[r], plain.deviation[r]))
+            .map(|r| variation(x.row(r), middle[r], plain.deviation[r]))
             .collect();
         let bent = bent(x, &middle, &spread);
         Self {
@@ -73,7 +73,7 @@ impl Inputs {
 
 /// What a channel varies by: where more than half of its readings are the same (saturated, or touched seldom), their
 /// deviation.
-fn spread(row: &[f64], middle: f64, deviation: f64) -> f64 {
+fn variation(row: &[f64], middle: f64, deviation: f64) -> f64 {
     if deviation == 0.0 {
         return 0.0;
     }

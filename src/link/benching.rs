@@ -159,8 +159,8 @@ pub fn press_simulated(
             std::thread::sleep(Duration::from_micros(TURN_US));
         }
         desk.board(&sent, now_us, collector, &mut out, &mut tell);
-        let heard = std::mem::take(&mut said);
-        collector.heard(&heard, now_us, &mut out, &mut |n| desk.hear(n, &mut tell));
+        let bytes = std::mem::take(&mut said);
+        collector.receive(&bytes, now_us, &mut out, &mut |n| desk.hear(n, &mut tell));
         collector.look(now_us, &mut out, &mut |n| desk.hear(n, &mut tell));
         printer.receive(&out, &mut said);
         now_us += TURN_US;
@@ -220,7 +220,7 @@ pub fn press_at_ports(
         printer.write(&std::mem::take(&mut out));
         match got(&mut *printer, &mut buffer) {
             Some(bytes) => {
-                collector.heard(&bytes, now(), &mut out, &mut |n| desk.hear(n, &mut tell));
+                collector.receive(&bytes, now(), &mut out, &mut |n| desk.hear(n, &mut tell));
             }
             None => collector.unplugged(),
         }

@@ -11,8 +11,8 @@ const MOST: usize = 300_000;
 #[derive(Default)]
 pub struct Truths {
     waiting: VecDeque<Truth>,
-    /// As it was told last.
-    told: Option<Truth>,
+    /// As it was said last.
+    last: Option<Truth>,
 }
 
 impl Truths {
@@ -34,13 +34,13 @@ impl Truths {
             truth = self.waiting.pop_front();
         }
         let truth = truth?;
-        let new = self.told.is_none_or(|told| told.touch != truth.touch);
-        self.told = Some(truth);
+        let new = self.last.is_none_or(|last| last.touch != truth.touch);
+        self.last = Some(truth);
         new.then_some(truth)
     }
 
     /// What is true is new to whoever begins to listen now.
     pub(super) fn begin_anew(&mut self) {
-        self.told = None;
+        self.last = None;
     }
 }

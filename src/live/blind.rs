@@ -18,7 +18,7 @@ pub(super) struct Blind {
     used: Vec<bool>,
     noise: Vec<f64>,
     share: Option<f64>,
-    told: f64,
+    said: f64,
 }
 
 impl Blind {
@@ -46,12 +46,12 @@ impl Blind {
         let least: Vec<Option<f64>> = noise.iter().zip(&self.used).map(least).collect();
         let share = matching.map.unfelt(&least);
         self.share = Some(share);
-        let is_news = share > self.told + MUCH;
+        let is_news = share > self.said + MUCH;
         // What has become better is worth a word when it becomes as bad again.
-        self.told = if is_news {
+        self.said = if is_news {
             share
         } else {
-            self.told.min(share + MUCH)
+            self.said.min(share + MUCH)
         };
         (share, is_news)
     }

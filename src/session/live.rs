@@ -181,12 +181,15 @@ impl Session {
     fn host(&mut self, sensing: &Arc<Sensing>, board: SimulatedBoard) {
         let truths = Arc::new(Mutex::new(Truths::default()));
         let known = Arc::clone(&truths);
-        let told = move |truth: Truth| {
+        let on_truth = move |truth: Truth| {
             if let Ok(mut known) = known.lock() {
                 known.push(truth);
             }
         };
-        match doorway().open().and_then(|door| host(board, door, told)) {
+        match doorway()
+            .open()
+            .and_then(|door| host(board, door, on_truth))
+        {
             Ok(hosted) => {
                 let address = Address::parse(&hosted.port, BAUD, Pace::Real);
                 self.live.hosted = Some(hosted);
@@ -211,11 +214,11 @@ impl Session {
             pipeline.set_trained(trained.clone(), used.clone());
         }
         let feed = Arc::clone(&self.live.feed);
-        let (told, over) = (Arc::clone(&feed), feed);
+        let (shared, over) = (Arc::clone(&feed), feed);
         let (wake, last) = (self.wake.clone(), self.wake.clone());
         let started = Connection::start(
             Listener::new(address, pipeline).knowing(truths),
-            move |heard| feed::hear(&told, &heard, &|| wake.now()),
+            move |event| feed::hear(&shared, &event, &|| wake.now()),
             move |ended| {
                 if let Ok(mut feed) = over.lock() {
                     feed.ended = Some(ended);

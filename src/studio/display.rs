@@ -200,11 +200,11 @@ impl Display {
 
 /// What an error of the window's library says, without where in its source it was noticed, and without the full stop.
 fn cause(error: &str) -> &str {
-    let told = match error.split_once("os error at ") {
-        Some((_, place)) => place.split_once(": ").map_or(place, |(_, told)| told),
+    let reason = match error.split_once("os error at ") {
+        Some((_, place)) => place.split_once(": ").map_or(place, |(_, reason)| reason),
         None => error,
     };
-    told.trim().trim_end_matches('.')
+    reason.trim().trim_end_matches('.')
 }
 
 /// Whether an X server that is there did not let us in, in the words of the window's library.

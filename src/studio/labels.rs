@@ -9,7 +9,7 @@ const DIRECTIONS: usize = 12;
 /// Places for round marks of one radius at anchors: at the anchor where it is free, else beside it. The
 /// first have the first choice, so that a mark stays where it is when others come.
 #[must_use]
-pub fn spread(anchors: &[Pos2], radius: f32) -> Vec<Pos2> {
+pub fn places_apart(anchors: &[Pos2], radius: f32) -> Vec<Pos2> {
     let mut placed: Vec<Pos2> = Vec::with_capacity(anchors.len());
     for &anchor in anchors {
         let free = |at: &Pos2| placed.iter().all(|p| p.distance(*at) >= 2.0 * radius);
@@ -35,7 +35,7 @@ mod tests {
         let anchors: Vec<Pos2> = (0..12)
             .map(|k| Pos2::new(100.0 + 3.0 * (k % 4) as f32, 50.0 + 2.0 * (k / 4) as f32))
             .collect();
-        let places = spread(&anchors, 9.0);
+        let places = places_apart(&anchors, 9.0);
         assert_eq!(places[0], anchors[0]);
         for (k, a) in places.iter().enumerate() {
             assert!(a.distance(anchors[k]) < 60.0);

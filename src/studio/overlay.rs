@@ -170,7 +170,7 @@ pub fn paint_gauges(look: Look<'_>, painter: &Painter, pane: Pane) {
         .filter(|mark| rect.expand(20.0).contains(mark.at))
         .collect();
     let anchors: Vec<Pos2> = marks.iter().map(|m| m.at).collect();
-    for (mark, place) in marks.iter().zip(labels::spread(&anchors, MARK + 0.5)) {
+    for (mark, place) in marks.iter().zip(labels::places_apart(&anchors, MARK + 0.5)) {
         mark.paint(painter, place);
     }
 }

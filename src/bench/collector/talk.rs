@@ -1,36 +1,42 @@
 //! What the machine says, and what is looked at as time passes.
 
-use super::super::marlin::Heard;
+use super::super::marlin::MachineReply;
 use super::motion::Moved;
 use super::{Collector, Doing, FIRST_US, News, Phase, RESTARTS, SILENT_US};
 
 impl Collector {
     /// Takes in what the machine says.
-    pub fn heard(
+    pub fn receive(
         &mut self,
         bytes: &[u8],
         now_us: u64,
         out: &mut Vec<u8>,
         tell: &mut dyn FnMut(News),
     ) {
-        for heard in self.marlin.push(bytes, now_us, out) {
-            self.take(heard, now_us, out, tell);
+        for reply in self.marlin.push(bytes, now_us, out) {
+            self.take(reply, now_us, out, tell);
         }
     }
 
-    fn take(&mut self, heard: Heard, now_us: u64, out: &mut Vec<u8>, tell: &mut dyn FnMut(News)) {
+    fn take(
+        &mut self,
+        reply: MachineReply,
+        now_us: u64,
+        out: &mut Vec<u8>,
+        tell: &mut dyn FnMut(News),
+    ) {
         if self.phase == Phase::Over {
             return;
         }
-        match heard {
-            Heard::Restarted => self.restarted(now_us, out, tell),
-            Heard::Failed(why) => {
+        match reply {
+            MachineReply::Restarted => self.restarted(now_us, out, tell),
+            MachineReply::Failed(why) => {
                 self.lose(
                     &format!("the machine cannot be trusted any more: {why}"),
                     out,
                 );
             }
-            Heard::Done(said) => self.done(&said, now_us, out, tell),
+            MachineReply::Done(said) => self.done(&said, now_us, out, tell),
         }
     }
 
@@ -104,8 +110,8 @@ impl Collector {
             self.open(false, now_us, out);
             return;
         };
-        if let Some(heard) = self.marlin.look(now_us, out) {
-            self.take(heard, now_us, out, tell);
+        if let Some(reply) = self.marlin.look(now_us, out) {
+            self.take(reply, now_us, out, tell);
         }
         if let Doing::Moving(motion) = &self.doing
             && motion.is_late(now_us)

@@ -87,7 +87,7 @@ impl<'a> Bench<'a> {
                 collector.felt(&counts, self.now_us, &mut out, &mut tell);
             }
             collector.look(self.now_us, &mut out, &mut tell);
-            collector.heard(
+            collector.receive(
                 &std::mem::take(&mut self.said),
                 self.now_us,
                 &mut out,
@@ -338,7 +338,7 @@ fn a_machine_that_cannot_be_believed_is_told_to_stop() {
     bench.run(&mut collector, 3.0);
     let mut out = Vec::new();
     let halted = b"Error:Printer halted. kill() called!\n";
-    collector.heard(halted, bench.now_us, &mut out, &mut |_| {});
+    collector.receive(halted, bench.now_us, &mut out, &mut |_| {});
     assert!(out.ends_with(b"M410\n"));
     assert!(matches!(collector.ended(), Some(Ended::Stopped(_))));
 }

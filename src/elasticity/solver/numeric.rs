@@ -166,12 +166,12 @@ impl Fronts<'_> {
         }
     }
 
-    /// Lets the supernodes that this one heard, and itself, wait for the next that they have rows in.
+    /// Lets the supernodes that waited for this one, and itself, wait for the next that they have rows in.
     fn pass_on(&mut self, s: usize, supernode: &[u32]) {
         let end = self.symbolic.supernode_end()[s];
-        let mut heard = std::mem::take(&mut self.waiting[s]);
-        heard.push(s as u32);
-        for d in heard {
+        let mut descendants = std::mem::take(&mut self.waiting[s]);
+        descendants.push(s as u32);
+        for d in descendants {
             let pattern = self.symbolic.supernode(d as usize).pattern();
             let next = &mut self.next[d as usize];
             *next += pattern[*next..].partition_point(|&r| r < end);

@@ -122,7 +122,7 @@ pub fn outlook(
     let candidates: Vec<SurfacePoint> = places.iter().copied().step_by(share).collect();
     let presses: Vec<Press> = candidates.iter().map(|&at| made(at, force)).collect();
     let of_readings: Vec<DMatrix<f64>> = presses.iter().map(basis).collect();
-    let told: Vec<Option<DMatrix<f64>>> = presses
+    let information: Vec<Option<DMatrix<f64>>> = presses
         .iter()
         .zip(&of_readings)
         .map(|(press, basis)| tells(press, basis, &errors, off.drift))
@@ -149,15 +149,15 @@ pub fn outlook(
         places: Vec::new(),
     };
     for _ in 0..MOST {
-        let after = |told: &DMatrix<f64>| doubt(&(&normal + told));
-        let best = (told.iter().enumerate())
-            .filter_map(|(k, told)| Some((k, after(told.as_ref()?))))
+        let after = |information: &DMatrix<f64>| doubt(&(&normal + information));
+        let best = (information.iter().enumerate())
+            .filter_map(|(k, information)| Some((k, after(information.as_ref()?))))
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((k, left)) = best else {
             break;
         };
-        if let Some(told) = &told[k] {
-            normal += told;
+        if let Some(information) = &information[k] {
+            normal += information;
         }
         outlook.doubts.push(left);
         outlook.places.push(candidates[k]);

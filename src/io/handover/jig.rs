@@ -33,7 +33,10 @@ pub fn files(jig: &Jig) -> Vec<(String, Vec<u8>)> {
     let mut files: Vec<(String, Vec<u8>)> = pieces
         .map(|part| {
             let name = format!("{FOLDER}/{}.stl", part.name);
-            (name, stl(&part.name, &laid(&part.solid, &part.laid)))
+            (
+                name,
+                stl(&part.name, &on_the_bed(&part.solid, &part.print_turn)),
+            )
         })
         .collect();
     files.push((format!("{FOLDER}/jig.csv"), table(jig, &made).into_bytes()));
@@ -93,7 +96,7 @@ fn table(jig: &Jig, made: &[(&Stack, Vec<Part>)]) -> String {
 }
 
 /// As it lies on the printer's bed, its middle over the origin.
-fn laid(solid: &Facets, turn: &DMat3) -> Facets {
+fn on_the_bed(solid: &Facets, turn: &DMat3) -> Facets {
     let turned: Vec<DVec3> = solid.positions.iter().map(|&p| *turn * p).collect();
     let low = turned.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let high = turned.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);

@@ -54,10 +54,10 @@ fn frames(messages: &[Message]) -> Vec<u8> {
 }
 
 /// All that is heard there until it is over, and how it ended.
-fn heard(address: Address) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
+fn heard_until_over(address: Address) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>) {
     let (mut said, mut counts) = (Vec::new(), Vec::new());
     let (stop, (_commands, inbox)) = (AtomicBool::new(false), channel());
-    let ended = Listener::new(address, pipeline()).run(&stop, &inbox, |heard| match heard {
+    let ended = Listener::new(address, pipeline()).run(&stop, &inbox, |event| match event {
         SessionEvent::State(State::Gone) => stop.store(true, Ordering::Relaxed),
         SessionEvent::Hello(hello) => said.push(format!("hello {}", hello.name)),
         SessionEvent::Message(text) => said.push(format!("message {text}")),
@@ -79,7 +79,7 @@ fn of_board(bytes: Vec<u8>) -> Vec<String> {
         // Until the other side has taken it and is gone.
         let _ = std::io::copy(&mut stream, &mut std::io::sink());
     });
-    heard(Address::Socket(address)).0
+    heard_until_over(Address::Socket(address)).0
 }
 
 fn recording(path: &Path) -> Address {
@@ -93,7 +93,7 @@ fn of_recording(bytes: &[u8]) -> (Vec<String>, Vec<Vec<f64>>, Result<(), String>
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.hapdrec");
     std::fs::write(&path, bytes).unwrap();
-    heard(recording(&path))
+    heard_until_over(recording(&path))
 }
 
 fn log(text: &str) -> Message {
@@ -153,7 +153,7 @@ fn lines_with_many_channels_are_recorded_whole() {
     let mut recorder = Recorder::create(&path).unwrap();
     recorder.sample(&sample);
     drop(recorder);
-    assert_eq!(heard(recording(&path)).1, [sample.counts]);
+    assert_eq!(heard_until_over(recording(&path)).1, [sample.counts]);
     // One whose middle is lost is not taken for one of fewer channels.
     let torn = ["part 0 1,2", "line 4 5,6", "line 0 1,2,x", "part 9", "line"];
     let torn = torn.map(|text| Message::Note(text.into()));

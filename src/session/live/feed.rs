@@ -75,14 +75,14 @@ pub struct Feed {
 /// Shared with the listening thread.
 pub type Shared = Arc<Mutex<Feed>>;
 
-/// Takes in what was heard, and wakes the window when there is something to see.
-pub fn hear(feed: &Shared, heard: &SessionEvent, wake: &dyn Fn()) {
+/// Takes in what happened on the line, and wakes the window when there is something to see.
+pub fn hear(feed: &Shared, event: &SessionEvent, wake: &dyn Fn()) {
     let Ok(mut feed) = feed.lock() else {
         return;
     };
-    let at_once = feed.take(heard);
+    let at_once = feed.take(event);
     let due = feed.drawn.is_none_or(|t| t.elapsed() >= FRAME);
-    let seen = matches!(heard, SessionEvent::Sample { .. });
+    let seen = matches!(event, SessionEvent::Sample { .. });
     if at_once || (seen && due) {
         feed.drawn = Some(Instant::now());
         wake();
@@ -91,8 +91,8 @@ pub fn hear(feed: &Shared, heard: &SessionEvent, wake: &dyn Fn()) {
 
 impl Feed {
     /// Whether the window must show it at once.
-    fn take(&mut self, heard: &SessionEvent) -> bool {
-        match heard {
+    fn take(&mut self, event: &SessionEvent) -> bool {
+        match event {
             SessionEvent::State(state) => {
                 self.state = Some((*state).clone());
                 if **state == State::Waiting {

@@ -230,12 +230,18 @@ pub fn live_tab(ask: &mut Ask<'_>, ui: &mut Ui) {
     let (words, warning) = live_in_words(ask.session);
     let compare = ask.session.desk.compare;
     ask.session.live.look(|feed| {
-        heard(ui, feed, RichText::new(words).strong(), warning, compare);
+        line_and_estimates(ui, feed, RichText::new(words).strong(), warning, compare);
     });
 }
 
 /// How the line does and what every estimator says, over the strips.
-fn heard(ui: &mut Ui, feed: &Feed, words: RichText, warning: Option<Color32>, compare: bool) {
+fn line_and_estimates(
+    ui: &mut Ui,
+    feed: &Feed,
+    words: RichText,
+    warning: Option<Color32>,
+    compare: bool,
+) {
     ui.horizontal_wrapped(|ui| {
         ui.label(warning.map_or(words.clone(), |c| words.color(c)));
         facts(ui, feed);

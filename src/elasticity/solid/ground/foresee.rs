@@ -1,4 +1,4 @@
-//! What a part's elements will come to: the first ones are solved, from which the others are told.
+//! What a part's elements will come to: the first ones are solved, from which the others are extrapolated.
 
 use glam::DVec3;
 
@@ -28,10 +28,10 @@ struct Look<'a> {
 impl Look<'_> {
     /// Looks at cells of the next size (m): solves them where they are among the first or quick.
     fn go_on(&mut self, size: f64, watch: Watch) -> Result<(), ElasticError> {
-        let told = self.told(size);
+        let taken = self.extrapolated(size);
         let all_solved = self.grids.len() == self.taken.len();
-        let taken = match told.filter(|t| !all_solved || !is_quick(t.multiplications)) {
-            Some(told) => told,
+        let taken = match taken.filter(|t| !all_solved || !is_quick(t.multiplications)) {
+            Some(taken) => taken,
             None => self.solve(size, watch)?,
         };
         self.taken.push(taken);
@@ -46,21 +46,21 @@ impl Look<'_> {
     }
 
     /// What cells of a size (m) take, from two that were solved.
-    fn told(&self, size: f64) -> Option<Taken> {
+    fn extrapolated(&self, size: f64) -> Option<Taken> {
         let [.., before, last] = &self.taken[..] else {
             return None;
         };
         let shape = self.ground.shape();
         let more = shape.unknowns(size) / shape.unknowns(self.foreseen.size);
-        let told = last.beyond(before, last.unknowns * more);
+        let taken = last.beyond(before, last.unknowns * more);
         // Of a pattern that does not fit into memory nothing is known.
-        told.entries.is_finite().then_some(told)
+        taken.entries.is_finite().then_some(taken)
     }
 
-    /// Whether cells of a size (m) fit into memory, as far as that is told.
+    /// Whether cells of a size (m) fit into memory, as far as that can be foreseen.
     fn fits(&self, size: f64) -> bool {
-        let told = self.told(size);
-        told.is_none_or(|told| told.bytes <= memory::allowed())
+        let taken = self.extrapolated(size);
+        taken.is_none_or(|taken| taken.bytes <= memory::allowed())
     }
 
     fn solve(&mut self, size: f64, watch: Watch) -> Result<Taken, ElasticError> {
