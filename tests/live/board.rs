@@ -150,6 +150,23 @@ fn a_simulated_board_speaks_the_protocol() {
     );
 }
 
+/// A board sends as often as it is asked to, whatever it would do by itself.
+#[test]
+fn a_board_is_asked_for_its_rate() {
+    let (_board, port) = board(&["--rate", "500"]);
+    let steps = |more: &[&str]| {
+        let listening = listen(&port, more);
+        let times: Vec<u64> = (0..60)
+            .map(|_| listening.json()["t_us"].as_u64().unwrap())
+            .collect();
+        let mut steps: Vec<u64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.sort_unstable();
+        steps[steps.len() / 2]
+    };
+    assert_eq!(steps(&[]), 2000);
+    assert_eq!(steps(&["--rate", "200"]), 5000);
+}
+
 /// Scripted touches at known places, gauges exactly as drawn: each is found where it is, and nothing between them.
 /// They begin late enough for a busy machine to have tared.
 #[test]

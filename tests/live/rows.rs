@@ -63,7 +63,9 @@ impl Press {
 struct Heard {
     time_s: f64,
     kind: Option<String>,
-    /// Places (mm), forces (N) and radii of the regions (mm), the hardest first.
+    /// The place (mm) by the estimator that was asked for.
+    place: Option<DVec3>,
+    /// By matching: places (mm), forces (N) and radii of the regions (mm), the hardest first.
     touches: Vec<(DVec3, f64, f64)>,
     channels_ok: u64,
 }
@@ -77,8 +79,10 @@ impl Heard {
             let at = DVec3::new(x, y, z);
             (at, number(t, "force_n"), number(t, "uncertainty_mm"))
         };
+        let [x, y, z] = ["x_mm", "y_mm", "z_mm"].map(|key| said[key].as_f64());
         Self {
             time_s: 1e-6 * number(&said, "t_us"),
+            place: x.zip(y).zip(z).map(|((x, y), z)| DVec3::new(x, y, z)),
             kind: said["kind"].as_str().map(str::to_owned),
             touches: said["touches"]
                 .as_array()
@@ -222,9 +226,18 @@ impl Bench {
 
 /// What is heard of a recording with a project, and what is said beside.
 fn listen(recording: &std::path::Path, project: &std::path::Path) -> (Vec<Heard>, String) {
+    listen_with(recording, project, &["--quality", "draft"])
+}
+
+fn listen_with(
+    recording: &std::path::Path,
+    project: &std::path::Path,
+    more: &[&str],
+) -> (Vec<Heard>, String) {
     let done = Command::new(env!("CARGO_BIN_EXE_hapdef"))
-        .args(["listen", text(recording), "--fast", "--quality", "draft"])
+        .args(["listen", text(recording), "--fast"])
         .args(["--project", text(project)])
+        .args(more)
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
@@ -436,6 +449,34 @@ fn a_palm_is_an_area() {
     let wrong = areas.iter().map(wrong).sum::<f64>() / areas.len() as f64;
     println!("{share:.3} are areas, their forces {wrong:.2} N off");
     assert!(share > 0.75 && wrong < 1.5);
+}
+
+/// Regressions that are trained on touches of the model find the place where they are asked for; how many touch, matching says
+/// in any case.
+#[test]
+fn the_estimator_that_is_asked_for_finds_the_place() {
+    let bench = Bench::of(in_turn(3.0, 1.5, 0.6, &places(8), 10.0));
+    let recording = bench.record(&BOARD);
+    let project = bench.exact("0.0");
+    let found = ["matching", "svr", "normalized"].map(|estimator| {
+        let more = ["--quality", "draft", "--estimator", estimator];
+        let (heard, _) = listen_with(&recording, &project, &more);
+        let off: Vec<f64> = (bench.full(&heard))
+            .filter_map(|(press, h)| Some(h.place?.distance(press.place)))
+            .collect();
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        let by_matching = bench.off(&heard).0;
+        println!("{estimator}: {mean:.2} mm, matching beside it {by_matching:.2} mm");
+        assert!(bench.felt(&heard) > 0.99 && off.len() == bench.full(&heard).count());
+        [mean, by_matching]
+    });
+    let [matching, svr, normalized] = found;
+    assert!(matching[0] == matching[1] && matching[0] < 1.0, "{found:?}");
+    for [mean, by_matching] in [svr, normalized] {
+        assert!(by_matching == matching[1], "{found:?}");
+        assert!(mean > matching[0] && mean < 12.0, "{found:?}");
+    }
+    assert!(svr[0] != normalized[0], "{found:?}");
 }
 
 /// Twelve presses by hand: places are told up to 1 mm off along every axis (1 mm rms in all), forces up to 5 % (3 % rms), and
