@@ -21,5 +21,5 @@ pub use machine::{Axis, Machine, Pose, TipSensor};
 pub use marlin::{MachineReply, Marlin, position_in};
 pub use mount::{Mount, Touched};
 pub use plan::{MachineReach, Planned, plan};
-pub use press::{Limits, Samples};
+pub use press::{Limits, SampleMean};
 pub use printer::{PrinterFaults, SimulatedPrinter};

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::plan::Planned;
-use super::press::Samples;
+use super::press::SampleMean;
 
 /// What the limb answers at a place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -152,7 +152,7 @@ impl Check {
     }
 
     /// A reading of it, at a depth (m) and a force (N).
-    pub fn read(&mut self, depth: f64, force: Option<f64>, reading: &Samples, rest: &[f64]) {
+    pub fn read(&mut self, depth: f64, force: Option<f64>, reading: &SampleMean, rest: &[f64]) {
         let mean = reading.mean();
         let change = mean.iter().zip(rest).map(|(m, r)| m - r).collect();
         self.steps.push((depth * 1e3, force, change));

@@ -13,7 +13,7 @@ use super::check::{Answer, Check};
 use super::machine::Machine;
 use super::marlin::Marlin;
 use super::plan::Planned;
-use super::press::{Limits, Samples};
+use super::press::{Limits, SampleMean};
 
 /// What whoever drives it is told.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,7 +94,7 @@ enum Doing {
     Reading {
         from_us: u64,
         until_us: u64,
-        reading: Samples,
+        reading: SampleMean,
         kept: bool,
     },
     Nothing,

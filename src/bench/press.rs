@@ -42,13 +42,13 @@ impl Default for Limits {
 
 /// Samples of a time, by channel.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Samples {
+pub struct SampleMean {
     count: usize,
     sums: Vec<f64>,
     squares: Vec<f64>,
 }
 
-impl Samples {
+impl SampleMean {
     /// Takes in a sample. One with another number of channels is of another board.
     pub fn push(&mut self, counts: &[f64]) {
         if self.count == 0 {
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn a_reading_is_a_mean_with_its_deviation() {
-        let mut reading = Samples::default();
+        let mut reading = SampleMean::default();
         for k in 0..100 {
             reading.push(&[10.0 + f64::from(k % 2), 5.0]);
             // Not of this board.

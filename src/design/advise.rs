@@ -13,7 +13,7 @@ use super::layout::size_mm;
 use super::{DesignError, Ground, Inputs, ground};
 use crate::budget::Watch;
 use crate::elasticity::solid::ground::{Foreseen, SolidGround};
-use crate::elasticity::solid::sizing::CellSizing;
+use crate::elasticity::solid::sizing::PartMeasures;
 use crate::elasticity::{ElasticError, Touch, scope};
 use crate::mesh::TriMesh;
 use crate::mesh::sample;
@@ -144,7 +144,7 @@ fn of_closed(
         .collect();
     let area: f64 = faces.iter().map(|&t| whole.facet_area(t)).sum();
     let radius = scope::radii(whole, &faces, solid.wall());
-    let asked = Workload::new(inputs, area / 2.0, radius[0], solid.shape());
+    let asked = Workload::new(inputs, area / 2.0, radius[0], solid.measures());
     let (cells, why) = if solves {
         of_solid(&asked, inputs, solid, watch)?
     } else {
@@ -217,7 +217,7 @@ fn of_open(inputs: &Inputs, rims: usize, watch: Watch) -> Advice {
         inputs,
         part.area(),
         radius[0],
-        CellSizing::of_wall(wall * 1e-3, 2.0 * part.area()),
+        PartMeasures::of_wall(wall * 1e-3, 2.0 * part.area()),
     );
     let costs = [asked.shell(), asked.solid()];
     let [shell, cells] = &costs;

@@ -56,6 +56,8 @@ impl Design {
         design.by_hand = true;
         let old = self.chosen_id();
         let new = old.chooser.set(sites.len());
+        // Sets that are as large and larger are no steps on the way to this one.
+        let is_step = |sensors: usize| sensors < new.sensors;
         let selections = Arc::make_mut(&mut design.selections);
         if let Some(led) = selections.iter_mut().find(|s| s.selector == self.lead) {
             led.achieved.cautions.push(
@@ -63,22 +65,33 @@ impl Design {
             );
             // Its figures for that set say nothing of this one.
             led.achieved.error_estimate = None;
-            if let Some(last) = led.sets.last_mut() {
-                *last = SensorSet {
-                    sites,
-                    criterion: None,
-                    criterion_mm: None,
-                    gap: None,
-                    margin: None,
-                    certificate: None,
-                    expected_mm: None,
-                };
-            }
+            led.sets.pop();
+            led.sets.retain(|set| is_step(set.sites.len()));
+            led.sets.push(SensorSet {
+                sites,
+                criterion: None,
+                criterion_mm: None,
+                gap: None,
+                margin: None,
+                certificate: None,
+                expected_mm: None,
+            });
         }
         let evaluation = Arc::make_mut(&mut design.evaluation);
+        forget(evaluation, |set| {
+            set.chooser == old.chooser && set != old && !is_step(set.sensors)
+        });
         replace_judged(evaluation, old, new, judged);
         design
     }
+}
+
+/// Leaves out what was judged of some sets.
+fn forget(evaluation: &mut Evaluation, gone: impl Fn(SetId) -> bool) {
+    evaluation.rows.retain(|r| !gone(r.set));
+    evaluation.sets.retain(|s| !gone(s.set));
+    evaluation.found.retain(|m| !gone(m.set));
+    evaluation.matched.retain(|r| !gone(r.set));
 }
 
 /// Puts what was judged of one set in the place of another, as if it were that one with other gauges.

@@ -26,14 +26,14 @@ pub struct Reduced {
     pub feasible: Vec<usize>,
     /// Signals of the feasible sites.
     pub x: SignalMatrix,
-    asked: AskedSites,
+    asked: ReductionRequest,
     components: OnceLock<Pca>,
     candidates: OnceLock<Arc<Candidates>>,
     geometry: OnceLock<Located>,
 }
 
 /// How a reduction is to be made.
-struct AskedSites {
+struct ReductionRequest {
     reduction: Reduction,
     /// Most candidates.
     limit: usize,
@@ -73,7 +73,7 @@ impl Reduced {
         if let Some(known) = self.candidates.get() {
             return Ok(known);
         }
-        let AskedSites {
+        let ReductionRequest {
             reduction,
             limit,
             sensors,
@@ -168,7 +168,7 @@ pub fn reduce_sites(
     Ok(Reduced {
         feasible,
         x,
-        asked: AskedSites {
+        asked: ReductionRequest {
             reduction: inputs.project.reduction(),
             limit: budget.candidates.max(sensors),
             sensors,

@@ -81,12 +81,12 @@ impl Document {
 
     /// The layer grows by a distance over the surface (m), by one vertex at least.
     pub fn grow(&mut self, layer: Layer, by: f64) {
-        self.repaint(layer, |document, mask| document.grow_by(mask, true, by));
+        self.repaint(layer, |document, mask| document.extend(mask, true, by));
     }
 
     /// The layer shrinks by a distance over the surface (m), by one vertex at least.
     pub fn shrink(&mut self, layer: Layer, by: f64) {
-        self.repaint(layer, |document, mask| document.grow_by(mask, false, by));
+        self.repaint(layer, |document, mask| document.extend(mask, false, by));
     }
 
     /// One step of undo that changes a layer.
@@ -98,7 +98,7 @@ impl Document {
     }
 
     /// Vertices near those that are `painted` become so too.
-    fn grow_by(&self, mask: &mut [bool], painted: bool, by: f64) {
+    fn extend(&self, mask: &mut [bool], painted: bool, by: f64) {
         let beside: Vec<u32> = (self.part.edges().iter())
             .filter(|e| mask[e.a as usize] != mask[e.b as usize])
             .flat_map(|e| [e.a, e.b])

@@ -33,7 +33,9 @@ pub mod part;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
 
-use super::drawn::{AsDrawn, AsGlued, GluingCovariance, covariance, doubt, upper_triangle};
+use super::drawn::{
+    AsDrawn, AsGlued, GluingCovariance, covariance, gluing_covariance, upper_triangle,
+};
 use super::map::{ResponseMap, Slope};
 use super::matching::Errors;
 use crate::mesh::SurfacePoint;
@@ -105,7 +107,7 @@ pub fn calibrate(
     } = fitted(drawn, &known, noise, off);
     let channels = noise.len();
     let doubts = fit.map_or_else(
-        || vec![doubt(&off.gluing); channels],
+        || vec![gluing_covariance(&off.gluing); channels],
         |fit| fit.doubts(channels),
     );
     Calibration {
@@ -302,7 +304,7 @@ impl Least<'_> {
     fn prior(&self) -> DVector<f64> {
         /// Nothing is known better than this (shares, millimetres, degrees).
         const SURE: f64 = 1e-6;
-        let gauge = covariance(&doubt(&self.off.gluing)).diagonal();
+        let gauge = covariance(&gluing_covariance(&self.off.gluing)).diagonal();
         let channels = self.noise.len();
         let variance = |k: usize| {
             if k == PER_GAUGE * channels {

@@ -76,7 +76,7 @@ pub type GluingCovariance = [f64; 10];
 
 /// Before anything is known but how a workshop glues.
 #[must_use]
-pub fn doubt(gluing: &Gluing) -> GluingCovariance {
+pub fn gluing_covariance(gluing: &Gluing) -> GluingCovariance {
     let place = (gluing.place * 1e3).powi(2) / 2.0;
     let angle = gluing.angle.to_degrees().powi(2);
     [
@@ -128,7 +128,10 @@ impl AsDrawn {
     /// these gauges.
     #[must_use]
     pub fn deviations(&self, off: &Uncertainty) -> Deviations {
-        self.deviations_of(&vec![doubt(&off.gluing); self.map.channels()], off)
+        self.deviations_of(
+            &vec![gluing_covariance(&off.gluing); self.map.channels()],
+            off,
+        )
     }
 
     /// As [`Self::deviations`], by what is still not known of each gauge.

@@ -88,7 +88,7 @@ pub fn train(
     };
     let families = asked.family.map_or(Family::ALL.to_vec(), |f| vec![f]);
     let (chosen, tried) = lesson.choose(&families, watch)?;
-    let doubt = lesson.doubt(&chosen, watch)?;
+    let doubt = lesson.error_model(&chosen, watch)?;
     let estimator = TouchEstimator {
         force: school.force(&division, &families, &mut notes, watch)?,
         inputs: school.inputs,
@@ -254,7 +254,7 @@ impl Lesson {
     }
 
     /// How far a chosen machine may be off.
-    fn doubt(&self, chosen: &Chosen, watch: Watch) -> Result<ErrorModel, LearningError> {
+    fn error_model(&self, chosen: &Chosen, watch: Watch) -> Result<ErrorModel, LearningError> {
         let left = chosen.settings.left_out(&self.known, watch)?;
         let left = left.ok_or(LearningError::Singular)?;
         let machine = &chosen.machine;

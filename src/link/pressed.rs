@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::counted_line::CountedLine;
-use crate::bench::Samples;
+use crate::bench::SampleMean;
 use crate::live::{Input, Receiver};
 use crate::wire::Hello;
 
@@ -50,7 +50,7 @@ struct Scribe {
     board: Option<Hello>,
     open: Option<BenchPress>,
     /// What is read just now, with when it began.
-    reading: Option<(String, Samples, u64)>,
+    reading: Option<(String, SampleMean, u64)>,
     done: Vec<BenchPress>,
     /// Presses since that place was last found to be as at first, where there is such a place.
     doubted: Option<Vec<BenchPress>>,
@@ -84,7 +84,7 @@ impl Scribe {
         let (word, rest) = text.split_once(' ').unwrap_or((text, ""));
         match word {
             "press" => self.open = self.begun(rest),
-            "read" => self.reading = Some((rest.to_owned(), Samples::default(), 0)),
+            "read" => self.reading = Some((rest.to_owned(), SampleMean::default(), 0)),
             "end" => self.close(),
             "again" | "failed" => (self.open, self.reading) = (None, None),
             "pressed" => {

@@ -79,7 +79,7 @@ impl Listener {
             self.enter(State::Ended, tell);
             return Ok(());
         }
-        let why = self.receiver.doubt().and_then(Unusable::in_words);
+        let why = self.receiver.unusable().and_then(Unusable::in_words);
         let why = why.map_or(String::new(), |why| format!(": {why}"));
         Err(format!(
             "{}: there is no reading in this recording that can be used{why}",
@@ -136,7 +136,7 @@ impl Listener {
 
     /// Says why nothing that comes can be used: at once where waiting will not help.
     fn explain(&mut self, tell: &mut impl FnMut(SessionEvent)) {
-        let Some(doubt) = self.receiver.doubt() else {
+        let Some(doubt) = self.receiver.unusable() else {
             return;
         };
         let due = doubt.is_lasting() || self.last_arrival.elapsed() > PATIENCE;

@@ -284,7 +284,7 @@ impl Receiver {
 
     /// Why nothing that came since the last sample can be used, as far as that is known.
     #[must_use]
-    pub fn doubt(&self) -> Option<Unusable> {
+    pub fn unusable(&self) -> Option<Unusable> {
         let silent = self.traffic.samples == self.before.samples;
         let guess = match self.speech {
             Speech::Unknown if self.rows == 0 && self.traffic.bytes > self.before.bytes => {
@@ -342,11 +342,11 @@ mod tests {
         let rows = "1,2\n".repeat(8) + &"1,nan\n".repeat(3);
         receiver.push(rows.as_bytes(), 0, |_| samples += 1);
         assert_eq!((samples, receiver.traffic.refused), (5, 3));
-        let words = receiver.doubt().and_then(Unusable::in_words).unwrap();
+        let words = receiver.unusable().and_then(Unusable::in_words).unwrap();
         assert!(words.contains("number 2 is none"), "{words}");
-        assert!(receiver.doubt().is_some_and(Unusable::is_lasting));
+        assert!(receiver.unusable().is_some_and(Unusable::is_lasting));
         receiver.push(b"1,2\n", 0, |_| samples += 1);
-        assert_eq!((samples, receiver.doubt()), (6, None));
+        assert_eq!((samples, receiver.unusable()), (6, None));
     }
 
     fn hello() -> Hello {
@@ -399,7 +399,10 @@ mod tests {
         assert!(receiver.speaks_lines());
         receiver.push(&data(1, 9), 0, |_| {});
         assert!(!receiver.speaks_lines());
-        assert_eq!(receiver.doubt(), Some(Unusable::Refused(Refusal::NoLayout)));
+        assert_eq!(
+            receiver.unusable(),
+            Some(Unusable::Refused(Refusal::NoLayout))
+        );
     }
 
     #[test]
@@ -415,7 +418,7 @@ mod tests {
         let doubt = |bytes: &[u8]| {
             let mut receiver = Receiver::default();
             receiver.push(bytes, 0, |_| {});
-            receiver.doubt()
+            receiver.unusable()
         };
         let refused = |doubt: Option<Unusable>| match doubt {
             Some(Unusable::Refused(why)) => why.in_words().unwrap(),
@@ -455,7 +458,7 @@ mod tests {
             (data(9, 12), None),
         ] {
             receiver.push(&bytes, 0, |_| {});
-            assert_eq!(receiver.doubt(), doubt);
+            assert_eq!(receiver.unusable(), doubt);
         }
         assert_eq!(doubt(b"1,2\n"), None);
         assert_eq!(doubt(b""), None);

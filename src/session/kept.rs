@@ -12,7 +12,7 @@ use crate::project::{Kept, KeptError, KeptFailure};
 #[must_use]
 pub fn chooser_title(selector: &str) -> &str {
     let kind = SelectorKind::ALL.into_iter().find(|k| k.name() == selector);
-    kind.map_or("By hand", SelectorKind::title)
+    kind.map_or(Chooser::Hand, Chooser::from).title()
 }
 
 impl Session {

@@ -15,7 +15,7 @@ use crate::evaluation::EstimatorKind;
 use crate::io::artifacts::{range, signal_to_noise, signal_unit};
 use crate::placement::SensorSet;
 use crate::placement::expected_error::ASSUMES;
-use crate::session::{NOBODY_REDUCES, Session, Task};
+use crate::session::{NOBODY_REDUCES, Session};
 
 /// One for each selector; told apart by colour-blind eyes too (Okabe and Ito).
 const COLOURS: [Color32; 5] = [
@@ -91,7 +91,7 @@ pub fn header(ask: &mut Ask<'_>, ui: &mut Ui) -> bool {
 /// Why there are no figures yet.
 fn nothing_judged(session: &Session) -> String {
     let mut running = session.jobs.running().iter();
-    if running.any(|job| matches!(job.task, Task::Design(_))) {
+    if session.drive.selects() && running.any(|job| job.task.is_of_pipeline()) {
         return "Gauges are being selected, then judged on unseen touches".into();
     }
     let press = "Press “Select gauges” to choose the sites and judge them on unseen touches";

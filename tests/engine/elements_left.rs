@@ -6,13 +6,13 @@ use hapdef::uncertainty::Gluing;
 
 /// What a gauge reads of a touch by finer elements less what it reads, that, and what it changes by a metre along and
 /// across.
-type Quantity = [f64; 4];
+type GaugeReading = [f64; 4];
 
 /// Noise that nothing is better than (strain).
 const NOISE: f64 = 1e-6;
 
 /// Readings of the chosen gauges, touch by touch.
-fn readings(inputs: &Inputs) -> Vec<Vec<Quantity>> {
+fn readings(inputs: &Inputs) -> Vec<Vec<GaugeReading>> {
     let budget = Quality::Draft.budget();
     let sensing = design::sensing(inputs, &budget, &unwatched).unwrap();
     let (finer, _) = (sensing.reference(inputs, &Gluing::EXACT, 0, &unwatched)).unwrap();
@@ -34,8 +34,8 @@ fn readings(inputs: &Inputs) -> Vec<Vec<Quantity>> {
 
 /// Mean square of what is off over its variance, and the mean logarithm of its density.
 fn judged(
-    readings: &[Vec<Quantity>],
-    variance: &dyn Fn(&[Quantity], &Quantity) -> f64,
+    readings: &[Vec<GaugeReading>],
+    variance: &dyn Fn(&[GaugeReading], &GaugeReading) -> f64,
 ) -> [f64; 2] {
     let (mut sums, mut count) = ([0.0; 2], 0.0);
     for touch in readings {
@@ -71,7 +71,7 @@ fn what_elements_leave_is_as_if_gauges_were_glued_off() {
     let as_said = judged(&readings, &|_, [_, own, along, across]| {
         said.variance(*own, *along, *across, 0.0)
     });
-    let best = |variance: &dyn Fn(&[Quantity], &Quantity) -> f64| {
+    let best = |variance: &dyn Fn(&[GaugeReading], &GaugeReading) -> f64| {
         let of = |k: i32| {
             let share = 1e-3 * 1.05_f64.powi(k);
             let [squares, density] =

@@ -258,20 +258,35 @@ fn gauges_put_by_hand_are_what_the_report_shows() {
         let set = Chooser::from(SelectorKind::PcaQr).set(sensors);
         design.evaluation.over_all(set).map(|r| r.error_mm)
     };
-    // One moved; and one more.
+    // One moved; one more; and one less, in the place of the selector's own set of as many.
     let free: Vec<usize> = (design.reduced.feasible.iter().copied())
         .filter(|s| !design.chosen().contains(s))
         .collect();
-    for extra in [0, 1] {
+    for count in [3, 4, 2] {
         let mut sites = design.chosen().to_vec();
         sites[1] = free[free.len() / 2];
-        sites.extend(&free[..extra]);
+        sites.extend(&free[..count.max(3) - 3]);
+        sites.truncate(count);
         let judged = design::judge_set(&inputs, &design, &sites, &unwatched).unwrap();
         let hand = design.with_hand(sites.clone(), &judged);
         assert_eq!(hand.chosen(), sites);
         assert_eq!(row(&hand, sites.len()), Some(judged.rows[0].error_mm));
-        assert_eq!(row(&hand, 2), row(&design, 2));
-        assert_eq!(hand.evaluation.sets.len(), design.evaluation.sets.len());
+        assert_eq!(row(&hand, 1), row(&design, 1));
+        let sizes: Vec<usize> = (hand.led().unwrap().sets.iter())
+            .map(|set| set.sites.len())
+            .collect();
+        assert!(
+            sizes.is_sorted() && sizes.last() == Some(&count),
+            "{sizes:?}"
+        );
+        let own = Chooser::from(SelectorKind::PcaQr);
+        let judged_sizes: Vec<usize> = (hand.evaluation.sets.iter())
+            .filter(|set| set.set.chooser == own)
+            .map(|set| set.set.sensors)
+            .collect();
+        assert_eq!(judged_sizes, sizes);
+        let of_regions = judged.rows.len();
+        assert_eq!(hand.evaluation.of(own.set(count)).count(), of_regions);
         let table = artifacts::sites_csv(&inputs, &hand);
         assert_eq!(table.lines().count(), 1 + sites.len());
         assert!(table.contains(&format!(",{},2,", sites[1])), "{table}");

@@ -235,6 +235,7 @@ fn tetrahedra_of_every_kind_bend_as_a_beam() {
             assert_eq!(volume.tetrahedra, of_first.tetrahedra);
             assert_eq!(volume.nodes, of_first.nodes);
             assert_eq!(volume.from_linear, is_linear);
+            assert_eq!(other.mesh.boundary_edges().count(), 0);
         }
         assert_eq!(first.mesh.boundary_edges().count(), 0);
         let (displacement, strain, notes) = answer(first, None);

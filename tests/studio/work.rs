@@ -139,7 +139,8 @@ fn count() {
     assert!(none_trained(number), "the number: {number:?}");
 
     // What gauges report: read from the elements that are there. Displacements are judged by regression, on the truth
-    // alone. What is read of them is solved for at most once a touch and once a site, on the model and on the truth.
+    // alone: a solve for each touch of both, and one below the cut for each axis of each gauge of the truth, as it is drawn
+    // and as each of eight workshops glues it.
     change(&mut w, |p| p.gauge.signal = Signal::Displacement);
     let signal = until_it_stands(&mut w);
     assert_eq!(signal.factorizations, 2, "the signal: {signal:?}");
@@ -147,8 +148,8 @@ fn count() {
         let result = w.session().results.design.as_ref().unwrap();
         let design = &result.value.design;
         let (dataset, truth) = (&design.simulated.dataset, &design.reference);
-        let model = dataset.touches.len() + dataset.sites.len();
-        (model + truth.touches.len() + truth.sites.len()) as u64
+        let gauges = 3 * (1 + 8) * truth.sites.len();
+        (dataset.touches.len() + truth.touches.len() + gauges) as u64
     };
     assert!(signal.solves <= most, "the signal: {signal:?}");
     assert!(signal.fits > 0, "the signal: {signal:?}");

@@ -1,7 +1,7 @@
 //! One press, from the tip out of the way to the tip out of the way.
 
 use super::super::machine::Pose;
-use super::super::press::Samples;
+use super::super::press::SampleMean;
 use super::{Collector, Doing, Ended, FAIL, FAILURES, FREE_N, News, Phase};
 
 impl Collector {
@@ -13,7 +13,7 @@ impl Collector {
         self.doing = Doing::Reading {
             from_us,
             until_us: from_us + self.limits.read_us,
-            reading: Samples::default(),
+            reading: SampleMean::default(),
             kept: what.is_some(),
         };
     }
@@ -113,7 +113,7 @@ impl Collector {
 
     pub(super) fn rested(
         &mut self,
-        reading: &Samples,
+        reading: &SampleMean,
         pose: &Pose,
         now_us: u64,
         out: &mut Vec<u8>,
@@ -151,7 +151,7 @@ impl Collector {
 
     pub(super) fn feel(
         &mut self,
-        reading: &Samples,
+        reading: &SampleMean,
         pose: &Pose,
         now_us: u64,
         out: &mut Vec<u8>,
@@ -191,7 +191,7 @@ impl Collector {
         self.read(Some(&format!("depth {depth:.4}")), now_us, tell);
     }
 
-    pub(super) fn deeper(&mut self, reading: &Samples, now_us: u64, out: &mut Vec<u8>) {
+    pub(super) fn deeper(&mut self, reading: &SampleMean, now_us: u64, out: &mut Vec<u8>) {
         /// Of a step, below which another says nothing more.
         const LEAST: f64 = 0.05;
         let force = self.machine.force(&reading.mean(), &self.rest);

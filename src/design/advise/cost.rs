@@ -6,7 +6,7 @@ use super::super::layout::simulation_gb;
 use super::super::{Inputs, SLOPE_TOUCHES};
 use crate::budget::Budget;
 use crate::elasticity::solid::ground::{Foreseen, SolidGround};
-use crate::elasticity::solid::sizing::CellSizing;
+use crate::elasticity::solid::sizing::PartMeasures;
 use crate::elasticity::system::bytes_in_work;
 use crate::plain::digits;
 use crate::project::PartModel;
@@ -89,13 +89,13 @@ pub struct Workload {
     wall: f64,
     radius: f64,
     /// Of the solid.
-    shape: CellSizing,
+    shape: PartMeasures,
 }
 
 impl Workload {
     /// Of a part whose walls have middles of this area (m²) and are bent to a radius (m).
     #[must_use]
-    pub fn new(inputs: &Inputs, area: f64, radius: f64, shape: CellSizing) -> Self {
+    pub fn new(inputs: &Inputs, area: f64, radius: f64, shape: PartMeasures) -> Self {
         let (project, budget) = (&inputs.project, inputs.project.budget.budget());
         let touches = project.touch.count.min(budget.touches);
         let spacing = project.sites.spacing();

@@ -19,7 +19,7 @@ use super::SolidModel;
 use super::immersed::{Fineness, Immersed};
 use super::orders;
 use super::simplex::HIGHEST;
-use super::sizing::{CellSizing, FINER};
+use super::sizing::{FINER, PartMeasures};
 use crate::budget::{Cancelled, Watch, report};
 use crate::elasticity::error::ElasticError;
 use crate::elasticity::grade::even_size;
@@ -235,11 +235,11 @@ impl SolidGround {
 
     /// What the size of its cells hangs on.
     #[must_use]
-    pub fn shape(&self) -> CellSizing {
+    pub fn measures(&self) -> PartMeasures {
         let (lower, upper) = self.whole.bounds();
         let mut sides = (upper - lower).to_array();
         sides.sort_by(f64::total_cmp);
-        CellSizing {
+        PartMeasures {
             area: self.whole.area(),
             volume: self.whole.volume_enclosed(),
             wall: self.wall(),
@@ -276,7 +276,7 @@ impl SolidGround {
     /// Size of cells (m) for about so many unknowns.
     #[must_use]
     pub fn size_for(&self, unknowns: f64) -> f64 {
-        self.shape().size_for(unknowns)
+        self.measures().size_for(unknowns)
     }
 
     /// A word on supports that have no area: no displacement of an elastic solid under them is finite.

@@ -27,7 +27,7 @@ const MOST_UNKNOWNS: f64 = 300_000.0;
 
 /// What the size of cells hangs on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CellSizing {
+pub struct PartMeasures {
     /// Of the surface (m²), and of what it encloses (m³).
     pub area: f64,
     /// Of what the surface encloses (m³).
@@ -38,7 +38,7 @@ pub struct CellSizing {
     pub across: f64,
 }
 
-impl CellSizing {
+impl PartMeasures {
     /// Of a wall (m) with two faces of an area (m²) together.
     #[must_use]
     pub fn of_wall(wall: f64, area: f64) -> Self {
@@ -107,13 +107,13 @@ mod tests {
 
     #[test]
     fn the_size_for_unknowns_has_so_many() {
-        let cube = CellSizing {
+        let cube = PartMeasures {
             area: 6.0 * 0.02 * 0.02,
             volume: 8e-6,
             wall: 0.02,
             across: 0.02,
         };
-        for shape in [cube, CellSizing::of_wall(1e-3, 0.06)] {
+        for shape in [cube, PartMeasures::of_wall(1e-3, 0.06)] {
             for unknowns in [1e2, 1e4, 1e6] {
                 let size = shape.size_for(unknowns);
                 assert!((shape.unknowns(size) / unknowns - 1.0).abs() < 1e-6);
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn the_first_cells_resolve_what_there_is() {
-        let cube = CellSizing {
+        let cube = PartMeasures {
             area: 6.0 * 0.02 * 0.02,
             volume: 8e-6,
             wall: 0.02,

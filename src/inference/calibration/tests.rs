@@ -158,7 +158,7 @@ fn presses_by_hand_never_make_it_worse() {
                 .map(|_| press(&real, &off.pressing, &mut rng))
                 .collect();
             let found = calibrate(&drawn, &known, &NOISE, &off);
-            let prior = doubt(&off.gluing);
+            let prior = gluing_covariance(&off.gluing);
             for doubts in &found.doubts {
                 for k in [0, 4, 7, 9] {
                     assert!((0.0..=1.000_001 * prior[k]).contains(&doubts[k]));
@@ -311,7 +311,7 @@ fn a_channel_that_was_not_read_learns_nothing() {
     let of = found.glued[1];
     let moved = (of.along_mm).hypot(of.across_mm).hypot(of.turned_degrees);
     assert!((of.gain - 1.0).abs() < 0.02 && moved < 0.02);
-    let prior = doubt(&off.gluing);
+    let prior = gluing_covariance(&off.gluing);
     assert!((found.doubts[1][0] / prior[0] - 1.0).abs() < 0.05);
     for c in (0..CHANNELS).filter(|c| *c != 1) {
         let doubt = found.doubts[c][0].sqrt();

@@ -37,6 +37,12 @@ pub struct Drive {
 }
 
 impl Drive {
+    /// Whether gauges are on their way: what is computed leads to a selection.
+    #[must_use]
+    pub fn selects(&self) -> bool {
+        self.goal == Some(Goal::Design)
+    }
+
     /// The step that the running design is at.
     #[must_use]
     pub fn step(&self) -> Option<Step> {

@@ -38,7 +38,7 @@ impl Look<'_> {
         let next = &mut self.foreseen;
         next.go_on(&taken);
         next.size = size;
-        next.boxes += self.ground.shape().area / self.ground.fineness(size).least.powi(2);
+        next.boxes += self.ground.measures().area / self.ground.fineness(size).least.powi(2);
         let left = self.ground.left(&self.grids, &self.touches, &self.places);
         let finer = size / self.grids.size();
         next.estimate = left.scaled(finer.powf(ORDER), finer.powf(STRAIN_ORDER));
@@ -50,7 +50,7 @@ impl Look<'_> {
         let [.., before, last] = &self.taken[..] else {
             return None;
         };
-        let shape = self.ground.shape();
+        let shape = self.ground.measures();
         let more = shape.unknowns(size) / shape.unknowns(self.foreseen.size);
         let taken = last.beyond(before, last.unknowns * more);
         // Of a pattern that does not fit into memory nothing is known.
@@ -99,7 +99,7 @@ impl SolidGround {
         if self.immersed.own().is_some() {
             return self.foresee_raised(touches, places, count, aim, watch);
         }
-        let shape = self.shape();
+        let shape = self.measures();
         let least = shape.least(aim, count);
         let touches = sample(touches);
         let (tip, away) = self.nearest(&touches);

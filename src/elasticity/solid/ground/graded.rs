@@ -10,7 +10,7 @@ use crate::elasticity::estimate::{self, Discretization, Sample};
 use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::solid::series::Series;
-use crate::elasticity::solid::sizing::{self, CellSizing, LEAST_GRIDS};
+use crate::elasticity::solid::sizing::{self, LEAST_GRIDS, PartMeasures};
 use crate::elasticity::solid::tip;
 
 /// Orders at which errors of displacements and of strains on the surface fall: of displacements between 2, where all
@@ -88,7 +88,7 @@ impl SolidGround {
         if self.immersed.own().is_some() {
             return self.raise(touches, places, aim, watch);
         }
-        let shape = self.shape();
+        let shape = self.measures();
         let least = shape.least(aim, touches.len());
         let touches = sample(touches);
         let places: Vec<DVec3> = subsample(places, PLACES);
@@ -175,7 +175,12 @@ impl SolidGround {
     /// Sizes of the cells (m), one after the other, that [`Self::grade`] would come to for a part and a tip (m), were
     /// the error as on other parts.
     #[must_use]
-    pub fn foreseen(shape: &CellSizing, tip: f64, aim: &ElementBudget, touches: usize) -> Vec<f64> {
+    pub fn foreseen(
+        shape: &PartMeasures,
+        tip: f64,
+        aim: &ElementBudget,
+        touches: usize,
+    ) -> Vec<f64> {
         let least = shape.least(aim, touches);
         let mut sizes = vec![shape.first(tip, f64::INFINITY, least)];
         while let Some(&size) = sizes.last()
