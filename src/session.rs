@@ -62,7 +62,7 @@ pub use state::drive::Drive;
 pub use state::expected::{ExpectedOf, Expecting};
 pub use state::fields::{FieldInputs, FieldKind, FieldValues};
 pub use state::learned::Learnt;
-pub use state::live::Live;
+pub use state::live::{KnownTouch, Live};
 pub use state::measure::{Distance, Ends};
 pub use state::results::{DesignMark, DesignResult, Results, SimulationResult};
 pub use state::study::{Column, OpenStudy, Study, UnitLimb};

@@ -22,6 +22,8 @@ pub struct Desk {
     pub compare: bool,
     /// That known touches are pressed with (N).
     pub known_force_n: f64,
+    /// Whether a click on the limb says where the next one is pressed.
+    pub known_by_click: bool,
     /// Of the test-bed.
     pub bench: BenchDesk,
 }
@@ -36,6 +38,7 @@ impl Default for Desk {
             estimator: ShownEstimator::default(),
             compare: false,
             known_force_n: 10.0,
+            known_by_click: false,
             bench: BenchDesk::default(),
         }
     }

@@ -46,6 +46,8 @@ pub enum Task {
     Board,
     Train,
     Calibrate,
+    /// Whether known touches fit each other.
+    CheckKnown,
     Table,
     /// Of the test-bed: a plan, and going through it.
     PlanPresses,
@@ -85,6 +87,7 @@ impl Task {
             Self::Board => "Make a simulated board".into(),
             Self::Train => "Train the estimators".into(),
             Self::Calibrate => "Calibrate".into(),
+            Self::CheckKnown => "Check the known touches".into(),
             Self::Table => "Write the table".into(),
             Self::PlanPresses => "Plan the presses".into(),
             Self::Press => "Press the limb".into(),
@@ -121,6 +124,7 @@ impl Task {
                 | Self::Advise
                 | Self::Expect
                 | Self::Confuse
+                | Self::CheckKnown
                 | Self::Field
                 | Self::UnitLimb
                 | Self::Measure

@@ -258,6 +258,7 @@ mod tests {
     use crate::link::BAUD;
     use crate::session::Wake;
     use crate::session::slot::Slot;
+    use crate::session::state::live::KnownTouch;
 
     fn session() -> Session {
         let document = Document::new(opening::bundled().unwrap(), None);
@@ -280,10 +281,14 @@ mod tests {
         s.live.recorded = Some("old-part.hapdrec".into());
         s.complain("stays to be read");
         s.tell("the old part is done");
-        let pressed = KnownPress {
-            at: s.document.inputs().part.vertex_point(0),
-            force: 5.0,
-            reading: vec![1e-4; 10],
+        let pressed = KnownTouch {
+            press: KnownPress {
+                at: s.document.inputs().part.vertex_point(0),
+                force: 5.0,
+                reading: vec![1e-4; 10],
+            },
+            used: true,
+            misfit: None,
         };
         s.live.known.push(Slot {
             inputs: s.document.sensing_inputs(),

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use glam::DVec3;
+
 use super::commands::UiCommand;
 use super::nudge::next_site;
 use super::view::{Picture, View, Way};
@@ -137,6 +139,10 @@ pub enum BoardAction {
     /// Goes by the project's model again.
     CloseEstimator,
     TakeKnown,
+    /// Where the next known touch is pressed (m).
+    AskKnownAt(DVec3),
+    UseKnown(usize, bool),
+    DeleteKnown(usize),
     Calibrate,
     CalibrateFromBoard,
     StopTakingKnown,
@@ -320,6 +326,9 @@ impl BoardAction {
             Self::Disconnect => session.disconnect(),
             Self::CloseEstimator => session.close_estimator(),
             Self::TakeKnown => session.take_known(),
+            Self::AskKnownAt(at) => session.ask_known_at(at),
+            Self::UseKnown(number, used) => session.use_known(number, used),
+            Self::DeleteKnown(number) => session.delete_known(number),
             Self::StopTakingKnown => session.stop_taking_known(),
             Self::Calibrate => session.start_calibration(),
             Self::CalibrateFromBoard => session.calibrate_from_board(),

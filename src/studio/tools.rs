@@ -4,11 +4,11 @@ use egui::{PointerButton, Pos2, Response, Ui};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::action::{Compute, HandAction, History};
+use super::action::{BoardAction, Compute, HandAction, History};
 use super::ask::Ask;
 use super::paint::exaggeration;
 use super::scene::{Scene, pick_on};
-use super::view::{Field, Gesture, Pane, Tool, View};
+use super::view::{Field, Gesture, Pane, Stage, Tool, View};
 use crate::document::Brush;
 use crate::mesh::{SurfacePoint, TriMesh};
 use crate::project::ChosenSite;
@@ -155,10 +155,20 @@ fn press(scene: &Scene, ask: &mut Ask<'_>, pane: Pane, at: Option<Pos2>) {
     let Some(place) = at.and_then(|at| pick_shown(scene, ask, pane, at)) else {
         return ask.act(Compute::LetGo);
     };
+    if clicks_known_touches(ask) {
+        let at = ask.session.document.inputs().part.point(place);
+        return ask.act(BoardAction::AskKnownAt(at));
+    }
     ask.act(Compute::Press(place));
     if !matches!(ask.view.field, Field::Strain | Field::Displacement) {
         ask.view.field = Field::Strain;
     }
+}
+
+/// Whether a click on the limb says where the next known touch is pressed.
+fn clicks_known_touches(ask: &Ask<'_>) -> bool {
+    let session = ask.session;
+    ask.view.stage == Stage::Live && session.live.is_connected() && session.desk.known_by_click
 }
 
 /// The point of the limb under a place of the window, on the shape that is shown there.

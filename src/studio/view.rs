@@ -30,6 +30,8 @@ pub struct View {
     pub shown_kept: BTreeSet<String>,
     /// The confusion that was clicked.
     pub looked_at: Option<usize>,
+    /// The known touch that the pointer is on, by its number.
+    pub known_hover: Option<usize>,
     pub camera: Camera,
     pub tool: Tool,
     pub layer: Layer,
@@ -70,6 +72,7 @@ impl View {
             picked: Vec::new(),
             shown_kept: BTreeSet::new(),
             looked_at: None,
+            known_hover: None,
             camera: Camera::framing(lower, upper, axis.stance(&document.part)),
             tool: Tool::Touch,
             layer: Layer::Feasible,

@@ -98,6 +98,7 @@ fn a_simulated_board_from_start_to_replay() {
     }
 
     compare(&mut w);
+    known(&mut w);
     unplug(&mut w);
     let seen = record(&mut w, &folder.path().join("touches.hapdrec"));
     replay(&mut w, &folder.path().join("touches.hapdrec"), &seen);
@@ -122,6 +123,57 @@ fn compare(w: &mut Window) {
     w.assert_named("live");
     w.harness.get_by_label("Compare all").click();
     w.harness.run_ok();
+}
+
+/// Known touches are checked beside each other, left out, taken in again and deleted; a click on the limb says where the
+/// next one is pressed.
+fn known(w: &mut Window) {
+    let counts = |w: &Window| (w.session().known_touches(), w.session().known_used());
+    let of_list = |w: &Window, number: usize| {
+        let mut list = w.session().known_list();
+        list.find(|(n, _)| *n == number).unwrap().1.clone()
+    };
+    let (count, used) = counts(w);
+    assert!(count >= 12 && used == count);
+    w.wait("a look at all", 90, |s| {
+        s.session
+            .known_list()
+            .all(|(_, touch)| touch.misfit.is_some())
+    });
+    let mut misfits: Vec<f64> = (w.session().known_list())
+        .map(|(_, touch)| touch.misfit.unwrap())
+        .collect();
+    misfits.sort_by(f64::total_cmp);
+    assert!(misfits[count / 2] < 4.0, "{misfits:?}");
+    if let Some(path) = std::env::var_os("HAPDEF_PICTURES") {
+        let path = Path::new(&path).join("live-known.png");
+        w.picture().save(path).unwrap();
+    }
+
+    let click = |w: &mut Window, name: &str| {
+        w.harness.get_by_label(name).click_accesskit();
+        w.harness.run_ok();
+    };
+    click(w, "Known touch 2");
+    assert_eq!(counts(w), (count, count - 1));
+    assert!(!of_list(w, 1).used);
+    w.harness.get_by_label_contains("1 left out");
+    click(w, "Known touch 2");
+    assert_eq!(counts(w), (count, count));
+    let second = of_list(w, 1);
+    click(w, "Delete known touch 1");
+    assert_eq!(counts(w), (count - 1, count - 1));
+    assert_eq!(of_list(w, 0).press.at, second.press.at);
+
+    let proposed = w.session().proposed_touch().unwrap();
+    click(w, "Click on the limb says where");
+    w.click(w.place(31.83, 0.0, 60.0));
+    w.harness.run_ok();
+    let asked = w.session().proposed_touch().unwrap();
+    assert!(
+        asked.distance(proposed) > 1e-3 && asked.distance(DVec3::new(31.83e-3, 0.0, 60e-3)) < 2e-3
+    );
+    click(w, "Click on the limb says where");
 }
 
 /// Noticed, and found again once it is plugged in.

@@ -6,11 +6,13 @@ use glam::DVec3;
 
 use super::gathering::{Awaited, Gathered};
 use crate::design::Sensing;
+use crate::inference::calibration::judged::misfits;
 use crate::inference::{Calibration, KnownPress, calibrate};
 use crate::job::Reporter;
 use crate::session::jobs::Task;
 use crate::session::slot::{Slot, current};
 use crate::session::state::Session;
+use crate::session::state::live::KnownTouch;
 use crate::uncertainty::{Pressing, Uncertainty};
 
 /// How many are proposed, and how many a calibration takes at least.
@@ -18,12 +20,21 @@ pub const WANTED: usize = crate::design::PROPOSED;
 pub const LEAST: usize = 4;
 
 impl Session {
-    /// Where the next known touch is proposed (m).
+    /// Where the next known touch is to be pressed (m): where somebody wants to, or as it is proposed.
     #[must_use]
     pub fn proposed_touch(&self) -> Option<DVec3> {
-        let places = &self.sensing()?.proposed;
+        let sensing = self.sensing()?;
+        if self.live.known_at.is_some() {
+            return self.live.known_at;
+        }
+        let places = &sensing.proposed;
         let touch = places.get(self.known_touches() % places.len().max(1))?;
         Some(touch.position)
+    }
+
+    /// Has the next known touch pressed at a place of the part (m).
+    pub fn ask_known_at(&mut self, at: DVec3) {
+        self.live.known_at = Some(at);
     }
 
     /// Reads the press that is on as one at the proposed place.
@@ -39,6 +50,7 @@ impl Session {
     /// Takes the next touches of a simulated board as known ones, and calibrates with them.
     pub fn calibrate_from_board(&mut self) {
         self.live.known.clear();
+        self.live.known_version += 1;
         // One that was read meanwhile is not of these.
         drop(self.live.gathered());
         self.live.exact = true;
@@ -53,14 +65,43 @@ impl Session {
     /// How many known touches there are of these gauges.
     #[must_use]
     pub fn known_touches(&self) -> usize {
-        self.known_presses().count()
+        self.known_list().count()
     }
 
-    /// Those that these gauges have read.
-    fn known_presses(&self) -> impl Iterator<Item = &KnownPress> {
+    /// Those that these gauges have read, each with the number by which it is left out or deleted.
+    pub fn known_list(&self) -> impl Iterator<Item = (usize, &KnownTouch)> {
         let inputs = self.document.sensing_inputs();
-        let all = self.live.known.iter();
-        all.filter_map(move |slot| current(Some(slot), &inputs))
+        let all = self.live.known.iter().enumerate();
+        all.filter_map(move |(number, slot)| Some((number, current(Some(slot), &inputs)?)))
+    }
+
+    /// Where a known touch was asked for (m); nothing where the gauges are others now.
+    #[must_use]
+    pub fn known_place(&self, touch: &KnownTouch) -> Option<DVec3> {
+        Some(self.sensing()?.drawn.map.mesh.point(touch.press.at))
+    }
+
+    /// How many of them calibrate.
+    #[must_use]
+    pub fn known_used(&self) -> usize {
+        self.known_list().filter(|(_, touch)| touch.used).count()
+    }
+
+    /// Leaves a known touch out, or takes it in again.
+    pub fn use_known(&mut self, number: usize, used: bool) {
+        if let Some(slot) = self.live.known.get_mut(number) {
+            slot.value.used = used;
+            self.live.known_version += 1;
+        }
+    }
+
+    /// Deletes a known touch. It was read from a board, and no undo presses it again: that is said.
+    pub fn delete_known(&mut self, number: usize) {
+        if number < self.live.known.len() {
+            self.live.known.remove(number);
+            self.live.known_version += 1;
+            self.tell("A known touch was deleted; it can only be pressed again. To keep one without using it, leave it out");
+        }
     }
 
     /// Takes in what was read meanwhile.
@@ -76,6 +117,66 @@ impl Session {
             self.stop_taking_known();
             self.start_calibration();
         }
+        self.check_known(&sensing);
+    }
+
+    /// Looks whether known touches fit each other: each beside all others that are used.
+    fn check_known(&mut self, sensing: &Arc<Sensing>) {
+        let version = self.live.known_version;
+        let noise = self.live.look(|f| f.noise.clone()).unwrap_or_default();
+        let ready = noise.len() == sensing.gauges.len() && self.known_used() >= LEAST;
+        if !ready
+            || self.live.known_checked == version
+            || !self.jobs.is_new(Task::CheckKnown, &version)
+        {
+            return;
+        }
+        let all: Vec<(usize, KnownTouch)> = (self.known_list())
+            .map(|(number, touch)| (number, touch.clone()))
+            .collect();
+        let (sensing, off) = (Arc::clone(sensing), self.known_off(sensing));
+        let work = move |_: &Reporter| {
+            let used = all.iter().filter(|(_, touch)| touch.used);
+            let used: Vec<KnownPress> = used.map(|(_, touch)| touch.press.clone()).collect();
+            let mut of_used = misfits(&sensing.drawn, &used, &noise, &off).into_iter();
+            let of_left_out = |touch: &KnownTouch| {
+                let beside = [&used[..], std::slice::from_ref(&touch.press)].concat();
+                misfits(&sensing.drawn, &beside, &noise, &off).pop()
+            };
+            let found = all.iter().map(|(number, touch)| {
+                let own = if touch.used {
+                    of_used.next()
+                } else {
+                    of_left_out(touch)
+                };
+                (*number, own)
+            });
+            Ok(found.collect::<Vec<_>>())
+        };
+        self.jobs
+            .start(Task::CheckKnown, version, work, |s, version, found| {
+                if s.live.known_version != version {
+                    return;
+                }
+                s.live.known_checked = version;
+                for (number, misfit) in found {
+                    if let Some(slot) = s.live.known.get_mut(number) {
+                        slot.value.misfit = misfit;
+                    }
+                }
+            });
+    }
+
+    /// What is known to be off of known touches.
+    fn known_off(&self, sensing: &Sensing) -> Uncertainty {
+        let mut off = Uncertainty {
+            elements: sensing.off.elements,
+            ..self.document.state.project.uncertainty()
+        };
+        if self.live.exact {
+            off.pressing = Pressing::EXACT;
+        }
+        off
     }
 
     fn keep_known(&mut self, sensing: &Sensing, gathered: &Gathered) {
@@ -84,13 +185,20 @@ impl Session {
         let trusted = |c: usize| used.get(c).copied().unwrap_or(true);
         let read = |c: usize| gathered.strain.get(c).copied().filter(|_| trusted(c));
         let reading = (0..sensing.gauges.len()).map(|c| read(c).unwrap_or(f64::NAN));
-        let value = KnownPress {
+        let press = KnownPress {
             at: sensing.drawn.map.mesh.index().nearest(gathered.at).0,
             force: gathered.force,
             reading: reading.collect(),
         };
         let inputs = self.document.sensing_inputs();
+        let value = KnownTouch {
+            press,
+            used: true,
+            misfit: None,
+        };
         self.live.known.push(Slot { inputs, value });
+        self.live.known_version += 1;
+        self.live.known_at = None;
     }
 
     /// Fits how the gauges are glued.
@@ -98,20 +206,15 @@ impl Session {
         let Some(sensing) = self.sensing().map(Arc::clone) else {
             return;
         };
-        let known: Vec<KnownPress> = self.known_presses().cloned().collect();
+        let used = self.known_list().filter(|(_, touch)| touch.used);
+        let known: Vec<KnownPress> = used.map(|(_, touch)| touch.press.clone()).collect();
         let noise = self.live.look(|f| f.noise.clone()).unwrap_or_default();
         if known.len() < LEAST || noise.len() != sensing.gauges.len() {
             return self.complain(format!(
                 "A calibration takes at least {LEAST} known touches"
             ));
         }
-        let mut off = Uncertainty {
-            elements: sensing.off.elements,
-            ..self.document.state.project.uncertainty()
-        };
-        if self.live.exact {
-            off.pressing = Pressing::EXACT;
-        }
+        let off = self.known_off(&sensing);
         let work = move |_: &Reporter| Ok(calibrate(&sensing.drawn, &known, &noise, &off));
         self.start_sensing(Task::Calibrate, work, |s, _, found| {
             s.take_calibration(&found);

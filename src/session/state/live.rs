@@ -24,6 +24,18 @@ pub(in crate::session) enum Target {
     Simulated,
 }
 
+/// A known touch, as it was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownTouch {
+    /// Where it was asked for, how hard, and what the gauges read.
+    pub press: KnownPress,
+    /// Whether the gauges are calibrated with it.
+    pub used: bool,
+    /// How far off it is from what all others foresee: weighted squares a channel, about one where it fits. Absent until that
+    /// was looked at.
+    pub misfit: Option<f64>,
+}
+
 /// Trained estimators, and the gauges that they were trained for.
 pub(in crate::session) type TrainedFor = (Vec<bool>, Pair);
 
@@ -37,8 +49,14 @@ pub struct Live {
     pub(in crate::session) hosted: Option<Hosted>,
     pub(in crate::session) feed: Shared,
     pub(in crate::session) target: Option<Target>,
-    /// Known presses, with the gauges that read them: of others they say nothing.
-    pub(in crate::session) known: Vec<Slot<SensingInputs, KnownPress>>,
+    /// Known touches, with the gauges that read them: of others they say nothing.
+    pub(in crate::session) known: Vec<Slot<SensingInputs, KnownTouch>>,
+    /// Counts what is done to these.
+    pub(in crate::session) known_version: u64,
+    /// For which of these versions it was looked at whether they fit each other.
+    pub(in crate::session) known_checked: u64,
+    /// Where somebody wants to press next (m), in place of what is proposed.
+    pub(in crate::session) known_at: Option<DVec3>,
     /// Whether all of them were read off a board that tells where it is pressed, and how hard.
     pub(in crate::session) exact: bool,
     pub(in crate::session) trained: Option<Slot<SensingInputs, TrainedFor>>,

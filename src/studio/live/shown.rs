@@ -31,6 +31,7 @@ fn colour(estimator: ShownEstimator) -> Color32 {
 
 /// What is heard of a touch, over the limb.
 pub fn paint_live(look: Look<'_>, painter: &Painter, pane: Pane) {
+    paint_known(look, painter, pane);
     paint_proposed(look, painter, pane);
     look.session
         .live
@@ -204,6 +205,36 @@ fn paint_trail(look: Look<'_>, painter: &Painter, pane: Pane, feed: &Feed) {
             painter.line_segment(
                 [from, to],
                 Stroke::new(3.0, colour(e).gamma_multiply(0.6 * fade)),
+            );
+        }
+    }
+}
+
+/// Where known touches were pressed: crosses with their numbers, thin where they are left out.
+fn paint_known(look: Look<'_>, painter: &Painter, pane: Pane) {
+    if look.view.stage != Stage::Live || !look.session.live.is_connected() {
+        return;
+    }
+    for (shown, (number, touch)) in (1..).zip(look.session.known_list()) {
+        let place = look.session.known_place(touch);
+        let Some(at) = place.and_then(|place| look.place_in(pane, place)) else {
+            continue;
+        };
+        let is_looked_at = look.view.known_hover == Some(number);
+        let reach = if is_looked_at { 8.0 } else { 4.0 };
+        let width = if touch.used { 2.0 } else { 0.8 };
+        for d in [vec2(reach, reach), vec2(reach, -reach)] {
+            painter.line_segment([at - d, at + d], Stroke::new(width + 2.0, Color32::BLACK));
+            painter.line_segment([at - d, at + d], Stroke::new(width, Color32::WHITE));
+        }
+        if is_looked_at {
+            let words = format!("known touch {shown}");
+            label(
+                painter,
+                at + vec2(14.0, 0.0),
+                Align2::LEFT_CENTER,
+                &words,
+                Color32::WHITE,
             );
         }
     }
