@@ -23,7 +23,7 @@ use hapdef::inference::{
     Deviations, Errors, Features, KnownPress, Lessons, Matching, ResponseMap, Trained, calibrate,
     cramer_rao,
 };
-use hapdef::link::{Address, BAUD, Doorway, Listener, Pace, SessionEvent, State, host};
+use hapdef::link::{Address, BAUD, Doorway, Hosted, Listener, Pace, SessionEvent, State, host};
 use hapdef::live::{Input, Pipeline, Receiver};
 use hapdef::regression::Hyper;
 use hapdef::uncertainty::{Gluing, Making, Pressing, Uncertainty};
@@ -407,18 +407,10 @@ impl Lab {
         );
     }
 
-    /// How long after its byte a touch is known, twelve channels at 4 kHz, by the clock: with nothing else on the machine.
-    fn fast(&mut self, text: &mut String) {
-        const RATE_HZ: u16 = 4000;
-        const CHANNELS: usize = 12;
-        /// Until when it is watched (s of the board's time).
-        const UNTIL: f64 = 25.0;
+    /// A board at a port of its own, glued by a workshop and touched at random by 2 to 15 N.
+    fn touched_board(&self, options: Options, faults: Faults) -> Hosted {
         let places = board::places(&self.inputs, &self.sensing, SEED).expect("places");
         let script = Script::random(places, Drawn::usual([2.0, 15.0], Making::EXACT), 1);
-        let options = Options {
-            rate_hz: RATE_HZ,
-            ..board::options(&self.inputs, CHANNELS)
-        };
         let made = board::simulated(
             &self.inputs,
             &self.sensing,
@@ -426,11 +418,26 @@ impl Lab {
             script,
             Some(15.0),
             options,
-            Faults::default(),
+            faults,
             &unwatched,
         );
         let door = doorway().open().expect("a port");
-        let hosted = host(made.expect("the board"), door, |_| {}).expect("a thread");
+        host(made.expect("the board"), door, |_| {}).expect("a thread")
+    }
+
+    /// How long after its byte a touch is known, twelve channels at 4 kHz, by the clock: with nothing else on the machine.
+    fn fast(&mut self, text: &mut String) {
+        const RATE_HZ: u16 = 4000;
+        const CHANNELS: usize = 12;
+        /// Until when it is watched (s of the board's time).
+        const UNTIL: f64 = 25.0;
+        let hosted = self.touched_board(
+            Options {
+                rate_hz: RATE_HZ,
+                ..board::options(&self.inputs, CHANNELS)
+            },
+            Faults::default(),
+        );
         let live = &self.inputs.project.live;
         let settings = live.settings(self.sensing.gauges.len());
         let pipeline = Pipeline::new(self.sensing.map_for(live), settings);
@@ -463,28 +470,11 @@ impl Lab {
 
     /// A board that is unplugged three times, and how soon that is noticed and mended.
     fn unplug(&mut self, text: &mut String) {
-        let places = board::places(&self.inputs, &self.sensing, SEED).expect("places");
-        let script = Script::random(places, Drawn::usual([2.0, 15.0], Making::EXACT), 1);
         let mut faults = Faults::default();
         let plugs = [(4.0, 5.0), (8.0, 8.5), (12.0, 14.0)];
         faults.unplugged = plugs.to_vec();
         let options = board::options(&self.inputs, self.sensing.gauges.len());
-        let made = board::simulated(
-            &self.inputs,
-            &self.sensing,
-            Workshop::All,
-            script,
-            Some(15.0),
-            options,
-            faults,
-            &unwatched,
-        );
-        let hosted = host(
-            made.expect("the board"),
-            doorway().open().expect("a port"),
-            |_| {},
-        )
-        .expect("a thread");
+        let hosted = self.touched_board(options, faults);
         let gauges = self.sensing.gauges.len();
         let live = &self.inputs.project.live;
         let pipeline = Pipeline::new(self.sensing.map_for(live), live.settings(gauges));

@@ -19,7 +19,7 @@ use super::spared::Spared;
 use super::{listen, out};
 use crate::design::{Sensing, check_reach};
 use crate::elasticity::Touch;
-use crate::inference::calibration::judged::{Outlook, misfits, outlook};
+use crate::inference::calibration::judged::{MISFIT, Outlook, misfits, outlook};
 use crate::inference::calibration::part::of_part;
 use crate::inference::{Calibration, KnownPress, calibrate};
 use crate::io::points::{AskedPoint, read_points};
@@ -35,8 +35,6 @@ use summary::{FoundOfPart, Row, Summary};
 
 /// A calibration needs as many presses at least.
 const LEAST: usize = 4;
-/// Weighted squares a channel beyond which a press does not fit the others.
-const MISFIT: f64 = 4.0;
 
 #[derive(Args, Debug, Clone)]
 pub struct CalibrateArgs {

@@ -14,6 +14,9 @@ const MOST: usize = 12;
 /// A press more is worth it where it takes this share off what is not known.
 const WORTH: f64 = 0.05;
 
+/// Weighted squares a channel beyond which a press does not fit the others: it was made otherwise than it says.
+pub const MISFIT: f64 = 4.0;
+
 /// How far off each press is from what all others foresee: weighted squares over the channels that read it, about one where
 /// it fits. With fewer than two presses nothing is foreseen.
 #[must_use]

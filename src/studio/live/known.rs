@@ -6,6 +6,7 @@ use super::super::action::BoardAction;
 use super::super::ask::Ask;
 use super::super::form::{number, quantity, rows};
 use super::super::theme;
+use crate::inference::calibration::judged::MISFIT;
 use crate::project::CalibrationKeys;
 use crate::session::{Awaited, KnownTouch, LEAST_KNOWN, WANTED_KNOWN};
 
@@ -79,9 +80,6 @@ const KNOWN_COLUMNS: [(&str, &str); 4] = [
     ("", ""),
 ];
 
-/// A misfit above this is of a press that was made otherwise than it was asked for.
-const FITS: f64 = 4.0;
-
 fn known_row(ask: &mut Ask<'_>, ui: &mut Ui, shown: usize, (number, touch): (usize, &KnownTouch)) {
     let mut used = touch.used;
     let name = format!("Known touch {shown}");
@@ -92,7 +90,7 @@ fn known_row(ask: &mut Ask<'_>, ui: &mut Ui, shown: usize, (number, touch): (usi
     }
     let force = ui.label(format!("{:.1} N", touch.press.force));
     let misfit = touch.misfit.map_or("…".to_owned(), |m| format!("{m:.1}"));
-    let far = touch.misfit.is_some_and(|m| m > FITS);
+    let far = touch.misfit.is_some_and(|m| m > MISFIT);
     let misfit = if far {
         RichText::new(misfit).color(theme::STALE)
     } else {
