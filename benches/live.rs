@@ -30,6 +30,7 @@ use hapdef::uncertainty::{Gluing, Making, Pressing, Uncertainty};
 use hapdef::wire::{Hello, Message, VERSION, encode};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 use timing::{cpu_seconds, reference_seconds};
 
 const FILE: &str = "benches/live.md";
@@ -87,8 +88,7 @@ fn main() {
 }
 
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
+    rng.sample(StandardNormal)
 }
 
 /// The model, touches nobody has trained on, and what was trained.

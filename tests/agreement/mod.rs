@@ -13,6 +13,7 @@ use hapdef::project::ChosenSite;
 use hapdef::regression::folds::evenly;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 
 pub const FORCES_N: [f64; 3] = [3.0, 10.0, 25.0];
 
@@ -20,10 +21,9 @@ fn budget() -> Budget {
     Quality::Draft.budget()
 }
 
-/// Standard normal, by Box and Muller.
+/// Standard normal.
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
+    rng.sample(StandardNormal)
 }
 
 /// A set of gauges, as sites of the dataset.

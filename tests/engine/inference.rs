@@ -18,6 +18,7 @@ use hapdef::uncertainty::{Pressing, Uncertainty};
 use hapdef::wire::{Message, encode};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 
 const NOISE: f64 = 1e-6;
 
@@ -37,8 +38,7 @@ pub fn lab() -> &'static Lab {
 }
 
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
+    rng.sample(StandardNormal)
 }
 
 /// Touches away from the held ends.
