@@ -222,15 +222,25 @@ fn trade(text: &mut String) {
     let many =
         dataset::distribute_touches(&inputs.part, 1000, 98, 2.4e-3, false, (force, tip), None);
     let draft = design::simulate(&inputs, &Quality::Draft.budget(), &unwatched).expect("simulates");
-    let places: Vec<DVec3> = draft.dataset.sites.iter().map(|s| s.position).collect();
+    let places: Vec<DVec3> = draft
+        .dataset
+        .sites
+        .iter()
+        .map(|s| s.gauge.position)
+        .collect();
     let chosen: Vec<_> = sample::random(&inputs.part, 300, 97, |_| true)
         .iter()
         .map(|&at| {
             let p = inputs.part.point(at);
-            let near = |a: &&dataset::Site, b: &&dataset::Site| {
-                a.position.distance(p).total_cmp(&b.position.distance(p))
-            };
-            *draft.dataset.sites.iter().min_by(near).expect("sites")
+            let far = |s: &&dataset::Site| s.gauge.position.distance(p);
+            let near = |a: &&dataset::Site, b: &&dataset::Site| far(a).total_cmp(&far(b));
+            draft
+                .dataset
+                .sites
+                .iter()
+                .min_by(near)
+                .expect("sites")
+                .gauge
         })
         .collect();
     let read = |model: &ShellModel, touches: &[Touch]| {

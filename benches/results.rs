@@ -214,7 +214,7 @@ fn solve(
     let feasible = design::filter(inputs, &reference).sites();
     let sites: Vec<_> = feasible
         .iter()
-        .map(|&s| reference.dataset.sites[s])
+        .map(|&s| reference.dataset.sites[s].gauge)
         .collect();
     let (x, _) = dataset::measure(&model, touches, &sites, Signal::Strain, &unwatched)
         .expect("nobody cancels");

@@ -41,7 +41,7 @@ mod tests {
 
     #[test]
     fn touches_are_off_by_as_much_as_is_said() {
-        const COUNT: usize = 4000;
+        const COUNT: usize = 16_000;
         let touch = Touch {
             position: DVec3::ZERO,
             normal: DVec3::Z,

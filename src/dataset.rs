@@ -17,6 +17,7 @@ use crate::budget::{Cancelled, Watch, Work};
 use crate::elasticity::observe::{Face, along};
 use crate::elasticity::respond::{Quantity, respond};
 use crate::elasticity::{Model, Push, Touch};
+use crate::gauge::Gauge;
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 use crate::uncertainty::Making;
 
@@ -354,12 +355,13 @@ pub fn simulate(
     let (mut slopes, mut otherwise) = (None, None);
     if signal == Signal::Strain && !slope_touches.is_empty() {
         let turned = by_angle.into_iter().flatten().collect();
+        let gauges: Vec<Gauge> = sites.iter().map(|s| s.gauge).collect();
         let (found, solves) =
-            GluingSlopes::of(model, &sites, &touches, slope_touches, turned, watch)?;
+            GluingSlopes::of(model, &gauges, &touches, slope_touches, turned, watch)?;
         work.solves += solves as u64;
         slopes = Some(found);
         let (found, solves) =
-            MakingSlopes::of(model, &sites, &touches, slope_touches, making, watch)?;
+            MakingSlopes::of(model, &gauges, &touches, slope_touches, making, watch)?;
         work.solves += solves as u64;
         otherwise = Some(found);
     }
@@ -374,7 +376,7 @@ pub fn simulate(
     })
 }
 
-/// Reads the signal of given sites, with their directions as they are, under given touches: what a
+/// Reads the signal of given gauges under given touches: what a
 /// finer model says of a design made on a coarser one. Also how many right-hand sides that took.
 ///
 /// # Errors
@@ -382,17 +384,17 @@ pub fn simulate(
 pub fn measure(
     model: &dyn Model,
     touches: &[impl Copy + Sync + Into<Push>],
-    sites: &[Site],
+    gauges: &[Gauge],
     signal: Signal,
     watch: Watch,
 ) -> Result<(SignalMatrix, usize), Cancelled> {
-    let (observer, angles) = gauges_on(model, sites);
+    let (observer, angles) = gauges_on(model, gauges);
     let reading = match signal {
         Signal::Strain => Quantity::Gauge(&angles),
         Signal::Displacement | Signal::NormalDisplacement => Quantity::Displacement,
     };
     let responses = respond(model, touches, &observer, reading, watch)?;
-    let mut values = vec![0.0; sites.len() * touches.len()];
+    let mut values = vec![0.0; gauges.len() * touches.len()];
     let mut rows = vec![vec![0.0; touches.len()]; 3];
     for (i, into) in values.chunks_exact_mut(touches.len()).enumerate() {
         if signal == Signal::Strain {

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::bounds::Bounds;
 use crate::dataset::Site;
+use crate::gauge::Gauge;
 use crate::mesh::{SurfacePoint, TriMesh, geodesic, sample};
 use crate::statistics::median;
 
@@ -199,7 +200,7 @@ pub fn feasible_beside(
     sites: &[DVec3],
 ) -> Feasibility {
     let off_centre = (input.sites.iter())
-        .map(|gauge| off_centre_of(sites, gauge.position, rules.edge_neighbours))
+        .map(|site| off_centre_of(sites, site.gauge.position, rules.edge_neighbours))
         .collect();
     let filters = Filters {
         clearance: Cow::Borrowed(clearance),
@@ -344,7 +345,7 @@ impl<'a> Filters<'a> {
 
     fn footprint(&self, i: usize) -> Footprint {
         let input = self.input;
-        footprint(input.mesh, &input.sites[i], self.rules)
+        footprint(input.mesh, &input.sites[i].gauge, self.rules)
     }
 }
 
@@ -352,7 +353,7 @@ impl<'a> Filters<'a> {
 /// an edge it lies to one side.
 fn off_centre(sites: &[Site], neighbours: usize) -> Vec<f64> {
     let k = neighbours.min(sites.len().saturating_sub(1));
-    let positions: Vec<DVec3> = sites.iter().map(|s| s.position).collect();
+    let positions: Vec<DVec3> = sites.iter().map(|s| s.gauge.position).collect();
     if k == 0 {
         return vec![0.0; sites.len()];
     }
@@ -434,10 +435,9 @@ struct Footprint {
 }
 
 /// Lays the gauge's grid into the tangent plane and looks for the surface under it.
-fn footprint(mesh: &TriMesh, site: &Site, rules: &FeasibleRules) -> Footprint {
+fn footprint(mesh: &TriMesh, gauge: &Gauge, rules: &FeasibleRules) -> Footprint {
     /// Overhang allowed, as a share of the grid's width.
     const SLACK: f64 = 0.05;
-    let across = site.normal.cross(site.direction);
     let mut result = Footprint {
         on_part: true,
         height: 0.0,
@@ -446,13 +446,13 @@ fn footprint(mesh: &TriMesh, site: &Site, rules: &FeasibleRules) -> Footprint {
         .into_iter()
         .flat_map(|a| [-1.0, 0.0, 1.0].map(|b| (a, b)))
     {
-        let offset =
-            site.direction * (a * rules.grid_length / 2.0) + across * (b * rules.grid_width / 2.0);
-        let target = site.position + offset;
+        let offset = gauge.direction * (a * rules.grid_length / 2.0)
+            + gauge.across() * (b * rules.grid_width / 2.0);
+        let target = gauge.position + offset;
         let (at, _) = mesh.index().nearest(target);
         let gap = mesh.point(at) - target;
-        let height = gap.dot(site.normal);
-        let sideways = (gap - site.normal * height).length();
+        let height = gap.dot(gauge.normal);
+        let sideways = (gap - gauge.normal * height).length();
         // On a curved part the nearest point shifts by about height × slope: not an overhang.
         let slope = height.abs() * 2.0 / offset.length().max(f64::MIN_POSITIVE);
         result.on_part &= sideways <= SLACK * rules.grid_width + 1.5 * height.abs() * slope;

@@ -69,6 +69,7 @@ mod eigen;
 pub mod elasticity;
 pub mod evaluation;
 pub mod feasible;
+pub mod gauge;
 pub mod gaussian_process;
 pub mod given;
 pub mod inference;

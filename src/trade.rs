@@ -183,7 +183,7 @@ fn attempt(
         model_percent: design.simulated.discretization.displacement_percent,
         candidates: design.candidate_count(),
         sites_mm: (design.chosen().iter())
-            .map(|&s| (sites[s].position * 1e3).to_array())
+            .map(|&s| (sites[s].gauge.position * 1e3).to_array())
             .collect(),
     })
 }

@@ -97,7 +97,7 @@ impl Displaced {
     fn on_own_model(&self, finer: &Reference) -> Result<Reference, DesignError> {
         let (project, known) = (&self.inputs.project, &self.simulated.dataset);
         let model = self.simulated.model()?;
-        let place = |&site: &usize| model.index().nearest(known.sites[site].position).0;
+        let place = |&site: &usize| model.index().nearest(known.sites[site].gauge.position).0;
         let points: Vec<_> = finer.sites.iter().map(place).collect();
         let slopes = (&[][..], &project.making());
         let touches = finer.touches.clone();
@@ -116,7 +116,7 @@ impl Displaced {
             element_mm: self.simulated.element_mm,
             work: data.work,
             sites: finer.sites.clone(),
-            drawn: data.sites,
+            drawn: data.sites.iter().map(|s| s.gauge).collect(),
             workshop: data.x.clone(),
             x: data.x,
             off: finer.off,

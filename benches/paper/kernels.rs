@@ -62,7 +62,7 @@ pub fn theirs(displaced: &Displaced) -> Result<Vec<Chosen>, DesignError> {
     };
     let (reduced, dataset) = (&displaced.reduced, &displaced.simulated.dataset);
     let places: Vec<DVec3> = (located.sites.iter())
-        .map(|&s| dataset.sites[s].position)
+        .map(|&s| dataset.sites[s].gauge.position)
         .collect();
     let arcs = (places.iter()).flat_map(|&a| places.iter().map(move |&b| arc(a, b)));
     let arcs: Vec<f64> = arcs.collect();

@@ -192,7 +192,7 @@ fn print_gauges(design: &Design) -> anyhow::Result<()> {
     out::line("gauge       x        y        z (mm)   direction")?;
     for (number, &s) in (1..).zip(design.chosen()) {
         let site = &design.simulated.dataset.sites[s];
-        let (p, d) = (site.position * 1000.0, site.direction);
+        let (p, d) = (site.gauge.position * 1000.0, site.gauge.direction);
         out::line(&format!(
             "{number:>5} {:8.2} {:8.2} {:8.2}   {:+.3} {:+.3} {:+.3}",
             p.x, p.y, p.z, d.x, d.y, d.z

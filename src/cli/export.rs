@@ -134,7 +134,7 @@ fn scene(args: &ExportArgs, loaded: &LoadedProject, inner: &Inner) -> anyhow::Re
     };
     let mut gauges = inner.clone();
     for gauge in &mut gauges.gauges {
-        gauge.place = shaken(gauge.place);
+        gauge.gauge.position = shaken(gauge.gauge.position);
     }
     let both = limb.positions().iter().zip(&moved);
     let positions: Vec<DVec3> = both.map(|(p, u)| *p + *u * args.exaggerate).collect();

@@ -4,10 +4,11 @@
 //! Under some of the touches of a dataset, and solved for only where either may be off: they are other loads.
 
 use super::columns::Columns;
-use super::site::{Site, gauges_on};
+use super::site::gauges_on;
 use crate::budget::{Cancelled, Watch};
 use crate::elasticity::respond::{Quantity, Responses, respond};
 use crate::elasticity::{Model, Push, Touch};
+use crate::gauge::Gauge;
 use crate::uncertainty::Making;
 
 /// Of a tip's radius: as far as it is made larger and smaller for the slope.
@@ -44,7 +45,7 @@ impl MakingSlopes {
     /// [`Cancelled`] when the watch asks for it.
     pub(super) fn of(
         model: &dyn Model,
-        sites: &[Site],
+        gauges: &[Gauge],
         touches: &[Touch],
         columns: &[usize],
         making: &Making,
@@ -52,11 +53,11 @@ impl MakingSlopes {
     ) -> Result<(Self, usize), Cancelled> {
         let pressed: Vec<Touch> = columns.iter().map(|&t| touches[t]).collect();
         let solve = |wanted: bool, ways: fn(&Touch) -> [Push; WAYS]| {
-            if !wanted || sites.is_empty() {
+            if !wanted || gauges.is_empty() {
                 return Ok(None);
             }
             let pushes: Vec<Push> = pressed.iter().flat_map(ways).collect();
-            let (observer, angles) = gauges_on(model, sites);
+            let (observer, angles) = gauges_on(model, gauges);
             let reading = Quantity::Gauge(&angles);
             respond(model, &pushes, &observer, reading, watch).map(Some)
         };
@@ -66,7 +67,7 @@ impl MakingSlopes {
         };
         let mut solves = 0;
         // One after the other: the answers to both together might not fit where those to one do.
-        let shape = (sites.len(), pressed.len());
+        let shape = (gauges.len(), pressed.len());
         if let Some(sized) = solve(making.tip > 0.0, of_two_sizes)? {
             solves += sized.solves;
             let radius = |t: usize| pressed[t].tip_radius;
@@ -157,16 +158,16 @@ fn along_the_surface(touch: &Touch) -> [Push; WAYS] {
     })
 }
 
-/// What every site makes of what it reads of each touch made in two ways: sites × touches.
+/// What every gauge makes of what it reads of each touch made in two ways: sites × touches.
 fn each(
     responses: &Responses,
-    (sites, touches): (usize, usize),
+    (gauges, touches): (usize, usize),
     of: impl Fn(usize, [f64; WAYS]) -> f64,
 ) -> Vec<f32> {
     let mut row = vec![0.0; WAYS * touches];
-    let mut values = Vec::with_capacity(sites * touches);
-    for site in 0..sites {
-        responses.row_into(site, &mut row);
+    let mut values = Vec::with_capacity(gauges * touches);
+    for gauge in 0..gauges {
+        responses.row_into(gauge, &mut row);
         let (pairs, _) = row.as_chunks::<WAYS>();
         values.extend(
             pairs

@@ -6,32 +6,29 @@ use glam::DVec3;
 
 use crate::elasticity::Model;
 use crate::elasticity::observe::{Face, Observer, SiteFrame};
+use crate::gauge::Gauge;
 use crate::mesh::SurfacePoint;
 
 /// A possible gauge position on the inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Site {
-    /// On the mid-surface (m).
-    pub position: DVec3,
-    /// Outward unit normal.
-    pub normal: DVec3,
-    /// Unit direction in the surface in which the gauge measures: where there is one a place, that with
-    /// the largest strain over the touches (rms).
-    pub direction: DVec3,
-    /// Rms over the touches of the strain along `direction`, inside face.
+    /// On the surface that is computed with: of a shell its mid-surface. Where there is one gauge a place, its direction
+    /// is that with the largest strain over the touches (rms).
+    pub gauge: Gauge,
+    /// Rms over the touches of the strain along its direction, inside face.
     pub rms_strain: f64,
     /// Largest principal strain over the touches (absolute), inside face: no direction reads more.
     pub peak_strain: f64,
 }
 
 /// What reads the places of gauges on a model's surface, and their angles in its frames.
-pub(super) fn gauges_on(model: &dyn Model, sites: &[Site]) -> (Observer, Vec<f64>) {
-    let points: Vec<SurfacePoint> = sites
+pub(super) fn gauges_on(model: &dyn Model, gauges: &[Gauge]) -> (Observer, Vec<f64>) {
+    let points: Vec<SurfacePoint> = gauges
         .iter()
         .map(|s| model.index().nearest(s.position).0)
         .collect();
     let observer = model.observer(&points, Face::Inside);
-    let angles = sites
+    let angles = gauges
         .iter()
         .zip(observer.frames())
         .map(|(s, f)| s.direction.dot(f.y_axis).atan2(s.direction.dot(f.x_axis)))
@@ -111,9 +108,11 @@ impl Moments {
         touches: usize,
     ) -> Site {
         Site {
-            position,
-            normal: frame.z_axis,
-            direction: frame.x_axis * angle.cos() + frame.y_axis * angle.sin(),
+            gauge: Gauge {
+                position,
+                direction: frame.x_axis * angle.cos() + frame.y_axis * angle.sin(),
+                normal: frame.z_axis,
+            },
             rms_strain: (self.along(angle) / touches.max(1) as f64).max(0.0).sqrt(),
             peak_strain: self.peak,
         }

@@ -7,10 +7,11 @@
 use rayon::prelude::*;
 
 use super::columns::Columns;
-use super::site::{Site, gauges_on};
+use super::site::gauges_on;
 use crate::budget::{Cancelled, Watch};
 use crate::elasticity::respond::{PressedModel, Quantity, Responses, respond};
 use crate::elasticity::{Model, Touch};
+use crate::gauge::Gauge;
 use crate::uncertainty::Gluing;
 
 /// How far a gauge is moved either way (m): about as far as a workshop is off.
@@ -43,14 +44,14 @@ impl GluingSlopes {
     /// [`Cancelled`] when the watch asks for it.
     pub(super) fn of(
         model: &dyn Model,
-        sites: &[Site],
+        gauges: &[Gauge],
         touches: &[Touch],
         columns: &[usize],
         turned: Vec<f32>,
         watch: Watch,
     ) -> Result<(Self, usize), Cancelled> {
         let pressed: Vec<Touch> = columns.iter().map(|&t| touches[t]).collect();
-        let moved: Vec<Site> = sites.iter().flat_map(shifted).collect();
+        let moved: Vec<Gauge> = gauges.iter().flat_map(shifted).collect();
         let (observer, angles) = gauges_on(model, &moved);
         let responses = respond(
             model,
@@ -59,7 +60,7 @@ impl GluingSlopes {
             Quantity::GaugeDifference(&angles, SLOPE),
             watch,
         )?;
-        let slopes = Self::read(&responses, sites.len(), columns.to_vec(), turned);
+        let slopes = Self::read(&responses, gauges.len(), columns.to_vec(), turned);
         Ok((slopes, responses.solves))
     }
 
@@ -69,16 +70,16 @@ impl GluingSlopes {
     /// [`Cancelled`] when the watch asks for it.
     pub(super) fn under(
         pressed: &PressedModel,
-        sites: &[Site],
+        gauges: &[Gauge],
         turned: Vec<f32>,
         watch: Watch,
     ) -> Result<(Self, usize), Cancelled> {
-        let moved: Vec<Site> = sites.iter().flat_map(shifted).collect();
+        let moved: Vec<Gauge> = gauges.iter().flat_map(shifted).collect();
         let (observer, angles) = gauges_on(pressed.model(), &moved);
         let responses =
             pressed.read(&observer, Quantity::GaugeDifference(&angles, SLOPE), watch)?;
         let columns = (0..pressed.touches()).collect();
-        let slopes = Self::read(&responses, sites.len(), columns, turned);
+        let slopes = Self::read(&responses, gauges.len(), columns, turned);
         Ok((slopes, responses.solves))
     }
 
@@ -205,12 +206,9 @@ pub(super) fn turned(components: &[Vec<f64>], angle: f64, columns: &[usize]) -> 
 }
 
 /// A gauge moved along itself and across itself, forth and back.
-fn shifted(site: &Site) -> [Site; 2 * MOVES] {
-    let across = site.normal.cross(site.direction);
-    [site.direction, -site.direction, across, -across].map(|toward| Site {
-        position: site.position + toward * STEP,
-        ..*site
-    })
+fn shifted(gauge: &Gauge) -> [Gauge; 2 * MOVES] {
+    [(STEP, 0.0), (-STEP, 0.0), (0.0, STEP), (0.0, -STEP)]
+        .map(|(along, across)| gauge.moved(along, across))
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use crate::budget::{Cancelled, Watch};
 use crate::elasticity::Touch;
 use crate::elasticity::observe::along;
 use crate::elasticity::respond::{PressedModel, Quantity};
+use crate::gauge::Gauge;
 use crate::uncertainty::Making;
 
 /// A gauge and what it reads of every touch (strain).
@@ -58,7 +59,7 @@ impl Surveyed {
 /// [`Cancelled`] when the watch asks for it.
 pub fn survey(
     pressed: &PressedModel,
-    gauges: &[Site],
+    gauges: &[Gauge],
     (touches, making): (&[Touch], &Making),
     watch: Watch,
 ) -> Result<(Vec<Surveyed>, usize), Cancelled> {
@@ -83,10 +84,16 @@ pub fn survey(
         let mean: Vec<f64> = columns.iter().map(|&t| mean(t)).collect();
         read.push((site, x, mean));
     }
-    let sites: Vec<Site> = read.iter().map(|(site, ..)| *site).collect();
-    let (changes, solves) = GluingSlopes::under(pressed, &sites, turned, watch)?;
-    let (otherwise, more) =
-        MakingSlopes::of(pressed.model(), &sites, touches, &columns, making, watch)?;
+    let read_gauges: Vec<Gauge> = read.iter().map(|(site, ..)| site.gauge).collect();
+    let (changes, solves) = GluingSlopes::under(pressed, &read_gauges, turned, watch)?;
+    let (otherwise, more) = MakingSlopes::of(
+        pressed.model(),
+        &read_gauges,
+        touches,
+        &columns,
+        making,
+        watch,
+    )?;
     let surveyed = (read.into_iter().enumerate()).map(|(i, (site, x, mean))| Surveyed {
         site,
         x,
@@ -108,9 +115,11 @@ mod tests {
         let (xx, yy, xy) = (3.0, -1.0, 0.5);
         let gauge = Surveyed {
             site: Site {
-                position: DVec3::ZERO,
-                normal: DVec3::Z,
-                direction: DVec3::X,
+                gauge: Gauge {
+                    position: DVec3::ZERO,
+                    direction: DVec3::X,
+                    normal: DVec3::Z,
+                },
                 rms_strain: 0.0,
                 peak_strain: 0.0,
             },

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{Simulated, WORKSHOP_SEED};
-use crate::dataset::Site;
+use crate::gauge::Gauge;
 use crate::uncertainty::Gluing;
 
 /// How many workshops glue the gauges that are judged: one alone is a seventh better or worse than they are in the mean.
@@ -15,15 +15,15 @@ pub(super) fn of_workshop(seed: u64, workshop: u64) -> u64 {
     seed.wrapping_add(workshop << 32)
 }
 
-/// Sites of a dataset as a workshop glues their gauges.
+/// Gauges at sites of a dataset as a workshop glues them.
 pub(super) fn sites_as_built(
     simulated: &Simulated,
     sites: &[usize],
     gluing: &Gluing,
     seed: u64,
-) -> Vec<Site> {
+) -> Vec<Gauge> {
     let all = &simulated.dataset.sites;
-    let built = |&s: &usize| as_built(&all[s], gluing, seed, s);
+    let built = |&s: &usize| as_built(&all[s].gauge, gluing, seed, s);
     sites.iter().map(built).collect()
 }
 
@@ -56,14 +56,13 @@ pub(super) fn workshop_draw(gluing: &Gluing, seed: u64, site: usize) -> Workshop
     }
 }
 
-pub(super) fn as_built(site: &Site, gluing: &Gluing, seed: u64, number: usize) -> Site {
+/// A gauge as a workshop glues it, by its number.
+pub(super) fn as_built(gauge: &Gauge, gluing: &Gluing, seed: u64, number: usize) -> Gauge {
     let draw = workshop_draw(gluing, seed, number);
-    let across = site.normal.cross(site.direction);
-    let along = |angle: f64| site.direction * angle.cos() + across * angle.sin();
-    Site {
-        position: site.position + along(draw.toward) * gluing.place,
-        direction: along(draw.turned),
-        ..*site
+    let toward = gauge.turned(draw.toward).direction;
+    Gauge {
+        position: gauge.position + toward * gluing.place,
+        ..gauge.turned(draw.turned)
     }
 }
 
@@ -73,13 +72,11 @@ mod tests {
 
     use super::*;
 
-    fn site() -> Site {
-        Site {
+    fn gauge() -> Gauge {
+        Gauge {
             position: DVec3::new(0.01, 0.02, 0.03),
-            normal: DVec3::Z,
             direction: DVec3::X,
-            rms_strain: 0.0,
-            peak_strain: 0.0,
+            normal: DVec3::Z,
         }
     }
 
@@ -91,16 +88,16 @@ mod tests {
             gain: 0.05,
         };
         for number in 0..20 {
-            let built = as_built(&site(), &gluing, 7, number);
-            assert!((built.position.distance(site().position) - 2e-3).abs() < 1e-12);
+            let built = as_built(&gauge(), &gluing, 7, number);
+            assert!((built.position.distance(gauge().position) - 2e-3).abs() < 1e-12);
             assert!((built.direction.angle_between(DVec3::X) - 0.1).abs() < 1e-9);
             let gain = workshop_draw(&gluing, 7, number).gain;
             assert!(((gain - 1.0).abs() - 0.05).abs() < 1e-12);
             // Another workshop is off the same way, by another amount.
-            let usual = as_built(&site(), &Gluing::default(), 7, number);
-            let [a, b] = [built, usual].map(|s| (s.position - site().position).normalize());
+            let usual = as_built(&gauge(), &Gluing::default(), 7, number);
+            let [a, b] = [built, usual].map(|s| (s.position - gauge().position).normalize());
             assert!(a.distance(b) < 1e-9);
-            assert_eq!(as_built(&site(), &Gluing::EXACT, 7, number), site());
+            assert_eq!(as_built(&gauge(), &Gluing::EXACT, 7, number), gauge());
         }
     }
 }

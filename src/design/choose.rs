@@ -37,7 +37,7 @@ impl<'a> Offer<'a> {
         sites: &'a [usize],
     ) -> Result<Self, DesignError> {
         let positions: Vec<DVec3> = (sites.iter())
-            .map(|&s| simulated.dataset.sites[s].position)
+            .map(|&s| simulated.dataset.sites[s].gauge.position)
             .collect();
         let keys = &inputs.project.selection;
         let near = |at: DVec3| nearest(&positions, at).ok_or(PlacementError::NoSites);
@@ -262,7 +262,7 @@ fn select_by_expected_error(
 /// The feasible sites nearest to the places where gauges must be: rows of the reduced signals.
 fn required_rows(inputs: &Inputs, simulated: &Simulated, reduced: &Reduced) -> Vec<usize> {
     let positions: Vec<DVec3> = (reduced.feasible.iter())
-        .map(|&s| simulated.dataset.sites[s].position)
+        .map(|&s| simulated.dataset.sites[s].gauge.position)
         .collect();
     let required = inputs.project.selection.required();
     required.filter_map(|at| nearest(&positions, at)).collect()

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::layout::touches_on;
 use super::{DesignError, Ground, Inputs};
 use crate::budget::{Cancelled, Watch};
-use crate::dataset::Site;
-use crate::elasticity::sensitivity::{Gauge, Sensitivity};
+use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Model, Touch};
+use crate::gauge::Gauge;
 use crate::inference::{AsDrawn, ResponseMap};
 use crate::mesh::TriMesh;
 use crate::uncertainty::Making;
@@ -25,28 +25,17 @@ pub(super) fn proposed(mesh: &TriMesh, inputs: &Inputs) -> Result<Vec<Touch>, De
 /// Length and width (m) of the grid of a gauge that reads at a point.
 pub(super) const POINT: [f64; 2] = [1e-9, 1e-9];
 
-/// A gauge at a site of a design, with a grid of this length and width (m).
-pub(super) fn gauge_at(site: &Site, [length, width]: [f64; 2]) -> Gauge {
-    Gauge {
-        position: site.position,
-        direction: site.direction,
-        normal: site.normal,
-        length,
-        width,
-    }
-}
-
-/// What gauges read everywhere on a mesh, as drawn, as it changes with the way they are glued, and with that in which
+/// What gauges, with grids of a length and a width (m), read everywhere on a mesh, as drawn, as it changes with the way they are glued, and with that in which
 /// touches by a tip of some radius (m) are made, as far as that may be off.
 pub(super) fn drawn_on(
     model: &dyn Model,
-    gauges: &[Gauge],
+    (gauges, grid): (&[Gauge], [f64; 2]),
     mesh: &Arc<TriMesh>,
     (tip_radius, making): (f64, &Making),
     watch: Watch,
 ) -> Result<AsDrawn, Cancelled> {
     let moved: Vec<Gauge> = gauges.iter().flat_map(moved).collect();
-    let sensitivity = Sensitivity::new(model, &moved, watch)?;
+    let sensitivity = Sensitivity::new(model, &moved, grid, watch)?;
     let pressed = |radius: f64| ResponseMap::new(&sensitivity, Arc::clone(mesh), radius, watch);
     let mut drawn = if making.friction > 0.0 {
         let axes = ResponseMap::along_axes(&sensitivity, mesh, tip_radius, watch)?;
@@ -70,14 +59,9 @@ pub(super) fn drawn_on(
 
 /// A gauge as drawn, and moved and turned either way.
 fn moved(gauge: &Gauge) -> [Gauge; MOVES] {
-    let across = gauge.normal.cross(gauge.direction);
-    let at = |along: f64, aside: f64, degrees: f64| {
-        let (sin, cos) = degrees.to_radians().sin_cos();
-        Gauge {
-            position: gauge.position + gauge.direction * along + across * aside,
-            direction: gauge.direction * cos + across * sin,
-            ..*gauge
-        }
+    let at = |along: f64, across: f64, degrees: f64| Gauge {
+        position: gauge.moved(along, across).position,
+        ..gauge.turned(degrees.to_radians())
     };
     let (s, t) = (STEP_MM * 1e-3, STEP_DEGREES);
     [

@@ -70,6 +70,6 @@ impl LookedAt {
 pub(super) fn painted_sites(part: &TriMesh, mask: &[bool], sites: &[Site]) -> Vec<bool> {
     sites
         .iter()
-        .map(|site| part.mostly_in(mask, part.index().nearest(site.position).0))
+        .map(|site| part.mostly_in(mask, part.index().nearest(site.gauge.position).0))
         .collect()
 }

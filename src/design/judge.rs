@@ -7,7 +7,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::as_built::{WORKSHOPS, gains, of_workshop, sites_as_built};
-use super::drawn::{gauge_at, proposed};
+use super::drawn::proposed;
 use super::known;
 use super::layout::test_touches;
 use super::presses::{self, Press, PressReadings};
@@ -15,11 +15,12 @@ use super::reference::{Reference, grid, regions};
 use super::{DesignError, Inputs, MADE_SEED, NOISE_SEED, PRESS_SEED, Reduced, Simulated};
 use crate::as_made::as_made;
 use crate::budget::{Budget, Cancelled, Watch, Work};
-use crate::dataset::{self, Dataset, Signal, SignalMatrix, Site};
+use crate::dataset::{self, Dataset, Signal, SignalMatrix};
 use crate::elasticity::Model;
 use crate::elasticity::load::{Push, Touch};
-use crate::elasticity::sensitivity::{Gauge, Sensitivity};
+use crate::elasticity::sensitivity::Sensitivity;
 use crate::evaluation::{self, Candidate, Chooser, EstimatorKind, Evaluation, Judging, Trial};
+use crate::gauge::Gauge;
 use crate::mesh::TriMesh;
 use crate::placement::Selection;
 use crate::regression::folds::evenly;
@@ -69,15 +70,14 @@ fn read(
     model: &dyn Model,
     inputs: &Inputs,
     pushes: &[Push],
-    sites: &[Site],
+    gauges: &[Gauge],
     grid: Option<[f64; 2]>,
     watch: Watch,
 ) -> Result<(SignalMatrix, usize), Cancelled> {
     let Some(grid) = grid else {
-        return dataset::measure(model, pushes, sites, inputs.project.gauge.signal, watch);
+        return dataset::measure(model, pushes, gauges, inputs.project.gauge.signal, watch);
     };
-    let gauges: Vec<Gauge> = sites.iter().map(|site| gauge_at(site, grid)).collect();
-    let sensitivity = Sensitivity::new(model, &gauges, watch)?;
+    let sensitivity = Sensitivity::new(model, gauges, grid, watch)?;
     let columns: Vec<Vec<f64>> = (pushes.par_iter())
         .map(|push| sensitivity.read_push(push))
         .collect();
@@ -104,11 +104,11 @@ pub(super) fn measured_by(
     rows.sort_unstable();
     rows.dedup();
     let all = &simulated.dataset.sites;
-    let drawn: Vec<Site> = rows.iter().map(|&s| all[s]).collect();
+    let drawn: Vec<Gauge> = rows.iter().map(|&s| all[s].gauge).collect();
     let (off, seed) = (known::off(project, simulated), project.budget.seed);
     let built = |w| sites_as_built(simulated, &rows, &off.gluing, of_workshop(seed, w));
     // All kinds of gauges in one measurement: the loads are solved for once.
-    let gauges: Vec<Site> = (drawn.iter().copied())
+    let gauges: Vec<Gauge> = (drawn.iter().copied())
         .chain((0..WORKSHOPS).flat_map(built))
         .collect();
     let mut pushes = as_made(&touches, &off.making, seed.wrapping_add(MADE_SEED));

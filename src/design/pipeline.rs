@@ -177,7 +177,7 @@ impl Design {
         let sites = &self.simulated.dataset.sites;
         let (locations, variances) = self.reduced.uncertainty(sites, gauges)?;
         let places: Vec<(DVec3, DVec3)> = (locations.iter())
-            .map(|&s| (sites[s].position, sites[s].normal))
+            .map(|&s| (sites[s].gauge.position, sites[s].gauge.normal))
             .collect();
         Some(scatter::to_vertices(mesh, &places, &variances))
     }

@@ -5,19 +5,17 @@ use std::sync::Arc;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::{Inputs, Simulated};
+use super::{InnerFace, Inputs, Simulated};
 use crate::budget::unwatched;
 use crate::dataset::Site;
-use crate::jig::{FILM, PressedGauge, RodReach, Wall};
+use crate::gauge::Gauge;
+use crate::jig::{FILM, RodReach, Wall};
 use crate::project::PartModel;
 
 /// The jig that sites are filtered by.
 pub(super) struct Pressing {
     reach: RodReach,
-    /// Whether normals of sites look inwards.
-    looks_in: bool,
-    /// From a site to the inner face (m).
-    depth: f64,
+    face: InnerFace,
 }
 
 impl Pressing {
@@ -27,13 +25,10 @@ impl Pressing {
         if !project.feasible.jig {
             return None;
         }
-        let (looks_in, depth) = match project.part.model {
-            PartModel::Solid => (true, 0.0),
-            PartModel::Shell => (false, 0.5e-3 * project.part.thickness_mm),
-        };
+        let inner = InnerFace::of(&project.part);
         let face = match project.part.model {
             PartModel::Solid => Arc::clone(&simulated.mesh),
-            PartModel::Shell => Arc::new(simulated.mesh.offset(-depth)),
+            PartModel::Shell => Arc::new(inner.mesh(&simulated.mesh)),
         };
         let wall = Wall {
             part: match project.part.model {
@@ -45,28 +40,14 @@ impl Pressing {
         };
         let grid = DVec2::new(project.gauge.grid_length_mm, project.gauge.grid_width_mm);
         let sites = &simulated.dataset.sites[..simulated.lattice];
-        let places: Vec<PressedGauge> = sites.iter().map(|s| pressed(s, looks_in, depth)).collect();
+        let places: Vec<Gauge> = sites.iter().map(|s| inner.gauge(&s.gauge)).collect();
         let reach = RodReach::new(wall, &places, grid / 2.0 + FILM, &unwatched).ok()?;
-        Some(Self {
-            reach,
-            looks_in,
-            depth,
-        })
+        Some(Self { reach, face: inner })
     }
 
     /// One value a gauge.
-    pub(super) fn gets_to(&self, gauges: &[Site]) -> Vec<bool> {
-        let gets = |s: &Site| self.reach.gets_to(&pressed(s, self.looks_in, self.depth));
-        gauges.par_iter().map(gets).collect()
-    }
-}
-
-fn pressed(site: &Site, looks_in: bool, depth: f64) -> PressedGauge {
-    let out = if looks_in { -site.normal } else { site.normal };
-    PressedGauge {
-        number: 0,
-        place: site.position - out * depth,
-        out,
-        direction: site.direction,
+    pub(super) fn gets_to(&self, sites: &[Site]) -> Vec<bool> {
+        let gets = |site: &Site| self.reach.gets_to(&self.face.gauge(&site.gauge));
+        sites.par_iter().map(gets).collect()
     }
 }

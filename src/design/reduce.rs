@@ -134,7 +134,7 @@ impl Reduced {
     #[must_use]
     pub fn uncertainty(&self, all: &[Site], gauges: &[DVec3]) -> Option<(Vec<usize>, Vec<f64>)> {
         let located = self.geometry.get()?;
-        let away = |l: usize, p: DVec3| all[located.sites[l]].position.distance_squared(p);
+        let away = |l: usize, p: DVec3| all[located.sites[l]].gauge.position.distance_squared(p);
         let measured: Vec<usize> = (gauges.iter())
             .filter_map(|&p| {
                 (0..located.sites.len()).min_by(|&a, &b| away(a, p).total_cmp(&away(b, p)))

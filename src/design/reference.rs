@@ -6,6 +6,7 @@ use crate::budget::Work;
 use crate::dataset::{SignalMatrix, Site};
 use crate::elasticity::load::Touch;
 use crate::evaluation::{self, EstimatorKind, TouchRegion};
+use crate::gauge::Gauge;
 use crate::project::{Project, boxes};
 use crate::uncertainty::Uncertainty;
 
@@ -23,7 +24,7 @@ pub struct Reference {
     /// Dataset sites that were measured, rising, and their signals.
     pub sites: Vec<usize>,
     /// Where they are: gauges off the lattice may have moved under the same number.
-    pub drawn: Vec<Site>,
+    pub drawn: Vec<Gauge>,
     /// Signals of these sites (sites × touches).
     pub x: SignalMatrix,
     /// The same sites as workshops would build them, which take turns from touch to touch.
@@ -97,7 +98,7 @@ impl Reference {
         let mut rows = sites.to_vec();
         rows.sort_unstable();
         rows.dedup();
-        let here = rows.iter().filter_map(|&s| all.get(s));
+        let here = rows.iter().filter_map(|&s| Some(&all.get(s)?.gauge));
         let by = project.judging().estimator();
         let presses = by == EstimatorKind::Svr || self.pressed.is_some();
         let same = off.builds_as(&self.off) && grid(project) == self.grid;
@@ -123,9 +124,11 @@ mod tests {
 
     fn site() -> Site {
         Site {
-            position: DVec3::new(0.01, 0.02, 0.03),
-            normal: DVec3::Z,
-            direction: DVec3::X,
+            gauge: Gauge {
+                position: DVec3::new(0.01, 0.02, 0.03),
+                direction: DVec3::X,
+                normal: DVec3::Z,
+            },
             rms_strain: 0.0,
             peak_strain: 0.0,
         }
@@ -139,7 +142,7 @@ mod tests {
             element_mm: 1.0,
             work: Work::default(),
             sites: vec![2, 5],
-            drawn: vec![site(); 2],
+            drawn: vec![site().gauge; 2],
             x: SignalMatrix::default(),
             workshop: SignalMatrix::default(),
             off: Uncertainty::default(),
@@ -169,7 +172,7 @@ mod tests {
         assert!(!reference.measures(&[5, 2], &all, &usual, &project));
         assert!(matched.measures(&[5, 2], &all, &usual, &project));
         // A gauge off the lattice may lie elsewhere now.
-        all[5].position.x += 1e-4;
+        all[5].gauge.position.x += 1e-4;
         assert!(!matched.measures(&[5, 2], &all, &usual, &project));
         all[5] = site();
         project.gauge.grid_length_mm += 1.0;

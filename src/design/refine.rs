@@ -28,6 +28,7 @@ use crate::budget::{Budget, Cancelled, Watch, Work, report};
 use crate::dataset::{Move, Signal, Site, Surveyed, survey};
 use crate::elasticity::Touch;
 use crate::elasticity::respond::PressedModel;
+use crate::gauge::Gauge;
 use crate::placement::expected_error::{Moving, NUISANCES};
 use crate::placement::{Constraints, Selection, SensorSet};
 use crate::uncertainty::Making;
@@ -75,7 +76,7 @@ pub fn refine(
     }
     let refined = search(inputs, &simulated, reduced, &set.sites, budget, watch)?;
     selection.achieved.effort += refined.work;
-    let moved: Vec<&Gauge> = refined.gauges.iter().filter(|g| g.moved).collect();
+    let moved: Vec<&MovingGauge> = refined.gauges.iter().filter(|g| g.moved).collect();
     if moved.is_empty() {
         notes.push("Refining places: none off the sites was better.".into());
         return Ok(simulated);
@@ -89,10 +90,10 @@ pub fn refine(
 }
 
 /// One gauge on its way.
-struct Gauge {
+struct MovingGauge {
     now: Surveyed,
     /// Where it was on the lattice.
-    from: Site,
+    from: Gauge,
     /// Of the first step and turn, the share that it may be moved by now.
     reach: f64,
     moved: bool,
@@ -100,7 +101,7 @@ struct Gauge {
 
 /// What came of it.
 struct Refined {
-    gauges: Vec<Gauge>,
+    gauges: Vec<MovingGauge>,
     before_mm: f64,
     after_mm: f64,
     /// Where one place is meant.
@@ -111,9 +112,9 @@ struct Refined {
 impl Refined {
     fn words(&self, moved: usize) -> String {
         let all = || self.gauges.iter().filter(|g| g.moved);
-        let way = |g: &Gauge| g.now.site.position.distance(g.from.position) * 1e3;
-        let turn = |g: &Gauge| {
-            let cos = g.now.site.direction.dot(g.from.direction);
+        let way = |g: &MovingGauge| g.now.site.gauge.position.distance(g.from.position) * 1e3;
+        let turn = |g: &MovingGauge| {
+            let cos = g.now.site.gauge.direction.dot(g.from.direction);
             cos.abs().min(1.0).acos().to_degrees()
         };
         format!(
@@ -175,18 +176,24 @@ fn search(
     let confirming = Moving::new(x, &targets, &confirmed, (FINE, seats + 1), &whole, watch)?;
     let model = simulated.meshed.model(watch)?;
     let pressed = PressedModel::new(&*model, &simulated.dataset.touches);
-    let sites: Vec<Site> = set.iter().map(|&s| simulated.dataset.sites[s]).collect();
+    let chosen: Vec<Gauge> = set
+        .iter()
+        .map(|&s| simulated.dataset.sites[s].gauge)
+        .collect();
     let making = inputs.project.uncertainty().making_allowed();
     let made = (&simulated.dataset.touches[..], &making);
-    let (surveyed, solves) = survey(&pressed, &sites, made, watch)?;
+    let (surveyed, solves) = survey(&pressed, &chosen, made, watch)?;
     let mut work = model.system().work();
     work.solves += solves as u64;
-    let gauges = surveyed.into_iter().zip(&sites).map(|(now, from)| Gauge {
-        now,
-        from: *from,
-        reach: 1.0,
-        moved: false,
-    });
+    let gauges = surveyed
+        .into_iter()
+        .zip(&chosen)
+        .map(|(now, from)| MovingGauge {
+            now,
+            from: *from,
+            reach: 1.0,
+            moved: false,
+        });
     let mut search = Search {
         room: Room::new(inputs, simulated),
         known: &known,
@@ -210,7 +217,7 @@ struct Search<'a> {
     pressed: &'a PressedModel<'a>,
     /// The touches that are pressed, and how far off they are made.
     made: (&'a [Touch], &'a Making),
-    gauges: Vec<Gauge>,
+    gauges: Vec<MovingGauge>,
     /// How many of them, the first, must stay where they are.
     fixed: usize,
     /// What the gauges were chosen by; seats beyond theirs are for moves that are tried.
@@ -276,13 +283,13 @@ impl Search<'_> {
         if asked.is_empty() {
             return Ok(());
         }
-        let sites: Vec<Site> = asked.iter().map(|(_, site)| *site).collect();
-        let (found, solves) = survey(self.pressed, &sites, self.made, self.watch)?;
+        let gauges: Vec<Gauge> = asked.iter().map(|(_, site)| site.gauge).collect();
+        let (found, solves) = survey(self.pressed, &gauges, self.made, self.watch)?;
         self.work.solves += solves as u64;
         let sites: Vec<Site> = found.iter().map(|gauge| gauge.site).collect();
         let allowed = self.room.allowed_wholly(&sites, self.watch)?;
         for (((k, _), gauge), allowed) in asked.into_iter().zip(found).zip(allowed) {
-            let clear = allowed && self.keeps_clear(k, gauge.site.position);
+            let clear = allowed && self.keeps_clear(k, gauge.site.gauge.position);
             if !(clear && self.takes(k, gauge)?) {
                 self.gauges[k].reach /= 2.0;
             }
@@ -297,7 +304,7 @@ impl Search<'_> {
         let moves = moves(step, turn).into_iter();
         let tried: Vec<(Move, Site)> = moves
             .filter_map(|to| Some((to, self.room.moved(&now, to)?)))
-            .filter(|(_, site)| self.keeps_clear(k, site.position))
+            .filter(|(_, site)| self.keeps_clear(k, site.gauge.position))
             .collect();
         let sites: Vec<Site> = tried.iter().map(|(_, site)| *site).collect();
         let allowed = self.room.allowed(&sites);
@@ -321,10 +328,12 @@ impl Search<'_> {
 
     /// Whether a gauge may go to a place (m) for all that the others, and what it costs, have to say.
     fn keeps_clear(&self, k: usize, to: DVec3) -> bool {
-        let from = self.gauges[k].now.site.position;
+        let from = self.gauges[k].now.site.gauge.position;
         let mut others = (self.gauges.iter().enumerate()).filter(|(other, _)| *other != k);
-        others.all(|(_, other)| self.room.keeps_apart(from, to, other.now.site.position))
-            && self.room.is_no_dearer(self.gauges[k].from.position, to)
+        others.all(|(_, other)| {
+            self.room
+                .keeps_apart(from, to, other.now.site.gauge.position)
+        }) && self.room.is_no_dearer(self.gauges[k].from.position, to)
     }
 
     /// Puts a gauge in the stead of another if the set gains by it.

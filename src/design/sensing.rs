@@ -15,9 +15,10 @@ use super::layout::{lay_out_sites, lay_out_touches, test_touches, touches_on};
 use super::nearness::check_on_part;
 use super::{Built, DesignError, Ground, Inputs, Meshed, ground};
 use crate::budget::{Budget, MAP_TRIANGLES, Watch};
-use crate::dataset::{SignalMatrix, Site};
-use crate::elasticity::sensitivity::{Gauge, Sensitivity};
+use crate::dataset::SignalMatrix;
+use crate::elasticity::sensitivity::Sensitivity;
 use crate::elasticity::{Model, Touch};
+use crate::gauge::Gauge;
 use crate::inference::{AsDrawn, Deviations};
 use crate::live::GaugeModel;
 use crate::project::{ChosenSite, LiveKeys, Project};
@@ -29,6 +30,8 @@ pub use kept::Computed;
 pub struct Sensing {
     /// The gauges, a channel each.
     pub gauges: Vec<Gauge>,
+    /// Length and width (m) of their grids.
+    grid: [f64; 2],
     /// Where the project says that they lie.
     pub sites: Vec<ChosenSite>,
     /// What nodal forces make them read.
@@ -103,17 +106,19 @@ pub fn sensing(inputs: &Inputs, budget: &Budget, watch: Watch) -> Result<Sensing
     check_chosen(inputs)?;
     let (ground, graded) = graded_model(inputs, budget, watch)?;
     let gauges = chosen_gauges(project, &*graded.model);
-    let sensitivity = Sensitivity::new(&*graded.model, &gauges, watch)?;
+    let grid = project.gauge.grid();
+    let sensitivity = Sensitivity::new(&*graded.model, &gauges, grid, watch)?;
     let tip_radius = project.tip().1;
     let mesh = ground.of_size(map_size(&ground, tip_radius, MAP_TRIANGLES));
     let strain_percent = graded.estimate.strain_percent;
     let off = (project.uncertainty()).with_elements(strain_percent);
     let tip = (tip_radius, &off.making_at_most());
-    let drawn = drawn_on(&*graded.model, &gauges, &mesh, tip, watch)?;
+    let drawn = drawn_on(&*graded.model, (&gauges, grid), &mesh, tip, watch)?;
     let proposed = proposed(&drawn.map.mesh, inputs)?;
     Ok(Sensing {
         sites: project.selection.sites.clone(),
         gauges,
+        grid,
         sensitivity: Arc::new(sensitivity),
         deviations: drawn.deviations(&off),
         off,
@@ -155,22 +160,11 @@ fn graded_model(
 
 /// The chosen gauges on the model's own surface.
 fn chosen_gauges(project: &Project, model: &dyn Model) -> Vec<Gauge> {
-    let [length, width] = project.gauge.grid();
-    (project.selection.sites.iter())
-        .map(|site| {
-            let (at, _) = model.index().nearest(site.position());
-            let normal = model.mesh().normal(at);
-            let direction = DVec3::from_array(site.direction);
-            let flat = (direction - normal * direction.dot(normal)).try_normalize();
-            Gauge {
-                position: model.mesh().point(at),
-                direction: flat.unwrap_or_else(|| normal.any_orthonormal_vector()),
-                normal,
-                length,
-                width,
-            }
-        })
-        .collect()
+    let on = |site: &ChosenSite| {
+        let (at, _) = model.index().nearest(site.position());
+        Gauge::on(model.mesh(), at, DVec3::from_array(site.direction))
+    };
+    project.selection.sites.iter().map(on).collect()
 }
 
 impl Sensing {
@@ -188,11 +182,11 @@ impl Sensing {
     ) -> Result<(Sensitivity, Vec<f64>), DesignError> {
         let (_, model) = self.meshed(inputs, watch)?.reference_model(watch)?;
         let gauges: Vec<Gauge> = (self.gauges.iter().enumerate())
-            .map(|(k, gauge)| glued(gauge, gluing, seed, k))
+            .map(|(k, gauge)| as_built(gauge, gluing, seed, k))
             .collect();
         let gain = |k: usize| workshop_draw(gluing, seed, k).gain;
         let gains = (0..gauges.len()).map(gain).collect();
-        Ok((Sensitivity::new(&*model, &gauges, watch)?, gains))
+        Ok((Sensitivity::new(&*model, &gauges, self.grid, watch)?, gains))
     }
 
     /// The model that the gauges were read on.
@@ -294,21 +288,5 @@ impl Sensing {
                 ..off
             },
         }
-    }
-}
-
-fn glued(gauge: &Gauge, gluing: &Gluing, seed: u64, number: usize) -> Gauge {
-    let drawn = Site {
-        position: gauge.position,
-        normal: gauge.normal,
-        direction: gauge.direction,
-        rms_strain: 0.0,
-        peak_strain: 0.0,
-    };
-    let built = as_built(&drawn, gluing, seed, number);
-    Gauge {
-        position: built.position,
-        direction: built.direction,
-        ..*gauge
     }
 }

@@ -104,7 +104,7 @@ impl Simulated {
         watch: Watch,
     ) -> Result<Self, Cancelled> {
         let index = self.mesh.index();
-        let at = |gauge: &&Surveyed| index.nearest(gauge.site.position).0;
+        let at = |gauge: &&Surveyed| index.nearest(gauge.site.gauge.position).0;
         let points: Vec<SurfacePoint> = gauges.iter().map(at).collect();
         let around = self.surroundings_of(&points, watch)?;
         self.dataset.truncate(self.lattice);

@@ -14,22 +14,8 @@ use super::observe::Face;
 use super::respond::{Quantity, output_rows};
 use super::rows::Rows;
 use crate::budget::{Cancelled, Watch};
+use crate::gauge::Gauge;
 use crate::mesh::{SurfacePoint, TriMesh};
-
-/// A strain gauge as it is glued: it reads the mean strain over its grid.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gauge {
-    /// Of the grid's centre (m), on the mid-surface.
-    pub position: DVec3,
-    /// In the surface, along the grid.
-    pub direction: DVec3,
-    /// Outward.
-    pub normal: DVec3,
-    /// Along and across the direction (m).
-    pub length: f64,
-    /// Across the direction (m).
-    pub width: f64,
-}
 
 /// Gauss points over the half length and half width, with their weights: exact for quintics along the grid and
 /// for cubics across it.
@@ -43,17 +29,14 @@ const ACROSS: [(f64, f64); 2] = [
     (0.577_350_269_189_625_8, 0.5),
 ];
 
-impl Gauge {
-    /// Places over the grid, and what each weighs in the mean.
-    fn grid(&self) -> impl Iterator<Item = (DVec3, f64)> {
-        let across = self.normal.cross(self.direction);
-        ALONG.into_iter().flat_map(move |(s, v)| {
-            ACROSS.into_iter().map(move |(t, w)| {
-                let off = self.direction * (s * self.length) + across * (t * self.width);
-                (self.position + off / 2.0, v * w)
-            })
+/// Places over a gauge's grid of a length and a width (m), and what each weighs in the mean.
+fn over_grid(gauge: &Gauge, [length, width]: [f64; 2]) -> impl Iterator<Item = (DVec3, f64)> {
+    ALONG.into_iter().flat_map(move |(s, v)| {
+        ACROSS.into_iter().map(move |(t, w)| {
+            let off = gauge.direction * (s * length) + gauge.across() * (t * width);
+            (gauge.position + off / 2.0, v * w)
         })
-    }
+    })
 }
 
 /// The weights of nodal forces in every gauge's strain.
@@ -66,12 +49,17 @@ pub struct Sensitivity {
 }
 
 impl Sensitivity {
-    /// Solves for the gauges on a model.
+    /// Solves for gauges on a model, each of which reads the mean strain over a grid of this length and width (m).
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
-    pub fn new(model: &dyn Model, gauges: &[Gauge], watch: Watch) -> Result<Self, Cancelled> {
-        let rows = mean_rows(model, gauges);
+    pub fn new(
+        model: &dyn Model,
+        gauges: &[Gauge],
+        grid: [f64; 2],
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
+        let rows = mean_rows(model, gauges, grid);
         let system = model.system();
         let blocks =
             system.solve_rows(&rows, None, "Solving gauges", watch, |_, rows, solved| {
@@ -155,14 +143,14 @@ impl Sensitivity {
 }
 
 /// Mean strain over each gauge's grid, as rows over solved blocks.
-fn mean_rows(model: &dyn Model, gauges: &[Gauge]) -> Rows {
+fn mean_rows(model: &dyn Model, gauges: &[Gauge], grid: [f64; 2]) -> Rows {
     let (mut points, mut directions) = (Vec::<SurfacePoint>::new(), Vec::new());
     let mut means = Rows::default();
     for gauge in gauges {
         let first = points.len() as u32;
-        let grid: Vec<(DVec3, f64)> = gauge.grid().collect();
-        means.push((first..).zip(&grid).map(|(i, (_, weight))| (i, *weight)));
-        for (place, _) in grid {
+        let places: Vec<(DVec3, f64)> = over_grid(gauge, grid).collect();
+        means.push((first..).zip(&places).map(|(i, (_, weight))| (i, *weight)));
+        for (place, _) in places {
             points.push(model.index().nearest(place).0);
             directions.push(gauge.direction);
         }
@@ -206,8 +194,6 @@ mod tests {
                 position: mesh.point(at),
                 direction: frame.x_axis,
                 normal: frame.z_axis,
-                length: 1e-7,
-                width: 1e-7,
             })
             .collect();
         let touches: Vec<Touch> = (sample::random(&mesh, 9, 4, |_| true).into_iter())
@@ -218,7 +204,7 @@ mod tests {
                 tip_radius: 5e-3,
             })
             .collect();
-        let sensitivity = Sensitivity::new(&model, &gauges, &unwatched).unwrap();
+        let sensitivity = Sensitivity::new(&model, &gauges, [1e-7; 2], &unwatched).unwrap();
         let angles = vec![0.0; 5];
         let solved = respond(
             &model,

@@ -1,4 +1,5 @@
 use super::*;
+use crate::gauge::Gauge;
 
 /// The same as by looking at all of them.
 fn is_nearest(positions: &[DVec3], i: usize, list: &[usize]) -> bool {
@@ -30,9 +31,11 @@ fn a_gauge_on_a_site_is_as_far_from_an_edge_as_the_site() {
         .map(|i| DVec3::new(f64::from(i % 20), f64::from(i / 20), 0.0) * 2.1e-3)
         .collect();
     let site = |&position: &DVec3| Site {
-        position,
-        normal: DVec3::Z,
-        direction: DVec3::X,
+        gauge: Gauge {
+            position,
+            direction: DVec3::X,
+            normal: DVec3::Z,
+        },
         rms_strain: 0.0,
         peak_strain: 0.0,
     };

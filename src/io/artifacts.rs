@@ -168,8 +168,8 @@ pub fn sites_csv(inputs: &Inputs, design: &Design) -> String {
     ]);
     for (k, &s) in design.chosen().iter().enumerate() {
         let site = &dataset.sites[s];
-        let p = site.position * 1000.0;
-        let d = site.direction;
+        let p = site.gauge.position * 1000.0;
+        let d = site.gauge.direction;
         let (low, high) = range(dataset, s);
         table.row([
             format!("{:.4}", p.x),
@@ -221,12 +221,12 @@ fn save_arrays(path: &Path, dataset: &Dataset, run: Option<&str>) -> Result<(), 
         file.add(
             "site_m",
             &[sites, 3],
-            &flat(dataset.sites.iter().map(|s| s.position).collect()),
+            &flat(dataset.sites.iter().map(|s| s.gauge.position).collect()),
         )?;
         file.add(
             "direction",
             &[sites, 3],
-            &flat(dataset.sites.iter().map(|s| s.direction).collect()),
+            &flat(dataset.sites.iter().map(|s| s.gauge.direction).collect()),
         )?;
         let forces: Vec<f64> = dataset.touches.iter().map(|t| t.force).collect();
         file.add("force_n", &[touches], &forces)?;
@@ -248,12 +248,12 @@ pub fn summary(inputs: &Inputs, design: &Design) -> Value {
         .iter()
         .map(|&s| {
             let site = &dataset.sites[s];
-            let p = site.position * 1000.0;
+            let p = site.gauge.position * 1000.0;
             json!({
                 "index": s,
                 "refined": s >= design.simulated.lattice,
                 "x_mm": p.x, "y_mm": p.y, "z_mm": p.z,
-                "direction": site.direction.to_array(),
+                "direction": site.gauge.direction.to_array(),
                 "rms_microstrain": site.rms_strain * 1e6,
                 "signal_to_noise": signal_to_noise(inputs, site.rms_strain),
             })

@@ -25,14 +25,15 @@ use super::npz::{Arrays, NpzFile};
 use super::response_maps::{self, Maps, flat, numbers, vectors};
 use crate::budget::{Budget, Watch};
 use crate::design::{self, Computed, DesignError, Inputs, Sensing};
-use crate::elasticity::sensitivity::{Gauge, Sensitivity};
+use crate::elasticity::sensitivity::Sensitivity;
+use crate::gauge::Gauge;
 use crate::inference::{AsDrawn, ResponseMap};
 use crate::project::LiveKeys;
 
 /// Of the file.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Numbers of a gauge.
-const OF_A_GAUGE: usize = 11;
+const OF_A_GAUGE: usize = 9;
 
 /// The model of a project's gauges: the one that was kept beside the project (a file that is there), where it is of these
 /// inputs, or computed and kept.
@@ -116,19 +117,7 @@ fn write(path: &Path, key: &str, of: &Computed) -> Result<(), FileError> {
 fn numbers_of(gauge: &Gauge) -> [f64; OF_A_GAUGE] {
     let ([px, py, pz], [dx, dy, dz]) = (gauge.position.to_array(), gauge.direction.to_array());
     let [nx, ny, nz] = gauge.normal.to_array();
-    [
-        px,
-        py,
-        pz,
-        dx,
-        dy,
-        dz,
-        nx,
-        ny,
-        nz,
-        gauge.length,
-        gauge.width,
-    ]
+    [px, py, pz, dx, dy, dz, nx, ny, nz]
 }
 
 /// What lies there, where it has this key and is whole.
@@ -166,8 +155,6 @@ fn gauge_of(numbers: &[f64]) -> Gauge {
         position: vector(0),
         direction: vector(3),
         normal: vector(6),
-        length: numbers[9],
-        width: numbers[10],
     }
 }
 

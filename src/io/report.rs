@@ -13,14 +13,15 @@ use self::settings::settings;
 use super::run::{Provenance, range, signal_to_noise, signal_unit};
 use super::svg::{self, Marker, Paint, Series, escape};
 use crate::colormap::ColorMap;
+use crate::design::InnerFace;
 use crate::design::curves::{curve, failure_curve, failure_ways};
 use crate::design::{BLIND, Design, Inputs};
 use crate::evaluation::EstimatorKind;
+use crate::gauge::Gauge;
 use crate::gaussian_process::GpTrial;
 use crate::mesh::flatten::Flat;
 use crate::placement::candidates::Candidates;
 use crate::plain::{count, robust_top};
-use crate::project::PartModel;
 
 const STYLE: &str = "
 :root{color-scheme:light}body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1080px;margin:32px auto;padding:0 20px}
@@ -158,18 +159,15 @@ fn number(page: &mut String, value: &str, label: &str) {
 #[must_use]
 pub fn markers(inputs: &Inputs, design: &Design) -> Vec<Marker> {
     let sites = &design.simulated.dataset.sites;
-    // The inner face of a solid looks inward, the mid-surface of a shell outward.
-    let outward = match inputs.project.part.model {
-        PartModel::Solid => -1.0,
-        PartModel::Shell => 1.0,
-    };
+    let face = InnerFace::of(&inputs.project.part);
     (1..)
         .zip(design.chosen())
         .map(|(number, &s)| Marker {
             number,
-            position: sites[s].position,
-            normal: sites[s].normal * outward,
-            direction: sites[s].direction,
+            gauge: Gauge {
+                normal: face.out(sites[s].gauge.normal),
+                ..sites[s].gauge
+            },
         })
         .collect()
 }
@@ -238,7 +236,7 @@ fn sites(page: &mut String, inputs: &Inputs, design: &Design) {
     );
     for (k, &s) in design.chosen().iter().enumerate() {
         let site = &dataset.sites[s];
-        let (p, d) = (site.position * 1000.0, site.direction);
+        let (p, d) = (site.gauge.position * 1000.0, site.gauge.direction);
         let (low, high) = range(dataset, s);
         let ratio =
             signal_to_noise(inputs, site.rms_strain).map_or("–".into(), |r| format!("{r:.0}"));

@@ -78,8 +78,10 @@ pub fn as_chosen(all: &[Site], sites: &[usize]) -> Vec<ChosenSite> {
         .map(|&s| {
             let site = &all[s];
             ChosenSite {
-                position_mm: (site.position * 1000.0).to_array().map(|x| round(x, 1e3)),
-                direction: site.direction.to_array().map(|x| round(x, 1e4)),
+                position_mm: (site.gauge.position * 1000.0)
+                    .to_array()
+                    .map(|x| round(x, 1e3)),
+                direction: site.gauge.direction.to_array().map(|x| round(x, 1e4)),
             }
         })
         .collect()

@@ -5,19 +5,18 @@ use std::fmt::Write as _;
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::colormap::ColorMap;
+use crate::gauge::Gauge;
 use crate::mesh::TriMesh;
 use crate::mesh::flatten::Flat;
 use crate::mesh::stance::Stance;
 use crate::mesh::stretch::KEPT;
 use crate::plain;
 
-/// A gauge to be drawn: its number, place (m) and direction.
+/// A gauge to be drawn, with its number; its normal is from the inside to the outside.
 #[derive(Clone, Copy, Debug)]
 pub struct Marker {
     pub number: usize,
-    pub position: DVec3,
-    pub normal: DVec3,
-    pub direction: DVec3,
+    pub gauge: Gauge,
 }
 
 /// A side to look from: towards the viewer, and up.
@@ -69,9 +68,9 @@ pub fn limb(mesh: &TriMesh, paint: Paint, markers: &[Marker], view: &View, width
         );
     }
     for marker in markers {
-        let at = canvas.place((frame * marker.position).truncate());
-        let tip = (frame * marker.direction).truncate();
-        let near = marker.normal.dot(view.toward) > 0.0;
+        let at = canvas.place((frame * marker.gauge.position).truncate());
+        let tip = (frame * marker.gauge.direction).truncate();
+        let near = marker.gauge.normal.dot(view.toward) > 0.0;
         draw_marker(&mut svg, at, DVec2::new(tip.x, -tip.y), marker.number, near);
     }
     svg.push_str("</g></svg>");
@@ -111,8 +110,8 @@ pub fn unrolled(flat: &Flat, paint: Paint, markers: &[Marker], width: f64) -> St
         .map(|(tri, _)| path(&corners(tri)));
     hatch(&mut svg, &stretched.collect::<String>());
     for marker in markers {
-        let at = canvas.place(flat.place(marker.position));
-        let direction = flat.turn(marker.position, marker.direction);
+        let at = canvas.place(flat.place(marker.gauge.position));
+        let direction = flat.turn(marker.gauge.position, marker.gauge.direction);
         let direction = direction.normalize_or_zero();
         let direction = DVec2::new(direction.x, -direction.y);
         draw_marker(&mut svg, at, direction, marker.number, true);

@@ -46,23 +46,26 @@ impl Arm {
     /// Why an arm on this rod cannot press the gauge.
     pub fn new(
         on: &Wall,
-        gauge: &PressedGauge,
+        pressed: &PressedGauge,
         frame: &JigFrame,
         film: DVec2,
         sizes: &Sizes,
     ) -> Result<Self, Why> {
-        let (place, wall) = (frame.here(gauge.place), frame.way(gauge.out));
+        let (place, wall) = (
+            frame.here(pressed.gauge.position),
+            frame.way(pressed.gauge.normal),
+        );
         let flat = place.truncate();
         let straight = wall.truncate().dot(flat.normalize_or(DVec2::X));
         if straight < STRAIGHT {
             return Err(Why::Leans(straight.clamp(-1.0, 1.0).acos().to_degrees()));
         }
         let arm = Self {
-            number: gauge.number,
+            number: pressed.number,
             angle: flat.to_angle(),
             slot: place.z,
             travel: LEAST_TRAVEL,
-            pad: Pad::new(on, gauge, frame, film, sizes),
+            pad: Pad::new(on, pressed, frame, film, sizes),
         };
         if arm.most_travel(sizes) < LEAST_TRAVEL {
             return Err(Why::Near(flat.length()));

@@ -36,14 +36,19 @@ impl Pad {
     #[must_use]
     pub fn new(
         on: &Wall,
-        gauge: &PressedGauge,
+        pressed: &PressedGauge,
         frame: &JigFrame,
         film: DVec2,
         sizes: &Sizes,
     ) -> Self {
-        let (place, wall) = (frame.here(gauge.place), frame.way(gauge.out));
+        let (place, wall) = (
+            frame.here(pressed.gauge.position),
+            frame.way(pressed.gauge.normal),
+        );
         let out = place.with_z(0.0).normalize_or(DVec3::X);
-        let line = frame.way(gauge.direction).reject_from_normalized(out);
+        let line = frame
+            .way(pressed.gauge.direction)
+            .reject_from_normalized(out);
         let along = line.normalize_or(DVec3::Z);
         let mut pad = Self {
             out,

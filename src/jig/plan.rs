@@ -6,7 +6,7 @@ use super::arm::{Arm, Bodies};
 use super::convex::{meet, swept};
 use super::frame::{Entry, JigFrame};
 use super::reach::RodReach;
-use super::rod::{Line, Site, cover};
+use super::rod::{Interior, Line, cover};
 use super::sizes::Sizes;
 use super::slots::slots;
 use super::wall::{PressedGauge, Wall};
@@ -54,21 +54,21 @@ pub fn plan(
 ) -> Result<Jig, Cancelled> {
     /// Rods, one after another.
     const RODS: usize = 6;
-    let site = Site::new(wall, gauges, film);
-    let rods = cover(&site, gauges, RODS, watch)?;
+    let interior = Interior::new(wall, gauges.iter().map(|g| g.gauge.position), film);
+    let rods = cover(&interior, gauges, RODS, watch)?;
     let reached = |number: usize| {
         let mut arms = rods.iter().flat_map(|rod| &rod.arms);
         arms.any(|arm| arm.number == number)
     };
     // What is said of the others is of the line that the most are reached on.
     let line = rods.first().map(|rod| rod.line);
-    let line = line.or_else(|| site.lines().first().copied());
+    let line = line.or_else(|| interior.lines().first().copied());
     let left = gauges.iter().filter(|g| !reached(g.number));
-    let mut left_out = line.map_or(Vec::new(), |line| site.rod(line, left).left_out);
+    let mut left_out = line.map_or(Vec::new(), |line| interior.rod(line, left).left_out);
     let mut stacks: Vec<Stack> = Vec::new();
     let lines = rods.iter().map(|rod| rod.line).collect();
     for rod in rods {
-        let (passes, refused) = passes(&site, rod.line, rod.arms);
+        let (passes, refused) = passes(&interior, rod.line, rod.arms);
         left_out.extend(refused.iter().map(|arm| LeftOut {
             number: arm.number,
             why: Why::Arm,
@@ -76,18 +76,18 @@ pub fn plan(
         for arms in passes {
             stacks.push(Stack {
                 letter: letter(stacks.len()),
-                entry: site.entry(rod.line),
-                frame: site.frame(rod.line),
-                rim: site.rim(rod.line),
-                lift: lift(&site.sizes, &arms),
+                entry: interior.entry(rod.line),
+                frame: interior.frame(rod.line),
+                rim: interior.rim(rod.line),
+                lift: lift(&interior.sizes, &arms),
                 arms,
             });
         }
     }
     left_out.sort_by_key(|left| left.number);
     Ok(Jig {
-        sizes: site.sizes,
-        reach: RodReach::of(site, lines),
+        sizes: interior.sizes,
+        reach: RodReach::of(interior, lines),
         stacks,
         left_out,
     })
@@ -105,7 +105,7 @@ fn letter(k: usize) -> String {
 
 /// Arms that fit beside each other, in as few goes as a greedy search finds: each arm in the first that it fits into.
 /// Those come after them that do not even fit alone, with the seat in the way.
-fn passes(site: &Site, line: Line, arms: Vec<Arm>) -> (Vec<Vec<Arm>>, Vec<Arm>) {
+fn passes(interior: &Interior, line: Line, arms: Vec<Arm>) -> (Vec<Vec<Arm>>, Vec<Arm>) {
     let mut passes: Vec<Vec<Arm>> = Vec::new();
     let mut refused = Vec::new();
     for arm in arms {
@@ -114,8 +114,8 @@ fn passes(site: &Site, line: Line, arms: Vec<Arm>) -> (Vec<Vec<Arm>>, Vec<Arm>) 
             let Some(arm) = left.take() else { break };
             let mut with = pass.clone();
             with.push(arm.clone());
-            space_rings(&site.sizes, &mut with);
-            if fit(site, line, &with) {
+            space_rings(&interior.sizes, &mut with);
+            if fit(interior, line, &with) {
                 *pass = with;
             } else {
                 left = Some(arm);
@@ -123,8 +123,8 @@ fn passes(site: &Site, line: Line, arms: Vec<Arm>) -> (Vec<Vec<Arm>>, Vec<Arm>) 
         }
         if let Some(arm) = left {
             let mut alone = vec![arm];
-            space_rings(&site.sizes, &mut alone);
-            if fit(site, line, &alone) {
+            space_rings(&interior.sizes, &mut alone);
+            if fit(interior, line, &alone) {
                 passes.push(alone);
             } else {
                 refused.extend(alone);
@@ -155,15 +155,15 @@ fn space_rings(sizes: &Sizes, arms: &mut [Arm]) {
 
 /// Whether all arms (from the opening inwards) get in, are slid on one after another from the innermost, and have their
 /// pads pressed without meeting each other.
-fn fit(site: &Site, line: Line, arms: &[Arm]) -> bool {
+fn fit(interior: &Interior, line: Line, arms: &[Arm]) -> bool {
     /// How far a strut may rise over its length.
     const STEEP: f64 = 1.2;
-    let sizes = &site.sizes;
+    let sizes = &interior.sizes;
     let steep = arms.iter().any(|arm| {
         let reach = (arm.guide(sizes)[0] - sizes.ring_radius()).max(1.0);
         (arm.slot - arm.pad.height).abs() > STEEP * reach.max(sizes.ring)
     });
-    if steep || arms.iter().any(|arm| site.gets_in(line, arm).is_err()) {
+    if steep || arms.iter().any(|arm| interior.gets_in(line, arm).is_err()) {
         return false;
     }
     pairs(arms).all(|(a, b)| are_apart(sizes, a, b))

@@ -2,13 +2,14 @@
 
 use glam::DVec2;
 
-use super::rod::{Line, Site, cover};
+use super::rod::{Interior, Line, cover};
 use super::wall::{PressedGauge, Wall};
 use crate::budget::{Cancelled, Watch};
+use crate::gauge::Gauge;
 
 /// The rods that get to most of a part.
 pub struct RodReach {
-    site: Site,
+    interior: Interior,
     lines: Vec<Line>,
 }
 
@@ -17,36 +18,35 @@ impl RodReach {
     ///
     /// # Errors
     /// [`Cancelled`] when the watch asks for it.
-    pub fn new(
-        wall: Wall,
-        places: &[PressedGauge],
-        film: DVec2,
-        watch: Watch,
-    ) -> Result<Self, Cancelled> {
+    pub fn new(wall: Wall, places: &[Gauge], film: DVec2, watch: Watch) -> Result<Self, Cancelled> {
         /// Rods, one after another, and places that they are chosen by.
         const RODS: usize = 3;
         const PLACES: usize = 60;
-        let site = Site::new(wall, places, film);
+        let interior = Interior::new(wall, places.iter().map(|g| g.position), film);
         let apart = places.len().div_ceil(PLACES).max(1);
         let some: Vec<PressedGauge> = (0..)
             .zip(places.iter().step_by(apart))
-            .map(|(number, place)| PressedGauge { number, ..*place })
+            .map(|(number, &gauge)| PressedGauge { number, gauge })
             .collect();
-        let rods = cover(&site, &some, RODS, watch)?;
+        let rods = cover(&interior, &some, RODS, watch)?;
         let lines = rods.into_iter().map(|rod| rod.line).collect();
-        Ok(Self::of(site, lines))
+        Ok(Self::of(interior, lines))
     }
 
     /// Of rods on these lines.
     #[must_use]
-    pub fn of(site: Site, lines: Vec<Line>) -> Self {
-        Self { site, lines }
+    pub fn of(interior: Interior, lines: Vec<Line>) -> Self {
+        Self { interior, lines }
     }
 
     /// Whether an arm on one of the rods gets to a gauge.
     #[must_use]
-    pub fn gets_to(&self, gauge: &PressedGauge) -> bool {
+    pub fn gets_to(&self, gauge: &Gauge) -> bool {
+        let pressed = PressedGauge {
+            number: 0,
+            gauge: *gauge,
+        };
         let mut lines = self.lines.iter();
-        lines.any(|&line| self.site.arm(line, gauge).is_ok())
+        lines.any(|&line| self.interior.arm(line, &pressed).is_ok())
     }
 }

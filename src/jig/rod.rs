@@ -16,7 +16,7 @@ use crate::mesh::stance::Stance;
 pub const HEAD: f64 = 3.0;
 
 /// What gauges are pressed in, and with what.
-pub struct Site {
+pub struct Interior {
     /// The part.
     pub wall: Wall,
     /// Half length and width of a gauge's film (mm).
@@ -59,16 +59,16 @@ pub struct Rod {
     pub left_out: Vec<LeftOut>,
 }
 
-impl Site {
-    /// For gauges with a film of half these sizes (mm).
+impl Interior {
+    /// For gauges at places (m) on the inner face, with a film of half these sizes (mm).
     #[must_use]
-    pub fn new(wall: Wall, gauges: &[PressedGauge], film: DVec2) -> Self {
+    pub fn new(wall: Wall, places: impl Iterator<Item = DVec3>, film: DVec2) -> Self {
         let middle = middle(&wall.face, wall.stance);
-        let distance = |g: &PressedGauge| {
-            let at = wall.stance.coordinates(g.place).truncate();
+        let distance = |place: DVec3| {
+            let at = wall.stance.coordinates(place).truncate();
             at.distance(middle) * 1e3
         };
-        let nearest = gauges.iter().map(distance).fold(f64::INFINITY, f64::min);
+        let nearest = places.map(distance).fold(f64::INFINITY, f64::min);
         Self {
             sizes: Sizes::within(nearest),
             ends: [Entry::Foot, Entry::Top]
@@ -226,17 +226,17 @@ fn middle(face: &TriMesh, stance: Stance) -> DVec2 {
 /// # Errors
 /// [`Cancelled`] when the watch asks for it.
 pub fn cover(
-    site: &Site,
+    interior: &Interior,
     gauges: &[PressedGauge],
     most: usize,
     watch: Watch,
 ) -> Result<Vec<Rod>, Cancelled> {
     let mut tried: Vec<Rod> = Vec::new();
-    let lines = site.lines();
+    let lines = interior.lines();
     let count = lines.len();
     for (k, line) in lines.into_iter().enumerate() {
         report(watch, "Looking for a rod", k, count)?;
-        tried.push(site.rod(line, gauges));
+        tried.push(interior.rod(line, gauges));
         if tried.last().is_some_and(|rod| rod.left_out.is_empty()) {
             break;
         }

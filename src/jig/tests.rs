@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3};
 use super::shapes::closed;
 use super::*;
 use crate::budget::unwatched;
+use crate::gauge::Gauge;
 use crate::limb::LimbSpec;
 use crate::mesh::stance::Stance;
 use crate::mesh::{Facets, TriMesh};
@@ -35,11 +36,11 @@ fn limb() -> (TriMesh, Vec<PressedGauge>) {
         let out = mesh.normal(at);
         PressedGauge {
             number,
-            place: mesh.point(at),
-            out,
-            direction: (DVec3::Z + out.cross(DVec3::Z) * f64::from(number as u32 % 3))
-                .reject_from_normalized(out)
-                .normalize(),
+            gauge: Gauge::on(
+                &mesh,
+                at,
+                DVec3::Z + out.cross(DVec3::Z) * f64::from(number as u32 % 3),
+            ),
         }
     });
     let gauges = gauges.collect();
@@ -129,8 +130,8 @@ fn pads_press_gauges_where_they_belong() {
             // The middle of the face lies the gap before the gauge.
             let middle = arm.pad.grid().position(|at| at == DVec2::ZERO).unwrap();
             let face = arm.pad.point(DVec2::ZERO, arm.pad.face[middle]);
-            let place = stack.frame.here(glued.place);
-            let out = stack.frame.way(glued.out);
+            let place = stack.frame.here(glued.gauge.position);
+            let out = stack.frame.way(glued.gauge.normal);
             let off = place - face;
             assert!((off.dot(out) - jig.sizes.gap).abs() < 0.15, "{off}");
             assert!(
@@ -179,7 +180,7 @@ fn what_is_in_the_way_is_found_and_said() {
     );
     for stack in &jig.stacks {
         for arm in &stack.arms {
-            let z = whole[arm.number - 1].place.z;
+            let z = whole[arm.number - 1].gauge.position.z;
             assert_eq!(
                 z < f64::midpoint(low.z, high.z),
                 stack.entry == Entry::Foot,
@@ -209,11 +210,8 @@ fn what_is_in_the_way_is_found_and_said() {
 fn gauges_that_are_too_near_to_each_other_are_pressed_in_turn() {
     let (mesh, gauges) = limb();
     let first = gauges[0];
-    let second = PressedGauge {
-        number: 2,
-        place: first.place + DVec3::Z * 4e-3,
-        ..first
-    };
+    let mut second = PressedGauge { number: 2, ..first };
+    second.gauge.position += DVec3::Z * 4e-3;
     let jig = plan(of(&mesh, &mesh), &[first, second], HALF_FILM, &unwatched).unwrap();
     assert_eq!(jig.stacks.len(), 2);
     assert!(jig.left_out.is_empty());
@@ -222,11 +220,12 @@ fn gauges_that_are_too_near_to_each_other_are_pressed_in_turn() {
 #[test]
 fn what_a_filter_lets_through_is_reached() {
     let (mesh, gauges) = limb();
+    let gauges: Vec<Gauge> = gauges.iter().map(|g| g.gauge).collect();
     let reach = RodReach::new(of(&mesh, &mesh), &gauges, HALF_FILM, &unwatched).unwrap();
     assert!(gauges.iter().all(|g| reach.gets_to(g)));
     // A gauge on a wall that looks along the axis cannot be pressed from it.
-    let tilted = PressedGauge {
-        out: DVec3::new(0.3, 0.0, 0.95).normalize(),
+    let tilted = Gauge {
+        normal: DVec3::new(0.3, 0.0, 0.95).normalize(),
         ..gauges[0]
     };
     assert!(!reach.gets_to(&tilted));

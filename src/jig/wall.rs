@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
+use crate::gauge::Gauge;
 use crate::mesh::TriMesh;
 use crate::mesh::stance::Stance;
 
@@ -12,12 +11,8 @@ use crate::mesh::stance::Stance;
 pub struct PressedGauge {
     /// By which its pieces are named.
     pub number: usize,
-    /// On the inner face (m).
-    pub place: DVec3,
-    /// From the inside to the outside, of unit length.
-    pub out: DVec3,
-    /// In which it measures.
-    pub direction: DVec3,
+    /// On the inner face; its normal is from the inside to the outside.
+    pub gauge: Gauge,
 }
 
 /// A part, as far as a jig meets it.

@@ -107,7 +107,7 @@ impl Session {
         };
         let sites = &simulation.value.simulated.dataset.sites;
         let near = |a: &usize, b: &usize| {
-            let d = |s: &usize| sites[*s].position.distance_squared(p);
+            let d = |s: &usize| sites[*s].gauge.position.distance_squared(p);
             d(a).total_cmp(&d(b))
         };
         let best = self.free_sites(number).into_iter().min_by(near)?;
@@ -141,7 +141,7 @@ impl Session {
             .filter_map(|(k, p)| (k != number).then_some(p))
             .collect();
         let taken = |s: &usize| {
-            let p = sites[*s].position;
+            let p = sites[*s].gauge.position;
             others.iter().any(|o| o.distance(p) < SAME_MM * 1e-3)
         };
         verdicts.sites().into_iter().filter(|s| !taken(s)).collect()
@@ -159,7 +159,7 @@ impl Session {
         let simulation = self.results.simulation.as_ref()?;
         let sites = &simulation.value.simulated.dataset.sites;
         let scored = |s: usize| {
-            let p = sites[s].position;
+            let p = sites[s].gauge.position;
             let near = p.distance(from) < reach;
             Some((near.then(|| score(p)).flatten()?, s))
         };
@@ -229,10 +229,11 @@ impl Session {
                 DVec3::from_array(site.direction),
             );
             let off = |s: &usize| {
-                all[*s].position.distance(p) + TURNED * (1.0 - all[*s].direction.dot(d).abs())
+                all[*s].gauge.position.distance(p)
+                    + TURNED * (1.0 - all[*s].gauge.direction.dot(d).abs())
             };
             let best = (0..all.len()).min_by(|a, b| off(a).total_cmp(&off(b)))?;
-            (all[best].position.distance(p) < spacing).then_some(best)
+            (all[best].gauge.position.distance(p) < spacing).then_some(best)
         };
         sites.iter().map(find).collect()
     }

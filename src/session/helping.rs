@@ -121,7 +121,7 @@ impl Session {
         let least = self.document.state.project.selection.spacing();
         let gauges = self.gauge_places();
         let has_room = |s: &usize| {
-            let away = |gauge: &glam::DVec3| gauge.distance(sites[*s].position);
+            let away = |gauge: &glam::DVec3| gauge.distance(sites[*s].gauge.position);
             gauges.iter().all(|gauge| away(gauge) >= least)
         };
         let free = self.free_sites(usize::MAX).into_iter();

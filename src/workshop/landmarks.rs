@@ -46,13 +46,13 @@ pub fn landmarks(inner: &Inner) -> Vec<Landmarks> {
     let flat = Flat::of(&inner.mesh, inner.stance);
     let axis = flat.axis_point();
     (inner.gauges.iter())
-        .map(|gauge| of(inner, gauge, &rims, (foot, top), axis))
+        .map(|glued| of(inner, glued, &rims, (foot, top), axis))
         .collect()
 }
 
 fn of(
     inner: &Inner,
-    gauge: &Glued,
+    glued: &Glued,
     rims: &[[DVec3; 2]],
     (foot, top): (f64, f64),
     axis: Option<DVec3>,
@@ -60,15 +60,15 @@ fn of(
     /// Of the others that are told.
     const NEAREST: usize = 3;
     let stance = &inner.stance;
-    let height = stance.coordinates(gauge.place).z;
+    let height = stance.coordinates(glued.gauge.position).z;
     // A tube is walked around about its own axis, anything else about the origin of the file.
-    let arm = gauge.place - axis.unwrap_or(DVec3::ZERO);
+    let arm = glued.gauge.position - axis.unwrap_or(DVec3::ZERO);
     let around = arm.dot(stance.right()).atan2(arm.dot(stance.front()));
     let mut neighbours: Vec<Neighbour> = (inner.gauges.iter())
-        .filter(|other| other.number != gauge.number)
+        .filter(|other| other.number != glued.number)
         .map(|other| Neighbour {
             number: other.number,
-            distance: other.place.distance(gauge.place),
+            distance: other.gauge.position.distance(glued.gauge.position),
         })
         .collect();
     neighbours.sort_by(|a, b| {
@@ -79,23 +79,23 @@ fn of(
     neighbours.truncate(NEAREST);
     let nearest = |[a, b]: &[DVec3; 2]| {
         let along = *b - *a;
-        let share = (gauge.place - *a).dot(along) / along.length_squared().max(1e-30);
+        let share = (glued.gauge.position - *a).dot(along) / along.length_squared().max(1e-30);
         let at = *a + along * share.clamp(0.0, 1.0);
-        (at.distance(gauge.place), at)
+        (at.distance(glued.gauge.position), at)
     };
     Landmarks {
         above_foot: height - foot,
         below_top: top - height,
         around_deg: around.to_degrees(),
         from_edge: rims.iter().map(nearest).min_by(|a, b| a.0.total_cmp(&b.0)),
-        turned_deg: turned(inner, gauge).to_degrees(),
+        turned_deg: turned(inner, glued).to_degrees(),
         neighbours,
     }
 }
 
 /// Clockwise from up, as seen from inside: a gauge has no front and back.
-fn turned(inner: &Inner, gauge: &Glued) -> f64 {
-    let flat = |d: DVec3| d.reject_from_normalized(gauge.out);
+fn turned(inner: &Inner, glued: &Glued) -> f64 {
+    let flat = |d: DVec3| d.reject_from_normalized(glued.gauge.normal);
     let up = flat(inner.stance.up());
     let up = if up.length() > 0.1 {
         up
@@ -104,9 +104,13 @@ fn turned(inner: &Inner, gauge: &Glued) -> f64 {
     };
     let (up, right) = (
         up.normalize_or_zero(),
-        gauge.out.cross(up).normalize_or_zero(),
+        glued.gauge.normal.cross(up).normalize_or_zero(),
     );
-    let angle = gauge.direction.dot(right).atan2(gauge.direction.dot(up));
+    let angle = glued
+        .gauge
+        .direction
+        .dot(right)
+        .atan2(glued.gauge.direction.dot(up));
     let half = std::f64::consts::FRAC_PI_2;
     if angle > half {
         angle - 2.0 * half
@@ -134,6 +138,7 @@ fn rims(inner: &Inner) -> Vec<[DVec3; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gauge::Gauge;
     use crate::limb::LimbSpec;
     use crate::mesh::stance::Stance;
 
@@ -148,9 +153,11 @@ mod tests {
             let right = out.cross(stance.up());
             Glued {
                 number,
-                place: out * 31.8e-3 + stance.up() * z,
-                out,
-                direction: stance.up() * turned.cos() + right * turned.sin(),
+                gauge: Gauge {
+                    position: out * 31.8e-3 + stance.up() * z,
+                    direction: stance.up() * turned.cos() + right * turned.sin(),
+                    normal: out,
+                },
                 strain: [0.0; 2],
                 rms: 0.0,
             }

@@ -8,11 +8,11 @@ use super::inner::Glued;
 
 /// A frame at a gauge: its place (m), and the turn of its axes: x along the gauge, z from the inside to the outside.
 #[must_use]
-pub fn frame(gauge: &Glued) -> (DVec3, DMat3) {
-    let z = gauge.out.normalize_or(DVec3::Z);
-    let x = gauge.direction.reject_from_normalized(z);
+pub fn frame(glued: &Glued) -> (DVec3, DMat3) {
+    let z = glued.gauge.normal.normalize_or(DVec3::Z);
+    let x = glued.gauge.direction.reject_from_normalized(z);
     let x = x.normalize_or(z.any_orthonormal_vector());
-    (gauge.place, DMat3::from_cols(x, z.cross(x), z))
+    (glued.gauge.position, DMat3::from_cols(x, z.cross(x), z))
 }
 
 /// Roll, pitch and yaw (radians) of a turn, as URDF has them: about the fixed axes x, y and z, one after the other.
@@ -42,10 +42,10 @@ pub fn urdf(gauges: &[Glued], robot: &str, link: &str) -> String {
     let mut text = format!(
         "<?xml version=\"1.0\"?>\n<!-- A frame for each gauge: x along it, z from the inside to the outside. Metres and radians in the frame of \"{link}\".\n     Copy the links and joints into the robot's own description. -->\n<robot name=\"{robot}\">\n  <link name=\"{link}\"/>\n"
     );
-    for gauge in gauges {
-        let (place, turn) = frame(gauge);
+    for glued in gauges {
+        let (place, turn) = frame(glued);
         let [roll, pitch, yaw] = roll_pitch_yaw(&turn);
-        let name = format!("{link}_gauge_{}", gauge.number);
+        let name = format!("{link}_gauge_{}", glued.number);
         let _ = write!(
             text,
             "  <link name=\"{name}\"/>\n  <joint name=\"{name}_joint\" type=\"fixed\">\n    <parent link=\"{link}\"/>\n    <child link=\"{name}\"/>\n    <origin xyz=\"{:.6} {:.6} {:.6}\" rpy=\"{roll:.6} {pitch:.6} {yaw:.6}\"/>\n  </joint>\n",
@@ -68,6 +68,7 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gauge::Gauge;
 
     #[test]
     fn angles_are_those_of_the_turn() {
@@ -98,19 +99,21 @@ mod tests {
 
     #[test]
     fn a_frame_lies_along_its_gauge() {
-        let gauge = Glued {
+        let glued = Glued {
             number: 3,
-            place: DVec3::new(0.01, 0.02, 0.03),
-            out: DVec3::Y,
-            direction: DVec3::new(0.6, 0.0, 0.8),
+            gauge: Gauge {
+                position: DVec3::new(0.01, 0.02, 0.03),
+                direction: DVec3::new(0.6, 0.0, 0.8),
+                normal: DVec3::Y,
+            },
             strain: [0.0; 2],
             rms: 0.0,
         };
-        let (_, turn) = frame(&gauge);
-        assert!((turn * DVec3::X - gauge.direction).length() < 1e-12);
-        assert!((turn * DVec3::Z - gauge.out).length() < 1e-12);
+        let (_, turn) = frame(&glued);
+        assert!((turn * DVec3::X - glued.gauge.direction).length() < 1e-12);
+        assert!((turn * DVec3::Z - glued.gauge.normal).length() < 1e-12);
         assert!((turn.determinant() - 1.0).abs() < 1e-12);
-        let text = urdf(&[gauge], "r\"obot", "shin");
+        let text = urdf(&[glued], "r\"obot", "shin");
         assert!(text.contains("<child link=\"shin_gauge_3\"/>") && text.contains("r&quot;obot"));
         assert!(
             text.contains("xyz=\"0.010000 0.020000 0.030000\""),

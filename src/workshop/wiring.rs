@@ -250,13 +250,16 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::gauge::Gauge;
 
     fn gauge(number: usize, strain: [f64; 2]) -> Glued {
         Glued {
             number,
-            place: DVec3::ZERO,
-            out: DVec3::X,
-            direction: DVec3::Z,
+            gauge: Gauge {
+                position: DVec3::ZERO,
+                direction: DVec3::Z,
+                normal: DVec3::X,
+            },
             strain,
             rms: 0.0,
         }

@@ -188,8 +188,8 @@ fn sets(
         }
     }
     // All near one place: bad.
-    let centre = simulated.dataset.sites[feasible[0]].position;
-    let away = |s: &usize| simulated.dataset.sites[*s].position.distance(centre);
+    let centre = simulated.dataset.sites[feasible[0]].gauge.position;
+    let away = |s: &usize| simulated.dataset.sites[*s].gauge.position.distance(centre);
     let mut near = feasible.to_vec();
     near.sort_by(|a, b| away(a).total_cmp(&away(b)));
     sets.push(Set {
@@ -205,8 +205,8 @@ fn with_gauges(inputs: &Inputs, simulated: &Simulated, set: &[usize]) -> Inputs 
     let chosen = |&s: &usize| {
         let site = &simulated.dataset.sites[s];
         ChosenSite {
-            position_mm: (site.position * 1e3).to_array(),
-            direction: site.direction.to_array(),
+            position_mm: (site.gauge.position * 1e3).to_array(),
+            direction: site.gauge.direction.to_array(),
         }
     };
     inputs.project.selection.sites = set.iter().map(chosen).collect();

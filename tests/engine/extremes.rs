@@ -52,7 +52,7 @@ fn sound(name: &str, inputs: &Inputs) -> Design {
     }
     for site in &design.simulated.dataset.sites {
         assert!(
-            (site.direction.length() - 1.0).abs() < 1e-9,
+            (site.gauge.direction.length() - 1.0).abs() < 1e-9,
             "{name}: direction"
         );
     }
@@ -161,7 +161,9 @@ fn one_feasible_site_is_taken_and_a_second_is_refused() {
     let part = limb().part;
     let index = part.index();
     let one = open.reduced.feasible.iter().find_map(|&s| {
-        let at = index.nearest(open.simulated.dataset.sites[s].position).0;
+        let at = index
+            .nearest(open.simulated.dataset.sites[s].gauge.position)
+            .0;
         let mut mask = vec![false; part.positions().len()];
         for &v in &part.triangles()[at.triangle as usize] {
             mask[v as usize] = true;

@@ -267,7 +267,7 @@ fn a_report_shows_the_near_wall_as_near_and_no_limit_as_none() {
     asked.project.part.model = PartModel::Solid;
     // A solid's gauges are on a face that looks inward; what faces the reader is the other side of that wall.
     for (solid, shell) in markers(&asked, design).iter().zip(of_shell) {
-        assert_eq!(solid.normal, -shell.normal);
+        assert_eq!(solid.gauge.normal, -shell.gauge.normal);
     }
     let written = serde_json::to_value(Quality::Standard.budget()).unwrap();
     assert!(written["candidates"].is_null() && written["touches"].is_null());

@@ -95,8 +95,8 @@ fn variances_are_those_of_touches_that_are_made_so() {
             }
         };
         let pushes: Vec<Push> = touches.iter().map(drag).collect();
-        let sites = &all.sites[17..18];
-        let read = dataset::measure(&*model, &pushes, sites, Signal::Strain, &unwatched).unwrap();
+        let gauges = [all.sites[17].gauge];
+        let read = dataset::measure(&*model, &pushes, &gauges, Signal::Strain, &unwatched).unwrap();
         let columns = slopes.columns().touches().iter().zip(read.0.row(0));
         for (square, (&t, read)) in squares.iter_mut().zip(columns) {
             *square += (read - all.x.row(17)[t]).powi(2) / 4.0;
@@ -165,8 +165,8 @@ fn whoever_knows_of_friction_finds_touches_better() {
     let sites = &simulated().dataset.sites;
     inputs.project.selection.sites = (chosen(&inputs).into_iter())
         .map(|s| ChosenSite {
-            position_mm: (sites[s].position * 1e3).to_array(),
-            direction: sites[s].direction.to_array(),
+            position_mm: (sites[s].gauge.position * 1e3).to_array(),
+            direction: sites[s].gauge.direction.to_array(),
         })
         .collect();
     let sensing = design::sensing(&inputs, &budget(), &unwatched).unwrap();

@@ -7,13 +7,14 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use hapdef::budget::{Quality, unwatched};
-use hapdef::dataset::{self, Signal, SignalMatrix, Site};
+use hapdef::dataset::{self, Signal, SignalMatrix};
 use hapdef::design::{self, Inputs};
 use hapdef::elasticity::element::Facet;
 use hapdef::elasticity::observe::Face;
 use hapdef::elasticity::respond::{Quantity, Responses, Side, respond, respond_from};
 use hapdef::elasticity::support::held_freedoms;
 use hapdef::elasticity::{DofSet, Model as _, ShellModel, Touch};
+use hapdef::gauge::Gauge;
 use hapdef::mesh::TriMesh;
 use hapdef::placement::SelectorKind;
 use hapdef::regression::tune::Effort;
@@ -346,14 +347,14 @@ fn small(signal: Signal) -> (Inputs, hapdef::budget::Budget) {
 }
 
 /// A gauge half a millimetre along, back, across, back, and turned by a degree either way.
-fn moved(site: &Site) -> [Site; 6] {
-    let across = site.normal.cross(site.direction);
+fn moved(gauge: &Gauge) -> [Gauge; 6] {
+    let across = gauge.normal.cross(gauge.direction);
     let at = |along: f64, aside: f64, degrees: f64| {
         let (sin, cos) = degrees.to_radians().sin_cos();
-        Site {
-            position: site.position + site.direction * along + across * aside,
-            direction: site.direction * cos + across * sin,
-            ..*site
+        Gauge {
+            position: gauge.position + gauge.direction * along + across * aside,
+            direction: gauge.direction * cos + across * sin,
+            ..*gauge
         }
     };
     let half = 0.5e-3;
@@ -380,7 +381,9 @@ fn slopes_of_gluing_are_what_moved_gauges_read() {
         .map(|&t| all.touches[t])
         .collect();
     let sites: Vec<usize> = (0..all.sites.len()).step_by(61).collect();
-    let gauges: Vec<Site> = sites.iter().flat_map(|&s| moved(&all.sites[s])).collect();
+    let gauges: Vec<Gauge> = (sites.iter())
+        .flat_map(|&s| moved(&all.sites[s].gauge))
+        .collect();
     let model = simulated.model().unwrap();
     let read = dataset::measure(&*model, &touches, &gauges, Signal::Strain, &unwatched);
     let (read, _) = read.unwrap();
@@ -523,8 +526,8 @@ fn what_the_project_asks_of_a_choice_is_kept() {
     let simulated = Arc::new(design::simulate(&inputs, &budget, &unwatched).unwrap());
     let sites = &simulated.dataset.sites;
     for pair in sites.chunks_exact(2) {
-        assert_eq!(pair[0].position, pair[1].position);
-        assert!(pair[0].direction.dot(pair[1].direction).abs() < 1e-9);
+        assert_eq!(pair[0].gauge.position, pair[1].gauge.position);
+        assert!(pair[0].gauge.direction.dot(pair[1].gauge.direction).abs() < 1e-9);
         assert!(pair[0].rms_strain >= pair[1].rms_strain);
     }
     let feasibility = design::filter(&inputs, &simulated);
@@ -534,7 +537,7 @@ fn what_the_project_asks_of_a_choice_is_kept() {
             design::select(&inputs, &simulated, &reduced, kind, &budget, &unwatched).unwrap();
         let set = &chosen.sets.last().unwrap().sites;
         let cost = |s: &usize| {
-            if sites[*s].position.z <= 0.06 {
+            if sites[*s].gauge.position.z <= 0.06 {
                 3.5
             } else {
                 1.0
@@ -543,7 +546,7 @@ fn what_the_project_asks_of_a_choice_is_kept() {
         assert!(set.iter().map(cost).sum::<f64>() <= 4.0, "{kind:?}");
         for (k, a) in set.iter().enumerate() {
             for b in &set[..k] {
-                let apart = sites[*a].position.distance(sites[*b].position);
+                let apart = sites[*a].gauge.position.distance(sites[*b].gauge.position);
                 assert!(apart == 0.0 || apart >= 0.015, "{kind:?}: {apart}");
             }
         }

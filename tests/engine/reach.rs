@@ -272,7 +272,7 @@ fn the_papers_limb_is_touched_on_its_shell_and_glued_to_behind_it() {
         .collect();
     let feasible = design::filter(&inputs, &simulated).sites();
     let sites: Vec<DVec3> = (feasible.iter())
-        .map(|&s| simulated.dataset.sites[s].position)
+        .map(|&s| simulated.dataset.sites[s].gauge.position)
         .collect();
     assert!(sites.len() > 1000, "{}", sites.len());
     let outside = part(&touches, &|depth| depth < 1.0);

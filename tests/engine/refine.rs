@@ -116,21 +116,21 @@ fn gauges_that_moved_keep_every_rule() {
     let project = &inputs(count, true).project;
     let (rules, spacing) = (project.feasible_rules(), project.sites.spacing_mm * 1e-3);
     for site in &sites[lattice..] {
-        let on = simulated.mesh.point(index.nearest(site.position).0);
-        assert!(on.distance(site.position) < 1e-6);
-        assert!(site.direction.dot(site.normal).abs() < 1e-6);
-        assert!((site.direction.length() - 1.0).abs() < 1e-6);
+        let on = simulated.mesh.point(index.nearest(site.gauge.position).0);
+        assert!(on.distance(site.gauge.position) < 1e-6);
+        assert!(site.gauge.direction.dot(site.gauge.normal).abs() < 1e-6);
+        assert!((site.gauge.direction.length() - 1.0).abs() < 1e-6);
         assert!(site.rms_strain >= rules.least_signal_to_noise * rules.noise);
         assert!(site.peak_strain <= rules.range);
         // Where sites are feasible.
         let near = design.feasibility.sites().into_iter();
-        let away = near.map(|f| sites[f].position.distance(site.position));
+        let away = near.map(|f| sites[f].gauge.position.distance(site.gauge.position));
         assert!(away.fold(f64::INFINITY, f64::min) < 2.0 * spacing);
     }
     // As far from each other as sites are, or as they were.
     let places = |design: &Design| -> Vec<DVec3> {
         let all = design.chosen().iter();
-        all.map(|&s| design.simulated.dataset.sites[s].position)
+        all.map(|&s| design.simulated.dataset.sites[s].gauge.position)
             .collect()
     };
     let (before, after) = (places(plain), places(design));
@@ -146,7 +146,9 @@ fn gauges_that_moved_keep_every_rule() {
 fn what_is_kept_out_and_what_must_be_there_stays() {
     const SPACING: f64 = 12e-3;
     let [[plain, _], _] = pairs();
-    let must = plain.simulated.dataset.sites[plain.chosen()[0]].position;
+    let must = plain.simulated.dataset.sites[plain.chosen()[0]]
+        .gauge
+        .position;
     let mut asked = inputs(4, true);
     // One must stay, and none may come above it, nor near to another.
     asked.project.selection.required_mm = vec![(must * 1e3).to_array()];
@@ -160,7 +162,7 @@ fn what_is_kept_out_and_what_must_be_there_stays() {
     let (simulated, selection) = chosen(&asked, 2);
     let set = &selection.sets.last().unwrap().sites;
     let places: Vec<DVec3> = (set.iter())
-        .map(|&s| simulated.dataset.sites[s].position)
+        .map(|&s| simulated.dataset.sites[s].gauge.position)
         .collect();
     assert_eq!(places[0], must);
     assert!(set[0] < simulated.lattice);
@@ -229,7 +231,7 @@ fn what_is_written_has_the_gauges_as_they_are() {
     assert_eq!(summary["counts"]["inside_sites"], lattice);
     for (row, &s) in (summary["sites"].as_array().unwrap().iter()).zip(design.chosen()) {
         assert_eq!(row["refined"], s >= lattice);
-        assert_eq!(row["x_mm"], sites[s].position.x * 1e3);
+        assert_eq!(row["x_mm"], sites[s].gauge.position.x * 1e3);
     }
     let table = artifacts::sites_csv(&asked, design);
     assert_eq!(table.lines().count(), 1 + count);
@@ -263,7 +265,7 @@ fn what_is_known_of_a_refined_design_is_taken_over() {
     let (reference, off) = (&design.reference, &design.reference.off);
     let mut sites = again.simulated.dataset.sites.clone();
     assert!(reference.measures(&reference.sites, &sites, off, &asked.project));
-    sites[design.simulated.lattice].position.x += 1e-4;
+    sites[design.simulated.lattice].gauge.position.x += 1e-4;
     assert!(!reference.measures(&reference.sites, &sites, off, &asked.project));
 }
 

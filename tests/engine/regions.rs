@@ -39,7 +39,12 @@ fn touches_come_only_where_they_are_painted_and_gauges_only_where_they_are_not_k
     assert!(touches.iter().all(|t| t.position.z > 0.057));
     let feasible = design::filter(&inputs, &simulated);
     let sites = &simulated.dataset.sites;
-    assert!(feasible.sites().iter().all(|&s| sites[s].position.y < 2e-3));
+    assert!(
+        feasible
+            .sites()
+            .iter()
+            .all(|&s| sites[s].gauge.position.y < 2e-3)
+    );
     let taken = feasible.taken();
     let kept_out = taken.iter().find(|(f, _)| *f == Filter::KeptOut).unwrap().1;
     assert!(kept_out > 500, "{kept_out}");

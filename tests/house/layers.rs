@@ -7,7 +7,7 @@ use crate::arrows::{arrows, circles, each_use};
 use crate::source::Source;
 
 /// From the bottom up; a module may use those above it in this list, itself included.
-const ORDER: [&[&str]; 15] = [
+const ORDER: [&[&str]; 16] = [
     &[
         "bounds",
         "budget",
@@ -24,6 +24,7 @@ const ORDER: [&[&str]; 15] = [
         "wire",
     ],
     &["mesh"],
+    &["gauge"],
     &["limb", "elasticity", "jig"],
     &["dataset", "as_made"],
     &["feasible", "regression"],

@@ -108,7 +108,7 @@ fn a_sweep_goes_on_from_what_is_there_and_its_points_can_be_had_again() {
     // The setting reproduces the point.
     let sites = &design.simulated.dataset.sites;
     let places: Vec<[f64; 3]> = (design.chosen().iter())
-        .map(|&s| (sites[s].position * 1e3).to_array())
+        .map(|&s| (sites[s].gauge.position * 1e3).to_array())
         .collect();
     assert_eq!(places, point.sites_mm);
     assert_eq!(design.chosen_row().unwrap().error_mm, point.own_error_mm);

@@ -14,15 +14,15 @@ use rayon::prelude::*;
 
 use crate::budget::{Budget, Cancelled, Watch, report};
 use crate::dataset::SignalMatrix;
-use crate::design::drawn::{MOVES, POINT, drawn_on, gauge_at, map_size};
+use crate::design::drawn::{MOVES, POINT, drawn_on, map_size};
 use crate::design::known;
 use crate::design::reference::{Reference, noisy, noisy_means};
 use crate::design::{DesignError, Ground, Inputs, Simulated};
 use crate::draw::normal;
-use crate::elasticity::sensitivity::Gauge;
 use crate::elasticity::{Model, Touch};
 use crate::evaluation::failures::{Draw, FailureRow, MOST_FAILED};
 use crate::evaluation::{Candidate, Evaluation, Failures, Forces, Judging, Matched, is_largest};
+use crate::gauge::Gauge;
 use crate::inference::calibration::SAMPLES;
 use crate::inference::{AsDrawn, Deviations, Errors, KnownPress, Matching, calibrate};
 use crate::mesh::TriMesh;
@@ -170,16 +170,12 @@ impl ByMatching<'_> {
         rows.dedup();
         let sites = &self.simulated.dataset.sites;
         let gauges: Vec<Gauge> = (rows.iter())
-            .map(|&row| {
-                gauge_at(
-                    &sites[self.reference.sites[row]],
-                    self.reference.grid.unwrap_or(POINT),
-                )
-            })
+            .map(|&row| sites[self.reference.sites[row]].gauge)
             .collect();
+        let gauges = (&gauges[..], self.reference.grid.unwrap_or(POINT));
         let off = self.off();
         let tip = (self.tip_radius(), &off.making_at_most());
-        let drawn = drawn_on(model, &gauges, mesh, tip, watch)?;
+        let drawn = drawn_on(model, gauges, mesh, tip, watch)?;
         let exact = Uncertainty {
             gluing: Gluing::EXACT,
             ..off

@@ -11,6 +11,7 @@ use crate::design::pressing::Pressing;
 use crate::design::{DesignError, Inputs, Simulated};
 use crate::elasticity::support::supported_vertices;
 use crate::feasible::{FeasibleInput, FeasibleRules, Surroundings, clearance, feasible_beside};
+use crate::gauge::Gauge;
 use crate::mesh::SurfacePoint;
 
 /// Where gauges may be.
@@ -34,7 +35,7 @@ impl<'a> Room<'a> {
         Self {
             rules: inputs.project.feasible_rules(),
             clearance: clearance(&simulated.mesh, &held),
-            lattice: sites.iter().map(|site| site.position).collect(),
+            lattice: sites.iter().map(|site| site.gauge.position).collect(),
             spacing: inputs.project.sites.spacing(),
             pressing: Pressing::of(inputs, simulated),
             inputs,
@@ -43,73 +44,72 @@ impl<'a> Room<'a> {
     }
 
     /// A gauge after a move along the surface; nothing where that ends or turns away.
-    pub(super) fn moved(&self, gauge: &Site, to: Move) -> Option<Site> {
+    pub(super) fn moved(&self, site: &Site, to: Move) -> Option<Site> {
         /// Share of a step that the surface may be off its end.
         const OFF: f64 = 0.5;
         /// Cosine of the angle that it may turn by.
         const BENT: f64 = 0.5;
-        let across = gauge.normal.cross(gauge.direction);
-        let step = gauge.direction * to.along + across * to.across;
-        let (sin, cos) = to.turn.sin_cos();
-        let direction = gauge.direction * cos + across * sin;
+        let gauge = &site.gauge;
+        let turned = gauge.turned(to.turn);
+        let aim = gauge.moved(to.along, to.across).position;
+        let step = aim - gauge.position;
         if step == DVec3::ZERO {
             return Some(Site {
-                direction,
-                ..*gauge
+                gauge: turned,
+                ..*site
             });
         }
-        let aim = gauge.position + step;
         let mesh = &self.simulated.mesh;
         let at = mesh.index().nearest(aim).0;
         let (position, normal) = (mesh.point(at), mesh.normal(at));
         let on = position.distance(aim) <= OFF * step.length() && normal.dot(gauge.normal) >= BENT;
-        let flat = (direction - normal * direction.dot(normal)).try_normalize();
-        Some(Site {
+        let flat = (turned.direction - normal * turned.direction.dot(normal)).try_normalize();
+        let gauge = Gauge {
             position,
-            normal,
             direction: flat.filter(|_| on)?,
-            ..*gauge
-        })
+            normal,
+        };
+        Some(Site { gauge, ..*site })
     }
 
     /// Whether gauges may be where these are, for all that is seen of the surface around them.
-    pub(super) fn allowed(&self, gauges: &[Site]) -> Vec<bool> {
-        self.judged(gauges, &self.points(gauges), None)
+    pub(super) fn allowed(&self, sites: &[Site]) -> Vec<bool> {
+        self.judged(sites, &self.points(sites), None)
     }
 
     /// The same, and whether they can be reached there.
     pub(super) fn allowed_wholly(
         &self,
-        gauges: &[Site],
+        sites: &[Site],
         watch: Watch,
     ) -> Result<Vec<bool>, DesignError> {
-        let points = self.points(gauges);
+        let points = self.points(sites);
         let around = self.simulated.surroundings_of(&points, watch)?;
-        Ok(self.judged(gauges, &points, around.as_ref()))
+        Ok(self.judged(sites, &points, around.as_ref()))
     }
 
-    fn points(&self, gauges: &[Site]) -> Vec<SurfacePoint> {
+    fn points(&self, sites: &[Site]) -> Vec<SurfacePoint> {
         let index = self.simulated.mesh.index();
-        let at = |gauge: &Site| index.nearest(gauge.position).0;
-        gauges.iter().map(at).collect()
+        let at = |site: &Site| index.nearest(site.gauge.position).0;
+        sites.iter().map(at).collect()
     }
 
     fn judged(
         &self,
-        gauges: &[Site],
+        sites: &[Site],
         points: &[SurfacePoint],
         surroundings: Option<&Surroundings>,
     ) -> Vec<bool> {
-        let on = |mask: &Arc<Vec<bool>>| painted_sites(&self.inputs.part, mask, gauges);
+        let on = |mask: &Arc<Vec<bool>>| painted_sites(&self.inputs.part, mask, sites);
         let named = self.inputs.project.feasible.keep_out.as_ref();
         let painted = self.inputs.painted.as_ref().map(on);
         let kept_out = named.and_then(|name| self.inputs.masks.get(name)).map(on);
-        let jig = self.pressing.as_ref().map(|jig| jig.gets_to(gauges));
+        let jig = self.pressing.as_ref().map(|jig| jig.gets_to(sites));
         let input = FeasibleInput {
             mesh: &self.simulated.mesh,
             supported: &[],
             points,
-            sites: gauges,
+            sites,
             surroundings,
             painted: painted.as_deref(),
             kept_out: kept_out.as_deref(),

@@ -6,7 +6,8 @@ use super::Sensing;
 use crate::budget::Budget;
 use crate::design::drawn::proposed;
 use crate::design::{DesignError, Inputs};
-use crate::elasticity::sensitivity::{Gauge, Sensitivity};
+use crate::elasticity::sensitivity::Sensitivity;
+use crate::gauge::Gauge;
 use crate::inference::AsDrawn;
 
 /// The results of an elastic model for chosen gauges: all of a [`Sensing`] that takes long.
@@ -51,6 +52,7 @@ impl Sensing {
         Ok(Self {
             sites: project.selection.sites.clone(),
             gauges: kept.gauges,
+            grid: project.gauge.grid(),
             sensitivity: kept.sensitivity,
             deviations: kept.drawn.deviations(&off),
             off,

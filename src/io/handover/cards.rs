@@ -15,7 +15,7 @@ pub(super) fn all(flow: &mut Flow, source: &Source<'_>) {
     flow.heading("A card for each gauge");
     flow.text("Pictures are at full size and seen from inside, with the part's axis up; blue is an edge of the wall. Lengths are straight, as callipers measure them, from the middle of the gauge.");
     for (glued, landmarks) in source.inner.gauges.iter().zip(&source.landmarks) {
-        let patch = Patch::around(&source.inner, glued.place, 0.6e-3 * PICTURE);
+        let patch = Patch::around(&source.inner, glued.gauge.position, 0.6e-3 * PICTURE);
         let (sheet, corner) = flow.room(HEIGHT);
         frame(sheet, corner);
         if let Ok(patch) = patch {
@@ -60,12 +60,12 @@ fn picture(sheet: &mut Sheet, source: &Source<'_>, patch: &Patch, glued: &Glued,
     let size = DVec2::new(keys.grid_length_mm, keys.grid_width_mm);
     for other in &source.inner.gauges {
         let inside = |p: &DVec2| p.abs().max_element() * 1e3 < half - 3.0;
-        let Some(at) = patch.lay(other.place).filter(inside) else {
+        let Some(at) = patch.lay(other.gauge.position).filter(inside) else {
             continue;
         };
         if other.number != glued.number {
             label(sheet, place(at), other.number);
-        } else if let Some(along) = patch.turn(glued.place, glued.direction) {
+        } else if let Some(along) = patch.turn(glued.gauge.position, glued.gauge.direction) {
             gauge(
                 sheet,
                 place(at),
@@ -173,7 +173,7 @@ fn place(glued: &Glued, at: &Landmarks) -> Vec<(&'static str, String)> {
     if !others.is_empty() {
         lines.push(("Neighbours", others.join(", ")));
     }
-    let p = glued.place * 1e3;
+    let p = glued.gauge.position * 1e3;
     lines.push((
         "Place",
         format!("({:.2}, {:.2}, {:.2}) mm, on the inner face", p.x, p.y, p.z),

@@ -90,9 +90,9 @@ fn side(
         facet(sheet, corners, Paint::Tint(tint).ink(tri, facing));
     }
     for marker in markers(source.inputs, source.design) {
-        let at = fit.place((frame * marker.position).truncate());
-        let along = (frame * marker.direction).truncate();
-        let near = marker.normal.dot(view.toward) > 0.0;
+        let at = fit.place((frame * marker.gauge.position).truncate());
+        let along = (frame * marker.gauge.direction).truncate();
+        let near = marker.gauge.normal.dot(view.toward) > 0.0;
         small(
             sheet,
             at,
@@ -130,9 +130,9 @@ fn unrolled(flow: &mut Flow, source: &Source<'_>, tint: &[f64]) {
         facet(sheet, corners, ink);
     }
     for marker in markers(source.inputs, source.design) {
-        let at = fit.place(flat.place(marker.position));
+        let at = fit.place(flat.place(marker.gauge.position));
         let along = flat
-            .turn(marker.position, marker.direction)
+            .turn(marker.gauge.position, marker.gauge.direction)
             .normalize_or_zero();
         small(
             sheet,

@@ -4,7 +4,8 @@ use glam::{DVec2, DVec3};
 
 use super::marks::{ACCENT, INK};
 use super::source::Source;
-use crate::jig::{Arm, Jig, PressedGauge, Stack, bar, outline};
+use crate::gauge::Gauge;
+use crate::jig::{Arm, Jig, Stack, bar, outline};
 use crate::paper::{Align, Flow, Ink, Line, Sheet};
 use crate::workshop::Inner;
 
@@ -60,14 +61,14 @@ fn instead(source: &Source<'_>, number: usize) -> Option<String> {
     const TRIED: usize = 150;
     let gauge = source.inner.gauges.iter().find(|g| g.number == number)?;
     let all = &source.design.simulated.dataset.sites;
-    let far = |p: &PressedGauge| p.place.distance(gauge.place);
-    let mut sites: Vec<PressedGauge> = (source.design.feasibility.sites().into_iter())
-        .map(|s| source.inner.site(&all[s]))
+    let far = |at: &Gauge| at.position.distance(gauge.gauge.position);
+    let mut sites: Vec<Gauge> = (source.design.feasibility.sites().into_iter())
+        .map(|s| source.inner.gauge(&all[s].gauge))
         .collect();
     sites.sort_by(|a, b| far(a).total_cmp(&far(b)));
     let mut nearest = sites.iter().take(TRIED);
     let found = nearest.find(|site| source.jig.reach.gets_to(site))?;
-    let [x, y, z] = (found.place * 1e3).to_array();
+    let [x, y, z] = (found.position * 1e3).to_array();
     Some(format!(
         "The nearest site that an arm gets to is {:.0} mm away, at ({x:.0}, {y:.0}, {z:.0}) mm; feasible.jig = true keeps to such sites.",
         far(found) * 1e3

@@ -51,7 +51,7 @@ impl Scene<'_> {
         let [length, width] = self.grid_mm.map(|mm| mm * 1e-3);
         for gauge in &self.inner.gauges {
             let (place, turn) = frame(gauge);
-            let inside = place - gauge.out * (THICK / 2.0);
+            let inside = place - gauge.gauge.normal * (THICK / 2.0);
             let solid = plate(inside, &turn, DVec3::new(length, width, THICK));
             pieces.push(piece(&format!("gauge {}", gauge.number), solid, GAUGE));
         }

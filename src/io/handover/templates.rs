@@ -56,7 +56,7 @@ fn patches(source: &Source<'_>) -> Result<Vec<Sheet>, String> {
     let (mut corner, mut tall) = (DVec2::new(MARGIN, HEAD), 0.0_f64);
     for (glued, landmarks) in source.inner.gauges.iter().zip(&source.landmarks) {
         let radius = radius(source, landmarks);
-        let patch = Patch::around(&source.inner, glued.place, radius * 1e-3)?;
+        let patch = Patch::around(&source.inner, glued.gauge.position, radius * 1e-3)?;
         let side = (2.0 * radius).max(NARROWEST);
         if corner.x + side > size.x - MARGIN {
             corner = DVec2::new(MARGIN, corner.y + tall + GAP);
@@ -131,13 +131,13 @@ fn one(
         .filter(|o| o.number != glued.number)
     {
         if let Some(at) = patch
-            .lay(other.place)
+            .lay(other.gauge.position)
             .filter(|p| p.length() * 1e3 < radius - 2.5)
         {
             label(sheet, place(at), other.number);
         }
     }
-    if let Some(along) = patch.turn(glued.place, glued.direction) {
+    if let Some(along) = patch.turn(glued.gauge.position, glued.gauge.direction) {
         gauge(
             sheet,
             middle,

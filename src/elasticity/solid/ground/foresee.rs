@@ -11,6 +11,7 @@ use crate::elasticity::error::ElasticError;
 use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
 use crate::elasticity::solid::immersed::Fineness;
+use crate::elasticity::solid::orders::FIRST;
 use crate::elasticity::solid::plan;
 use crate::elasticity::solid::sizing::{self, LEAST_GRIDS};
 use crate::memory;
@@ -96,8 +97,8 @@ impl SolidGround {
         aim: &ElementBudget,
         watch: Watch,
     ) -> Result<Foreseen, ElasticError> {
-        if self.immersed.own().is_some() {
-            return self.foresee_raised(touches, places, count, aim, watch);
+        if let Some(first) = self.own_at(FIRST) {
+            return self.foresee_raised(first, touches, places, count, aim, watch);
         }
         let shape = self.measures();
         let least = shape.least(aim, count);

@@ -9,6 +9,7 @@ use crate::elasticity::error::ElasticError;
 use crate::elasticity::estimate::{self, Discretization, Sample};
 use crate::elasticity::grade::{PLACES, sample, subsample};
 use crate::elasticity::load::Touch;
+use crate::elasticity::solid::orders::FIRST;
 use crate::elasticity::solid::series::Series;
 use crate::elasticity::solid::sizing::{self, LEAST_GRIDS, PartMeasures};
 use crate::elasticity::solid::tip;
@@ -85,8 +86,8 @@ impl SolidGround {
         aim: &ElementBudget,
         watch: Watch,
     ) -> Result<SolidGraded, ElasticError> {
-        if self.immersed.own().is_some() {
-            return self.raise(touches, places, aim, watch);
+        if let Some(first) = self.own_at(FIRST) {
+            return self.raise(first, touches, places, aim, watch);
         }
         let shape = self.measures();
         let least = shape.least(aim, touches.len());

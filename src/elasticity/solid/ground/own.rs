@@ -93,7 +93,7 @@ fn left(changes: &[Discretization], before_last: bool) -> Discretization {
 
 impl SolidGround {
     /// The part's own tetrahedra at an order, up to [`HIGHEST`] and as far as memory holds who is whose neighbour.
-    fn own_at(&self, order: usize) -> Option<(Fineness, Tetrahedra)> {
+    pub(super) fn own_at(&self, order: usize) -> Option<(Fineness, Tetrahedra)> {
         let own = self.immersed.own()?;
         let each = Simplex::count(order).pow(2) * size_of::<u32>();
         let bytes = own.tetrahedra.len() as f64 * each as f64;
@@ -157,15 +157,13 @@ impl SolidGround {
     /// effort spent; displacements are carried on from the last two. The second order is solved in any case: it judges the first.
     pub(super) fn raise(
         &self,
+        first: (Fineness, Tetrahedra),
         touches: &[Touch],
         places: &[DVec3],
         aim: &ElementBudget,
         watch: Watch,
     ) -> Result<SolidGraded, ElasticError> {
         let mut climb = Climb::new(touches, places);
-        let Some(first) = self.own_at(FIRST) else {
-            unreachable!("only parts that have tetrahedra are raised");
-        };
         let given = self.solve_own(first, &climb, watch)?;
         let second = self.own_at(FIRST + 1);
         let affordable = affords(second.as_ref(), touches.len(), aim, 0.0);
@@ -219,6 +217,7 @@ impl SolidGround {
     /// [`ElasticError`] for what cannot be computed.
     pub(super) fn foresee_raised(
         &self,
+        first: (Fineness, Tetrahedra),
         touches: &[Touch],
         places: &[DVec3],
         count: usize,
@@ -226,9 +225,6 @@ impl SolidGround {
         watch: Watch,
     ) -> Result<Foreseen, ElasticError> {
         let mut climb = Climb::new(touches, places);
-        let Some(first) = self.own_at(FIRST) else {
-            unreachable!("only parts that have tetrahedra are raised");
-        };
         let mut foreseen = Foreseen::new(self.immersed.own().map_or(0.0, VolumeMesh::mean_edge));
         foreseen.raise(FIRST, &first.1);
         let given = self.solve_own(first, &climb, watch)?;

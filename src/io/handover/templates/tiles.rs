@@ -44,8 +44,10 @@ impl Plan {
         let triangles: Vec<[u32; 3]> = order.iter().map(|&t| flat.triangles[t]).collect();
         let (a, b) = (seen(flat.lower), seen(flat.upper));
         let gauges = inner.gauges.iter().flat_map(|g| {
-            let along = flat.turn(g.place, g.direction).normalize_or(DVec2::Y);
-            let at = seen(flat.place(g.place));
+            let along = flat
+                .turn(g.gauge.position, g.gauge.direction)
+                .normalize_or(DVec2::Y);
+            let at = seen(flat.place(g.gauge.position));
             // Beside the seam it is on both ends.
             let turns = flat
                 .around()
